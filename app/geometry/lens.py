@@ -30,6 +30,7 @@ class LensModel:
         undistort: Ideal coordinates of distorted ones, NaN where there are none, shape (N, 2).
         fold_radius: Ideal radius of the edge of what the lens shows.
         check: Raises DegenerateGeometryError for coefficients of no lens.
+        profile: Image radius by angle, of a lens of ``geometry.fisheye``.
     """
 
     count: int
@@ -39,6 +40,7 @@ class LensModel:
     undistort: Callable[[FloatArray, FloatArray], FloatArray]
     fold_radius: Callable[[FloatArray], float]
     check: Callable[[Sequence[float]], object]
+    profile: fisheye.ProfileOf | None = None
 
 
 def _by_angle(count: int, profile: fisheye.ProfileOf) -> LensModel:
@@ -51,6 +53,7 @@ def _by_angle(count: int, profile: fisheye.ProfileOf) -> LensModel:
         undistort=partial(_undistort, profile),
         fold_radius=partial(_fold_radius, profile),
         check=profile,
+        profile=profile,
     )
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from app.geometry.arrays import BoolArray, FloatArray, cross, require_shape
+from app.geometry.arrays import FloatArray, cross, require_shape
 from app.geometry.smallest_singular import smallest_singular_vectors
 
 _PARALLEL = 1e-12
@@ -116,33 +116,3 @@ def parallax_angle(
     # atan2 of (sine, cosine): arccos loses half the digits near zero, which
     # is exactly where small-baseline pairs live.
     return np.where(nowhere, np.nan, np.arctan2(sine, cosine))
-
-
-def point_covariances(
-    jacobians: FloatArray, pixel_covariances: FloatArray
-) -> tuple[FloatArray, BoolArray]:
-    """Covariances of points seen by several cameras each, square metres.
-
-    Args:
-        jacobians: Of the pixel by the point in each camera, shape (N, V, 2, 3).
-        pixel_covariances: Of the measured pixel in each camera, shape (N, V, 2, 2).
-
-    Returns:
-        Shape (N, 3, 3), and whether the cameras determine the point at all, shape (N,).
-
-    Source: Hartley & Zisserman, result 5.10.
-    """
-    weighed = np.linalg.solve(pixel_covariances, jacobians)
-    information = summed(jacobians.swapaxes(-1, -2) @ weighed)
-    values = np.linalg.eigvalsh(information)
-    parallel = values[:, 0] <= 1e-15 * values[:, -1]
-    information[parallel] = np.eye(3)
-    return np.asarray(np.linalg.inv(information), dtype=np.float64), ~parallel
-
-
-def summed(parts: FloatArray) -> FloatArray:
-    """Sums over the second axis, one after the other: the same bits however many rows there are."""
-    total = np.zeros((len(parts), *parts.shape[2:]))
-    for place in range(parts.shape[1]):
-        total += parts[:, place]
-    return total

@@ -13,7 +13,7 @@ from app.geometry.camera import Camera
 from app.soccer.finding import Finding
 from app.soccer.frames import Box, ImagePoint, height_above_grass
 
-SOLVER_VERSION = "5"
+SOLVER_VERSION = "6"
 """Part of every solution's key; raised by one whenever a number changes."""
 
 GAMMAS_PERCENT = (0.5, 1.0, 2.0)

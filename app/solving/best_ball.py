@@ -8,9 +8,8 @@ from itertools import combinations
 
 import numpy as np
 
-from app.geometry.arrays import BoolArray, FloatArray, IntArray
-from app.geometry.camera_stack import CameraStack
-from app.geometry.triangulation import point_covariances, summed
+from app.geometry.arrays import FloatArray, IntArray
+from app.geometry.likely_point import CameraTable, likely_points
 from app.soccer.policy import Policy
 from app.soccer.solution import BestBall, Pair
 from app.solving.spread import sight_spreads
@@ -18,8 +17,6 @@ from app.solving.triangulate import Sight
 
 MAX_MAHALANOBIS = 13.8
 """Squared, of two coordinates: one honest view in a thousand lies beyond."""
-_STEPS = 8
-_ARRIVED_M = 1e-6
 
 
 @dataclass(frozen=True)
@@ -113,17 +110,13 @@ def _influence(views: _Views, estimate: _Estimate) -> tuple[tuple[str, float], .
 
 
 class _Views:
-    """The views of a group, and the most likely point of any of their subsets.
-
-    Subsets of one size are computed together, for each call costs more than what it computes;
-    each has the bits that it has by itself.
-    """
+    """The views of a group, and the most likely point of any of their subsets."""
 
     def __init__(self, sights: Sequence[Sight], policy: Policy):
         self.sights = tuple(sights)
         self._policy = policy
         self._centers = np.array([sight.center for sight in sights])
-        self._cameras = CameraStack([sight.camera for sight in sights])
+        self._cameras = CameraTable.of([sight.camera for sight in sights])
 
     def estimates(
         self, chosen: Sequence[Sequence[int]], starts: Sequence[FloatArray]
@@ -136,71 +129,23 @@ class _Views:
         """
         if not chosen:
             return []
-        try:
-            return self._fitted(np.array(chosen), np.array(starts))
-        except np.linalg.LinAlgError:
-            if len(chosen) == 1:
-                return [None]
-            # One of them has no solution; the others have.
-            alone = zip(chosen, starts, strict=True)
-            return [self.estimates([views], [start])[0] for views, start in alone]
-
-    def _fitted(self, chosen: IntArray, points: FloatArray) -> list[_Estimate | None]:
+        views, points = np.array(chosen), np.array(starts)
         # The uncertainties hardly change on the way.
-        spreads = self._spreads(chosen, points)
-        settled, on_the_way = np.ones(len(chosen), bool), np.arange(len(chosen))
-        for _ in range(_STEPS):
-            now = self._linearized(chosen[on_the_way], points[on_the_way], spreads[on_the_way])
-            settled[on_the_way[~now.is_sound]] = False
-            step = (now.covariance @ now.pull[..., None])[..., 0]
-            points[on_the_way] += step
-            arrived = np.sqrt((step[:, None] @ step[:, :, None])[:, 0, 0]) < _ARRIVED_M
-            finite = np.isfinite(points[on_the_way]).all(axis=1)
-            settled[on_the_way[~finite]] = False
-            on_the_way = on_the_way[now.is_sound & finite & ~arrived]
-            if not len(on_the_way):
-                break
-        left = np.flatnonzero(settled)
-        last = self._linearized(chosen[left], points[left], spreads[left])
-        found: list[_Estimate | None] = [None] * len(chosen)
-        for row, number in enumerate(left.tolist()):
-            if last.is_sound[row]:
-                found[number] = _Estimate(
-                    tuple(chosen[number].tolist()),
-                    points[number],
-                    last.covariance[row],
-                    last.distances[row],
-                )
-        return found
+        made = likely_points(
+            self._cameras, self._centers, views, points, self._spreads(views, points)
+        )
+        return [
+            _Estimate(tuple(numbers), made.points[row], made.covariances[row], made.distances[row])
+            if made.found[row]
+            else None
+            for row, numbers in enumerate(chosen)
+        ]
 
     def _spreads(self, chosen: IntArray, points: FloatArray) -> FloatArray:
         """Covariance of each click at its start, square pixels, shape (E, V, 2, 2)."""
         sights = [self.sights[view] for view in chosen.ravel().tolist()]
         places = np.repeat(points, chosen.shape[1], axis=0)
         return sight_spreads(sights, places, self._policy).reshape(*chosen.shape, 2, 2)
-
-    def _linearized(self, chosen: IntArray, points: FloatArray, spreads: FloatArray) -> _Linear:
-        pixels, jacobians = self._cameras.linearize(points, chosen)
-        offsets = self._centers[chosen] - pixels
-        # In front of every camera; what is not is left out of what follows.
-        is_sound = ~np.isnan(pixels).any(axis=(1, 2))
-        offsets[~is_sound], jacobians[~is_sound] = 0.0, 0.0
-        weighed = np.linalg.solve(spreads, offsets[..., None])
-        pulls = jacobians.swapaxes(-1, -2) @ weighed
-        covariance, known = point_covariances(jacobians, spreads)
-        distances = (offsets[..., None, :] @ weighed)[..., 0, 0]
-        return _Linear(summed(pulls)[..., 0], covariance, distances, is_sound & known)
-
-
-@dataclass(frozen=True)
-class _Linear:
-    """Subsets of views around a point each: which way it should move, shape (E, 3), its covariance,
-    (E, 3, 3), each view's squared distance, (E, V), and whether all of that is known, (E,)."""
-
-    pull: FloatArray
-    covariance: FloatArray
-    distances: FloatArray
-    is_sound: BoolArray
 
 
 def _is_behind(pair: Pair, sights: Sequence[Sight]) -> bool:

@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+import numpy as np
+
+from app.geometry.camera import Camera
+from app.geometry.distortion import COEFFICIENTS
+from app.geometry.likely_point import CameraTable, likely_points
 from app.soccer.annotation import make_lines
 from app.soccer.frames import ImageSize
 from app.soccer.pitch import Pitch
@@ -18,5 +23,15 @@ _SQUARE = {
 
 
 def warm_up() -> None:
-    """Calibrate a made-up picture once; the first time on a machine this compiles for seconds."""
+    """Calibrate a made-up picture and look for a point once; the first time on a machine this compiles for seconds."""
     calibrate(make_lines(_SQUARE), Pitch(), ImageSize(960, 540), CalibrationPolicy())
+    lens = np.array([0.01, *np.zeros(COEFFICIENTS - 1)])
+    upright = Camera(np.eye(3), np.zeros(3), (1000.0, 1000.0), (480.0, 270.0), distortion=lens)
+    upright.undistort(np.zeros((1, 2)))
+    likely_points(
+        CameraTable.of([upright]),
+        np.zeros((1, 2)),
+        np.zeros((1, 1), int),
+        np.zeros((1, 3)),
+        np.ones((1, 1, 2, 2)),
+    )

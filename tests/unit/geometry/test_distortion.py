@@ -1,7 +1,7 @@
 import cv2
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from app.geometry.distortion import distort, distort_jacobian, fold_radius, undistort
@@ -39,6 +39,7 @@ class TestDistortJacobian:
 
 
 class TestUndistort:
+    @settings(deadline=None)
     @given(st.floats(-0.4, 0.4), st.floats(-0.3, 0.3), st.floats(-0.3, 0.5))
     def test_undoes_distortion(self, x, y, k1):
         coefficients = np.zeros(12)

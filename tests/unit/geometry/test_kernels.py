@@ -7,10 +7,20 @@ from types import ModuleType
 import pytest
 from numba.core.dispatcher import Dispatcher
 
-from app.geometry import curve_fit, curve_residuals, damped_solve, smallest_singular
+from app.geometry import (
+    curve_fit,
+    curve_residuals,
+    damped_solve,
+    lens_kernels,
+    likely_point,
+    smallest_singular,
+)
 
 
-@pytest.mark.parametrize("module", [curve_fit, curve_residuals, damped_solve, smallest_singular])
+@pytest.mark.parametrize(
+    "module",
+    [curve_fit, curve_residuals, damped_solve, lens_kernels, likely_point, smallest_singular],
+)
 def test_who_solves_keeps_nobody_from_being_answered(module: ModuleType) -> None:
     kernels = [item for item in vars(module).values() if isinstance(item, Dispatcher)]
     assert kernels

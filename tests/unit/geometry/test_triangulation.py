@@ -10,7 +10,6 @@ from app.geometry.smallest_singular import smallest_singular_vectors
 from app.geometry.triangulation import (
     moved_points,
     parallax_angle,
-    point_covariances,
     triangulate_pairs,
 )
 from tests.cameras import FULL_HD, looking
@@ -110,24 +109,3 @@ class TestParallaxAngle:
     def test_a_flat_point_is_our_mistake(self):
         with pytest.raises(ShapeError):
             parallax_angle(np.zeros((1, 3)), np.ones((1, 3)), np.zeros(3))
-
-
-class TestPointCovariances:
-    def test_two_perpendicular_views_of_known_resolution(self):
-        # One pixel is a centimetre for a camera that looks along x, and for one along y.
-        along_x = np.array([[0.0, 100.0, 0.0], [0.0, 0.0, 100.0]])
-        along_y = np.array([[100.0, 0.0, 0.0], [0.0, 0.0, 100.0]])
-        spreads, known = point_covariances(
-            np.array([[along_x, along_y]]), np.tile(np.eye(2), (1, 2, 1, 1))
-        )
-        assert known.all()
-        assert np.allclose(np.sqrt(np.diag(spreads[0])), [0.01, 0.01, 0.01 / np.sqrt(2)])
-
-    def test_parallel_views_determine_nothing_and_disturb_nobody(self):
-        along_x = np.array([[0.0, 100.0, 0.0], [0.0, 0.0, 100.0]])
-        along_y = np.array([[100.0, 0.0, 0.0], [0.0, 0.0, 100.0]])
-        both = np.array([[along_x, along_x], [along_x, along_y]])
-        spreads, known = point_covariances(both, np.tile(np.eye(2), (2, 2, 1, 1)))
-        alone, _ = point_covariances(both[1:], np.tile(np.eye(2), (1, 2, 1, 1)))
-        assert known.tolist() == [False, True]
-        assert np.array_equal(spreads[1], alone[0])
