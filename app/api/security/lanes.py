@@ -40,6 +40,8 @@ class Lane:
 
 LOOKS = Lane("looks", 2, 200)
 """What one group, view or camera is, and what a window asks again and again."""
+PAGES = Lane("pages", 2, 200)
+"""The page of the browser application, whichever address it is asked for under."""
 READS = Lane("reads", 4, 200)
 """All other reading: lists and counts of many groups, which the database takes its time for."""
 CHANGES = Lane("changes", 3, 100)
@@ -61,6 +63,7 @@ SIGN_ONS = Lane("sign-ons", 4, 50)
 """Single sign-on, whose provider may take its time, or never answer."""
 LANES = (
     LOOKS,
+    PAGES,
     READS,
     CHANGES,
     PREVIEWS,
@@ -76,6 +79,7 @@ THREADS = sum(lane.width for lane in LANES) + 6
 """A thread for each request at work, and some for files of the browser application."""
 
 _API = re.compile(r"/api/v\d+/")
+_NO_PAGE = re.compile(r"/(?:healthz|readyz|metrics)$|/(?:assets|static)/")
 _STREAM = re.compile(r"/events$")
 _IMAGE = re.compile(r"/(?:image|figures/[^/]+|views/[^/]+/(?:neighbours|paint|propose))$")
 _ZIP = re.compile(r"/exports/[^/]+/content$")
@@ -90,7 +94,7 @@ _UPLOAD = re.compile(r"/uploads$")
 def lane_of(method: str, path: str) -> Lane | None:
     """The lane of a request; None where it needs no thread for long."""
     if not _API.match(path):
-        return None
+        return None if _NO_PAGE.match(path) else PAGES
     if _STREAM.search(path):
         return STREAMS
     if _PREVIEW.search(path):

@@ -249,8 +249,11 @@ def _deed(_row: AuditRow, body: Mapping[str, Any]) -> str:
     return f"{body.get('did')}: {', '.join(more)}" if more else str(body.get("did"))
 
 
+_BATCH_DEEDS = {"made": "gave out", "changed": "changed", "closed": "closed", "deleted": "deleted"}
+
+
 def _own(row: AuditRow, body: Mapping[str, Any]) -> str | None:
-    """What became of somebody's own annotation, of gold groups and of guidelines; None: none of these."""
+    """What became of batches, of somebody's own annotation, of gold groups and of guidelines; None: none of these."""
     did, person, group = (body.get(name) for name in ("did", "person", "group"))
     why = f": {body['reason']}" if body.get("reason") else ""
     said = {
@@ -265,6 +268,8 @@ def _own(row: AuditRow, body: Mapping[str, Any]) -> str | None:
         ("gold", "marked"): f"marked group {group} as gold",
         ("gold", "unmarked"): f"group {group} is gold no longer",
     }
+    if row.kind == "work" and did in _BATCH_DEEDS and "name" in body:
+        return f"{_BATCH_DEEDS[did]} the batch “{body['name']}”"
     if row.kind == "guideline" and "number" in body:
         return f"wrote version {body['number']} of the guidelines"
     return said.get((row.kind, str(did)))

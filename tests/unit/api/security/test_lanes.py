@@ -17,6 +17,7 @@ from app.api.security.lanes import (
     IMAGES,
     LANES,
     LOOKS,
+    PAGES,
     PREVIEWS,
     QUESTIONS,
     READS,
@@ -63,9 +64,15 @@ class TestLaneOf:
     def test_is_told_by_method_and_path(self, method: str, path: str, lane: Any) -> None:
         assert lane_of(method, PREFIX + path) == lane
 
-    @pytest.mark.parametrize("path", ["/", "/healthz", "/static/main.js", "/review/3"])
-    def test_pages_and_health_wait_for_nobody(self, path: str) -> None:
+    @pytest.mark.parametrize(
+        "path", ["/healthz", "/readyz", "/metrics", "/static/main.js", "/assets/1/all.css"]
+    )
+    def test_health_and_files_of_the_page_wait_for_nobody(self, path: str) -> None:
         assert lane_of("GET", path) is None
+
+    @pytest.mark.parametrize("path", ["/", "/review/3", "/nowhere", "/healthz/x"])
+    def test_pages_wait_for_each_other_alone(self, path: str) -> None:
+        assert lane_of("GET", path) == PAGES
 
     def test_every_route_that_changes_something_has_one(self, api: TestClient) -> None:
         document = api.get(f"{PREFIX}/openapi.json").json()["paths"]

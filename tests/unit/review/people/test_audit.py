@@ -15,6 +15,7 @@ from app.review.people.people import invite
 from app.review.people.roles import EVERYTHING, DatasetRoles, Role
 from app.review.talk.comments import begin_thread
 from app.review.verdicts.verdict import set_verdict
+from app.review.work.batches import NewBatch, change_batch, make_batch, remove_batch
 from app.store.audit import AuditQuery
 from app.store.session import Store
 
@@ -95,6 +96,13 @@ class TestAudit:
 
     def test_every_kind_that_the_log_knows_has_its_family(self) -> None:
         assert {kind for kinds in KINDS.values() for kind in kinds} == set(_STEPS) | {"import"}
+
+    def test_what_became_of_a_batch_is_said_in_words(self, store: Store, said: int) -> None:
+        batch = make_batch(store, "demo", NewBatch("first look"), actor="bob")
+        change_batch(store, batch.id, state="closed", actor="bob")
+        remove_batch(store, batch.id, actor="bob")
+        did = ("deleted", "closed", "gave out")
+        assert lines(store)[:3] == [f"bob: {verb} the batch “first look”" for verb in did]
 
     def test_what_has_no_words_of_its_own_names_its_person(self, store: Store, said: int) -> None:
         record_deed(store, "bob", "webhook deleted", 1, url="https://hooks.example.org/")
