@@ -59,8 +59,8 @@ class TestQueryBox:
         page.keyboard.press("ArrowDown")
         expect(page.locator('[role="option"][aria-selected="true"]')).to_contain_text("split:")
         page.keyboard.press("Enter")
-        expect(page.get_by_role("option", name="train")).to_be_visible()
-        page.get_by_role("option", name="train").click()
+        expect(page.get_by_role("option", name="train", exact=True)).to_be_visible()
+        page.get_by_role("option", name="train", exact=True).click()
         expect(page.locator(".field--query")).to_have_value("number<=9 split:train ")
         page.wait_for_url("**split**")
 
