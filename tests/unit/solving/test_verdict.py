@@ -13,7 +13,7 @@ from app.soccer.policy import PAPER, Policy
 from app.soccer.solution import GATES
 from app.solving.facts import Facts, group_facts, join
 from app.solving.spread import MeanSpread
-from app.solving.verdict import PASSES, Verdict, judge, view_jac
+from app.solving.verdict import PASSES, Verdict, compare_again, judge, view_jac
 from tests.unit.solving.random_groups import random_policy, random_views
 
 
@@ -302,3 +302,50 @@ class TestViewJac:
     def test_measured_with_nothing_to_see_is_zero(self):
         bare = facts(mark_view=np.empty(0, np.int64), mark_px=np.empty(0))
         assert view_jac(bare, 0.5).tolist() == [0.0, 0.0]
+
+
+FOUR = join([facts()] * 4)
+EVERYTHING_ASKED = replace(
+    PAPER, min_baseline_m=14.0, min_parallax_degrees=90.0, max_sigma_m=0.5, min_p_value=0.05
+)
+
+
+class TestCompareAgain:
+    @pytest.fixture
+    def known(self) -> Verdict:
+        """Four groups whose numbers are at a threshold, just beyond it, not there, and at the end."""
+        return replace(
+            judged(FOUR),
+            baseline=np.array([14.0, 13.999, np.nan, 0.0]),
+            parallax=np.array([90.0, 89.999, np.nan, 0.0]),
+            failed=np.ones((PASSES, 4), bool),
+        )
+
+    sigma = np.array([0.5, 0.5001, np.nan, np.inf])
+    p_value = np.array([0.05, 0.0499, np.inf, 0.0])
+
+    def test_a_threshold_that_is_attained_is_met_and_what_is_not_known_meets_none(self, known):
+        failed = compare_again(known, EVERYTHING_ASKED, self.sigma, self.p_value)
+        for gate in ("baseline", "parallax", "sigma"):
+            assert failed[GATES.index(gate)].tolist() == [False, True, True, True], gate
+        # A group that cannot be tested is not held against its pictures.
+        assert failed[GATES.index("chi_square")].tolist() == [False, True, False, True]
+
+    def test_what_the_policy_does_not_ask_fails_nobody(self, known):
+        asked = replace(
+            EVERYTHING_ASKED, min_parallax_degrees=None, max_sigma_m=None, min_p_value=None
+        )
+        failed = compare_again(known, asked, self.sigma, self.p_value)
+        assert not failed[GATES.index("parallax") :].any()
+        assert failed[GATES.index("baseline")].tolist() == [False, True, True, True]
+
+    def test_what_was_not_measured_fails_nobody(self, known):
+        failed = compare_again(known, EVERYTHING_ASKED, None, None)
+        assert not failed[GATES.index("sigma") :].any()
+        assert failed[GATES.index("parallax")].tolist() == [False, True, True, True]
+
+    def test_gates_of_views_and_pairs_stay_and_the_verdict_that_is_known_stays_whole(self, known):
+        failed = compare_again(known, EVERYTHING_ASKED, self.sigma, self.p_value)
+        for gate in ("calibratable", "jac", "agreement", "two_views", "ball", "reprojection"):
+            assert failed[GATES.index(gate)].all(), gate
+        assert known.failed.all()
