@@ -47,6 +47,13 @@ class CameraTable:
     fold: FloatArray
     lens: FloatArray
 
+    @property
+    def columns(
+        self,
+    ) -> tuple[FloatArray, FloatArray, FloatArray, IntArray, FloatArray, FloatArray]:
+        """All of them, as the kernels take them."""
+        return self.rotation, self.position, self.K, self.kind, self.fold, self.lens
+
     @staticmethod
     def of(cameras: Sequence[Camera]) -> CameraTable:
         """The table of one camera or more."""
@@ -106,10 +113,9 @@ def likely_points(
         np.empty((count, 3, 3)),
         np.empty((count, views)),
     )
-    table = (cameras.rotation, cameras.position, cameras.K, cameras.kind, cameras.fold)
     _settle_all(
-        *table,
-        *(cameras.lens, pixels, chosen, spreads),
+        *cameras.columns,
+        *(pixels, chosen, spreads),
         *(made.points, made.covariances, made.distances, made.found),
     )
     return made
@@ -122,8 +128,7 @@ def look(cameras: CameraTable, number: int, point: FloatArray) -> tuple[FloatArr
         Shapes (2,) and (2, 3), pixels and pixels per metre.
     """
     pixel, slope = np.empty(2), np.empty((2, 3))
-    table = (cameras.rotation, cameras.position, cameras.K, cameras.kind, cameras.fold)
-    if not _look(*table, cameras.lens, number, point, pixel, slope):
+    if not _look(*cameras.columns, number, point, pixel, slope):
         pixel[:] = np.nan
     return pixel, slope
 
