@@ -25,7 +25,7 @@ from tests.torture import (
 
 SEED = 20260101
 ENGINES_GROUPS = 60
-PEOPLES_GROUPS = 360
+PEOPLES_GROUPS = 500
 """So many that fifty people find work for a minute."""
 
 

@@ -284,7 +284,7 @@ class _Target:
             Attack("idle sockets", scale.sockets, self._idle, mute),
             Attack("streams", scale.streams, self._listen, frozenset({200})),
             Attack("uploads", scale.uploads, self._upload, frozenset({201})),
-            Attack("ranges", scale.others, self._ranges, read | {206, 400, 431}),
+            Attack("ranges", scale.others, self._ranges, read | {206}),
             Attack("queries", scale.others, self._query, read | {400, 414, 422, 431}),
             Attack("edits", scale.others, self._edit, frozenset({400, 412, 413, 422})),
             Attack("previews", scale.others, self._preview, frozenset({200, 400, 422})),
