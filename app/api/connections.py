@@ -1,16 +1,18 @@
 """Connections: how long a client may take, how many there may be, and what malformed bytes get.
 
 uvicorn closes a connection that is idle between two requests. Here the rest is bounded as well:
-one that has not sent a whole head of a request, one that stops in the middle of a body, and one
-connection more than the process has room for.
+one that has not sent a whole head of a request, a head that is too long, one that stops in the
+middle of a body, and one connection more than the process has room for.
 """
 
 from __future__ import annotations
 
 import asyncio
+import re
 import resource
 from functools import cache
 from http import HTTPStatus
+from typing import Any
 
 import h11
 from uvicorn.protocols.http.h11_impl import H11Protocol
@@ -22,6 +24,9 @@ from app.api.security.headers import FIXED, content_security_policy
 
 HEAD_SECONDS = 15.0
 """From the connection, or the first byte of a request, to the end of its head."""
+HEAD_BYTES = 64 * 1024
+"""Of the first line of a request and its headers."""
+HEAD_END = re.compile(rb"\n\r?\n")
 BODY_SECONDS = 20.0
 """For each ``BODY_BYTES`` of a body, and for what is left of it."""
 BODY_BYTES = 16 * 1024
@@ -58,6 +63,11 @@ class Connection(H11Protocol):
     _received = 0
     _used = 0.0
 
+    def __init__(self, *args: Any, **kwargs: Any):
+        super().__init__(*args, **kwargs)
+        # h11 bounds what is incomplete alone: a head would pass or not by how its bytes arrive.
+        self.conn = h11.Connection(h11.SERVER, max_incomplete_event_size=HEAD_BYTES)
+
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
         """Take it; where there is no room, in the place of the one that is idle for longest."""
         if len(self.connections) >= connection_limit() and not self._make_room():
@@ -80,6 +90,9 @@ class Connection(H11Protocol):
             return
         self._used = self.loop.time()
         self._received += len(data)
+        if self.conn.their_state is h11.IDLE and self._is_too_long_a_head(data):
+            self._refuse(431, f"the head of the request is longer than {HEAD_BYTES:,} bytes")
+            return
         super().data_received(data)
         self._see()
 
@@ -103,6 +116,12 @@ class Connection(H11Protocol):
     def is_idle(self) -> bool:
         """Whether no request is under way."""
         return self.cycle is None or self.cycle.response_complete
+
+    def _is_too_long_a_head(self, data: bytes) -> bool:
+        """Whether a head ends too late with these bytes, or cannot end in time any more."""
+        arrived = self.conn.trailing_data[0] + data
+        end = HEAD_END.search(arrived)
+        return (end.end() if end else len(arrived)) > HEAD_BYTES
 
     def _see(self) -> None:
         """Set, keep or lift the deadline by the state of the request."""

@@ -15,7 +15,7 @@ import uvicorn
 from starlette.types import Receive, Scope, Send
 
 from app.api import connections
-from app.api.connections import Connection, connection_limit
+from app.api.connections import HEAD_BYTES, Connection, connection_limit
 from tests.waiting import SECONDS
 
 HEAD = b"POST / HTTP/1.1\r\nHost: a\r\nContent-Length: 1000000\r\n\r\n"
@@ -98,6 +98,19 @@ def ask(client: socket.socket) -> None:
     while not answer.endswith(b"\r\n\r\n0"):
         answer += client.recv(65536)
     assert answer.startswith(b"HTTP/1.1 200 ")
+
+
+def head_of(size: int) -> bytes:
+    """A request that is a head alone, so many bytes long."""
+    start, end = b"GET / HTTP/1.1\r\nHost: a\r\nRange: ", b"\r\n\r\n"
+    return start + b"0" * (size - len(start) - len(end)) + end
+
+
+def send_in_pieces(client: socket.socket, request: bytes, size: int) -> None:
+    """Send bytes so that the server meets them one piece after the other."""
+    for start in range(0, len(request), size):
+        client.sendall(request[start : start + size])
+        time.sleep(0.02)
 
 
 def assert_problem(answer: bytes, status: int) -> None:
@@ -197,6 +210,25 @@ class TestLimit:
 
     def test_leaves_descriptors_for_the_files_of_the_home(self) -> None:
         assert 8 <= connection_limit() <= connections.MAX_CONNECTIONS
+
+
+class TestHeads:
+    @pytest.mark.parametrize("piece", [1 << 20, 5000])
+    def test_one_that_fits_is_answered_however_it_arrives(self, port: int, piece: int) -> None:
+        with connect(port) as client:
+            send_in_pieces(client, head_of(HEAD_BYTES), piece)
+            assert client.recv(65536).startswith(b"HTTP/1.1 200 ")
+
+    @pytest.mark.parametrize("piece", [1 << 20, 5000])
+    def test_a_byte_more_is_refused_however_it_arrives(self, port: int, piece: int) -> None:
+        with connect(port) as client:
+            send_in_pieces(client, head_of(HEAD_BYTES + 1), piece)
+            assert_problem(rest(client), 431)
+
+    def test_a_body_that_comes_with_its_head_is_none_of_it(self, port: int) -> None:
+        with connect(port) as client:
+            client.sendall(HEAD + b"x" * 1_000_000)
+            assert client.recv(65536).startswith(b"HTTP/1.1 200 ")
 
 
 class TestMalformed:
