@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Hashable, Iterable, Iterator, Mapping
+from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import groupby
 from pathlib import Path
@@ -198,19 +198,20 @@ def _people(
 ) -> Iterator[dict[str, Any]]:
     """The people of an image, as they came or made anew, each track once."""
     seen: set[int] = set()
-    for index, box in enumerate(view.extras.boxes):
-        annotation = box.get(METADATA)
-        if isinstance(annotation, dict):
-            yield dict(annotation)
-            continue
-        made = _person(box)
-        if made is None:
+    made = [
+        None if isinstance(box.get(METADATA), dict) else _person(box) for box in view.extras.boxes
+    ]
+    standing = iter(_on_pitch(camera, [person["bbox_image"] for person in made if person]))
+    for index, (box, person) in enumerate(zip(view.extras.boxes, made, strict=True)):
+        if person is None:
+            if isinstance(box.get(METADATA), dict):
+                yield dict(box[METADATA])
             continue
         track = file.track(_who(box, group, view, index))
         if track in seen:
             track = file.track((group.key, view.key, index))
         seen.add(track)
-        yield {**made, "track_id": track, "bbox_pitch": _on_pitch(camera, made["bbox_image"])}
+        yield {**person, "track_id": track, "bbox_pitch": next(standing)}
 
 
 def _who(box: Mapping[str, Any], group: Group, view: View, index: int) -> Hashable:
@@ -221,14 +222,19 @@ def _who(box: Mapping[str, Any], group: Group, view: View, index: int) -> Hashab
     return (name, str(tag)) if str(tag).isdigit() else (name, str(tag), group.key)
 
 
-def _on_pitch(camera: Camera | None, place: Mapping[str, float]) -> dict[str, float] | None:
-    """Where the lower edge of a box stands on the grass, metres; None without a place there."""
-    if camera is None:
-        return None
-    bottom = place["y"] + place["h"]
-    ends = (place["x"], place["x_center"], place["x"] + place["w"])
-    found = camera.on_ground(np.array([[x, bottom] for x in ends]))
-    return _pitch_box(found) if np.isfinite(found).all() else None
+def _on_pitch(
+    camera: Camera | None, boxes: Sequence[Mapping[str, float]]
+) -> list[dict[str, float] | None]:
+    """Where the lower edge of each box stands on the grass, metres; None without a place there."""
+    if camera is None or not boxes:
+        return [None] * len(boxes)
+    edges = [
+        (x, box["y"] + box["h"])
+        for box in boxes
+        for x in (box["x"], box["x_center"], box["x"] + box["w"])
+    ]
+    places = camera.on_ground(np.array(edges)).reshape(-1, 3, 2)
+    return [_pitch_box(place) if np.isfinite(place).all() else None for place in places]
 
 
 def _pitch_box(places: FloatArray) -> dict[str, float]:

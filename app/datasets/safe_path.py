@@ -12,6 +12,8 @@ from app.errors import UnsafePathError
 from app.finite import quoted
 
 _DRIVE = re.compile(r"[A-Za-z]:")
+_CONTROL = re.compile(r"[\\\x00-\x1f\x7f]")
+_NO_TEXT = re.compile("[\ud800-\udfff]")
 MAX_PART = 255
 """Most bytes of the name of a file or folder; what is longer fits on no disk."""
 
@@ -53,6 +55,8 @@ def resolve_inside(root: Path, path: str) -> Path:
 
 
 def _spellings(path: str) -> list[str]:
+    if path.isascii() and "%" not in path:
+        return [path]
     spellings = [path, unicodedata.normalize("NFKC", path)]
     decoded = path
     for _ in range(3):
@@ -64,9 +68,9 @@ def _spellings(path: str) -> list[str]:
 def _unsafe(path: str) -> str | None:
     if not path:
         return "is empty"
-    if "\\" in path or any(ord(letter) < 32 or letter == "\x7f" for letter in path):
+    if _CONTROL.search(path):
         return "holds a backslash or a control character"
-    if any(0xD800 <= ord(letter) <= 0xDFFF for letter in path):
+    if _NO_TEXT.search(path):
         return "is not valid text"
     if path.startswith("/") or _DRIVE.match(path):
         return "is absolute"

@@ -6,6 +6,7 @@ Coefficients stand in the order k1 k2 p1 p2 k3 k4 k5 k6 s1 s2 s3 s4 (OpenCV docu
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from functools import lru_cache
 from typing import Any
@@ -87,8 +88,8 @@ def fold_radius(coefficients: FloatArray) -> float:
 def _fold_radius(
     k1: float, k2: float, _p1: float, _p2: float, k3: float, k4: float, k5: float, k6: float
 ) -> float:
-    if k2 == k3 == k4 == k5 == k6 == 0.0:
-        return float(np.sqrt(-1 / (3 * k1))) if k1 < 0 else np.inf
+    if k3 == k4 == k5 == k6 == 0.0:
+        return _fold_of_two_terms(k1, k2)
     # d/dr of r N(r^2) / D(r^2) is zero where N D + 2 s (N' D - N D') is, with s = r^2.
     numerator = np.polynomial.Polynomial([1.0, k1, k2, k3])
     denominator = np.polynomial.Polynomial([1.0, k4, k5, k6])
@@ -99,6 +100,18 @@ def _fold_radius(
     roots = np.concatenate([_roots(slope), _roots(denominator)])
     real = roots.real[(np.abs(roots.imag) < 1e-9) & (roots.real > 0)]
     return float(np.sqrt(real.min())) if len(real) else np.inf
+
+
+def _fold_of_two_terms(k1: float, k2: float) -> float:
+    """Where 1 + 3 k1 s + 5 k2 s^2 is zero first, s = r^2: that is what a resected camera has."""
+    half = 1.5 * k1
+    under = half * half - 5 * k2
+    if not under >= 0:
+        return math.inf
+    root = math.sqrt(under)
+    # The larger 1 / s, written so that nothing cancels.
+    inverse = root - half if half < 0 else -5 * k2 / ((root + half) or 1.0)
+    return math.sqrt(1 / inverse) if inverse > 0 else math.inf
 
 
 def _roots(polynomial: np.polynomial.Polynomial) -> np.ndarray[Any, Any]:

@@ -25,7 +25,7 @@ class TestATermThatIsNextToNothing:
         lens, tiny = np.zeros(12), np.zeros(12)
         lens[:2] = tiny[:2] = (-0.3, 0.01)
         tiny[4] = 1e-320
-        assert fold_radius(tiny) == fold_radius(lens)
+        assert np.isclose(fold_radius(tiny), fold_radius(lens), rtol=1e-12)
 
 
 class TestDistortJacobian:
@@ -68,6 +68,16 @@ class TestFoldRadius:
 
     def test_half_the_square_as_second_term_keeps_a_barrel_from_folding(self):
         assert fold_radius(np.array([-0.3, 0.045, *np.zeros(10)])) == np.inf
+
+    @settings(deadline=None)
+    @given(st.floats(-2, 2), st.floats(-2, 2))
+    def test_two_terms_fold_where_the_slope_of_the_radius_is_zero_first(self, k1, k2):
+        fold = fold_radius(np.array([k1, k2, *np.zeros(10)]))
+        squared = np.linspace(0, min(fold, 100.0) ** 2, 1000, endpoint=False)
+        assert (1 + 3 * k1 * squared + 5 * k2 * squared**2 > 0).all()
+        if fold < 1e50:
+            terms = np.array([1, 3 * k1 * fold**2, 5 * k2 * fold**4])
+            assert abs(terms.sum()) < 1e-9 * np.abs(terms).max()
 
 
 class TestOnePoint:
