@@ -6,6 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from app.geometry.arrays import FloatArray, require_shape
+from app.geometry.polyline_kernels import clipped, nearest_places
 
 
 def inside_image(points: FloatArray, width: int, height: int) -> npt.NDArray[np.bool_]:
@@ -34,24 +35,8 @@ def clip_polyline(points: FloatArray, width: int, height: int) -> FloatArray:
         Empty when no point lies inside: a polyline that only crosses is not visible.
     """
     points = require_shape(points, (None, 2), "points")
-    points = points[~np.isnan(points[:, 0])]
-    inside = inside_image(points, width, height)
-    if not inside.any():
-        return np.empty((0, 2))
-    parts = []
-    changes = np.flatnonzero(inside[1:] != inside[:-1])
-    begin = 0
-    for change in changes.tolist():
-        outside, within = (change, change + 1) if inside[change + 1] else (change + 1, change)
-        crossing = _crossing(points[within], points[outside], width, height)
-        if inside[change + 1]:
-            parts.append(crossing)
-        else:
-            parts.extend([points[begin : change + 1], crossing])
-        begin = change + 1
-    if inside[-1]:
-        parts.append(points[begin:])
-    return np.vstack(parts)
+    room = np.empty((2 * len(points), 2))
+    return room[: clipped(np.ascontiguousarray(points), width, height, room)].copy()
 
 
 def distance_to_polyline(points: FloatArray, polyline: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -74,29 +59,6 @@ def distance_to_polyline(points: FloatArray, polyline: FloatArray) -> tuple[Floa
     if len(polyline) == 1:
         nearest = np.repeat(polyline, len(points), axis=0)
         return np.hypot(*(points - nearest).T), nearest
-    start, along = polyline[:-1], np.diff(polyline, axis=0)
-    squared = np.maximum((along**2).sum(axis=1), 1e-300)
-    offset = points[:, None] - start[None]
-    share = np.clip((offset * along).sum(axis=2) / squared, 0.0, 1.0)
-    places = start + share[:, :, None] * along
-    apart = np.hypot(*np.moveaxis(points[:, None] - places, 2, 0))
-    best = apart.argmin(axis=1)
-    rows = np.arange(len(points))
-    return apart[rows, best], places[rows, best]
-
-
-def _crossing(inside: FloatArray, outside: FloatArray, width: int, height: int) -> FloatArray:
-    """Crossing of the border next to ``inside``, shape (1, 2), or (0, 2) when none is within."""
-    step = outside - inside
-    found = []
-    for axis, limit in ((0, 0.0), (0, width - 1.0), (1, 0.0), (1, height - 1.0)):
-        if step[axis] == 0:
-            continue
-        place = inside + (limit - inside[axis]) / step[axis] * step
-        place[axis] = limit
-        if 0 <= place[0] < width and 0 <= place[1] < height:
-            found.append(place)
-    if not found:
-        return np.empty((0, 2))
-    nearest: FloatArray = min(found, key=lambda place: float(np.sum((place - inside) ** 2)))
-    return nearest[None]
+    apart, nearest = np.empty(len(points)), np.empty((len(points), 2))
+    nearest_places(np.ascontiguousarray(points), np.ascontiguousarray(polyline), apart, nearest)
+    return apart, nearest

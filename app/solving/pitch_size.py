@@ -259,12 +259,13 @@ class _Seen:
         moves = _SHARES[self.observations.marking].copy()
         camera = self.problem.camera(self.fit.parameters)
         center = np.array(principal_point(self.problem.size))
-        for row in np.flatnonzero(beyond & _CROSSING[self.observations.marking]):
-            shape = self.observations.curves.shapes[self.observations.marking[row]]
-            ends = np.array([shape[:3], shape[3:]])
-            apart = camera.project(ends) - center - self.observations.pixels[row]
-            near = np.nan_to_num(np.hypot(*apart.T), nan=np.inf).argmin()
-            moves[row] = 0.5 * np.sign(ends[near, :2])
+        rows = np.flatnonzero(beyond & _CROSSING[self.observations.marking])
+        shapes = self.observations.curves.shapes[self.observations.marking[rows]]
+        ends = shapes.reshape(-1, 2, 3)
+        seen = camera.project(ends.reshape(-1, 3)).reshape(-1, 2, 2) - center
+        apart = seen - self.observations.pixels[rows, None]
+        near = np.nan_to_num(np.hypot(*np.moveaxis(apart, 2, 0)), nan=np.inf).argmin(axis=1)
+        moves[rows] = 0.5 * np.sign(ends[np.arange(len(rows)), near, :2])
         return moves
 
 
