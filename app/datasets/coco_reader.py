@@ -24,7 +24,8 @@ from app.errors import DatasetFormatError, UnsafePathError
 from app.geometry.camera import Camera
 from app.soccer.annotation import BallAnnotation, Extras
 from app.soccer.frames import Box
-from app.soccer.group import Group, Media, Station, View
+from app.soccer.group import Group, Station, View
+from app.soccer.media import Media
 from app.soccer.pitch import Pitch
 
 BALLS = frozenset({"ball", "sports ball", "sports-ball", "soccer ball", "football"})

@@ -14,7 +14,7 @@ from app.config import Settings
 from app.datasets.report import Report
 from app.errors import DatasetFormatError
 from app.object_store.path import StoredPath
-from app.soccer.group import Media
+from app.soccer.media import Media
 
 _CHUNK = 1024 * 1024
 BROKEN = (zipfile.BadZipFile, zlib.error, EOFError, RuntimeError, NotImplementedError, OSError)

@@ -12,7 +12,7 @@ from app.datasets.report import Report
 from app.datasets.safe_path import is_hidden, resolve_inside
 from app.datasets.zip_tree import ZipTree
 from app.errors import DatasetFormatError, UnsafePathError
-from app.soccer.group import Media
+from app.soccer.media import Media
 
 
 class FolderTree:

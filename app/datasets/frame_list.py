@@ -21,7 +21,8 @@ from app.datasets.safe_path import check_name
 from app.errors import DatasetFormatError, InputError, NotFoundError
 from app.object_store.address import is_address, seal
 from app.object_store.path import StoredPath, find_path, target_path
-from app.soccer.group import Group, Media, View
+from app.soccer.group import Group, View
+from app.soccer.media import Media
 
 _SHA256 = re.compile(r"[0-9a-f]{64}")
 

@@ -21,7 +21,8 @@ from app.datasets.trees import open_tree
 from app.errors import DatasetFormatError, UnsafePathError
 from app.soccer.annotation import BallAnnotation, Extras, Lines
 from app.soccer.frames import Box, ImageSize
-from app.soccer.group import Group, Media, Station, View
+from app.soccer.group import Group, Station, View
+from app.soccer.media import Media
 
 _IDS = {1: "player", 2: "goalkeeper", 3: "referee", 4: BALL, 5: PITCH, 6: "camera"}
 _FOLDERS = ("img1/", "", "frames/")

@@ -22,7 +22,8 @@ from app.datasets.viper_reader import ViperTrack, read_viper
 from app.geometry.camera import Camera
 from app.soccer.annotation import BallAnnotation, Extras
 from app.soccer.frames import ImagePoint, ImageSize
-from app.soccer.group import Group, Media, Station, View
+from app.soccer.group import Group, Station, View
+from app.soccer.media import Media
 
 TEST_CAMERAS = frozenset({1, 2})
 """Cameras 3 to 6 train."""

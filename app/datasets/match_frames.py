@@ -12,7 +12,7 @@ from app.datasets.file_tree import FileTree
 from app.datasets.frame_names import IMAGE_SUFFIXES
 from app.datasets.report import Report
 from app.errors import DatasetFormatError
-from app.soccer.group import Media
+from app.soccer.media import Media
 
 ARCHIVE = "Frames-v3.zip"
 FOLDERS = ("", "v3_frames/", "Frames-v3/", "frames/")

@@ -20,7 +20,8 @@ from app.datasets.trees import open_tree
 from app.datasets.view_groups import PlacedView, ViewGroups
 from app.datasets.view_state import StateReader, extras_from_json
 from app.errors import DatasetFormatError
-from app.soccer.group import Group, Media
+from app.soccer.group import Group
+from app.soccer.media import Media
 
 NEEDED = ("group", "view", "width", "height", "lines", "balls", "given", "extras", "station")
 OPTIONAL = (

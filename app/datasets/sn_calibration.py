@@ -17,7 +17,8 @@ from app.datasets.frame_names import UNASSIGNED, match_frame, view_place
 from app.datasets.soccernet_v3 import SPLITS
 from app.soccer.annotation import Lines
 from app.soccer.frames import ImageSize
-from app.soccer.group import Group, Media, View
+from app.soccer.group import Group, View
+from app.soccer.media import Media
 
 DEFAULT_SIZE = ImageSize(960, 540)
 LINES, CAMERAS = "lines", "cameras"

@@ -21,7 +21,8 @@ from app.datasets.trees import open_tree
 from app.errors import DatasetFormatError, UnknownMarkingError
 from app.soccer.annotation import Extras, Lines, make_lines
 from app.soccer.frames import ImagePoint, ImageSize
-from app.soccer.group import Group, Media, Station, View
+from app.soccer.group import Group, Station, View
+from app.soccer.media import Media
 from app.soccer.pitch import WITHOUT_GEOMETRY, canonical_marking
 
 _OTHER_FILES = ("manifest.json", "findings.json", "calibrate.json", "leave_one_out.json")

@@ -12,7 +12,7 @@ from app.datasets.zip_tree import ZipTree
 from app.errors import DatasetFormatError, TooLargeError, UnsafePathError
 from app.object_store.path import RangeReads, StoredPath
 from app.object_store.store import Stored
-from app.soccer.group import Media
+from app.soccer.media import Media
 
 STREAM = 4 * 1024**2
 """Bytes that are fetched at once of a file that is read from its beginning to its end."""

@@ -14,7 +14,7 @@ from app.datasets.safe_path import check_name, is_hidden
 from app.errors import DatasetFormatError, UnsafePathError
 from app.nested_zip import UNREADABLE, open_nested, open_zip, open_zip_elsewhere
 from app.object_store.path import StoredPath
-from app.soccer.group import Media
+from app.soccer.media import Media
 
 _RATIO_FLOOR = 1024 * 1024
 

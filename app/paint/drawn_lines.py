@@ -12,7 +12,7 @@ from app.geometry.camera import Camera
 from app.paint.view_proposal import ViewProposal, propose_lines
 from app.soccer.annotation import Lines, make_lines
 from app.soccer.frames import ImageSize
-from app.soccer.group import Media
+from app.soccer.media import Media
 from app.soccer.pitch import Pitch, twin_marking
 from app.soccer.policy import CalibrationPolicy
 from app.soccer.solution import Calibration

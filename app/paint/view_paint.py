@@ -19,7 +19,7 @@ from app.paint.picture_scale import SHAPES_APART, PictureScale, why_unreadable
 from app.paint.ridges import line_like
 from app.paint.snap import snap
 from app.soccer.frames import Box, ImagePoint, ImageSize
-from app.soccer.group import Media
+from app.soccer.media import Media
 from app.soccer.paint_evidence import NO_PAINT, PAINT_DISAGREES, PaintEvidence
 from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy

@@ -16,7 +16,7 @@ from app.paint.picture_scale import PictureScale, why_unreadable
 from app.paint.propose import propose
 from app.soccer.annotation import Lines
 from app.soccer.frames import ImageSize
-from app.soccer.group import Media
+from app.soccer.media import Media
 from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy
 from app.store.media import decode_frame

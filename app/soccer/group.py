@@ -9,6 +9,7 @@ from app.errors import InputError
 from app.geometry.camera import Camera
 from app.soccer.annotation import BallAnnotation, Extras, Lines
 from app.soccer.frames import ImageSize
+from app.soccer.media import Media
 from app.soccer.paint_evidence import PaintReading
 from app.soccer.picture import PictureGeometry
 from app.soccer.pitch import Pitch
@@ -70,16 +71,6 @@ class Station:
     ) -> Station:
         """This station with another given camera; what was known of the old one is not of it."""
         return replace(self, given=given, given_covariance=covariance)
-
-
-@dataclass(frozen=True)
-class Media:
-    """Where the frame of a view can be read: a file, or a member of an archive."""
-
-    path: str
-    member: str | None = None
-    frame: int | None = None
-    """Number of the frame when ``path`` is a video."""
 
 
 @dataclass(frozen=True)

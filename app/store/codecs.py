@@ -19,7 +19,8 @@ from app.geometry.camera import Camera, camera_covariance
 from app.geometry.lens import BROWN_CONRADY
 from app.soccer.annotation import BallAnnotation, Extras, Lines, make_lines
 from app.soccer.frames import Box, ImagePoint, ImageSize
-from app.soccer.group import Group, Media, SharedPosition, Station, View
+from app.soccer.group import Group, SharedPosition, Station, View
+from app.soccer.media import Media
 from app.soccer.paint_evidence import PaintReading, reading_from_text
 from app.soccer.picture import PictureGeometry
 from app.soccer.pitch import Pitch

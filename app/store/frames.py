@@ -17,7 +17,7 @@ from app.child import Allowance, ChildEnded
 from app.child_pool import ChildPool, PoolTask
 from app.config import Settings
 from app.errors import ImageError, ReviewError, StorageError, TooLargeError
-from app.soccer.group import Media
+from app.soccer.media import Media
 from app.store.image_header import JPEG
 from app.store.media import cached_frame, content_type, frame_name, frame_stamp, read_frame
 from app.store.neighbours import neighbours

@@ -14,7 +14,8 @@ from sqlalchemy.sql import FromClause
 
 from app.errors import NotFoundError
 from app.soccer.annotation import BallAnnotation, Extras
-from app.soccer.group import Group, Media, SharedPosition, Station, View
+from app.soccer.group import Group, SharedPosition, Station, View
+from app.soccer.media import Media
 from app.soccer.paint_evidence import PaintReading
 from app.soccer.pitch import Pitch
 from app.soccer.policy import Policy

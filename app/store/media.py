@@ -17,7 +17,7 @@ from app.config import Settings
 from app.durable import replace_file
 from app.errors import ImageError, NotFoundError, StorageError, TooLargeError
 from app.object_store.address import unseal
-from app.soccer.group import Media
+from app.soccer.media import Media
 from app.store.archives import Archives
 from app.store.image_header import ImageHeader, check_size, read_header
 from app.store.object_frames import is_stored, read_object

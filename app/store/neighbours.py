@@ -14,7 +14,7 @@ from pathlib import Path, PurePath, PurePosixPath
 import cv2
 
 from app.errors import ImageError, NotFoundError, StorageError
-from app.soccer.group import Media
+from app.soccer.media import Media
 from app.store.media import has_member
 from app.store.object_frames import is_stored
 from app.store.video import open_video

@@ -16,7 +16,7 @@ from app.object_store.address import is_address, split_address, unseal
 from app.object_store.path import StoredPath
 from app.object_store.refusal import ChangedObjectError
 from app.object_store.store import ObjectStore, open_store
-from app.soccer.group import Media
+from app.soccer.media import Media
 from app.store.archives import Archives
 from app.store.object_cache import ObjectCache
 

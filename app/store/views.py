@@ -10,7 +10,7 @@ from sqlalchemy import ColumnElement, select
 from sqlalchemy.orm import Session
 
 from app.soccer.annotation import BallAnnotation
-from app.soccer.group import Media
+from app.soccer.media import Media
 from app.store.codecs import as_written, ball_from_json, parse
 from app.store.conditions import Condition
 from app.store.models import GroupModel, QueueModel, StationModel, ViewModel

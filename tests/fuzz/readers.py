@@ -34,7 +34,8 @@ from app.review.exporting.formats import FORMATS, WriteOptions, write_format
 from app.review.importing.sources import STATIC, Source, _groups, _static, import_source
 from app.review.policies.text import MAX_CHARACTERS, policy_from_yaml
 from app.review.queue.query import parse_query
-from app.soccer.group import Group, Media
+from app.soccer.group import Group
+from app.soccer.media import Media
 from app.soccer.policy import PAPER
 from app.solving.solve import solve
 from app.store.media import read_frame

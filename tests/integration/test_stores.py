@@ -31,7 +31,8 @@ from app.review.editing.store_check import examine_stores
 from app.review.exporting.export import export
 from app.review.importing.folders import list_folder, resolve_folder
 from app.review.importing.sources import Source, import_source
-from app.soccer.group import Group, Media
+from app.soccer.group import Group
+from app.soccer.media import Media
 from app.store.media import content_type, read_frame
 from app.store.object_frames import is_kept
 from app.store.session import Store

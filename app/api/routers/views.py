@@ -40,7 +40,7 @@ from app.review.editing.edit import (
 from app.review.editing.places import FoundView, find_view
 from app.review.editing.submit import submit_view
 from app.review.editing.view_paint import NO_FRAME_HINT
-from app.soccer.group import Media
+from app.soccer.media import Media
 from app.store.frames import Frames, Picture
 from app.store.neighbours import FARTHEST
 

@@ -11,7 +11,7 @@ from app.paint.drawn_lines import beside_drawn
 from app.paint.view_proposal import ViewProposal, proposal_of
 from app.soccer.annotation import Lines
 from app.soccer.frames import ImageSize
-from app.soccer.group import Media
+from app.soccer.media import Media
 from app.soccer.paint_evidence import EXTRACTOR_VERSION
 from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from app.errors import NotFoundError
-from app.soccer.group import Media
+from app.soccer.media import Media
 from app.store import views
 from app.store.session import Store
 

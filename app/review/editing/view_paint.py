@@ -21,7 +21,8 @@ from app.review.editing.known import known_calibrations
 from app.review.editing.point_limits import require_few_points_in_all
 from app.soccer.annotation import Lines
 from app.soccer.frames import ImageSize
-from app.soccer.group import Group, Media, View
+from app.soccer.group import Group, View
+from app.soccer.media import Media
 from app.soccer.policy import CalibrationPolicy
 from app.soccer.solution import Calibration
 from app.solving.calibrate import calibrate_clicks, clicks_key, view_key

@@ -10,7 +10,8 @@ from app.datasets.frame_names import FrameName, match_frame
 from app.datasets.safe_path import resolve_inside
 from app.errors import ImageError, NotFoundError, StorageError, TooLargeError
 from app.object_store.address import is_address, unseal
-from app.soccer.group import Group, Media, View
+from app.soccer.group import Group, View
+from app.soccer.media import Media
 from app.store.frames import Picture
 from app.store.media import media_facts
 

@@ -24,7 +24,8 @@ from app.geometry.camera import Camera
 from app.review.editing.recompute import solve_dataset
 from app.review.importing.ingest import ingest
 from app.soccer.annotation import Lines, make_lines
-from app.soccer.group import Group, Media, Station, View
+from app.soccer.group import Group, Station, View
+from app.soccer.media import Media
 from app.soccer.pitch import MARKINGS, Pitch
 from app.store.session import Store
 from tests.balls import box_around

@@ -13,7 +13,8 @@ import pytest
 
 from app.config import Settings
 from app.review.importing.ingest import ingest
-from app.soccer.group import Group, Media, Station, View
+from app.soccer.group import Group, Station, View
+from app.soccer.media import Media
 from app.store.session import Store
 from tests.cameras import SIZE
 from tests.unit.paint.lawns import TRUE, drawn, lawn

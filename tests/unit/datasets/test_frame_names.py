@@ -4,7 +4,8 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from app.datasets.frame_names import flat_frame, likely_suffix, match_frame, split_folder, view_stem
-from app.soccer.group import Group, Media
+from app.soccer.group import Group
+from app.soccer.media import Media
 
 Make = Callable[..., Group]
 

@@ -20,7 +20,8 @@ from app.errors import InputError
 from app.geometry.camera import Camera
 from app.soccer.annotation import Extras
 from app.soccer.frames import Box, ImagePoint, ImageSize
-from app.soccer.group import Group, Media
+from app.soccer.group import Group
+from app.soccer.media import Media
 from tests.cameras import WIDE_LENSES, wide
 
 Value = dict[str, Any]

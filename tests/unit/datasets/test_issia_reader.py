@@ -15,7 +15,8 @@ from app.datasets.issia_reader import (
 from app.datasets.report import Report
 from app.geometry.camera import Camera
 from app.soccer.frames import ImagePoint, ImageSize
-from app.soccer.group import Group, Media
+from app.soccer.group import Group
+from app.soccer.media import Media
 
 
 def _xgtf(balls: dict[int, tuple[int, int]], persons: dict[int, int]) -> str:

@@ -10,7 +10,7 @@ from app.datasets.file_tree import DEFAULT_LIMITS, Limits
 from app.datasets.match_frames import MatchFrames
 from app.datasets.report import Report
 from app.datasets.trees import open_tree
-from app.soccer.group import Media
+from app.soccer.media import Media
 
 
 def _frames(folder: Path, report: Report) -> MatchFrames:

@@ -22,7 +22,8 @@ from app.errors import InputError, UnsafePathError
 from app.geometry.camera import Camera
 from app.soccer.annotation import make_lines
 from app.soccer.frames import ImageSize
-from app.soccer.group import Group, Media, Station
+from app.soccer.group import Group, Station
+from app.soccer.media import Media
 from app.soccer.pitch import MARKINGS
 
 MATCH = "l/s/m"

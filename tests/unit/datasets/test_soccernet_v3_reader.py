@@ -9,7 +9,8 @@ import pytest
 
 from app.datasets.report import Report
 from app.datasets.soccernet_v3_reader import read_soccernet_v3
-from app.soccer.group import Group, Media
+from app.soccer.group import Group
+from app.soccer.media import Media
 
 Write = Callable[[Any], Path]
 

@@ -21,7 +21,8 @@ from app.review.importing.ingest import ingest
 from app.review.queue.listing import list_groups
 from app.soccer.annotation import BallAnnotation, Extras, make_lines
 from app.soccer.frames import Box, ImagePoint
-from app.soccer.group import Group, Media, Station, View
+from app.soccer.group import Group, Station, View
+from app.soccer.media import Media
 from app.soccer.pitch import MARKINGS, Pitch
 from app.store.models import DatasetModel
 from app.store.session import Store

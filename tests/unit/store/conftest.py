@@ -13,7 +13,8 @@ from app.config import Settings
 from app.geometry.camera import Camera
 from app.soccer.annotation import BallAnnotation, Extras, make_lines
 from app.soccer.frames import Box, ImagePoint, ImageSize
-from app.soccer.group import Group, Media, Station, View
+from app.soccer.group import Group, Station, View
+from app.soccer.media import Media
 from app.soccer.pitch import Pitch
 from app.soccer.policy import PAPER
 from app.store.codecs import canonical, policy_to_json

@@ -6,7 +6,8 @@ import pytest
 
 from app.soccer.annotation import BallAnnotation, Extras, make_lines
 from app.soccer.frames import ImageSize
-from app.soccer.group import Group, Media, SharedPosition
+from app.soccer.group import Group, SharedPosition
+from app.soccer.media import Media
 from app.soccer.paint_evidence import PaintEvidence, PaintPoint, PaintReading
 from app.soccer.picture import PictureGeometry
 from app.soccer.pitch import Pitch

@@ -16,7 +16,7 @@ import pytest
 from app.child import Allowance
 from app.config import Settings
 from app.errors import ImageError, NotFoundError, TooLargeError
-from app.soccer.group import Media
+from app.soccer.media import Media
 from app.store import frames as module
 from app.store.frames import Frames, make_picture
 

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from app.errors import ImageError, NotFoundError, TooLargeError
-from app.soccer.group import Media
+from app.soccer.media import Media
 from app.store import media as media_module
 from app.store.archives import Archives
 from app.store.media import content_type, decode_picture, frame_name, media_facts, read_frame

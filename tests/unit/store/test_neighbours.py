@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 import pytest
 
-from app.soccer.group import Media
+from app.soccer.media import Media
 from app.store.neighbours import counts_time, neighbours
 
 PIXELS = np.full((64, 96, 3), 90, np.uint8)

@@ -16,7 +16,8 @@ from app.review.editing.recompute import solve_dataset
 from app.review.importing.ingest import ingest
 from app.review.jobs.jobs import Jobs
 from app.soccer.frames import ImageSize
-from app.soccer.group import Group, Media, Station, View
+from app.soccer.group import Group, Station, View
+from app.soccer.media import Media
 from app.store.frames import Picture
 from tests.waiting import SECONDS
 

@@ -13,7 +13,8 @@ import pytest
 
 from app.review.importing.ingest import ingest
 from app.review.versions.freeze import FreezeRequest, freeze
-from app.soccer.group import Group, Media
+from app.soccer.group import Group
+from app.soccer.media import Media
 from app.store.neighbours import FARTHEST
 
 API = "/api/v1"

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from app.review.importing.ingest import ingest
-from app.soccer.group import Media
+from app.soccer.media import Media
 from tests.waiting import SECONDS
 
 PAINT = "/api/v1/datasets/broadcast/paint"

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from app.review.importing.ingest import ingest
-from app.soccer.group import Media
+from app.soccer.media import Media
 from app.soccer.pitch import Pitch
 from tests.cameras import SIZE
 from tests.unit.api.conftest import lines_of

@@ -24,7 +24,7 @@ from app.api.routers.views import (
 from app.child_pool import PoolTask
 from app.errors import OverloadedError
 from app.review.importing.ingest import ingest
-from app.soccer.group import Media
+from app.soccer.media import Media
 
 API = "/api/v1"
 

@@ -32,7 +32,8 @@ from app.review.editing.submit import load, submit, undo
 from app.review.importing.carry import carried_group
 from app.review.importing.ingest import ingest
 from app.review.queue.listing import list_groups
-from app.soccer.group import Group, Media, Station, View
+from app.soccer.group import Group, Station, View
+from app.soccer.media import Media
 from app.store.digest import station_digest
 from app.store.frozen import freeze_said, thaw_group
 from app.store.log import verify_chain

@@ -21,7 +21,7 @@ from app.review.policies.policy import change_policy
 from app.review.verdicts.verdict import set_verdict
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import Box
-from app.soccer.group import Media
+from app.soccer.media import Media
 from app.soccer.policy import PAPER
 
 

@@ -11,7 +11,8 @@ import pytest
 from app.config import Settings
 from app.review.exporting.images import ExportImages
 from app.soccer.frames import ImageSize
-from app.soccer.group import Group, Media, Station, View
+from app.soccer.group import Group, Station, View
+from app.soccer.media import Media
 from app.store.frames import make_picture
 
 

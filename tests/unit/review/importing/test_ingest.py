@@ -16,7 +16,8 @@ from app.review.importing.cameras import ingest_cameras
 from app.review.importing.ingest import ensure_dataset, ingest
 from app.soccer.annotation import BallAnnotation, make_lines
 from app.soccer.frames import Box, ImagePoint
-from app.soccer.group import Group, Media
+from app.soccer.group import Group
+from app.soccer.media import Media
 from app.store.session import Store
 
 

@@ -14,7 +14,8 @@ from app.review.jobs import paint as paint_job
 from app.review.jobs.jobs import Jobs
 from app.review.jobs.paint import PAINT, take_paint_back
 from app.review.policies.policy import change_policy
-from app.soccer.group import Group, Media
+from app.soccer.group import Group
+from app.soccer.media import Media
 from app.soccer.policy import TOUCHLINE
 from app.store.jobs import NewJob, insert_job
 from app.store.log import read_log

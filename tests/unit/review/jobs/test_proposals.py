@@ -13,7 +13,8 @@ from app.review.importing.ingest import ingest
 from app.review.jobs import proposals as proposals_job
 from app.review.jobs.jobs import Jobs
 from app.review.jobs.proposals import PROPOSALS, stop_and_forget
-from app.soccer.group import Group, Media, Station, View
+from app.soccer.group import Group, Station, View
+from app.soccer.media import Media
 from app.store.session import Store
 from tests.cameras import SIZE
 from tests.unit.review.editing.test_paint import Here

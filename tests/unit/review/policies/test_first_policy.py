@@ -8,7 +8,8 @@ import pytest
 
 from app.review.policies.first_policy import first_policy
 from app.soccer.frames import ImageSize
-from app.soccer.group import Group, Media, Station, View
+from app.soccer.group import Group, Station, View
+from app.soccer.media import Media
 from app.soccer.policy import PAPER, TOUCHLINE
 
 SIZE = ImageSize(960, 540)

@@ -25,7 +25,7 @@ from app.review.work.batches import NewBatch, get_batch, make_batch
 from app.review.work.leases import Leases, Worker
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import ImagePoint
-from app.soccer.group import Media
+from app.soccer.media import Media
 from app.store.session import Store
 from tests.e2e.film import write_film
 

@@ -29,7 +29,7 @@ from app.review.work.progress import my_work
 from app.sample.truth import TRUTH, truth_to_json
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import Box, ImagePoint
-from app.soccer.group import Media
+from app.soccer.media import Media
 from app.solving.jaccard import project_markings
 from app.store.session import Store
 from tests.scenes import make_scenes

@@ -18,7 +18,7 @@ from app.review.versions.freeze import FreezeRequest, freeze, plan_freeze
 from app.review.versions.version import list_versions, thaw
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import Box
-from app.soccer.group import Media
+from app.soccer.media import Media
 from app.soccer.policy import STRICT
 from app.soccer.split import Split
 from app.store.models import LogModel, SolutionModel
