@@ -1,0 +1,162 @@
+"""The program: the command line with all its commands, the place where everything is put together.
+
+A command (``app.commands``) parses, calls one function of a floor below, prints a table or JSON
+and returns an exit code: 0 done, 1 it could not be done, 2 it was asked for in a wrong way.
+Progress and complaints go to stderr. Heavy modules are imported inside the commands, so that
+``--help`` is quick.
+"""
+
+from __future__ import annotations
+
+import gc
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from app.commands import (
+    backup,
+    batches,
+    cluster,
+    datasets,
+    doctor,
+    evaluation,
+    files,
+    lines,
+    noise,
+    paint,
+    picture,
+    pitch,
+    policy,
+    positions,
+    predictions,
+    propose,
+    rig,
+    sample,
+    service,
+    solving,
+    users,
+    verdicts,
+    versions,
+)
+from app.commands.options import act_as
+from app.commands.server import work_at
+from app.commands.terminal import complain, spell_out
+from app.errors import ReviewError
+
+READER_GONE = 141
+"""Exit code of a command whose reader has gone, as shells have it."""
+YOUNG = 50_000
+"""New objects before the collector looks at them: what libraries bring is there to stay, and to walk
+through it again and again is a sixth of a start."""
+
+app = typer.Typer(
+    name="touchline",
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+PARTS = (
+    service,
+    sample,
+    files,
+    solving,
+    rig,
+    verdicts,
+    lines,
+    propose,
+    noise,
+    paint,
+    pitch,
+    positions,
+    picture,
+    versions,
+    evaluation,
+    predictions,
+    doctor,
+    backup,
+    cluster,
+)
+for part in PARTS:
+    app.add_typer(part.commands)
+app.add_typer(datasets.commands, name="datasets")
+app.add_typer(batches.commands, name="batch")
+app.add_typer(policy.commands, name="policy")
+app.add_typer(users.commands, name="users")
+
+
+def _tell_version(asked: bool) -> None:
+    if asked:
+        from app.datasets.manifest import SOFTWARE, software_version
+
+        typer.echo(f"{SOFTWARE} {software_version()}")
+        raise typer.Exit
+
+
+@app.callback()
+def options(
+    context: typer.Context,
+    actor: Annotated[
+        str | None,
+        typer.Option(
+            envvar="TOUCHLINE_ACTOR",
+            metavar="NAME",
+            help="What this script calls itself; history and verdicts name it as script:NAME.",
+        ),
+    ] = None,
+    server: Annotated[
+        str | None,
+        typer.Option(
+            envvar="TOUCHLINE_SERVER",
+            metavar="URL",
+            help="Work against this server instead of a home on this machine, where a command can.",
+        ),
+    ] = None,
+    token_file: Annotated[
+        Path | None,
+        typer.Option(
+            envvar="TOUCHLINE_TOKEN_FILE",
+            help="File with a token of a team's server, that you alone can read.",
+        ),
+    ] = None,
+    version: Annotated[
+        bool,
+        typer.Option(
+            "--version", help="Tell the version and end.", callback=_tell_version, is_eager=True
+        ),
+    ] = False,
+) -> None:
+    """Turn multi-view soccer frames into a trusted 3D ball dataset."""
+    act_as(actor)
+    work_at(server, token_file, context.invoked_subcommand)
+    if server is not None and token_file is not None and actor is not None:
+        raise typer.BadParameter(
+            "the log names the person of the token; leave it out", param_hint="--actor"
+        )
+
+
+def run() -> None:
+    """Carry out a command line: what a caller can cause is one sentence on stderr and exit code 1."""
+    spell_out()
+    gc.set_threshold(YOUNG)
+    try:
+        app()
+    except SystemExit as end:
+        # Whoever reads, such as head, has seen enough.
+        if isinstance(end.__context__, BrokenPipeError):
+            sys.exit(READER_GONE)
+        raise
+    except ReviewError as error:
+        complain(error.message, error.hint)
+        sys.exit(1)
+    except RuntimeError as error:
+        # numba's words when it finds no folder to write to; it has no class of its own for them.
+        if "cannot cache function" not in str(error):
+            raise
+        complain(
+            "this user can write neither to the installation nor to a cache of its own, where the"
+            " compiled solver is kept",
+            "Point NUMBA_CACHE_DIR at a folder that this user alone can write.",
+        )
+        sys.exit(1)
