@@ -7,10 +7,12 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from fastapi import FastAPI
+from sqlalchemy import delete
 
 from app.review.people import links
 from app.review.people.people import invite
 from app.review.people.roles import Role
+from app.store.people_models import AttemptModel
 from app.store.session import Store
 from tests.security.asking import Answer, Asker
 from tests.security.table import Row, rows
@@ -76,6 +78,11 @@ class Team:
         links.use(self.store, link.token, SECRET)
         self.cookies[name] = cookie_in(self.log_in(name))
         return self.cookies[name]
+
+    def forget_tries(self) -> None:
+        """As if nobody had tried anything yet, where the database has what was tried."""
+        with self.store.write(lasting=False) as session:
+            session.execute(delete(AttemptModel))
 
     def bearer(self, *scopes: str, role: str = "admin") -> str:
         """The header of a token of somebody, made once for these scopes."""

@@ -238,6 +238,7 @@ class TestTokens:
         self, team: Team, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         monkeypatch.setattr(tries, "TOKENS_OF_AN_ADDRESS", parse("4/minute"))
+        team.forget_tries()
         guesses = [self.ask(team, f"Bearer {new_text()}") for _ in range(5)]
         assert [answer.status for answer in guesses] == [401] * 4 + [429]
         assert 0 < int(guesses[-1].headers["retry-after"]) <= 60

@@ -148,7 +148,8 @@ class Logins:
         """Begin a session; returns its token. The one that the browser had ``before`` ends.
 
         A name that nobody has takes as long as a wrong password, and gets the same answer. A code is
-        looked at after the password alone; ``on_code`` is called before, to count it.
+        looked at after the password alone; ``on_code`` is called before, to count it (in a
+        transaction of its own, which another that writes would wait for).
 
         Raises:
             NotLoggedInError: Name and password do not belong together, or the account is disabled; or
@@ -157,16 +158,19 @@ class Logins:
         name = name.strip().lower()[:LONGEST]
         with self._store.read() as session:
             person = person_by_name(session, name)
+            is_asked = person is not None and has_second_factor(session, person.id)
         able = person is not None and not person.disabled
         if not is_password(password, person.password if person and able else None):
             raise NotLoggedInError(WRONG, hint="An admin can send you a link for a new password.")
         assert person is not None
+        if is_asked and code is not None:
+            on_code()
 
         def require_code(session: Session) -> None:
             if has_second_factor(session, person.id):
-                if code is None:
+                # What was not counted, for the account had no second factor yet, is asked for.
+                if code is None or not is_asked:
                     raise NotLoggedInError(ASK_CODE, hint=LOST, pointer="/code")
-                on_code()
                 if not take_code(session, self._store, person.id, code, self._clock()):
                     raise NotLoggedInError(WRONG_CODE, hint=LOST, pointer="/code")
 

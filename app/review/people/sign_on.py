@@ -196,13 +196,16 @@ class SignOn:
         claims = begun.claims or self._claims(begun, code)
         person_id, password = self._person(begun, claims)
         vouched = self.rules.is_vouched(claims)
+        if factor is not None and not vouched:
+            # In a transaction of its own, which another that writes would wait for.
+            on_code(self._name(person_id))
 
         def require(session: Session) -> None:
             # Read again: the account may have been taken away from them since.
             if not _is_theirs(session, self.rules, claims, person_id):
                 raise NotLoggedInError(self._unknown(), hint=self._ask())
             if not vouched and has_second_factor(session, person_id):
-                self._require_factor(session, person_id, factor, on_code)
+                self._require_factor(session, person_id, factor)
             use_identity(session, person_id, shown_of(claims), _text(self._clock()))
 
         try:
@@ -309,14 +312,15 @@ class SignOn:
         put_identity(session, {**values, "person_id": person_id, "created": _text(self._clock())})
         note(session, person.name, person.name, "single sign-on linked", person.role, account=shown)
 
-    def _require_factor(
-        self, session: Session, person_id: int, factor: str | None, on_code: Callable[[str], None]
-    ) -> None:
+    def _name(self, person_id: int) -> str:
+        with self._store.read() as session:
+            person = person_by_id(session, person_id)
+        assert person is not None
+        return str(person.name)
+
+    def _require_factor(self, session: Session, person_id: int, factor: str | None) -> None:
         if factor is None:
             raise NotLoggedInError(ASK_CODE, hint=LOST, pointer=FACTOR)
-        person = person_by_id(session, person_id)
-        assert person is not None
-        on_code(person.name)
         if not take_code(session, self._store, person_id, factor, self._clock()):
             raise NotLoggedInError(WRONG_CODE, hint=LOST, pointer=FACTOR)
 

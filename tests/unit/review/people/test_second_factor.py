@@ -16,6 +16,7 @@ from pwdlib.hashers.argon2 import Argon2Hasher
 from app.config import Settings
 from app.errors import ConflictError, InputError, NotFoundError, NotLoggedInError
 from app.review.people import links, passwords
+from app.review.people.attempts import Attempts
 from app.review.people.logins import Login, Logins
 from app.review.people.people import find_person, invite
 from app.review.people.roles import Role
@@ -127,6 +128,19 @@ class TestLogin:
                     "anna", password, code="000000", on_code=lambda: counted.append(1)
                 )
         assert counted == [1]
+
+    def test_a_try_is_counted_in_the_database_too_where_processes_share_it(
+        self, desk: Desk
+    ) -> None:
+        desk.enrol()
+        attempts = Attempts(desk.store)
+
+        def count() -> None:
+            assert attempts.hit("code/anna", 1, 3600.0) is None
+
+        code = desk.code()
+        assert desk.logins.log_in("anna", SECRET, code=code, on_code=count)
+        assert attempts.hit("code/anna", 1, 3600.0) is not None
 
     def test_a_recovery_code_takes_its_place_once(self, desk: Desk) -> None:
         desk.enrol()
