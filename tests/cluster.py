@@ -10,6 +10,7 @@ import tempfile
 import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from itertools import count
 from pathlib import Path
 
 from tests.waiting import SECONDS
@@ -49,9 +50,10 @@ class Cluster:
         folder: Where its socket is.
     """
 
+    _numbers = count(1)
+
     def __init__(self, folder: Path):
         self.folder = folder
-        self._count = 0
 
     @property
     def pid(self) -> int:
@@ -64,9 +66,8 @@ class Cluster:
 
     def create(self, like: str | None = None) -> str:
         """A new database, empty or like the one of a URL; returns its URL."""
-        self._count += 1
-        # Several processes of tests may share a cluster.
-        name = f"touchline{os.getpid()}_{self._count}"
+        # Several processes of tests may share a cluster, and several of these one process.
+        name = f"touchline{os.getpid()}_{next(Cluster._numbers)}"
         return self.make(name, "template0" if like is None else _name(like))
 
     def make(self, name: str, like: str) -> str:

@@ -183,6 +183,7 @@ class TestFullPath:
         other = client.post(f"{API}/exports", json={**order, "all": False}, headers=headers)
         assert other.status_code == 422
 
+    @pytest.mark.file_of_sqlite("several servers may work over one database of PostgreSQL")
     def test_a_second_server_over_the_same_home_is_refused(self, touchline, client) -> None:
         done = touchline("serve", "--port", "0")
         assert done.returncode == 1

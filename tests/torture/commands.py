@@ -44,10 +44,10 @@ PICTURES = (
 """The same where the pictures count; in each group one view has no line, another a single one."""
 CONTENTS = {
     "groups": "SELECT key, inputs_hash, source_hash FROM groups ORDER BY key",
-    "solutions": "SELECT g.key, s.inputs_hash, s.policy_hash, s.summary, hex(s.body)"
+    "solutions": "SELECT g.key, s.inputs_hash, s.policy_hash, s.summary, s.body"
     " FROM solution s JOIN groups g ON g.id = s.group_id ORDER BY 1, 2, 3",
-    "calibrations": "SELECT key, hex(body) FROM calibration ORDER BY key",
-    "paint": "SELECT digest, reason, hex(body) FROM paint_evidence ORDER BY digest",
+    "calibrations": "SELECT key, body FROM calibration ORDER BY key",
+    "paint": "SELECT digest, reason, body FROM paint_evidence ORDER BY digest",
     "proposals": "SELECT g.key, v.key, p.outcome, p.sentence, p.lines, p.beside, p.frame, p.sought_with"
     " FROM proposal p"
     " JOIN view v ON v.id = p.view_id JOIN groups g ON g.id = v.group_id ORDER BY 1, 2",

@@ -134,14 +134,21 @@ def require_group(store: Store, group_id: int) -> None:
 def every_entry(
     store: Store, asked: AuditQuery, sight: Sight, search: str = ""
 ) -> Iterator[AuditEntry]:
-    """All of it, a page at a time, so that a long log fits into memory."""
-    before: int | None = None
-    while True:
-        page = read_audit(store, asked, sight, search=search, before=before, limit=_BATCH)
+    """All of it, a page at a time, so that a long log fits into memory.
+
+    The first page is read at once: a question that cannot be asked is refused before anything is sent.
+    """
+
+    def page_after(before: int | None) -> AuditPage:
+        return read_audit(store, asked, sight, search=search, before=before, limit=_BATCH)
+
+    def entries(page: AuditPage) -> Iterator[AuditEntry]:
         yield from page.items
-        if page.next is None:
-            return
-        before = page.next
+        while page.next is not None:
+            page = page_after(page.next)
+            yield from page.items
+
+    return entries(page_after(None))
 
 
 def _holds(entry: AuditEntry, words: list[str]) -> bool:
