@@ -81,8 +81,8 @@ export function AccountPage() {
 			${error ? html`<${Trouble} title="The account cannot be shown" error=${error} retry=${read} />` : null}
 			${!sessions && !error ? html`<${Loading} what="sessions" />` : null}
 			${sessions && ways ? html`
-				<div class="page__columns">
-					<section class="card card--flush account__sessions" aria-labelledby="account-sessions">
+				<div class="account">
+					<section class="card card--flush" aria-labelledby="account-sessions">
 						<h2 id="account-sessions">Where ${me.value?.name} (${me.value?.role}) is logged in</h2>
 						<table class="table">
 							<thead><tr><th>Browser</th><th>Since</th><th>Used</th><td></td></tr></thead>
@@ -90,10 +90,12 @@ export function AccountPage() {
 						</table>
 						${sessions.length > 1 ? html`<p class="buttons"><button class="button" type="button" onClick=${() => end(null)}>End all others</button></p>` : null}
 					</section>
-					<${IdentityCard} ways=${ways} changed=${read} />
-					${ways.password && !ways.only ? html`<${PasswordForm} changed=${read} />` : null}
 					<${SecondFactorCard} changed=${read} again=${factors} />
-					<${PasskeysCard} changed=${() => { read(); setFactors(factors + 1); }} />
+					<div class="account__ways">
+						<${IdentityCard} ways=${ways} changed=${read} />
+						${ways.password && !ways.only ? html`<${PasswordForm} changed=${read} />` : null}
+						<${PasskeysCard} changed=${() => { read(); setFactors(factors + 1); }} />
+					</div>
 				</div>
 				<${TokenCard} />` : null}
 		<//>

@@ -82,10 +82,11 @@ export function PasskeysCard({ changed = () => {} }) {
 			<div class="passkeys__form">
 				${codes.length ? html`<${Codes} codes=${codes} close=${close} />` : null}
 				${leaving ? html`
-					<${OneField} key=${leaving.id} id="passkey-remove" ...${proof()} button=${`Take away ${leaving.name}`} name="password" type="password" complete="current-password" error=${error} send=${(/** @type {string} */ password) => remove(leaving, password)}>
+					<${OneField} key=${leaving.id} id="passkey-remove" ...${proof()} button=${`Take away ${leaving.name}`} name="password" type="password" complete="current-password" error=${error} send=${(/** @type {string} */ password) => remove(leaving, password)}
+						beside=${html`<button class="button" type="button" onClick=${() => setLeaving(null)}>Keep it</button>`}
+					>
 						<p>${leaving.name} will log you in no more. Delete it in the device, too.</p>
-					<//>
-					<p><button class="button" type="button" onClick=${() => setLeaving(null)}>Keep it</button></p>` : null}
+					<//>` : null}
 			</div>
 			${unavailable ? html`<p class="note passkeys__note">${unavailable.replace(/^./, (first) => first.toUpperCase())}</p>` : null}
 			${!unavailable && !codes.length && !leaving ? html`<${NewPasskey} make=${make} error=${error} busy=${busy} />` : null}

@@ -14,8 +14,8 @@ import { proof } from './proof.js';
 /** @import {EnrolmentJson, SecondFactorJson} from '../api/people.js' */
 /** @import {ComponentChildren} from 'preact' */
 
-/** A form with one field. @param {{id: string, label: string, button: string, name: string, type?: string, complete: string, optional?: boolean, error: ApiError | null, send: (text: string) => void, children?: ComponentChildren}} props */
-export function OneField({ id, label, button, name, type = 'text', complete, optional = false, error, send, children }) {
+/** A form with one field. @param {{id: string, label: string, button: string, name: string, type?: string, complete: string, optional?: boolean, error: ApiError | null, send: (text: string) => void, beside?: ComponentChildren, children?: ComponentChildren}} props `beside`: the button */
+export function OneField({ id, label, button, name, type = 'text', complete, optional = false, error, send, beside, children }) {
 	/** @param {SubmitEvent} event */
 	function submit(event) {
 		event.preventDefault();
@@ -26,7 +26,7 @@ export function OneField({ id, label, button, name, type = 'text', complete, opt
 			${children}
 			<div class="form__row"><label for=${id}>${label}</label><input class="field" id=${id} name=${name} type=${type} required=${!optional} maxlength=${type === 'password' ? 200 : 40} autocomplete=${complete} /></div>
 			<${FormError} error=${error} />
-			<p><button class="button" type="submit">${button}</button></p>
+			<p class="buttons"><button class="button" type="submit">${button}</button>${beside}</p>
 		</form>
 	`;
 }
@@ -70,6 +70,13 @@ function useFactor(again = 0) {
 	};
 }
 
+/** What there is, and how it goes. @param {{state: SecondFactorJson, error: ApiError | null, remove: (password: string) => void}} props */
+function Remove({ state, error, remove }) {
+	const told = html`<p>A code is asked for after your password. ${state.codes_left} of 10 recovery codes are left.</p>`;
+	if (state.required) return html`${told}<p class="note">Everybody needs one here. Has the device changed? An admin takes it away, then you make another one.</p>`;
+	return html`<${OneField} key="remove" id="factor-remove" ...${proof()} button="Take it away" name="password" type="password" complete="current-password" error=${error} send=${remove}>${told}<//>`;
+}
+
 /** @param {{changed?: () => void, again?: number}} props */
 export function SecondFactorCard({ changed = () => {}, again = 0 }) {
 	const { state, made, codes, error, begin, confirm, remove, close } = useFactor(again);
@@ -84,10 +91,7 @@ export function SecondFactorCard({ changed = () => {}, again = 0 }) {
 					${state.on ? html`<p>Your passkeys are asked for after your password; ${state.codes_left} of 10 recovery codes are left.</p>` : null}
 					<p>With an authenticator (an app on your phone) a password alone, in wrong hands, opens nothing.</p>
 				<//>` : null}
-			${state && !made && !codes && state.authenticator ? html`
-				<p>A code is asked for after your password. ${state.codes_left} of 10 recovery codes are left.</p>
-				${state.required ? html`<p class="note">Everybody needs one here. Has the device changed? An admin takes it away, then you make another one.</p>` : html`
-					<${OneField} key="remove" id="factor-remove" ...${proof()} button="Take it away" name="password" type="password" complete="current-password" error=${error} send=${remove} />`}` : null}
+			${state && !made && !codes && state.authenticator ? html`<${Remove} state=${state} error=${error} remove=${remove} />` : null}
 		</section>
 	`;
 }
