@@ -31,7 +31,7 @@ import httpx
 import psutil
 import yaml
 
-from app.commands.program import app as touchline
+from app.commands.command_line import app as touchline
 from app.config import Settings
 from app.object_store.store import ObjectStore, open_store
 from app.review.jobs.solve import WORTH_A_POOL

@@ -50,5 +50,6 @@ def solved_groups(session: Session, after: int) -> list[tuple[int, int]]:
         .join(SolutionModel, SolutionModel.group_id == GroupModel.id)
         .where(SolutionModel.id > after)
         .distinct()
+        .order_by(GroupModel.dataset_id, GroupModel.id)
     )
     return [(row.dataset_id, row.id) for row in session.execute(statement)]

@@ -10,7 +10,7 @@ import pytest
 from sqlalchemy import update
 from typer.testing import CliRunner
 
-from app.commands.program import app as cli
+from app.commands.command_line import app as cli
 from app.config import Settings
 from app.errors import InputError
 from app.evaluation.overlap import iou

@@ -27,10 +27,10 @@ LOAD_ALL = """(modules) => {
   const folder = new URL('.', document.querySelector('script[src$="/main.js"]').src);
   return Promise.all(modules.map(async (name) => { await import(new URL(name, folder).href); }));
 }"""
-ASK = """from app import cli
-print(cli.__file__)
+ASK = """from app.commands import command_line
+print(command_line.__file__)
 for words in (["--version"], ["backup", "-h"]):
-    cli.app(words, standalone_mode=False)
+    command_line.app(words, standalone_mode=False)
 """
 WHEEL, SOURCES = "*.whl", "*.tar.gz"
 

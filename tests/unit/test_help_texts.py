@@ -45,7 +45,7 @@ PLAIN_WORDS = """
     application archive archives arrays arrival ask axis backup bar bars batches best binned bodies
     bundle proposal
     body boxes bulk button buttons cache calibrate canvas caption card cards cell changes chart
-    child chip choice chooser class cli client clock codec codecs colours comparison completion
+    child chip choice chooser class cli client clock codec codecs colours command comparison completion
     conditions config confirm connections contact copy cross csv cursor curve damped delete deps details
     detect diagram dialog diff doctor document documents drags drawing durable editor empty encode
     encoded engine environment estimator etags evaluate event events exact examination export

@@ -9,7 +9,7 @@ import pytest
 from sqlalchemy import text
 from typer.testing import CliRunner
 
-from app.commands.program import app
+from app.commands.command_line import app
 from app.config import Settings
 from app.review.importing.ingest import ensure_dataset
 from app.store.dialect.dialect import dialect_of

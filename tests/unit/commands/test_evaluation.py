@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner, Result
 
-from app.commands.program import app
+from app.commands.command_line import app
 from app.config import Settings
 from app.datasets.report import Report
 from app.datasets.soccernet_v3_reader import read_soccernet_v3

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from app.commands.program import app
+from app.commands.command_line import app
 from app.config import Settings
 from app.errors import InputError
 from app.review.importing.ingest import ingest

@@ -17,7 +17,7 @@ from typer.testing import CliRunner, Result
 from app.api.application import create_app
 from app.api.server import listen, make_server
 from app.api.team import Team
-from app.commands.program import app
+from app.commands.command_line import app
 from app.commands.remote import write_evaluation
 from app.commands.server import Server, _explained, connected
 from app.commands.terminal import log_to_stderr

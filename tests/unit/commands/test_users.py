@@ -14,7 +14,7 @@ from pwdlib import PasswordHash
 from pwdlib.hashers.argon2 import Argon2Hasher
 from typer.testing import CliRunner, Result
 
-from app.commands.program import app
+from app.commands.command_line import app
 from app.config import Settings
 from app.errors import NotLoggedInError
 from app.review.importing.ingest import ensure_dataset

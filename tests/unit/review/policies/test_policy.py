@@ -53,6 +53,7 @@ class TestReadPolicy:
         with pytest.raises(NotFoundError):
             read_policy(store, "nothing")
 
+    @pytest.mark.file_of_sqlite("which index SQLite says that it would use")
     def test_reads_a_few_entries_however_long_the_log(self, store: Store) -> None:
         ensure_dataset(store, "demo", "ann")
         with store.read() as session:

@@ -18,7 +18,7 @@ import pytest
 import typer
 
 from app import cli
-from app.commands.program import YOUNG, app
+from app.commands.command_line import YOUNG, app
 from app.datasets.manifest import software_version
 from app.datasets.sn_calibration_writer import lines_to_json
 from tests.scenes import make_scenes

@@ -1,4 +1,4 @@
-"""The program: the command line with all its commands, the place where everything is put together.
+"""The command line with all its commands: the place where everything is put together.
 
 A command (``app.commands``) parses, calls one function of a floor below, prints a table or JSON
 and returns an exit code: 0 done, 1 it could not be done, 2 it was asked for in a wrong way.
