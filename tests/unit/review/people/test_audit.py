@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from app.errors import InputError
 from app.review.editing.replay import _STEPS
 from app.review.editing.submit import load
 from app.review.people.audit import KINDS, Family, every_entry, read_audit
@@ -93,6 +94,16 @@ class TestAudit:
                     break
                 before = page.next
             assert ids == every
+
+    def test_what_cannot_be_read_is_refused_before_the_first_entry_is_given(
+        self, store: Store, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        def refuse(*_asked: object) -> None:
+            raise InputError("a text holds a character that the database cannot keep")
+
+        monkeypatch.setattr("app.review.people.audit.audit_rows", refuse)
+        with pytest.raises(InputError):
+            every_entry(store, ALL, EVERYTHING)
 
     def test_every_kind_that_the_log_knows_has_its_family(self) -> None:
         assert {kind for kinds in KINDS.values() for kind in kinds} == set(_STEPS) | {"import"}
