@@ -13,6 +13,8 @@ import re
 from dataclasses import dataclass
 
 import anyio
+from starlette.datastructures import Headers
+from starlette.responses import HTMLResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from app.api.problem import make_problem, problem_response
@@ -21,6 +23,14 @@ from app.api.security.origin import SAFE_METHODS
 PATIENCE = 10.0
 """Seconds that a request waits for its turn."""
 RETRY_SECONDS = "2"
+BUSY_PAGE = f"""<!doctype html>
+<html lang="en">
+<meta charset="utf-8">
+<meta http-equiv="refresh" content="{RETRY_SECONDS}">
+<title>Busy · Touchline</title>
+<p>The server is busy with other pages. This one tries again by itself; nothing is lost.</p>
+</html>
+"""
 
 
 @dataclass(frozen=True)
@@ -178,12 +188,7 @@ class Lanes:
             await self.app(scope, receive, send)
             return
         if not await door.enter():
-            problem = make_problem(
-                503,
-                f"the server is busy with other {door.lane.name}",
-                hint="Nothing was done. Send it again in a moment.",
-            )
-            await problem_response(problem, {"Retry-After": RETRY_SECONDS})(scope, receive, send)
+            await _refusal(scope, door.lane)(scope, receive, send)
             return
         place = _Place(door)
 
@@ -195,6 +200,19 @@ class Lanes:
             await self.app(scope, receive, watch)
         finally:
             place.end()
+
+
+def _refusal(scope: Scope, lane: Lane) -> Response:
+    """What who had no turn is told: a page for people who asked for one, else a problem."""
+    later = {"Retry-After": RETRY_SECONDS}
+    if lane is PAGES and "text/html" in Headers(scope=scope).get("accept", ""):
+        return HTMLResponse(BUSY_PAGE, 503, {**later, "Cache-Control": "no-store"})
+    problem = make_problem(
+        503,
+        f"the server is busy with other {lane.name}",
+        hint="Nothing was done. Send it again in a moment.",
+    )
+    return problem_response(problem, later)
 
 
 class _Place:

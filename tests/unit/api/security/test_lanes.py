@@ -105,14 +105,18 @@ class Service:
         self.work, self.doors = Work(), Doors()
         self.lanes = Lanes(self.work, self.doors)
         self.statuses: list[int] = []
+        self.bodies: list[bytes] = []
         self.tasks: list[asyncio.Task[None]] = []
 
-    def ask(self, method: str, path: str) -> None:
-        scope = {"type": "http", "method": method, "path": PREFIX + path, "headers": []}
+    def ask(self, method: str, path: str, prefix: str = PREFIX, accept: str = "*/*") -> None:
+        headers = [(b"accept", accept.encode())]
+        scope = {"type": "http", "method": method, "path": prefix + path, "headers": headers}
 
         async def send(message: Any) -> None:
             if message["type"] == "http.response.start":
                 self.statuses.append(message["status"])
+            else:
+                self.bodies.append(message["body"])
 
         async def run() -> None:
             await self.lanes(scope, receive_nothing, send)
@@ -188,6 +192,25 @@ class TestLanes:
             while not service.statuses:
                 await asyncio.sleep(0.01)
             assert service.statuses == [503]
+            await service.end()
+
+        run(test)
+
+    @pytest.mark.parametrize(
+        ("accept", "begins"), [("text/html,*/*", b"<!doctype html>"), ("*/*", b'{"type"')]
+    )
+    def test_who_waits_for_a_page_is_told_by_one(
+        self, monkeypatch: pytest.MonkeyPatch, accept: str, begins: bytes
+    ) -> None:
+        monkeypatch.setattr(lanes, "PATIENCE", 0.01)
+
+        async def test(service: Service) -> None:
+            for _ in range(PAGES.width + 1):
+                service.ask("GET", "/groups", prefix="", accept=accept)
+            while not service.bodies:
+                await asyncio.sleep(0.01)
+            assert service.statuses == [503]
+            assert service.bodies[0].startswith(begins)
             await service.end()
 
         run(test)
