@@ -6,7 +6,7 @@ import io
 import json
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import closing
 from dataclasses import replace
 from functools import cached_property
@@ -31,6 +31,7 @@ from tests.integration.conftest import bomb, picture
 from tests.provider import CLIENT, SECRET, Provider, providing
 from tests.scenes import make_scenes
 from tests.security.asking import JSON, Asker
+from tests.security.door import Door
 from tests.security.team import HIDDEN, Team
 from tests.waiting import SECONDS
 
@@ -193,3 +194,20 @@ def team(tmp_path_factory: pytest.TempPathFactory, provider: Provider) -> Iterat
             server.should_exit = True
             thread.join(SECONDS)
         passwords._nobodys.cache_clear()
+
+
+@pytest.fixture
+def door(team: Team, provider: Provider) -> Iterator[Door]:
+    provider.behave()
+    yield Door(team, provider)
+    provider.behave()
+
+
+@pytest.fixture
+def ruled(door: Door, monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
+    """Lets the operator have said something else of whom to let in."""
+
+    def rule(**other: Any) -> None:
+        monkeypatch.setattr(door.sign_on, "rules", replace(door.sign_on.rules, **other))
+
+    return rule

@@ -2,115 +2,23 @@
 
 from __future__ import annotations
 
-import base64
-import hmac
 import json
-import threading
-import time
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
 from datetime import timedelta
-from functools import partial
 from typing import Any
-from urllib.parse import parse_qs, urlsplit
 
 import httpx
 import pyotp
 import pytest
-from cryptography.hazmat.primitives.serialization import Encoding, PublicFormat
-from joserfc import jwk
 
-from app.review.people import provider_answers
 from app.review.people.attempts import Attempts
 from app.review.people.links import make_first_link
 from app.review.people.logins import Way
-from app.review.people.people import change_person, find_person, invite
+from app.review.people.people import change_person, find_person
 from app.review.people.roles import Role
 from app.review.people.second_factor import SecondFactors
-from app.review.people.sign_on import LASTS, SignOn
-from tests.provider import CLIENT, Provider, send_away, tell
-from tests.provider import SECRET as CLIENT_SECRET
-from tests.security.asking import Answer
-from tests.security.team import API, SECRET, Team, cookie_in
-
-BEGIN, FINISH = f"{API}/session/sign-on/begin", f"{API}/session/sign-on"
-
-
-@dataclass
-class Door:
-    """Somebody before the team's server, who comes by the provider."""
-
-    team: Team
-    provider: Provider
-
-    @property
-    def sign_on(self) -> SignOn:
-        found: SignOn = self.team.app.state.team.sign_on
-        return found
-
-    def begin(self, **said: Any) -> tuple[str, str]:
-        """Address at the provider, and the cookie of the browser."""
-        answer = self.team.ask("POST", BEGIN, said)
-        return json.loads(answer.body)["address"], cookie_in(answer)
-
-    def back(self, address: str) -> dict[str, str]:
-        """What the provider adds to our address once somebody has logged in there."""
-        there = httpx.get(address, follow_redirects=False).headers["location"]
-        assert there.startswith(f"{self.team.address}/login?"), there
-        return {name: values[0] for name, values in parse_qs(urlsplit(there).query).items()}
-
-    def finish(self, told: dict[str, str], cookie: str, **more: str) -> Answer:
-        return self.team.ask("POST", FINISH, {**told, **more}, Cookie=cookie)
-
-    def enter(self, **said: Any) -> Answer:
-        address, cookie = self.begin(**said)
-        return self.finish(self.back(address), cookie)
-
-    def invite(self, name: str, role: Role = Role.ANNOTATOR) -> str:
-        """The link of somebody new."""
-        return invite(self.team.store, name, role, actor="local")[1].token
-
-    def join(self, name: str, role: Role = Role.ANNOTATOR) -> None:
-        """Somebody new, who comes by the provider from now on."""
-        self.provider.who = {"sub": f"s-{name}", "preferred_username": name}
-        assert name_in(self.enter(link=self.invite(name, role))) == name
-
-
-@pytest.fixture
-def door(team: Team, provider: Provider) -> Iterator[Door]:
-    provider.behave()
-    yield Door(team, provider)
-    provider.behave()
-
-
-@pytest.fixture
-def ruled(door: Door, monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
-    """Lets the operator have said something else of whom to let in."""
-
-    def rule(**other: Any) -> None:
-        monkeypatch.setattr(door.sign_on, "rules", replace(door.sign_on.rules, **other))
-
-    return rule
-
-
-def name_in(answer: Answer) -> str:
-    assert answer.status == 200, answer.body
-    return str(json.loads(answer.body)["session"]["name"])
-
-
-def session_in(answer: Answer) -> str:
-    """The cookie of the session that an answer begins."""
-    found = [
-        part.partition(";")[0]
-        for part in answer.headers["set-cookie"].replace(", touch", "\ntouch").split("\n")
-    ]
-    return next(part for part in found if part.startswith("touchline_session="))
-
-
-def assert_refused(answer: Answer, status: int = 401, word: str = "") -> None:
-    assert answer.status == status, answer.body
-    assert "touchline_session" not in answer.headers.get("set-cookie", "")
-    assert word in answer.body.decode(), answer.body
+from app.review.people.sign_on import LASTS
+from tests.security.door import BEGIN, FINISH, Door, assert_refused, name_in, session_in
+from tests.security.team import API, SECRET, cookie_in
 
 
 class TestComingIn:
@@ -302,171 +210,6 @@ class TestState:
         assert_refused(door.finish(told, cookie, iss="https://evil.example"), word="another")
         address, cookie = door.begin()
         assert name_in(door.finish(door.back(address), cookie, iss=door.provider.address)) == "ida"
-
-
-def pack(content: bytes) -> str:
-    return base64.urlsafe_b64encode(content).rstrip(b"=").decode()
-
-
-def by_hand(claims: dict[str, Any], header: dict[str, str], secret: bytes | None) -> str:
-    """A token as no library makes it: without a signature, or by a secret that may be a public key."""
-    parts = ".".join(pack(json.dumps(one).encode()) for one in ({"kid": "first", **header}, claims))
-    mac = b"" if secret is None else hmac.digest(secret, parts.encode(), "sha256")
-    return f"{parts}.{pack(mac)}"
-
-
-def public_keys(provider: Provider) -> list[bytes]:
-    """What everybody has of the provider's key, in the forms in which it could be mistaken for a secret."""
-    key = provider.key.raw_value.public_key()
-    forms = (Encoding.PEM, Encoding.DER)
-    return [key.public_bytes(form, PublicFormat.SubjectPublicKeyInfo) for form in forms]
-
-
-class TestToken:
-    def test_says_what_was_asked_or_nobody_comes_in(self, door: Door) -> None:
-        door.join("tom")
-        now = int(time.time())
-        for changed in (
-            {"nonce": "another"},
-            {"nonce": None},
-            {"aud": "another client"},
-            {"aud": "another client", "azp": CLIENT},
-            {"aud": [CLIENT, "another client"]},
-            {"aud": None},
-            {"azp": "another client"},
-            {"iss": "https://evil.example"},
-            {"iss": None},
-            {"exp": now - 3600},
-            {"exp": None},
-            {"iat": now + 3600},
-            {"nbf": now + 3600},
-            {"sub": None},
-            {"sub": 7},
-        ):
-            door.provider.changed = changed
-            assert_refused(door.enter(), word="not vouch")
-
-    def test_the_clocks_may_differ_by_a_minute(self, door: Door) -> None:
-        door.join("clara")
-        now = int(time.time())
-        door.provider.changed = {"exp": now - 40, "iat": now - 300}
-        assert name_in(door.enter()) == "clara"
-
-    def test_is_signed_by_the_provider_and_by_nobody_else(self, door: Door) -> None:
-        door.join("ken")
-        other = jwk.RSAKey.generate_key(2048, {"kid": "first"})
-        signed = door.provider.signed
-        secrets = [*public_keys(door.provider), CLIENT_SECRET.encode()]
-        for sign in (
-            *(
-                partial(by_hand, header={"alg": alg}, secret=None)
-                for alg in ("none", "None", "RS256")
-            ),
-            *(partial(by_hand, header={"alg": "HS256"}, secret=one) for one in secrets),
-            lambda claims: signed(claims, other),
-            lambda claims: signed(claims)[:-8] + "AAAAAAAA",
-            lambda claims: signed(claims, other, jwk=other.as_dict(private=False)),
-            lambda claims: "no token",
-        ):
-            door.provider.sign = sign
-            assert_refused(door.enter(), word="not vouch")
-
-    def test_new_keys_of_the_provider_are_asked_for_but_not_by_everybodys_word(
-        self, door: Door
-    ) -> None:
-        door.join("nina")
-        kept = door.sign_on._provider._keys
-        assert kept is not None
-        door.provider.key = jwk.RSAKey.generate_key(2048, {"kid": "second"})
-        door.provider.asked.clear()
-        assert_refused(door.enter(), word="not vouch")
-        assert "/keys" not in door.provider.asked, "they were asked for within the last minute"
-        old = replace(kept, at=kept.at - timedelta(minutes=2))
-        door.sign_on._provider._keys = old
-        assert name_in(door.enter()) == "nina"
-        door.provider.behave()
-        door.sign_on._provider._keys = old
-
-
-class TestProvider:
-    """One that does not do as it should."""
-
-    @pytest.fixture(autouse=True)
-    def forgetful(self, door: Door, monkeypatch: pytest.MonkeyPatch) -> None:
-        """Nothing is remembered of it."""
-        there = door.sign_on._provider
-        monkeypatch.setattr(there, "_description", None)
-        monkeypatch.setattr(there, "_keys", None)
-
-    def test_that_never_ends_holds_nobody_up(
-        self, door: Door, monkeypatch: pytest.MonkeyPatch
-    ) -> None:
-        monkeypatch.setattr(provider_answers, "SECONDS", 2.0)
-        answered, heard_out = threading.Event(), []
-
-        def drip(handler: Any) -> None:
-            handler.send_response(200)
-            handler.end_headers()
-            for _ in range(200):
-                if answered.wait(0.1):
-                    return
-                handler.wfile.write(b" ")
-                handler.wfile.flush()
-            heard_out.append(True)
-
-        door.provider.instead["/token"] = drip
-        refused = self.ends(door)
-        answered.set()
-        assert_refused(refused, 409, "does not answer")
-        assert not heard_out
-
-    def test_that_talks_too_much_is_not_heard_out(self, door: Door) -> None:
-        sent = []
-
-        def talk(handler: Any) -> None:
-            handler.send_response(200)
-            handler.end_headers()
-            for _ in range(160):
-                handler.wfile.write(b" " * 2**16)
-                sent.append(2**16)
-
-        door.provider.instead["/token"] = talk
-        assert_refused(self.ends(door), 409, "does not answer")
-        assert sum(sent) < 10 * 2**20
-
-    @pytest.mark.parametrize("path", ["/.well-known/openid-configuration", "/token", "/keys"])
-    def test_that_sends_us_elsewhere_is_not_followed(self, door: Door, path: str) -> None:
-        door.provider.instead["/elsewhere"] = lambda handler: tell(handler, {"keys": []})
-        there = f"{door.provider.address}/elsewhere"
-        door.provider.instead[path] = lambda handler: send_away(handler, there)
-        door.provider.asked.clear()
-        assert_refused(self.ends(door), 409, "does not answer")
-        assert "/elsewhere" not in door.provider.asked
-
-    @pytest.mark.parametrize("name", ["token_endpoint", "jwks_uri", "authorization_endpoint"])
-    def test_that_names_foreign_addresses_is_refused(self, door: Door, name: str) -> None:
-        path = "/.well-known/openid-configuration"
-        for there in ("http://127.0.0.2:9/x", "https://127.0.0.1/x", "file:///etc/passwd", 7):
-            described = {**door.provider.described(), name: there}
-            door.provider.instead[path] = lambda handler, said=described: tell(handler, said)
-            assert_refused(self.ends(door), 409, "TOUCHLINE_SSO_HOSTS")
-
-    def test_that_calls_itself_otherwise_is_refused(self, door: Door) -> None:
-        described = {**door.provider.described(), "issuer": "https://evil.example"}
-        path = "/.well-known/openid-configuration"
-        door.provider.instead[path] = lambda handler: tell(handler, described)
-        assert_refused(self.ends(door), 409, "not what this server was told")
-
-    @pytest.mark.parametrize("said", [b"[1]", b"<html>", b'{"a":' * 9000, b"\xff"])
-    def test_that_talks_nonsense_is_refused(self, door: Door, said: bytes) -> None:
-        door.provider.instead["/token"] = lambda handler: tell(handler, said)
-        assert_refused(self.ends(door), 409, "does not answer")
-
-    def ends(self, door: Door) -> Answer:
-        begun = door.team.ask("POST", BEGIN, {})
-        if begun.status != 200:
-            return begun
-        return door.finish(door.back(json.loads(begun.body)["address"]), cookie_in(begun))
 
 
 class TestSecondFactor:
