@@ -159,7 +159,7 @@ function PolicyOf({ one }) {
 	return html`
 		${job ? html`<section class="card"><${JobProgress} job=${job} /></section>` : null}
 		${error ? html`<p class="card form__error" role="alert">${error}</p>` : null}
-		<div class="page__columns">
+		<div class="page__columns policy">
 			<${PolicyText} key=${`${policy.hash} ${policy.version}`} one=${one} policy=${policy} etag=${etag} busy=${busy} send=${send} />
 			<div class="page__list">
 				<${Shipped} one=${one} policy=${policy} etag=${etag} shipped=${shipped} busy=${busy} send=${send} />
