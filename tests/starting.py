@@ -155,7 +155,7 @@ def wait_for_requests() -> str:
     """Fork for every request, and return the program that is to be run, in the fork."""
     line = socket.socket(fileno=int(sys.argv[1]))
     # Ctrl+C reaches every process of a terminal; this one ends with its parent.
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    interrupted = signal.signal(signal.SIGINT, signal.SIG_IGN)
     _load()
     while True:
         message, files, _, _ = socket.recv_fds(line, MOST, 3)
@@ -165,6 +165,8 @@ def wait_for_requests() -> str:
         if not between:
             _leave_behind(line)
             program = _become(json.loads(message), files)
+            # Whoever was started in the background of a script ignores it, and so do its children.
+            signal.signal(signal.SIGINT, interrupted)
             line.send(b"born")
             line.close()
             return program
@@ -217,7 +219,6 @@ def _become(asked: dict[str, Any], files: list[int]) -> str:
     os.environ.clear()
     os.environ.update(asked["environment"])
     time.tzset()
-    signal.signal(signal.SIGINT, signal.default_int_handler)
     sys.argv = ["-c", *asked["arguments"]]
     return str(asked["program"])
 

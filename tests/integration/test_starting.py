@@ -52,7 +52,9 @@ ENDS = {
     "import threading; threading.Timer(0.01, print, ['from a thread']).start()": 0,
     "import os, signal; os.kill(os.getpid(), signal.SIGTERM)": -signal.SIGTERM,
     "import os, signal; os.kill(os.getpid(), signal.SIGKILL)": -signal.SIGKILL,
-    "import os, signal; os.kill(os.getpid(), signal.SIGINT)": -signal.SIGINT,
+    "import os, signal; os.kill(os.getpid(), signal.SIGINT)": (
+        0 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN else -signal.SIGINT
+    ),
     "import os; os.abort()": -signal.SIGABRT,
 }
 """Programs, and the exit codes that ``subprocess`` knows them by."""
