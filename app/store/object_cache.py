@@ -10,6 +10,7 @@ import contextlib
 import fcntl
 import hashlib
 import os
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -20,6 +21,8 @@ LOOKS = 50
 """After every fiftieth part of the room a process looks whether there is too much."""
 KEPT = 0.8
 """Part of the room that is left full; the rest is for what is written between two looks."""
+PATIENCE_S = 5.0
+"""Who has written its part waits so long for another who makes room; one that was stopped holds nobody."""
 
 
 class ObjectCache:
@@ -90,16 +93,25 @@ class ObjectCache:
 
     @contextlib.contextmanager
     def _alone(self) -> Iterator[bool]:
-        """Whether no other process makes room now."""
+        """Whether no other makes room any more: what was written meanwhile counts, too."""
         handle = os.open(self._folder, os.O_RDONLY | os.O_CLOEXEC)
         try:
-            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            yield True
-        except BlockingIOError:
-            yield False
+            yield _locked(handle, time.monotonic() + PATIENCE_S)
         finally:
             os.close(handle)
 
     def _place(self, name: str) -> Path:
         digest = hashlib.sha256(name.encode()).hexdigest()
         return self._folder / digest[:2] / digest[2:34]
+
+
+def _locked(handle: int, until: float) -> bool:
+    """Lock an open folder, or say that another held it all the while."""
+    while True:
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            return True
+        except BlockingIOError:
+            if time.monotonic() > until:
+                return False
+            time.sleep(0.005)
