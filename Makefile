@@ -141,4 +141,4 @@ postgresql: setup
 	@$(BIN)/python -m tests.install_postgresql
 
 clean:
-	rm -rf .venv .venv-release .venv-generators .readers dist static/node_modules tests/generators/node_modules
+	rm -rf .venv .venv-release .venv-generators .readers .moto dist static/node_modules tests/generators/node_modules
