@@ -45,7 +45,9 @@ def run(arguments: list[str]) -> int:
         url = cluster.make(EMPTY, "template0")
         Store.open(Settings(home=cluster.folder / "home", database_url=url)).close()
         command = [sys.executable, "-m", "pytest", *arguments]
-        environment = {**os.environ, NAMED: str(cluster.folder)}
+        # A home that was named for the caller, as make does, would give its database to all.
+        environment = {name: text for name, text in os.environ.items() if name not in (_HOME, _URL)}
+        environment[NAMED] = str(cluster.folder)
         return subprocess.run(command, env=environment, check=False).returncode
 
 
