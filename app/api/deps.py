@@ -30,6 +30,7 @@ from app.review.jobs.imports import resume_imports
 from app.review.jobs.jobs import Jobs, Pool
 from app.review.jobs.paint import PAINT
 from app.review.jobs.pictures import PICTURES
+from app.review.jobs.positions import POSITIONS
 from app.review.jobs.proposals import PROPOSALS
 from app.review.jobs.rig import make_rigs
 from app.review.jobs.shared_jobs import SharedJobs
@@ -111,6 +112,8 @@ class Services:
         resume_solving(self.jobs, self.store)
         for kind in (PAINT, PROPOSALS, PICTURES):
             kind.resume(self.jobs, self.store)
+        # Begun again, a share would be one more to take back.
+        POSITIONS.make(self.jobs, self.store)
         resume_exports(self.jobs, self.store, self.exports, self.frames)
         resume_versions(self.jobs, self.store)
         resume_imports(self.jobs, self.store, self.settings)

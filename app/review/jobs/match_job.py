@@ -103,12 +103,18 @@ class MatchJob:
 
     def resume(self, jobs: Jobs, store: Store) -> None:
         """Let what an earlier server was at go on; its work leaves alone what is done."""
+        jobs.resumes(self.kind, self._work_of(jobs, store))
 
+    def make(self, jobs: Jobs, store: Store) -> None:
+        """Let another process carry out what this one is asked for; after a death nothing goes on."""
+        jobs.makes(self.kind, self._work_of(jobs, store))
+
+    def _work_of(self, jobs: Jobs, store: Store) -> Callable[[Job], Work]:
         def work_of(job: Job) -> Work:
             match, run = job.request["match"], job.request.get("run")
             return self._work(MatchesAsked(jobs, store, job.dataset_id or 0, match, job.actor, run))
 
-        jobs.resumes(self.kind, work_of)
+        return work_of
 
     def take_back(
         self,

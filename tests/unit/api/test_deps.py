@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import asyncio
+from importlib import import_module
 from inspect import iscoroutinefunction
 from pathlib import Path
+from pkgutil import iter_modules
 from threading import Event
 
 import pytest
@@ -15,7 +17,10 @@ from app.api.errors import PreconditionRequiredError
 from app.api.reply import get_asked
 from app.config import Settings
 from app.errors import BusyError, InputError
+from app.review import jobs
 from app.review.jobs import upkeep
+from app.review.jobs.jobs import Jobs
+from app.review.jobs.match_job import MatchJob
 
 
 class TestServices:
@@ -37,6 +42,26 @@ class TestServices:
         assert tidying.wait(20)
         services.close()
         assert told == [True]
+
+    def test_another_process_can_make_the_work_of_every_kind_of_job_over_matches(
+        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        made: set[str] = set()
+        for name in ("makes", "resumes"):
+            monkeypatch.setattr(Jobs, name, lambda _, kind, work_of: made.add(kind))
+        services = Services.open(Settings(home=tmp_path / "home"))
+        services.start()
+        services.close()
+        modules = [
+            import_module(f"{jobs.__name__}.{item.name}") for item in iter_modules(jobs.__path__)
+        ]
+        kinds = {
+            value.kind
+            for module in modules
+            for value in vars(module).values()
+            if isinstance(value, MatchJob)
+        }
+        assert {"paint", "positions"} <= kinds <= made
 
 
 class TestRequireIfMatch:
