@@ -13,7 +13,7 @@ from app.geometry.camera import Camera
 from app.soccer.finding import Finding
 from app.soccer.frames import Box, ImagePoint, height_above_grass
 
-SOLVER_VERSION = "6"
+SOLVER_VERSION = "7"
 """Part of every solution's key; raised by one whenever a number changes."""
 
 GAMMAS_PERCENT = (0.5, 1.0, 2.0)
@@ -41,8 +41,10 @@ class MarkingFit:
         outcome: ``tp``, ``fp`` or ``fn`` at the policy's gamma, as JaC counts it.
         distances_px: Distance of each annotated point to the projected polyline; empty when
             the marking is not annotated or not visible.
-        nearest: The closest place on the polyline for each annotated point.
-        polyline: The projected marking, clipped at the image border; empty when not visible.
+        nearest: The closest place on the polyline for each annotated point, to a thousandth of a
+            pixel.
+        polyline: The projected marking, clipped at the image border, likewise; empty when not
+            visible.
         used: False when the solver left the marking out.
     """
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Mapping
 from dataclasses import replace
+from itertools import islice
 from types import MappingProxyType
 
 import numpy as np
@@ -28,7 +29,13 @@ from app.soccer.solution import (
     PaintFit,
     Suspect,
 )
-from app.solving.jaccard import jaccard, measure_markings, outcomes, project_markings
+from app.solving.jaccard import (
+    ProjectedMarking,
+    jaccard,
+    measure_markings,
+    outcomes,
+    project_markings,
+)
 from app.solving.labels import find_suspects
 from app.solving.observations import Observations, observe
 from app.solving.paint_camera import PaintProblem, solve_paint
@@ -46,6 +53,9 @@ MIN_MEASUREMENTS = 7
 """A camera with one focal length has seven unknowns; the distortion has a prior."""
 
 NONE_KNOWN: Mapping[str, Calibration] = MappingProxyType({})
+
+DRAWN_DIGITS = 3
+"""Decimals of a pixel that are kept of what is drawn; distances keep every bit."""
 
 MAX_POSITION_SIGMA_M = 5.0
 MAX_FOCAL_SIGMA = 0.10
@@ -322,16 +332,13 @@ def measure(calibration: Calibration, lines: Lines, pitch: Pitch, size: ImageSiz
     by_gamma = [outcomes(measured, lines, gamma / 100 * size.diagonal) for gamma in GAMMAS_PERCENT]
     left_out = {suspect.marking for suspect in calibration.suspects}
     markings = []
+    drawn = _drawn(measured)
     for marking, outcome in by_gamma[0].items():
         fit = MarkingFit(marking, outcome, used=marking not in left_out)
         if marking in measured:
-            seen = measured[marking]
-            fit = replace(
-                fit,
-                distances_px=tuple(seen.distances.tolist()),
-                nearest=_points(seen.nearest),
-                polyline=_points(seen.polyline),
-            )
+            nearest, polyline = drawn[marking]
+            distances_px = tuple(measured[marking].distances.tolist())
+            fit = replace(fit, distances_px=distances_px, nearest=nearest, polyline=polyline)
         markings.append(fit)
     distances = np.concatenate([np.array(fit.distances_px) for fit in markings] or [np.empty(0)])
     has_lines = any(lines.values())
@@ -383,5 +390,13 @@ def _unobservable(spread: FloatArray) -> tuple[str, ...]:
     return tuple(words)
 
 
-def _points(pixels: FloatArray) -> tuple[ImagePoint, ...]:
-    return tuple(ImagePoint(x, y) for x, y in pixels.tolist())
+def _drawn(
+    measured: Mapping[str, ProjectedMarking],
+) -> dict[str, tuple[tuple[ImagePoint, ...], tuple[ImagePoint, ...]]]:
+    """Nearest places and polyline of each marking, as they are drawn: rounded."""
+    if not measured:
+        return {}
+    pixels = [part for seen in measured.values() for part in (seen.nearest, seen.polyline)]
+    points = map(ImagePoint._make, np.round(np.concatenate(pixels), DRAWN_DIGITS).tolist())
+    parts = iter([tuple(islice(points, len(part))) for part in pixels])
+    return {marking: (next(parts), next(parts)) for marking in measured}

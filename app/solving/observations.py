@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 
 from app.geometry.arrays import FloatArray
+from app.geometry.point_kernels import keep_farthest
 from app.geometry.resection import ARC, SEGMENT, Curves, IntArray, Sightings
 from app.soccer.annotation import Lines
 from app.soccer.frames import ImageSize
@@ -54,13 +54,10 @@ class Observations:
 
         The points farthest apart are kept: they say nearly all there is.
         """
-        kept: list[int] = []
-        for index in np.unique(self.marking):
-            rows = np.flatnonzero(self.marking == index)
-            limit = circular if self.curves.kinds[index] == ARC else straight
-            kept.extend(_spread(self.pixels[rows], rows, limit))
-        chosen = np.array(sorted(kept), dtype=np.int64)
-        return Observations(self.curves, self.pixels[chosen], self.marking[chosen])
+        limits = np.where(self.curves.kinds == ARC, circular, straight)
+        keep = np.empty(len(self.pixels), dtype=np.bool_)
+        keep_farthest(self.pixels, self.marking, limits, keep)
+        return Observations(self.curves, self.pixels[keep], self.marking[keep])
 
 
 def observe(lines: Lines, pitch: Pitch, size: ImageSize) -> Observations:
@@ -101,18 +98,3 @@ def _numbers(shape: Segment | Arc) -> tuple[float, ...]:
     if isinstance(shape, Arc):
         return (*shape.center, shape.radius, shape.first, shape.last, 0.0)
     return (*shape.start, *shape.end)
-
-
-def _spread(pixels: FloatArray, rows: Iterable[int], limit: int) -> list[int]:
-    """Rows of up to ``limit`` points, each chosen farthest from those before it."""
-    candidates = list(rows)
-    if len(candidates) <= limit:
-        return candidates
-    first = int(np.argmax(((pixels - pixels.mean(axis=0)) ** 2).sum(axis=1)))
-    chosen = [first]
-    nearest = ((pixels - pixels[first]) ** 2).sum(axis=1)
-    while len(chosen) < limit:
-        following = int(np.argmax(nearest))
-        chosen.append(following)
-        nearest = np.minimum(nearest, ((pixels - pixels[following]) ** 2).sum(axis=1))
-    return [candidates[index] for index in chosen]

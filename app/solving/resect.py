@@ -7,7 +7,7 @@ give the same bits.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -61,11 +61,42 @@ class Stage:
     tolerance: float
 
 
-SCOUT = Stage(starts=len(STANDS), steps=5, scale_px=30.0, tolerance=1e-3)
-SEARCH = Stage(starts=12, steps=8, scale_px=30.0, tolerance=1e-3)
-NARROW = Stage(starts=6, steps=10, scale_px=8.0, tolerance=1e-4)
-FINAL = Stage(starts=2, steps=25, scale_px=0.0, tolerance=1e-6)
+FINAL = Stage(starts=1, steps=25, scale_px=0.0, tolerance=1e-6)
 """Its scale is the policy's."""
+
+
+@dataclass(frozen=True)
+class Plan:
+    """How a camera is sought: each stage goes on with the best of the one before.
+
+    Attributes:
+        scout: From every stand.
+        search: On few points of each marking, like the scouts.
+        narrow: On all points.
+        final: Likewise, under the policy's scale.
+    """
+
+    scout: Stage
+    search: Stage
+    narrow: Stage
+    final: Stage
+
+
+QUICK = Plan(
+    scout=Stage(starts=len(STANDS), steps=1, scale_px=30.0, tolerance=1e-3),
+    search=Stage(starts=12, steps=8, scale_px=30.0, tolerance=1e-3),
+    narrow=Stage(starts=4, steps=10, scale_px=8.0, tolerance=1e-4),
+    final=FINAL,
+)
+THOROUGH = Plan(
+    scout=replace(QUICK.scout, steps=5),
+    search=QUICK.search,
+    narrow=replace(QUICK.narrow, starts=6),
+    final=replace(FINAL, starts=2),
+)
+"""For what is nearly undetermined, or fits badly: there the best of several minima is sought."""
+FEW_MEASUREMENTS = 10
+"""With fewer, several cameras fit nearly as well."""
 MAIN_STAND_X_M, MAIN_STAND_Y_M, MAIN_STAND_Z_M = (-20.0, 20.0), (38.0, 110.0), (-30.0, -6.0)
 """A camera that stands within these bounds (pitch frame) is a main camera."""
 MAIN_MEAN = np.array([0.0, 0.0, 64.5, -15.5])
@@ -165,34 +196,41 @@ class ResectionProblem:
         return LinePrior(sigma * self.unit, min(floor, sigma) * self.unit, self.line_share)
 
     def resect(self, observations: Observations) -> Resection:
-        """The best camera; where it fits badly, also sought without the circles first.
+        """The best camera; where it fits badly, also sought thoroughly, and without the circles first.
 
         Points of a circle of which little is seen can settle on its wrong side and hold the
         camera there; straight markings have no wrong side.
         """
         fit = self.search(observations)
+        if self.distances(fit.parameters, observations).max() <= POOR_PX * self.unit:
+            return fit
+        fits = [fit, self._search(observations, THOROUGH)]
         straight = observations.without(*CIRCLES)
         if (
-            self.distances(fit.parameters, observations).max() <= POOR_PX * self.unit
-            or len(straight.pixels) == len(observations.pixels)
-            or measurement_count(straight) < PARAMETERS
+            len(straight.pixels) < len(observations.pixels)
+            and measurement_count(straight) >= PARAMETERS
         ):
-            return fit
-        other = self.refine(observations, self.search(straight).parameters[None])
-        return min(fit, other, key=lambda item: item.cost)
+            fits.append(self.refine(observations, self.search(straight).parameters[None]))
+        return min(fits, key=lambda item: item.cost)
 
     def search(self, observations: Observations) -> Resection:
         """The best camera from the whole bank of stands."""
+        few = measurement_count(observations) < FEW_MEASUREMENTS
+        return self._search(observations, THOROUGH if few else QUICK)
+
+    def _search(self, observations: Observations, plan: Plan) -> Resection:
         thinned = observations.thinned(POINTS_PER_LINE, POINTS_PER_CIRCLE)
         starts = stand_starts(observations, self.size.diagonal)
-        scouted = self._run(thinned, starts, SCOUT, damping=1e-2)
-        searched = self._run(thinned, best(scouted, SEARCH.starts), SEARCH)
-        return self.refine(observations, best(searched, NARROW.starts))
+        scouted = self._run(thinned, starts, plan.scout, damping=1e-2)
+        searched = self._run(thinned, best(scouted, plan.search.starts), plan.search)
+        return self.refine(observations, best(searched, plan.narrow.starts), plan)
 
-    def refine(self, observations: Observations, starts: FloatArray) -> Resection:
+    def refine(
+        self, observations: Observations, starts: FloatArray, plan: Plan = QUICK
+    ) -> Resection:
         """The best camera from some starts near a minimum, shape (B, 8)."""
-        narrowed = self._run(observations, starts, NARROW)
-        fit = self._run(observations, best(narrowed, FINAL.starts), FINAL)
+        narrowed = self._run(observations, starts, plan.narrow)
+        fit = self._run(observations, best(narrowed, plan.final.starts), plan.final)
         return Resection(best(fit, 1)[0], float(fit.cost.min()))
 
     def refine_main(self, fit: Resection, observations: Observations) -> Resection:

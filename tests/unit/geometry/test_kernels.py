@@ -13,13 +13,24 @@ from app.geometry import (
     damped_solve,
     lens_kernels,
     likely_point,
+    point_kernels,
     smallest_singular,
+    start_kernels,
 )
 
 
 @pytest.mark.parametrize(
     "module",
-    [curve_fit, curve_residuals, damped_solve, lens_kernels, likely_point, smallest_singular],
+    [
+        curve_fit,
+        curve_residuals,
+        damped_solve,
+        lens_kernels,
+        likely_point,
+        point_kernels,
+        smallest_singular,
+        start_kernels,
+    ],
 )
 def test_who_solves_keeps_nobody_from_being_answered(module: ModuleType) -> None:
     kernels = [item for item in vars(module).values() if isinstance(item, Dispatcher)]

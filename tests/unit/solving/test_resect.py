@@ -5,7 +5,7 @@ from app.geometry.resection import X, Z
 from app.soccer.annotation import make_lines
 from app.soccer.policy import CalibrationPolicy
 from app.solving.observations import observe
-from app.solving.resect import ResectionProblem
+from app.solving.resect import POOR_PX, QUICK, THOROUGH, ResectionProblem
 from tests.cameras import SIZE, looking
 from tests.unit.solving.conftest import BEHIND_GOAL, BEND, OPPOSITE, PITCH, click
 
@@ -15,6 +15,33 @@ FEW = ("Side line top", "Big rect. right top", "Big rect. right main", "Circle r
 
 def position(fit):
     return fit.parameters[X : Z + 1]
+
+
+class TestResect:
+    def test_what_is_nearly_undetermined_is_sought_thoroughly(self, monkeypatch):
+        camera = looking((0.5, 70.0, -14.0), (34.0, -4.0, 0.0), 2400.0, bend=BEND)
+        lines = click(camera, 0.5)
+        plans = []
+        search = ResectionProblem._search
+
+        def note(problem, observations, plan):
+            plans.append(plan)
+            return search(problem, observations, plan)
+
+        monkeypatch.setattr(ResectionProblem, "_search", note)
+        few = make_lines({name: lines[name] for name in FEW[:3]} | {FEW[3]: lines[FEW[3]][:2]})
+        PROBLEM.resect(observe(few, PITCH, SIZE))
+        PROBLEM.resect(observe(lines, PITCH, SIZE))
+        assert plans == [THOROUGH, QUICK]
+
+    def test_a_poor_fit_is_never_worse_than_the_thorough_search_finds(self):
+        camera = looking((0.5, 70.0, -14.0), (34.0, -4.0, 0.0), 2400.0, bend=BEND)
+        lines = dict(click(camera, 0.5))
+        lines["Side line left"] = lines.pop("Side line right")
+        observations = observe(make_lines(lines), PITCH, SIZE)
+        fit = PROBLEM.resect(observations)
+        assert PROBLEM.distances(fit.parameters, observations).max() > POOR_PX * PROBLEM.unit
+        assert fit.cost <= PROBLEM._search(observations, THOROUGH).cost
 
 
 class TestRefineMain:

@@ -1,0 +1,115 @@
+"""Compiled kernel of resection's starts: cameras that stand somewhere, turned to what is seen."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from app.geometry.curve_residuals import SEGMENT, compiled
+
+NEAR_M = 1.0
+"""Metres in front of a stand from which a curve counts as seen."""
+SHORT_M = 5.0
+"""A shorter curve weighs like one of this length."""
+LEAST_SPREAD = 1e-3
+"""Of normalised image coordinates, where nothing lies in front of a stand."""
+
+
+@compiled
+def aim(stands, kinds, shapes, pixels, curve, least_spread_px, focals, starts):
+    """Writes one start for each stand: level, aimed and zoomed so that the seen curves lie where they are.
+
+    Each curve counts as its middle, the less the longer it is: of a long one perhaps a corner is seen.
+
+    Args:
+        stands: Pitch frame, metres, shape (S, 3).
+        kinds: As in ``resection.Curves``.
+        shapes: Likewise.
+        pixels: Relative to the principal point, shape (N, 2).
+        curve: Index of each point's curve, shape (N,).
+        least_spread_px: The curves are taken to be seen at least so far apart.
+        focals: Shortest and longest focal length, pixels.
+        starts: Result: parameters of ``resection``, shape (S, 8).
+    """
+    total, (column, row), (x, y, z) = 0.0, (0.0, 0.0), (0.0, 0.0, 0.0)
+    weight, seen, middles = _seen(kinds, shapes, pixels, curve)
+    for m in range(len(kinds)):
+        total += weight[m]
+    for m in range(len(kinds)):
+        weight[m] /= total
+        column, row = column + weight[m] * seen[m, 0], row + weight[m] * seen[m, 1]
+        x, y, z = (
+            x + weight[m] * middles[m, 0],
+            y + weight[m] * middles[m, 1],
+            z + weight[m] * middles[m, 2],
+        )
+    squared = 0.0
+    for m in range(len(kinds)):
+        squared += weight[m] * ((seen[m, 0] - column) ** 2 + (seen[m, 1] - row) ** 2)
+    spread_px = max(np.sqrt(squared), least_spread_px)
+    for s in range(len(stands)):
+        stand = stands[s]
+        fx, fy, fz = x - stand[0], y - stand[1], z - stand[2]
+        length = np.sqrt(fx * fx + fy * fy + fz * fz)
+        fx, fy, fz = fx / length, fy / length, fz / length
+        pan, tilt = np.arctan2(fx, -fy), np.arccos(fz)
+        wide = _width(stand, (fx, fy, fz), pan, tilt, middles, weight)
+        focal = min(max(spread_px / max(wide, LEAST_SPREAD), focals[0]), focals[1])
+        # Turn so that the aim appears where the annotation has it, not in the middle.
+        starts[s, 0] = pan - np.arctan(column / focal)
+        starts[s, 1] = tilt + np.arctan(row / focal)
+        starts[s, 2] = 0.0
+        starts[s, 3:6] = stand
+        starts[s, 6] = np.log(focal)
+        starts[s, 7] = 0.0
+
+
+@compiled
+def _seen(kinds, shapes, pixels, curve):
+    """Of each curve its weight (zero where it is not seen), the mean of its points and its middle."""
+    count = len(kinds)
+    points, weight = np.zeros(count), np.zeros(count)
+    seen, middles = np.zeros((count, 2)), np.zeros((count, 3))
+    for n in range(len(pixels)):
+        m = curve[n]
+        points[m] += 1
+        seen[m, 0] += pixels[n, 0]
+        seen[m, 1] += pixels[n, 1]
+    for m in range(count):
+        if points[m] == 0:
+            continue
+        seen[m] /= points[m]
+        weight[m] = 1 / max(_middle(kinds[m], shapes[m], middles[m]), SHORT_M)
+    return weight, seen, middles
+
+
+@compiled
+def _middle(kind, shape, middle):
+    """Writes the middle of a curve; returns how long it is, an arc as long as it is wide."""
+    if kind == SEGMENT:
+        for k in range(3):
+            middle[k] = (shape[k] + shape[3 + k]) / 2
+        dx, dy, dz = shape[3] - shape[0], shape[4] - shape[1], shape[5] - shape[2]
+        return np.sqrt(dx * dx + dy * dy + dz * dz)
+    middle[0], middle[1], middle[2] = shape[0], shape[1], 0.0
+    if shape[4] - shape[3] < 2 * np.pi - 1e-9:
+        facing = (shape[3] + shape[4]) / 2
+        middle[0] += shape[2] * np.cos(facing)
+        middle[1] += shape[2] * np.sin(facing)
+    return 2 * shape[2]
+
+
+@compiled
+def _width(stand, forward, pan, tilt, middles, weight):
+    """How wide a stand sees the middles that are in front of it: weighted root mean square of their
+    normalised image coordinates."""
+    rx, ry = np.cos(pan), np.sin(pan)
+    lift, sink = np.cos(tilt), np.sin(tilt)
+    squared = 0.0
+    for m in range(len(weight)):
+        dx, dy, dz = middles[m, 0] - stand[0], middles[m, 1] - stand[1], middles[m, 2] - stand[2]
+        depth = dx * forward[0] + dy * forward[1] + dz * forward[2]
+        if weight[m] > 0 and depth > NEAR_M:
+            right = dx * rx + dy * ry
+            down = -lift * ry * dx + lift * rx * dy + sink * dz
+            squared += weight[m] * (right * right + down * down) / (depth * depth)
+    return np.sqrt(squared)
