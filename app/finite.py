@@ -11,6 +11,8 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
+import msgspec
+
 
 def finite(value: Any) -> Any:
     """A value of dicts, lists and plain values in which no number is infinite or NaN.
@@ -41,18 +43,25 @@ def json_text(
         ascii_: Whether letters beyond ASCII are escaped.
         compact: Without spaces.
     """
-    separators = (",", ":") if compact else None
-
-    def text(plain: Any) -> str:
-        return json.dumps(
-            plain, indent=indent, ensure_ascii=ascii_, separators=separators, allow_nan=False
-        )
-
     try:
-        return text(value)
-    except ValueError:
-        # Rare, so that what is finite costs nothing.
-        return text(finite(value))
+        # Numbers that are not finite are null to this encoder, which is ten times as fast as Python's.
+        data = msgspec.json.encode(value)
+    except (TypeError, UnicodeEncodeError):
+        return _slow_text(value, indent, ascii_, compact)
+    if ascii_ and not data.isascii():
+        return _slow_text(value, indent, ascii_, compact)
+    if not compact:
+        data = msgspec.json.format(data, indent=indent or 0)
+    return data.decode()
+
+
+def _slow_text(value: Any, indent: int | None, ascii_: bool, compact: bool) -> str:
+    """``json_text`` of what the fast encoder has no place for: other keys and numbers than Python's,
+    halves of a surrogate pair; and of letters that are to be escaped."""
+    separators = (",", ":") if compact else None
+    return json.dumps(
+        finite(value), indent=indent, ensure_ascii=ascii_, separators=separators, allow_nan=False
+    )
 
 
 def quoted(text: str, most: int = 40) -> str:

@@ -12,6 +12,7 @@ from contextlib import contextmanager
 from dataclasses import asdict, fields
 from typing import Any
 
+import msgspec
 import numpy as np
 
 from app.errors import EXAMINE, DamagedError, GeometryError, InputError
@@ -45,7 +46,7 @@ def parse(text: str | bytes) -> Json:
         DamagedError: The text is not what was written.
     """
     try:
-        return json.loads(text)
+        return msgspec.json.decode(text)
     except ValueError as error:
         raise _damaged() from error
 

@@ -178,7 +178,7 @@ def text_of(body: bytes) -> str:
 
 def json_of(body: bytes) -> Json:
     """The value of frozen JSON."""
-    return parse(text_of(body))
+    return parse(inflate(body))
 
 
 def body_of(text: str) -> bytes:
