@@ -9,6 +9,7 @@ from app.datasets.camera_json import camera_to_json
 from app.datasets.export_record import ExportRecord
 from app.datasets.frame_names import view_place
 from app.datasets.safe_path import resolve_inside
+from app.datasets.small_files import PutText, put_on_disk
 from app.finite import json_text
 from app.geometry.camera import Camera
 
@@ -41,10 +42,17 @@ def write_cameras(root: Path, cameras: Mapping[str, Camera]) -> list[Path]:
     return written
 
 
-def write_camera_files(root: Path, records: Iterable[ExportRecord]) -> dict[str, int]:
+def write_camera_files(
+    root: Path, records: Iterable[ExportRecord], put: PutText | None = None
+) -> dict[str, int]:
     """Write ``<match>/camera_<stem>.json`` for every view with a camera.
 
     A static camera that many groups share is written once.
+
+    Args:
+        root: Existing folder.
+        records: Groups; one is in memory at a time.
+        put: Takes the files; below ``root`` by default.
 
     Returns:
         Counts: ``groups`` and ``cameras``.
@@ -54,18 +62,19 @@ def write_camera_files(root: Path, records: Iterable[ExportRecord]) -> dict[str,
     """
     counts = {"groups": 0, "cameras": 0}
     written: set[str] = set()
+    put = put or put_on_disk(root)
     for record in records:
         counts["groups"] += 1
-        counts["cameras"] += write_view_cameras(root, record, written)
+        counts["cameras"] += put_view_cameras(put, record, written)
     return counts
 
 
-def write_view_cameras(root: Path, record: ExportRecord, written: set[str]) -> int:
+def put_view_cameras(put: PutText, record: ExportRecord, written: set[str]) -> int:
     """Write the cameras of a group that are not written yet; how many that were."""
     before = len(written)
     for view in record.group.views:
         place, camera = view_place(record.group, view), record.camera(view)
         if camera is not None and place not in written:
-            write_cameras(root, {place: camera})
+            put(camera_name(place), camera_text(camera))
             written.add(place)
     return len(written) - before

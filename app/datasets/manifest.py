@@ -10,6 +10,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
+from app.datasets.small_files import gathered
 from app.finite import json_text
 
 MANIFEST = "manifest.json"
@@ -26,8 +27,6 @@ LICENCES: Mapping[str, str] = {
     "sample": "Synthetic scenes made by Touchline itself; no rights are reserved.",
 }
 UNKNOWN_LICENCE = "The terms of the source were not recorded; ask whoever supplied the data."
-
-_CHUNK = 1024 * 1024
 
 
 @dataclass(frozen=True)
@@ -93,20 +92,17 @@ def write_manifest(root: Path, manifest: Manifest) -> Path:
 
 
 def _files(root: Path) -> Iterator[dict[str, Any]]:
-    names = {path.relative_to(root).as_posix(): path for path in root.rglob("*") if path.is_file()}
-    for name in sorted(names):
-        if name != MANIFEST:
-            yield {
-                "path": name,
-                "bytes": names[name].stat().st_size,
-                "sha256": sha256_of(names[name]),
-            }
+    for name, file in gathered(root):
+        if name == MANIFEST:
+            continue
+        if isinstance(file, bytes):
+            size, digest = len(file), hashlib.sha256(file).hexdigest()
+        else:
+            size, digest = file.stat().st_size, sha256_of(file)
+        yield {"path": name, "bytes": size, "sha256": digest}
 
 
 def sha256_of(path: Path) -> str:
     """Digest of a file's content, hexadecimal."""
-    digest = hashlib.sha256()
     with path.open("rb") as file:
-        while chunk := file.read(_CHUNK):
-            digest.update(chunk)
-    return digest.hexdigest()
+        return hashlib.file_digest(file, "sha256").hexdigest()

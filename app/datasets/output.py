@@ -13,6 +13,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from app.datasets.manifest import MANIFEST, SOFTWARE
+from app.datasets.small_files import gathered
 from app.durable import PARTIAL, sync
 from app.errors import InputError, StorageError
 
@@ -124,14 +125,16 @@ def _publish_zip(staging: Path, out: Path) -> None:
 
 def write_zip(root: Path, file: object) -> None:
     """All files below ``root`` into a zip: sorted names, dated 1980-01-01."""
-    names = {path.relative_to(root).as_posix(): path for path in root.rglob("*") if path.is_file()}
     with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:  # type: ignore[call-overload]
-        for name in sorted(names):
+        for name, content in gathered(root):
             entry = zipfile.ZipInfo(name, _DATE)
             entry.external_attr = 0o644 << 16
             entry.create_system = 3
             entry.compress_type = zipfile.ZIP_DEFLATED
-            with names[name].open("rb") as source, archive.open(entry, "w") as target:
+            if isinstance(content, bytes):
+                archive.writestr(entry, content)
+                continue
+            with content.open("rb") as source, archive.open(entry, "w") as target:
                 shutil.copyfileobj(source, target, 1024 * 1024)
 
 

@@ -7,12 +7,13 @@ from pathlib import Path
 from typing import Any
 
 from app.datasets import fields
-from app.datasets.cameras_writer import write_cameras
+from app.datasets.cameras_writer import camera_name, camera_text
 from app.datasets.exact import exact_inverse
 from app.datasets.export_record import ExportRecord
 from app.datasets.frame_names import view_place
 from app.datasets.match_info import PLACE, MatchInfoWriter, record_of
 from app.datasets.safe_path import resolve_inside
+from app.datasets.small_files import PutText, put_on_disk
 from app.datasets.sn_calibration import (
     CAMERAS,
     LARGEST_UNIT,
@@ -99,12 +100,19 @@ def write_line_files(root: Path, files: Iterable[LineFile]) -> list[Path]:
     return written
 
 
-def write_sn_calibration(root: Path, records: Iterable[ExportRecord]) -> dict[str, int]:
+def write_sn_calibration(
+    root: Path, records: Iterable[ExportRecord], put: PutText | None = None
+) -> dict[str, int]:
     """Write ``lines/<folder>/<name>.json`` and ``cameras/<folder>/camera_<name>.json``.
 
     A folder holds the frames of one split and one size, and its name says both: the public
     evaluator wants all frames of a split in one folder, nothing else in it, and one size.
     ``match_info.json`` names the match of every image, and the place that it came from.
+
+    Args:
+        root: Existing folder.
+        records: Groups; one is in memory at a time.
+        put: Takes the files of lines and cameras; below ``root`` by default.
 
     Returns:
         Counts: ``groups``, ``frames`` and ``cameras``.
@@ -115,6 +123,7 @@ def write_sn_calibration(root: Path, records: Iterable[ExportRecord]) -> dict[st
     """
     counts = {"groups": 0, "frames": 0, "cameras": 0}
     names, with_camera = _Names(), set[str]()
+    put = put or put_on_disk(root)
     with MatchInfoWriter(root) as info:
         for record in records:
             counts["groups"] += 1
@@ -125,12 +134,12 @@ def write_sn_calibration(root: Path, records: Iterable[ExportRecord]) -> dict[st
                 name = names.of(place, record.split(view), view.size)
                 if not known:
                     lines, others = view.station.lines, view.extras.lines
-                    write_line_files(root, [LineFile(f"{LINES}/{name}", view.size, lines, others)])
+                    put(f"{LINES}/{name}.json", line_file_text(lines, view.size, others))
                     said = {**record_of(record.group, view), PLACE: place}
                     info.add(f"{LINES}/{name}.jpg", said)
                     counts["frames"] += 1
                 if camera is not None and name not in with_camera:
-                    write_cameras(root, {f"{CAMERAS}/{name}": camera})
+                    put(camera_name(f"{CAMERAS}/{name}"), camera_text(camera))
                     with_camera.add(name)
     return counts | {"cameras": len(with_camera)}
 

@@ -11,6 +11,7 @@ from typing import Any
 from app.datasets.csv_text import Table
 from app.datasets.export_record import ExportRecord, chosen_box
 from app.datasets.frame_names import flat_frame, likely_suffix, split_folder
+from app.datasets.small_files import PutText, put_on_disk
 from app.datasets.yolo_lists import ImageLists
 from app.soccer.frames import Box, ImageSize
 from app.soccer.group import View
@@ -29,7 +30,11 @@ names:
 
 
 def write_yolo(
-    root: Path, records: Iterable[ExportRecord], *, boxes: str = "optimized"
+    root: Path,
+    records: Iterable[ExportRecord],
+    put: PutText | None = None,
+    *,
+    boxes: str = "optimized",
 ) -> dict[str, int]:
     """Write labels, lists and ``data.yaml`` below an existing folder.
 
@@ -41,6 +46,7 @@ def write_yolo(
     Args:
         root: Existing folder.
         records: Groups; one is in memory at a time.
+        put: Takes the label files; below ``root`` by default.
         boxes: One of ``BOX_KINDS``.
 
     Returns:
@@ -49,6 +55,7 @@ def write_yolo(
     """
     names = ("groups", "labels", "boxes", "balls", "images", "images_missing")
     counts = dict.fromkeys(names, 0)
+    put = put or put_on_disk(root)
     with ExitStack() as stack:
         lists = stack.enter_context(ImageLists(root))
         file = stack.enter_context((root / TABLE).open("w", encoding="utf-8", newline=""))
@@ -56,7 +63,7 @@ def write_yolo(
         for record in records:
             counts["groups"] += 1
             for view in record.group.views:
-                image = _add(root, record, view, table, boxes, counts)
+                image = _add(put, record, view, table, boxes, counts)
                 split, group = split_folder(record.split(view)), record.group
                 lists.add(split, group.match, group.key, image)
     _write_data(root, lists, counts)
@@ -64,7 +71,7 @@ def write_yolo(
 
 
 def _add(
-    root: Path,
+    put: PutText,
     record: ExportRecord,
     view: View,
     table: Table,
@@ -74,11 +81,10 @@ def _add(
     """Write the label file of a view; returns the name of its image."""
     group, present, split = record.group, view.key in record.frames, record.split(view)
     image = record.frames.get(view.key) or flat_frame(group, view, split, likely_suffix(view))
-    label = root / str(PurePosixPath("labels", *PurePosixPath(image).parts[1:]).with_suffix(".txt"))
-    label.parent.mkdir(parents=True, exist_ok=True)
+    label = PurePosixPath("labels", *PurePosixPath(image).parts[1:]).with_suffix(".txt")
     box = chosen_box(record, view, boxes) if view.ball else None
     line = None if box is None else label_line(box, view.size)
-    label.write_text("" if line is None else f"{line}\n", encoding="utf-8")
+    put(str(label), "" if line is None else f"{line}\n")
     cells: tuple[Any, ...] = (image, present, group.key, view.key, split)
     table.add((*cells, view.size.width, view.size.height, record.verdict_text))
     counts["labels"] += 1

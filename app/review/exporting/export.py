@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from itertools import islice
 from pathlib import Path
@@ -13,6 +14,7 @@ from app.datasets.export_record import ExportRecord
 from app.datasets.file_tree import Root
 from app.datasets.issia import FramePersons
 from app.datasets.manifest import UNKNOWN_LICENCE, Manifest, write_manifest
+from app.datasets.small_files import PutText, SmallFiles
 from app.datasets.store_output import output_anywhere
 from app.errors import InputError
 from app.object_store.address import is_address
@@ -150,11 +152,22 @@ def export(
             # A version is the same every time; spare frames are the dataset's as it is.
             if format == "issia" and isinstance(source, LiveSource):
                 run.spare = spare_persons(session, dataset)
-            counts = run.write(root)
+            with _small_files(root, out) as put:
+                counts = run.write(root, put)
             _require_content(source.dataset, format, counts)
             write_manifest(root, run.manifest(counts))
     left_out = source.left_out if isinstance(source, LiveSource) else {}
     return ExportReport(out, format, counts, left_out, tuple(frames.missing))
+
+
+@contextmanager
+def _small_files(root: Path, out: Root) -> Iterator[PutText | None]:
+    """Where the files of single views go: on their way into a zip they wait together."""
+    if out.suffix.lower() != ".zip":
+        yield None
+        return
+    with SmallFiles(root) as files:
+        yield files.put
 
 
 def require_possible(
@@ -186,7 +199,8 @@ def require_possible(
         source = _First(whole)
         options = _Options(format, everything, boxes, images, views)
         frames = ExportImages(Path(folder), "none", _here(store), frame_layout(format))
-        counts = _Run(source, options, frames, None).write(Path(folder))
+        with SmallFiles(Path(folder)) as small:
+            counts = _Run(source, options, frames, None).write(Path(folder), small.put)
         if images != "none" and not frames.media:
             files = [] if source.is_all else frame_files(session, whole.dataset_id)
             _require_frames(whole.dataset, files)
@@ -272,7 +286,7 @@ class _Run:
         self._overrides: list[dict[str, str | None]] = []
         self.spare: Iterable[FramePersons] = ()
 
-    def write(self, root: Path) -> dict[str, int]:
+    def write(self, root: Path, put: PutText | None) -> dict[str, int]:
         """Write the format's files; returns its counts."""
         source, options = self._source, self._options
         policy = source.settings()
@@ -291,7 +305,7 @@ class _Run:
             provenance,
             self.spare,
         )
-        return write_format(root, self._records(), wanted)
+        return write_format(root, self._records(), wanted, put)
 
     def manifest(self, counts: Mapping[str, int]) -> Manifest:
         """What the manifest says of this export."""

@@ -19,6 +19,7 @@ from app.datasets.issia_3d_writer import write_issia_3d
 from app.datasets.issia_writer import write_issia
 from app.datasets.manifest import SOFTWARE, software_version
 from app.datasets.parquet_writer import write_parquet
+from app.datasets.small_files import PutText
 from app.datasets.sn_calibration import line_frame
 from app.datasets.sn_calibration_writer import write_sn_calibration
 from app.datasets.soccernet_v3_writer import write_soccernet_v3
@@ -72,9 +73,18 @@ class WriteOptions:
 
 
 def write_format(
-    root: Path, records: Iterable[ExportRecord], options: WriteOptions
+    root: Path,
+    records: Iterable[ExportRecord],
+    options: WriteOptions,
+    put: PutText | None = None,
 ) -> dict[str, int]:
     """Write a format's files below an existing folder; returns its counts.
+
+    Args:
+        root: Existing folder.
+        records: Groups; few are in memory at a time.
+        options: What the writer is told.
+        put: Takes the files of single views; below the folder by default.
 
     Raises:
         InputError: A group does not fit the format, or one of its cameras does not.
@@ -95,9 +105,9 @@ def write_format(
         case "issia":
             return write_issia(root, groups, options.spare)
         case "cameras":
-            return write_camera_files(root, records)
+            return write_camera_files(root, records, put)
         case "sn-calibration":
-            return write_sn_calibration(root, records)
+            return write_sn_calibration(root, records, put)
         case "gamestate":
             return write_gamestate(root, records)
         case "coco":
@@ -111,7 +121,7 @@ def write_format(
                 info=info,
             )
         case "yolo":
-            return write_yolo(root, records, boxes=boxes)
+            return write_yolo(root, records, put, boxes=boxes)
         case _:
             return write_parquet(
                 root,
