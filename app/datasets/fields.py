@@ -20,6 +20,8 @@ def number(value: Any) -> float:
     Raises:
         ValueError: Anything else, a truth value and a blank among it.
     """
+    if type(value) is float and math.isfinite(value):
+        return value
     if isinstance(value, bool) or not isinstance(value, (int, float, str)):
         raise ValueError(f"is {_kind(value)}, not a number")
     if isinstance(value, str):

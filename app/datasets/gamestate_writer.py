@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import lru_cache
 from itertools import groupby
 from pathlib import Path
 from typing import Any
@@ -29,7 +31,6 @@ from app.datasets.safe_path import resolve_inside
 from app.datasets.sn_calibration_writer import lines_to_json
 from app.errors import InputError
 from app.finite import json_text
-from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
 from app.soccer.annotation import BallAnnotation
 from app.soccer.group import Group, View
@@ -59,6 +60,10 @@ _BALL: dict[str, Any] = {
     "bbox_pitch": None,
 }
 _SPLIT_NUMBERS = {"train": 1, "valid": 2, "test": 3, "challenge": 4}
+_PITCH_BOX = tuple(
+    f"{axis}_bottom_{place}" for place in ("left", "middle", "right") for axis in "xy"
+)
+_CORNERS = ("x1", "y1", "x2", "y2")
 _FIRST_OF_OURS = 100_001
 """Track in a sequence that brings tracks of its own."""
 
@@ -118,22 +123,23 @@ def write_gamestate(root: Path, records: Iterable[ExportRecord]) -> dict[str, in
     counts = {"groups": 0, "images": 0, "annotated_balls": 0}
     files, matches = dict[Path, _File](), dict[Path, str]()
     for match, run in groupby(records, key=lambda record: record.group.match):
-        touched: set[Path] = set()
+        touched: dict[str, Path] = {}
         for record in run:
             counts["groups"] += 1
             for view in record.group.views:
                 split = record.split(view)
-                path = resolve_inside(root, f"{sequence_folder(match, split)}/{LABELS}")
-                other = matches.setdefault(path, match)
-                if other != match:
-                    raise InputError(f"the matches {other} and {match} would be one sequence")
-                if path not in files:
-                    files[path] = _File(path.parent.name, len(files) + 1, split)
-                elif path not in touched:
-                    _read_again(files[path], path)
-                touched.add(path)
-                _add(files[path], record, view, counts)
-        for path in sorted(touched):
+                if split not in touched:
+                    path = resolve_inside(root, f"{sequence_folder(match, split)}/{LABELS}")
+                    other = matches.setdefault(path, match)
+                    if other != match:
+                        raise InputError(f"the matches {other} and {match} would be one sequence")
+                    if path in files:
+                        _read_again(files[path], path)
+                    else:
+                        files[path] = _File(path.parent.name, len(files) + 1, split)
+                    touched[split] = path
+                _add(files[touched[split]], record, view, counts)
+        for path in sorted(touched.values()):
             _write(files[path], path)
     return counts
 
@@ -141,7 +147,7 @@ def write_gamestate(root: Path, records: Iterable[ExportRecord]) -> dict[str, in
 def _write(file: _File, path: Path) -> None:
     """Write a file, and forget what it holds until its match comes again."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(json_text(file.value()) + "\n", encoding="utf-8")
+    path.write_text(json_text(file.value(), compact=True) + "\n", encoding="utf-8")
     file.images, file.annotations = [], []
 
 
@@ -233,18 +239,15 @@ def _on_pitch(
         for box in boxes
         for x in (box["x"], box["x_center"], box["x"] + box["w"])
     ]
-    places = camera.on_ground(np.array(edges)).reshape(-1, 3, 2)
-    return [_pitch_box(place) if np.isfinite(place).all() else None for place in places]
+    places = camera.on_ground(np.array(edges)).reshape(-1, 6)
+    return [
+        _pitch_box(place) if all(map(math.isfinite, place)) else None for place in places.tolist()
+    ]
 
 
-def _pitch_box(places: FloatArray) -> dict[str, float]:
-    """``bbox_pitch`` of the left, middle and right of a lower edge, pitch frame, shape (3, 2)."""
-    names = ("left", "middle", "right")
-    return {
-        f"{axis}_bottom_{name}": float(value)
-        for name, place in zip(names, places, strict=True)
-        for axis, value in zip("xy", place, strict=True)
-    }
+def _pitch_box(place: Sequence[float]) -> dict[str, float]:
+    """``bbox_pitch`` of x and y of the left, middle and right of a lower edge, pitch frame."""
+    return dict(zip(_PITCH_BOX, place, strict=True))
 
 
 def _balls(file: _File, record: ExportRecord, view: View) -> Iterator[dict[str, Any]]:
@@ -267,7 +270,8 @@ def _below_ball(record: ExportRecord, view: View) -> dict[str, float] | None:
     # To the right in the image, along the grass.
     right = camera.rotation[0, :2] / max(float(np.hypot(*camera.rotation[0, :2])), 1e-9)
     radius = PAPER.ball_diameter_m / 2
-    return _pitch_box(np.array(point[:2]) + np.outer([-radius, 0.0, radius], right))
+    edge = np.array(point[:2]) + np.outer([-radius, 0.0, radius], right)
+    return _pitch_box(edge.ravel().tolist())
 
 
 def _rest(view: View, camera: Camera | None) -> Iterator[dict[str, Any]]:
@@ -304,16 +308,22 @@ def _place(x: float, y: float, width: float, height: float) -> dict[str, float]:
     }
 
 
+@lru_cache(maxsize=256)
+def _role_and_team(name: str) -> tuple[str, str | None]:
+    """What SoccerNet's class of a person says."""
+    words = name.lower().split()
+    role = next((role for role in _ROLES if role in words), "other")
+    return role, next((side for side in ("left", "right") if side in words), None)
+
+
 def _person(box: Mapping[str, Any]) -> dict[str, Any] | None:
     """A person of SoccerNet-v3 (``Player team left``, ``Main referee``); None without corners."""
     corners = box.get("points")
     try:
-        x1, y1, x2, y2 = (fields.number(corners[name]) for name in ("x1", "y1", "x2", "y2"))  # type: ignore[index]
+        x1, y1, x2, y2 = [fields.number(corners[name]) for name in _CORNERS]  # type: ignore[index]
     except (TypeError, KeyError, ValueError):
         return None
-    words = str(box.get("class") or "").lower().split()
-    role = next((name for name in _ROLES if name in words), "other")
-    team = next((side for side in ("left", "right") if side in words), None)
+    role, team = _role_and_team(str(box.get("class") or ""))
     number = str(box.get("ID"))
     return {
         "track_id": None,

@@ -47,22 +47,23 @@ def lines_to_json(
     for line, numbers in zip(others, flat, strict=True):
         extra = [ImagePoint(x, y) for x, y in zip(numbers[::2], numbers[1::2], strict=False)]
         points.setdefault(str(line.get("class")), []).extend(extra)
-    everything = [point for line in points.values() for point in line]
+    across, down = size.width - 1, size.height - 1
     # Far outside, a normalised coordinate would be read back as a pixel.
-    units = not pixels and all(
-        max(map(abs, size.pixel_to_unit(point))) <= LARGEST_UNIT for point in everything
-    )
-    return {name: [_written(p, size, units) for p in line] for name, line in points.items()}
-
-
-def _written(point: ImagePoint, size: ImageSize, units: bool) -> dict[str, float]:
-    if not units:
-        return {"x": point.x, "y": point.y}
-    x, y = size.pixel_to_unit(point)
+    far_x, far_y = LARGEST_UNIT * across, LARGEST_UNIT * down
+    if pixels or any(abs(x) > far_x or abs(y) > far_y for line in points.values() for x, y in line):
+        return {name: [{"x": x, "y": y} for x, y in line] for name, line in points.items()}
     return {
-        "x": exact_inverse(x, point.x, lambda unit: unit * (size.width - 1)),
-        "y": exact_inverse(y, point.y, lambda unit: unit * (size.height - 1)),
+        name: [{"x": _unit(x, across), "y": _unit(y, down)} for x, y in line]
+        for name, line in points.items()
     }
+
+
+def _unit(pixel: float, extent: int) -> float:
+    """The normalised number that is read as this pixel."""
+    unit = pixel / extent
+    if unit * extent == pixel:
+        return unit
+    return exact_inverse(unit, pixel, lambda guess: guess * extent)
 
 
 def line_file_text(

@@ -18,7 +18,7 @@ import numpy as np
 from app.errors import EXAMINE, DamagedError, GeometryError, InputError
 from app.geometry.camera import Camera, camera_covariance
 from app.geometry.lens import BROWN_CONRADY
-from app.soccer.annotation import BallAnnotation, Extras, Lines, make_lines
+from app.soccer.annotation import BallAnnotation, Extras, Lines
 from app.soccer.frames import Box, ImagePoint, ImageSize
 from app.soccer.group import Group, SharedPosition, Station, View
 from app.soccer.media import Media
@@ -30,6 +30,7 @@ from app.soccer.reasons import LeftOut
 
 Json = Any
 """What ``json`` makes: dict, list, str, int, float, bool or None."""
+_LINES = dict[str, tuple[ImagePoint, ...]]
 
 
 def canonical(value: Json) -> str:
@@ -114,8 +115,12 @@ def lines_to_json(lines: Lines) -> Json:
 
 
 def lines_from_json(value: Mapping[str, Any]) -> Lines:
-    """Back from ``lines_to_json``."""
-    return make_lines(value)
+    """Back from ``lines_to_json``.
+
+    Raises:
+        ValueError: It is not what that makes.
+    """
+    return dict(sorted(msgspec.convert(value, _LINES).items()))
 
 
 def ball_to_json(ball: BallAnnotation) -> Json:

@@ -15,6 +15,8 @@ from collections.abc import Callable
 from functools import cache
 from typing import Any, TypeVar
 
+import msgspec
+
 from app.geometry.camera import Camera
 from app.soccer.frames import ImagePoint
 from app.store.codecs import as_written, camera_from_json, camera_to_json
@@ -108,7 +110,22 @@ def _dataclass_codec(kind: Any) -> Codec:
     def decode(value: Any) -> Any:
         return kind(**{name: back(value[name]) for name, _, back in codecs if name in value})
 
-    return encode if later else whole, decode
+    def decode_plain(value: Any) -> Any:
+        try:
+            return msgspec.convert(value, kind)
+        except msgspec.ValidationError:
+            # The name of a number that is not finite is no number to it.
+            return decode(value)
+
+    return encode if later else whole, decode_plain if _is_plain(kind) else decode
+
+
+def _is_plain(hint: Any) -> bool:
+    """Whether JSON holds a type as a library reads it; a camera has a codec of its own."""
+    if hint is Camera:
+        return False
+    hints = typing.get_type_hints(hint).values() if dataclasses.is_dataclass(hint) else ()
+    return all(map(_is_plain, (*hints, *typing.get_args(hint))))
 
 
 def _optional_codec(arguments: tuple[Any, ...]) -> Codec:

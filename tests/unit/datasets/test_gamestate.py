@@ -205,7 +205,7 @@ class TestWriteGamestate:
     def test_no_name_ends_with_a_space(self, read: Read, labels: Value, tmp_path: Path) -> None:
         write(tmp_path / "out", read(labels))
         text = (tmp_path / "out/test/SNGS-060/Labels-GameState.json").read_text()
-        assert '"Goal left post left": ' in text
+        assert '"Goal left post left":' in text
         assert "left " not in text.replace("Goal left post", "")
 
     def test_roles_and_teams_of_soccernet_v3(
