@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
@@ -63,6 +62,8 @@ _SPLIT_NUMBERS = {"train": 1, "valid": 2, "test": 3, "challenge": 4}
 _PITCH_BOX = tuple(
     f"{axis}_bottom_{place}" for place in ("left", "middle", "right") for axis in "xy"
 )
+_PLACE_DIGITS = 9
+"""Decimals of a metre: of what is computed on the grass a nanometre is enough."""
 _CORNERS = ("x1", "y1", "x2", "y2")
 _FIRST_OF_OURS = 100_001
 """Track in a sequence that brings tracks of its own."""
@@ -160,14 +161,15 @@ def _add(file: _File, record: ExportRecord, view: View, counts: dict[str, int]) 
     kept = kept_of(view)
     file.kept = file.kept or kept
     camera = record.camera(view)
-    people = list(_people(file, record.group, view, camera))
+    people = _people(file, record.group, view, camera)
     image = _image(file, record.group, view, camera, people)
     file.images.append(image)
     identity = str(image.get("image_id", image.get("id")))
     annotations = [*people, *_balls(file, record, view), *_rest(view, camera)]
-    for number, annotation in enumerate(annotations, 1):
-        own = {"id": f"{identity}{number:03d}", "image_id": identity}
-        file.annotations.append(own | annotation)
+    file.annotations += [
+        {"id": f"{identity}{number:03d}", "image_id": identity, **annotation}
+        for number, annotation in enumerate(annotations, 1)
+    ]
     counts["images"] += 1
     counts["annotated_balls"] += sum(ball.center is not None for ball in view.balls)
 
@@ -199,25 +201,29 @@ def _holds(camera: Camera | None) -> bool:
     return camera is not None and not camera.is_wide
 
 
-def _people(
-    file: _File, group: Group, view: View, camera: Camera | None
-) -> Iterator[dict[str, Any]]:
+def _people(file: _File, group: Group, view: View, camera: Camera | None) -> list[dict[str, Any]]:
     """The people of an image, as they came or made anew, each track once."""
     seen: set[int] = set()
-    made = [
-        None if isinstance(box.get(METADATA), dict) else _person(box) for box in view.extras.boxes
-    ]
-    standing = iter(_on_pitch(camera, [person["bbox_image"] for person in made if person]))
-    for index, (box, person) in enumerate(zip(view.extras.boxes, made, strict=True)):
+    people: list[dict[str, Any]] = []
+    made: list[dict[str, Any]] = []
+    for index, box in enumerate(view.extras.boxes):
+        if isinstance(box.get(METADATA), dict):
+            people.append(dict(box[METADATA]))
+            continue
+        person = _person(box)
         if person is None:
-            if isinstance(box.get(METADATA), dict):
-                yield dict(box[METADATA])
             continue
         track = file.track(_who(box, group, view, index))
         if track in seen:
             track = file.track((group.key, view.key, index))
         seen.add(track)
-        yield {**person, "track_id": track, "bbox_pitch": next(standing)}
+        person["track_id"] = track
+        people.append(person)
+        made.append(person)
+    standing = _on_pitch(camera, [person["bbox_image"] for person in made])
+    for person, place in zip(made, standing, strict=True):
+        person["bbox_pitch"] = place
+    return people
 
 
 def _who(box: Mapping[str, Any], group: Group, view: View, index: int) -> Hashable:
@@ -225,7 +231,8 @@ def _who(box: Mapping[str, Any], group: Group, view: View, index: int) -> Hashab
     name, tag = box.get("class"), box.get("ID")
     if tag is None:
         return (group.key, view.key, index)
-    return (name, str(tag)) if str(tag).isdigit() else (name, str(tag), group.key)
+    text = str(tag)
+    return (name, text) if text.isdigit() else (name, text, group.key)
 
 
 def _on_pitch(
@@ -234,14 +241,13 @@ def _on_pitch(
     """Where the lower edge of each box stands on the grass, metres; None without a place there."""
     if camera is None or not boxes:
         return [None] * len(boxes)
-    edges = [
-        (x, box["y"] + box["h"])
-        for box in boxes
-        for x in (box["x"], box["x_center"], box["x"] + box["w"])
-    ]
-    places = camera.on_ground(np.array(edges)).reshape(-1, 6)
+    left, wide, low = np.array([(box["x"], box["w"], box["y"] + box["h"]) for box in boxes]).T
+    edges = np.column_stack([left, low, left + wide / 2, low, left + wide, low])
+    places = np.round(camera.on_ground(edges.reshape(-1, 2)).reshape(-1, 6), _PLACE_DIGITS)
+    stand = np.isfinite(places.sum(axis=1)).tolist()
     return [
-        _pitch_box(place) if all(map(math.isfinite, place)) else None for place in places.tolist()
+        _pitch_box(place) if stands else None
+        for place, stands in zip(places.tolist(), stand, strict=True)
     ]
 
 
@@ -271,7 +277,7 @@ def _below_ball(record: ExportRecord, view: View) -> dict[str, float] | None:
     right = camera.rotation[0, :2] / max(float(np.hypot(*camera.rotation[0, :2])), 1e-9)
     radius = PAPER.ball_diameter_m / 2
     edge = np.array(point[:2]) + np.outer([-radius, 0.0, radius], right)
-    return _pitch_box(edge.ravel().tolist())
+    return _pitch_box(np.round(edge, _PLACE_DIGITS).ravel().tolist())
 
 
 def _rest(view: View, camera: Camera | None) -> Iterator[dict[str, Any]]:

@@ -49,21 +49,25 @@ def lines_to_json(
         points.setdefault(str(line.get("class")), []).extend(extra)
     across, down = size.width - 1, size.height - 1
     # Far outside, a normalised coordinate would be read back as a pixel.
-    far_x, far_y = LARGEST_UNIT * across, LARGEST_UNIT * down
-    if pixels or any(abs(x) > far_x or abs(y) > far_y for line in points.values() for x, y in line):
+    far_x = [abs(x) for line in points.values() for x, _ in line]
+    far_y = [abs(y) for line in points.values() for _, y in line]
+    if pixels or max((max(far_x) / across, max(far_y) / down) if far_x else (0.0,)) > LARGEST_UNIT:
         return {name: [{"x": x, "y": y} for x, y in line] for name, line in points.items()}
     return {
-        name: [{"x": _unit(x, across), "y": _unit(y, down)} for x, y in line]
+        name: [
+            {
+                "x": unit if (unit := x / across) * across == x else _unit(x, across),
+                "y": unit if (unit := y / down) * down == y else _unit(y, down),
+            }
+            for x, y in line
+        ]
         for name, line in points.items()
     }
 
 
 def _unit(pixel: float, extent: int) -> float:
-    """The normalised number that is read as this pixel."""
-    unit = pixel / extent
-    if unit * extent == pixel:
-        return unit
-    return exact_inverse(unit, pixel, lambda guess: guess * extent)
+    """The normalised number that is read as this pixel, where the nearest one is not."""
+    return exact_inverse(pixel / extent, pixel, lambda unit: unit * extent)
 
 
 def line_file_text(
