@@ -78,9 +78,19 @@ def inputs_hash(
     return digest(parts)
 
 
-def group_inputs_hash(group: Group, paint: Mapping[str, str] | None = None) -> str:
-    """``inputs_hash`` of a group at hand; ``paint`` as there, where the readings are not."""
-    pairs = ((view_digest(view), station_digest(view.station)) for view in group.views)
+def group_inputs_hash(
+    group: Group,
+    paint: Mapping[str, str] | None = None,
+    views: Iterable[tuple[str, str]] | None = None,
+) -> str:
+    """``inputs_hash`` of a group at hand.
+
+    Args:
+        group: The group.
+        paint: As there, where the readings are not at hand.
+        views: As there, where they are known.
+    """
+    pairs = views or ((view_digest(view), station_digest(view.station)) for view in group.views)
     read = paint_to_json(group.paint) if paint is None else paint
     return inputs_hash(group.pitch, pairs, group.positions, read, group.noise)
 

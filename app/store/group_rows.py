@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
@@ -68,10 +68,17 @@ def positions_text(group: Group) -> str | None:
     return codecs.canonical(shared) if shared else None
 
 
-def head_values(group: Group, paint: Mapping[str, str] | None = None) -> dict[str, Any]:
+def head_values(
+    group: Group,
+    paint: Mapping[str, str] | None = None,
+    views: Iterable[tuple[str, str]] | None = None,
+) -> dict[str, Any]:
     """Columns of a group that follow from its value.
 
-    ``paint`` are the digests of what was read of its pictures, where the readings are not at hand.
+    Args:
+        group: The group.
+        paint: Digests of what was read of its pictures, where the readings are not at hand.
+        views: Digests of each view and its station, where they are known.
     """
     read = codecs.paint_to_json(group.paint) if paint is None else paint
     return {
@@ -83,7 +90,7 @@ def head_values(group: Group, paint: Mapping[str, str] | None = None) -> dict[st
         "pitch_width": group.pitch.width,
         "positions": positions_text(group),
         "paint": paint_text(read),
-        "inputs_hash": group_inputs_hash(group, read),
+        "inputs_hash": group_inputs_hash(group, read, views),
     }
 
 
@@ -137,9 +144,16 @@ class NewRows:
         ``shared`` has the ids of shared stations by key.
         """
         identity = self._group + len(self.groups)
+        first_view, first_station = len(self.views), len(self.stations)
+        for position, view in enumerate(group.views):
+            self.add_view(identity, view, position, shared)
+        digests = None
+        if not any(view.station.shared for view in group.views):
+            own = zip(self.views[first_view:], self.stations[first_station:], strict=True)
+            digests = [(view["digest"], station["digest"]) for view, station in own]
         self.groups.append(
             {
-                **head_values(group),
+                **head_values(group, views=digests),
                 "id": identity,
                 "dataset_id": self.dataset_id,
                 "number": self._number + len(self.groups) + 1,
@@ -148,8 +162,6 @@ class NewRows:
                 "source_hash": source,
             }
         )
-        for position, view in enumerate(group.views):
-            self.add_view(identity, view, position, shared)
         return identity
 
     def add_view(
