@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
@@ -71,23 +72,24 @@ _FIRST_OF_OURS = 100_001
 
 @dataclass
 class _File:
-    """One Labels-GameState.json while it is made."""
+    """One Labels-GameState.json while it is made; images and annotations are JSON already."""
 
     name: str
     number: int
     split: str
     kept: Mapping[str, Any] = field(default_factory=dict)
-    images: list[dict[str, Any]] = field(default_factory=list)
-    annotations: list[dict[str, Any]] = field(default_factory=list)
+    images: list[str] = field(default_factory=list)
+    annotations: list[str] = field(default_factory=list)
     tracks: dict[Hashable, int] = field(default_factory=dict)
 
-    def value(self) -> dict[str, Any]:
-        return {
-            "info": self.kept.get("info") or self._info(),
-            "images": self.images,
-            "annotations": self.annotations,
-            "categories": self.kept.get("categories") or _CATEGORIES,
-        }
+    def text(self) -> str:
+        info = _text(self.kept.get("info") or self._info())
+        categories = _text(self.kept.get("categories") or _CATEGORIES)
+        images, annotations = ",\n".join(self.images), ",\n".join(self.annotations)
+        return (
+            f'{{"info":{info},"images":[\n{images}\n],"annotations":[\n{annotations}\n],'
+            f'"categories":{categories}}}\n'
+        )
 
     def _info(self) -> dict[str, Any]:
         info = {"version": "1.3", "id": str(self.number), "name": self.name, "im_dir": IMAGES}
@@ -148,13 +150,18 @@ def write_gamestate(root: Path, records: Iterable[ExportRecord]) -> dict[str, in
 def _write(file: _File, path: Path) -> None:
     """Write a file, and forget what it holds until its match comes again."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(json_text(file.value(), compact=True) + "\n", encoding="utf-8")
+    path.write_text(file.text(), encoding="utf-8")
     file.images, file.annotations = [], []
 
 
 def _read_again(file: _File, path: Path) -> None:
     earlier = json.loads(path.read_text(encoding="utf-8"))
-    file.images, file.annotations = earlier["images"], earlier["annotations"]
+    file.images = [_text(item) for item in earlier["images"]]
+    file.annotations = [_text(item) for item in earlier["annotations"]]
+
+
+def _text(value: Any) -> str:
+    return json_text(value, compact=True)
 
 
 def _add(file: _File, record: ExportRecord, view: View, counts: dict[str, int]) -> None:
@@ -163,11 +170,11 @@ def _add(file: _File, record: ExportRecord, view: View, counts: dict[str, int]) 
     camera = record.camera(view)
     people = _people(file, record.group, view, camera)
     image = _image(file, record.group, view, camera, people)
-    file.images.append(image)
+    file.images.append(_text(image))
     identity = str(image.get("image_id", image.get("id")))
     annotations = [*people, *_balls(file, record, view), *_rest(view, camera)]
     file.annotations += [
-        {"id": f"{identity}{number:03d}", "image_id": identity, **annotation}
+        _text({"id": f"{identity}{number:03d}", "image_id": identity, **annotation})
         for number, annotation in enumerate(annotations, 1)
     ]
     counts["images"] += 1
@@ -274,10 +281,11 @@ def _below_ball(record: ExportRecord, view: View) -> dict[str, float] | None:
     if camera is None or point is None or not record.has_ball_3d(view):
         return None
     # To the right in the image, along the grass.
-    right = camera.rotation[0, :2] / max(float(np.hypot(*camera.rotation[0, :2])), 1e-9)
-    radius = PAPER.ball_diameter_m / 2
-    edge = np.array(point[:2]) + np.outer([-radius, 0.0, radius], right)
-    return _pitch_box(np.round(edge, _PLACE_DIGITS).ravel().tolist())
+    x, y = camera.rotation[0, :2].tolist()
+    share = PAPER.ball_diameter_m / 2 / max(math.hypot(x, y), 1e-9)
+    (east, south, _), right, down = point, x * share, y * share
+    edge = (east - right, south - down, east, south, east + right, south + down)
+    return _pitch_box([round(value, _PLACE_DIGITS) for value in edge])
 
 
 def _rest(view: View, camera: Camera | None) -> Iterator[dict[str, Any]]:

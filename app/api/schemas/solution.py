@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 from typing import Annotated, Any
 
@@ -20,13 +19,6 @@ from app.soccer.finding import Finding
 from app.soccer.frames import Box
 from app.soccer.group import Group
 from app.soccer.solution import GAMMAS_PERCENT, BallFit, Calibration, Solution
-
-DRAWN_DECIMALS = 3
-"""What is only drawn travels to a thousandth of a pixel; what is edited or judged, exactly."""
-
-
-def _drawn(points: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
-    return [(round(x, DRAWN_DECIMALS), round(y, DRAWN_DECIMALS)) for x, y in points]
 
 
 def _numbers(box: Any) -> Any:
@@ -48,7 +40,6 @@ Measured = float | None
 XY = tuple[float, float]
 XYZ = tuple[float, float, float]
 XYWH = Annotated[tuple[float, float, float, float], BeforeValidator(_numbers)]
-Drawn = Annotated[list[XY], BeforeValidator(_drawn)]
 Jac = Annotated[dict[str, float], BeforeValidator(_by_gamma)]
 """By gamma in per cent of the diagonal."""
 
@@ -88,8 +79,8 @@ class MarkingDocument(Document):
     used: bool
     largest_px: float | None
     distances_px: list[Measured]
-    nearest: Drawn
-    polyline: Drawn
+    nearest: list[XY]
+    polyline: list[XY]
 
 
 class SuspectDocument(Document):
