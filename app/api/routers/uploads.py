@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Callable
 from functools import partial
-from typing import Annotated, Any
+from typing import Annotated, Any, TypeVar
 
-from anyio import CancelScope, to_thread
+from anyio import CancelScope, CapacityLimiter, to_thread
+from anyio.lowlevel import RunVar
 from fastapi import APIRouter, Path, Query, Request, Response
 from starlette.requests import ClientDisconnect
 
@@ -25,9 +27,12 @@ from app.store.uploads import (
 )
 
 router = APIRouter(prefix="/uploads", tags=["imports"])
+T = TypeVar("T")
 
 CHUNK = 1024 * 1024
 """Bytes that are gathered before they are written."""
+DISK_THREADS = 2
+_THREADS: RunVar[CapacityLimiter] = RunVar("threads of uploads")
 LOOK_SECONDS = 0.25
 """Between two looks whether the server stops."""
 UploadId = Annotated[str, Path(max_length=64)]
@@ -70,7 +75,7 @@ async def upload_file(
 
 async def _receive(request: Request, services: Services, name: str, actor: str) -> Upload:
     """Write what comes, off the event loop; nothing stays of what does not come whole."""
-    writer = await to_thread.run_sync(UploadWriter, services.settings, name)
+    writer = await _on_disk(UploadWriter, services.settings, name)
     writing = asyncio.ensure_future(_write(request, writer))
     try:
         while not writing.done():
@@ -78,12 +83,12 @@ async def _receive(request: Request, services: Services, name: str, actor: str) 
             if services.stopping.is_set():
                 raise OverloadedError("the server stops", hint="Send the file again in a while.")
         writing.result()
-        return await to_thread.run_sync(partial(writer.finish, guess_format, by=actor))
+        return await _on_disk(partial(writer.finish, guess_format, by=actor))
     except BaseException as error:
         with CancelScope(shield=True):
             writing.cancel()
             await asyncio.wait({writing})
-            await to_thread.run_sync(writer.abort)
+            await _on_disk(writer.abort)
         if isinstance(error, ClientDisconnect):
             raise InputError("the upload was cut off") from None
         raise
@@ -94,9 +99,20 @@ async def _write(request: Request, writer: UploadWriter) -> None:
     async for chunk in request.stream():
         waiting += chunk
         if len(waiting) >= CHUNK:
-            await to_thread.run_sync(writer.write, bytes(waiting))
+            await _on_disk(writer.write, bytes(waiting))
             waiting.clear()
-    await to_thread.run_sync(writer.write, bytes(waiting))
+    await _on_disk(writer.write, bytes(waiting))
+
+
+async def _on_disk(work: Callable[..., T], *arguments: Any) -> T:
+    """Work on files, in one of few threads: eight that take turns with the event loop at each call
+    of the disk let readers wait ten times as long."""
+    try:
+        threads = _THREADS.get()
+    except LookupError:
+        threads = CapacityLimiter(DISK_THREADS)
+        _THREADS.set(threads)
+    return await to_thread.run_sync(work, *arguments, limiter=threads)
 
 
 @router.get("", operation_id="listUploads")
