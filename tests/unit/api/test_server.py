@@ -44,13 +44,13 @@ class TestListen:
 
 
 class TestSettle:
-    def test_what_is_there_for_good_is_not_collected_again(self) -> None:
+    def test_what_is_there_for_good_is_not_collected_again_and_what_lives_seldom(self) -> None:
         before = gc.get_threshold()
         gc.unfreeze()
         try:
             settle()
             assert gc.get_freeze_count() > len(gc.get_objects())
-            assert gc.get_threshold() == (700, 10, 10)
+            assert gc.get_threshold() == (700, 10, 100)
         finally:
             gc.set_threshold(*before)
 
