@@ -2,7 +2,7 @@
 
 Prints seconds, seconds of the processor (all processes of the command) and milliseconds of it a group,
 the most memory that they held at once, and what each may take of all of SoccerNet-v3.
-``python -m tests.bench.big [GROUPS ...]``; 12,764 groups take a quarter of an hour.
+``python -m tests.bench.big [GROUPS ...]``; 12,764 groups take ten minutes.
 """
 
 from __future__ import annotations

@@ -16,8 +16,11 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 import structlog
+from hypothesis import given
+from hypothesis import strategies as st
 from pydantic import BaseModel
 
 import app
@@ -53,6 +56,7 @@ WRITERS = {
         "api/security/bodies.py",  # measures, writes nothing
         "datasets/json_text.py",  # measures, writes nothing
     },
+    "msgspec.json.encode": {"finite.py"},
     "csv.writer": {"datasets/csv_text.py", "evaluation/figure_csv.py"},
     "csv.DictWriter": set(),
 }
@@ -135,6 +139,32 @@ class TestFinite:
     def test_text_is_json_by_the_letter(self, bad: float) -> None:
         assert json_text({"a": bad, "ä": 1.5}) == '{"a": null, "ä": 1.5}'
         assert json_text([bad], compact=True, ascii_=True) == "[null]"
+
+    @pytest.mark.parametrize("form", [{}, {"indent": 1}, {"compact": True}, {"ascii_": True}])
+    def test_text_is_spelt_as_python_spells_it(self, form: dict[str, Any]) -> None:
+        value = {
+            "a": [1, 2.5, None, True, "ü\n\u2028"],
+            "b": {},
+            "c": [],
+            "d": {"e": [{"f": -0.0}]},
+        }
+        spelling = {"indent": form.get("indent"), "ensure_ascii": "ascii_" in form}
+        separators = (",", ":") if "compact" in form else None
+        assert json_text(value, **form) == json.dumps(value, separators=separators, **spelling)
+
+    @pytest.mark.parametrize(
+        "value",
+        [{1.5: 1}, {None: 1}, {True: [math.inf]}, ["\ud800"], np.float64(1.5), [np.float64("inf")]],
+        ids=repr,
+    )
+    def test_what_the_fast_encoder_has_no_place_for_is_text_all_the_same(self, value: Any) -> None:
+        for form in ({}, {"indent": 1}, {"ascii_": True}, {"compact": True}):
+            assert json.loads(json_text(value, **form)) == json.loads(json.dumps(finite(value)))
+
+    @given(st.floats(allow_nan=False, allow_infinity=False) | st.integers())
+    def test_numbers_come_back_as_the_same_bits(self, number: float) -> None:
+        again = json.loads(json_text([number]))[0]
+        assert (type(again), repr(again)) == (type(number), repr(number))
 
 
 class TestDoors:
