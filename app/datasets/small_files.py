@@ -13,6 +13,7 @@ from heapq import merge
 from pathlib import Path, PurePosixPath
 
 from app.datasets.safe_path import check_name, resolve_inside
+from app.datasets.spill import disk_errors
 
 PutText = Callable[[str, str], None]
 """Takes a relative path, and the text of the file there."""
@@ -44,25 +45,29 @@ class SmallFiles:
 
     def __init__(self, root: Path):
         self._waiting: list[tuple[str, bytes]] = []
-        self._connection = sqlite3.connect(root / HELD, isolation_level=None)
-        # Nothing in it outlives the export, so nothing needs to survive a power cut.
-        self._connection.execute("PRAGMA journal_mode = OFF")
-        self._connection.execute("PRAGMA synchronous = OFF")
-        self._connection.execute("CREATE TABLE file (path TEXT PRIMARY KEY, body BLOB)")
-        self._connection.execute("BEGIN")
+        with disk_errors():
+            self._connection = sqlite3.connect(root / HELD, isolation_level=None)
+            # Nothing in it outlives the export, so nothing needs to survive a power cut.
+            self._connection.execute("PRAGMA journal_mode = OFF")
+            self._connection.execute("PRAGMA synchronous = OFF")
+            self._connection.execute("CREATE TABLE file (path TEXT PRIMARY KEY, body BLOB)")
+            self._connection.execute("BEGIN")
 
     def __enter__(self) -> SmallFiles:
         return self
 
-    def __exit__(self, *_: object) -> None:
-        self._flush()
-        self._connection.execute("COMMIT")
-        self._connection.close()
+    def __exit__(self, kind: object, *_: object) -> None:
+        with closing(self._connection):
+            if kind is None:
+                self._flush()
+                with disk_errors():
+                    self._connection.execute("COMMIT")
 
     def put(self, path: str, text: str) -> None:
         """Keep a file.
 
         Raises:
+            OSError: The disk refuses, also where the context ends.
             UnsafePathError: The path would leave a folder.
         """
         self._waiting.append((str(PurePosixPath(check_name(path))), text.encode()))
@@ -70,7 +75,8 @@ class SmallFiles:
             self._flush()
 
     def _flush(self) -> None:
-        self._connection.executemany("INSERT OR REPLACE INTO file VALUES (?, ?)", self._waiting)
+        with disk_errors():
+            self._connection.executemany("INSERT OR REPLACE INTO file VALUES (?, ?)", self._waiting)
         self._waiting.clear()
 
 
@@ -79,6 +85,9 @@ def gathered(root: Path) -> Iterator[tuple[str, Path | bytes]]:
 
     Yields:
         Relative path; where it lies, or its content.
+
+    Raises:
+        OSError: The disk refuses.
     """
     held = root / HELD
     paths = (path for path in root.rglob("*") if path != held and path.is_file())
@@ -87,7 +96,7 @@ def gathered(root: Path) -> Iterator[tuple[str, Path | bytes]]:
     if not held.exists():
         yield from on_disk
         return
-    with closing(sqlite3.connect(held)) as connection:
+    with disk_errors(), closing(sqlite3.connect(held)) as connection:
         waiting = connection.execute("SELECT path, body FROM file ORDER BY path")
         yield from merge(on_disk, waiting, key=_name)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import sqlite3
 import tempfile
 from collections.abc import Iterator
@@ -35,8 +36,22 @@ class Spill:
             yield (a, b, c, d), body
 
     def _flush(self) -> None:
-        self._connection.executemany("INSERT INTO item VALUES (?, ?, ?, ?, ?)", self._waiting)
+        with disk_errors():
+            self._connection.executemany("INSERT INTO item VALUES (?, ?, ?, ?, ?)", self._waiting)
         self._waiting.clear()
+
+
+@contextmanager
+def disk_errors() -> Iterator[None]:
+    """For a database in the place of files: what the disk refuses is told as it is of a file.
+
+    Raises:
+        OSError: The database could not be written or read.
+    """
+    try:
+        yield
+    except sqlite3.Error as error:
+        raise OSError(errno.EIO, str(error)) from error
 
 
 @contextmanager

@@ -47,6 +47,14 @@ class TestSmallFiles:
         assert made[0].getvalue() == made[1].getvalue()
         assert HELD not in zipfile.ZipFile(made[1]).namelist()
 
+    def test_a_disk_that_is_full_is_told_as_it_is_of_a_file(self, tmp_path):
+        files = SmallFiles(tmp_path)
+        # What SQLite is told of a disk without room.
+        files._connection.execute("PRAGMA max_page_count = 3")
+        with pytest.raises(OSError, match="full"), files:
+            for number in range(5000):
+                files.put(f"{number}.json", "x" * 100)
+
     @pytest.mark.parametrize("path", ["../out", "/etc/passwd", "a/../../b", ""])
     def test_no_path_leaves_the_folder(self, tmp_path, path):
         with SmallFiles(tmp_path) as files:
