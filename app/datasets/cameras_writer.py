@@ -9,7 +9,7 @@ from app.datasets.camera_json import camera_to_json
 from app.datasets.export_record import ExportRecord
 from app.datasets.frame_names import view_place
 from app.datasets.safe_path import resolve_inside
-from app.datasets.small_files import PutText, put_on_disk
+from app.datasets.view_files import PutText, put_on_disk
 from app.finite import json_text
 from app.geometry.camera import Camera
 

@@ -10,7 +10,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-from app.datasets.small_files import gathered
+from app.datasets.view_files import gathered
 from app.finite import json_text
 
 MANIFEST = "manifest.json"

@@ -13,7 +13,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from app.datasets.manifest import MANIFEST, SOFTWARE
-from app.datasets.small_files import gathered
+from app.datasets.view_files import gathered
 from app.durable import PARTIAL, sync
 from app.errors import InputError, StorageError
 

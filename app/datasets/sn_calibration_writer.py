@@ -13,7 +13,6 @@ from app.datasets.export_record import ExportRecord
 from app.datasets.frame_names import view_place
 from app.datasets.match_info import PLACE, MatchInfoWriter, record_of
 from app.datasets.safe_path import resolve_inside
-from app.datasets.small_files import PutText, put_on_disk
 from app.datasets.sn_calibration import (
     CAMERAS,
     LARGEST_UNIT,
@@ -23,6 +22,7 @@ from app.datasets.sn_calibration import (
     spelling,
     split_folder_of,
 )
+from app.datasets.view_files import PutText, put_on_disk
 from app.errors import InputError
 from app.finite import json_text
 from app.soccer.annotation import Lines

@@ -11,7 +11,7 @@ from typing import Any
 from app.datasets.csv_text import Table
 from app.datasets.export_record import ExportRecord, chosen_box
 from app.datasets.frame_names import flat_frame, likely_suffix, split_folder
-from app.datasets.small_files import PutText, put_on_disk
+from app.datasets.view_files import PutText, put_on_disk
 from app.datasets.yolo_lists import ImageLists
 from app.soccer.frames import Box, ImageSize
 from app.soccer.group import View

@@ -31,11 +31,12 @@ function Offers({ offers, active, choose }) {
 export function QueryBox({ field, invalid, onQuery }) {
 	const asked = param('q');
 	const [text, setText] = useState(asked);
-	const [completion, setCompletion] = useState(NOTHING);
+	/** The caret, as long as something is offered there. */
+	const [at, setAt] = useState(/** @type {number | null} */ (null));
 	/** The text of the chosen offer: offers may change while one chooses. */
 	const [chosen, setChosen] = useState('');
 	const caret = useRef(/** @type {number | null} */ (null));
-	const { offers } = completion;
+	const { offers } = at === null ? NOTHING : complete(text, at, facets.value, queryFields.value);
 	const active = offers.findIndex((one) => one.text === chosen);
 	useEffect(() => {
 		if (document.activeElement !== field.current) setText(asked);
@@ -51,52 +52,38 @@ export function QueryBox({ field, invalid, onQuery }) {
 		caret.current = null;
 	}, [text]);
 
-	const known = facets.value;
-	const fields = queryFields.value;
-	useEffect(() => {
-		// What arrives while somebody waits for it; what they have chosen meanwhile stays chosen. They may have typed on
-		// since this was drawn.
-		const now = field.current?.value ?? '';
-		if (document.activeElement !== field.current || !/\S$/.test(now)) return;
-		setCompletion(completionOf(now));
-	}, [known, fields]);
-
-	/** @param {string} now */
-	function completionOf(now) {
-		return complete(now, field.current?.selectionStart ?? now.length, facets.value, queryFields.value);
-	}
-	/** @param {string} now */
-	function offer(now) {
+	/** @param {HTMLInputElement | null} input */
+	function offer(input) {
 		setChosen('');
-		setCompletion(completionOf(now));
+		setAt(input ? input.selectionStart ?? input.value.length : null);
 	}
 	/** @param {Offer} one */
 	function choose(one) {
+		// They may have typed on since this was drawn.
 		const now = field.current?.value ?? text;
-		const { from, to } = completionOf(now);
-		const next = now.slice(0, from) + one.text + now.slice(to);
+		const { from, to } = complete(now, field.current?.selectionStart ?? now.length, facets.value, queryFields.value);
 		caret.current = from + one.text.length;
-		setText(next);
+		setText(now.slice(0, from) + one.text + now.slice(to));
 		setChosen('');
-		setCompletion(complete(next, caret.current, facets.value, queryFields.value));
+		setAt(caret.current);
 	}
 	/** @param {KeyboardEvent} event */
 	function key(event) {
-		if (event.key === 'ArrowDown' && offers.length === 0) offer(text);
+		if (event.key === 'ArrowDown' && offers.length === 0) offer(field.current);
 		else if (event.key === 'ArrowDown' || event.key === 'ArrowUp') {
 			// One place before the first: what was typed, taken as it is.
 			const next = active + (event.key === 'ArrowDown' ? 1 : -1);
 			setChosen(offers[next < -1 ? offers.length - 1 : next]?.text ?? '');
 		} else if ((event.key === 'Enter' || event.key === 'Tab') && offers[active]) choose(offers[active]);
 		else if (event.key === 'Enter') submit();
-		else if (event.key === 'Escape' && offers.length) setCompletion(NOTHING);
+		else if (event.key === 'Escape' && offers.length) setAt(null);
 		else if (event.key === 'Escape') field.current?.blur();
 		else return;
 		event.preventDefault();
 	}
 	function submit() {
 		onQuery(text);
-		setCompletion(NOTHING);
+		setAt(null);
 		field.current?.blur();
 	}
 	return html`
@@ -107,11 +94,11 @@ export function QueryBox({ field, invalid, onQuery }) {
 				aria-invalid=${invalid} aria-expanded=${offers.length > 0}
 				aria-controls="query-offers" aria-activedescendant=${active >= 0 ? `query-offer-${active}` : undefined}
 				onInput=${(/** @type {InputEvent} */ event) => {
-					const { value } = /** @type {HTMLInputElement} */ (event.target);
-					setText(value);
-					offer(value);
+					const input = /** @type {HTMLInputElement} */ (event.target);
+					setText(input.value);
+					offer(input);
 				}}
-				onFocus=${() => { loadFacets(); }} onBlur=${() => setCompletion(NOTHING)} onKeyDown=${key}
+				onFocus=${() => { loadFacets(); }} onBlur=${() => setAt(null)} onKeyDown=${key}
 			/>
 			${text ? html`
 				<button class="query-box__clear" type="button" aria-label="Clear the query" onClick=${() => { setText(''); onQuery(''); }}>×</button>` : null}

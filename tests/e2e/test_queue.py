@@ -32,6 +32,17 @@ TYPE_WHILE_VALUES_ARRIVE = """async () => {
 }"""
 
 
+CHOOSE_WHILE_VALUES_ARRIVE = """async () => {
+  const { facets } = await import(
+    document.querySelector('script[src$="main.js"]').src.replace('main.js', 'state/facets.js'));
+  const field = document.querySelector('.field--query');
+  facets.value = { ...facets.value };
+  // It is drawn, and what follows a drawing is still to come.
+  for (let turn = 0; turn < 5; turn += 1) await undefined;
+  field.dispatchEvent(new KeyboardEvent('keydown', { key: 'Enter', bubbles: true }));
+}"""
+
+
 def opened(open_page: OpenPage, query: str = "") -> Page:
     """The queue with its rows there."""
     page = open_page(f"/groups?q={query}")
@@ -76,6 +87,19 @@ class TestQueryBox:
         page.keyboard.press("ArrowDown")
         page.keyboard.press("Enter")
         expect(box).to_have_value("number<=9 split:")
+
+    def test_values_follow_a_field_that_is_chosen_while_they_arrive(
+        self, open_page: OpenPage
+    ) -> None:
+        page = opened(open_page)
+        page.keyboard.press("/")
+        page.keyboard.type("number<=9 spl")
+        expect(page.get_by_role("option", name="split:")).to_be_visible()
+        page.keyboard.press("ArrowDown")
+        expect(page.locator('[role="option"][aria-selected="true"]')).to_contain_text("split:")
+        page.evaluate(CHOOSE_WHILE_VALUES_ARRIVE)
+        expect(page.locator(".field--query")).to_have_value("number<=9 split:")
+        expect(page.get_by_role("option", name="train", exact=True)).to_be_visible()
 
     def test_a_status_button_filters_and_a_header_sorts(self, open_page: OpenPage) -> None:
         page = opened(open_page)

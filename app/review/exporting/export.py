@@ -14,8 +14,8 @@ from app.datasets.export_record import ExportRecord
 from app.datasets.file_tree import Root
 from app.datasets.issia import FramePersons
 from app.datasets.manifest import UNKNOWN_LICENCE, Manifest, write_manifest
-from app.datasets.small_files import PutText, SmallFiles
 from app.datasets.store_output import output_anywhere
+from app.datasets.view_files import PutText, ViewFiles
 from app.errors import InputError
 from app.object_store.address import is_address
 from app.object_store.path import StoredPath
@@ -152,7 +152,7 @@ def export(
             # A version is the same every time; spare frames are the dataset's as it is.
             if format == "issia" and isinstance(source, LiveSource):
                 run.spare = spare_persons(session, dataset)
-            with _small_files(root, out) as put:
+            with _view_files(root, out) as put:
                 counts = run.write(root, put)
             _require_content(source.dataset, format, counts)
             write_manifest(root, run.manifest(counts))
@@ -161,12 +161,12 @@ def export(
 
 
 @contextmanager
-def _small_files(root: Path, out: Root) -> Iterator[PutText | None]:
+def _view_files(root: Path, out: Root) -> Iterator[PutText | None]:
     """Where the files of single views go: on their way into a zip they wait together."""
     if out.suffix.lower() != ".zip":
         yield None
         return
-    with SmallFiles(root) as files:
+    with ViewFiles(root) as files:
         yield files.put
 
 
@@ -199,7 +199,7 @@ def require_possible(
         source = _First(whole)
         options = _Options(format, everything, boxes, images, views)
         frames = ExportImages(Path(folder), "none", _here(store), frame_layout(format))
-        with SmallFiles(Path(folder)) as small:
+        with ViewFiles(Path(folder)) as small:
             counts = _Run(source, options, frames, None).write(Path(folder), small.put)
         if images != "none" and not frames.media:
             files = [] if source.is_all else frame_files(session, whole.dataset_id)

@@ -19,11 +19,11 @@ from app.datasets.issia_3d_writer import write_issia_3d
 from app.datasets.issia_writer import write_issia
 from app.datasets.manifest import SOFTWARE, software_version
 from app.datasets.parquet_writer import write_parquet
-from app.datasets.small_files import PutText
 from app.datasets.sn_calibration import line_frame
 from app.datasets.sn_calibration_writer import write_sn_calibration
 from app.datasets.soccernet_v3_writer import write_soccernet_v3
 from app.datasets.soccernet_v3d_writer import write_soccernet_v3d
+from app.datasets.view_files import PutText
 from app.datasets.yolo_writer import write_yolo
 from app.errors import InputError
 from app.soccer.group import Group

@@ -6,15 +6,15 @@ import zipfile
 import pytest
 
 from app.datasets.output import write_zip
-from app.datasets.small_files import HELD, SmallFiles, gathered, put_on_disk
+from app.datasets.view_files import HELD, ViewFiles, gathered, put_on_disk
 from app.errors import UnsafePathError
 
 
-class TestSmallFiles:
+class TestViewFiles:
     def test_come_back_among_the_files_of_the_disk_in_the_order_of_their_paths(self, tmp_path):
         (tmp_path / "b").mkdir()
         (tmp_path / "b" / "2.csv").write_text("on disk")
-        with SmallFiles(tmp_path) as files:
+        with ViewFiles(tmp_path) as files:
             files.put("b/3.json", "ü")
             files.put("b/1.json", "{}")
             files.put("a.json", "")
@@ -26,7 +26,7 @@ class TestSmallFiles:
         ]
 
     def test_what_is_put_again_is_the_newer_file(self, tmp_path):
-        with SmallFiles(tmp_path) as files:
+        with ViewFiles(tmp_path) as files:
             files.put("a", "first")
             files.put("./a", "then")
         assert list(gathered(tmp_path)) == [("a", b"then")]
@@ -35,7 +35,7 @@ class TestSmallFiles:
         texts = {f"{match}/camera_{view}.json": f"{match} {view}" * view for match in "ba" for view in range(40)}  # fmt: skip
         (tmp_path / "disk").mkdir()
         (tmp_path / "held").mkdir()
-        with SmallFiles(tmp_path / "held") as files:
+        with ViewFiles(tmp_path / "held") as files:
             for put in (put_on_disk(tmp_path / "disk"), files.put):
                 for path, text in texts.items():
                     put(path, text)
@@ -48,7 +48,7 @@ class TestSmallFiles:
         assert HELD not in zipfile.ZipFile(made[1]).namelist()
 
     def test_a_disk_that_is_full_is_told_as_it_is_of_a_file(self, tmp_path):
-        files = SmallFiles(tmp_path)
+        files = ViewFiles(tmp_path)
         # What SQLite is told of a disk without room.
         files._connection.execute("PRAGMA max_page_count = 3")
         with pytest.raises(OSError, match="full"), files:
@@ -57,7 +57,7 @@ class TestSmallFiles:
 
     @pytest.mark.parametrize("path", ["../out", "/etc/passwd", "a/../../b", ""])
     def test_no_path_leaves_the_folder(self, tmp_path, path):
-        with SmallFiles(tmp_path) as files:
+        with ViewFiles(tmp_path) as files:
             for put in (files.put, put_on_disk(tmp_path)):
                 with pytest.raises(UnsafePathError):
                     put(path, "x")

@@ -1,4 +1,4 @@
-"""Small files of an export on their way into a zip: kept together until that is written.
+"""View files: those of single views of an export, kept together on their way into a zip.
 
 To make a file, and to open it twice more for its checksum and for the zip, takes longer than all
 else that an export does for a view.
@@ -17,7 +17,7 @@ from app.datasets.spill import disk_errors
 
 PutText = Callable[[str, str], None]
 """Takes a relative path, and the text of the file there."""
-HELD = ".small-files"
+HELD = ".view-files"
 """Where they wait, in the folder in which an export is gathered."""
 _BATCH = 1000
 
@@ -37,7 +37,7 @@ def put_on_disk(root: Path) -> PutText:
     return put
 
 
-class SmallFiles:
+class ViewFiles:
     """Files of a zip, in a database beside its other files; use as a context.
 
     A file that is put again is the newer one, as on a disk.
@@ -53,7 +53,7 @@ class SmallFiles:
             self._connection.execute("CREATE TABLE file (path TEXT PRIMARY KEY, body BLOB)")
             self._connection.execute("BEGIN")
 
-    def __enter__(self) -> SmallFiles:
+    def __enter__(self) -> ViewFiles:
         return self
 
     def __exit__(self, kind: object, *_: object) -> None:
