@@ -72,7 +72,7 @@ _FIRST_OF_OURS = 100_001
 
 @dataclass
 class _File:
-    """One Labels-GameState.json while it is made; images and annotations are JSON already."""
+    """One Labels-GameState.json while it is made; each image, and the annotations of each, are JSON already."""
 
     name: str
     number: int
@@ -173,10 +173,12 @@ def _add(file: _File, record: ExportRecord, view: View, counts: dict[str, int]) 
     file.images.append(_text(image))
     identity = str(image.get("image_id", image.get("id")))
     annotations = [*people, *_balls(file, record, view), *_rest(view, camera)]
-    file.annotations += [
-        _text({"id": f"{identity}{number:03d}", "image_id": identity, **annotation})
-        for number, annotation in enumerate(annotations, 1)
-    ]
+    if annotations:
+        found = [
+            {"id": f"{identity}{number:03d}", "image_id": identity, **annotation}
+            for number, annotation in enumerate(annotations, 1)
+        ]
+        file.annotations.append(_text(found).removeprefix("[").removesuffix("]"))
     counts["images"] += 1
     counts["annotated_balls"] += sum(ball.center is not None for ball in view.balls)
 
