@@ -8,8 +8,7 @@ from pathlib import Path, PurePosixPath
 from app.datasets.camera_json import camera_to_json
 from app.datasets.export_record import ExportRecord
 from app.datasets.frame_names import view_place
-from app.datasets.safe_path import resolve_inside
-from app.datasets.view_files import PutText, put_on_disk
+from app.datasets.view_files import PutText, put_on_disk, write_below
 from app.finite import json_text
 from app.geometry.camera import Camera
 
@@ -33,13 +32,9 @@ def write_cameras(root: Path, cameras: Mapping[str, Camera]) -> list[Path]:
     Raises:
         UnsafePathError: A key that would leave the folder.
     """
-    written = []
-    for key, camera in cameras.items():
-        path = resolve_inside(root, camera_name(key))
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(camera_text(camera), encoding="utf-8")
-        written.append(path)
-    return written
+    return [
+        write_below(root, camera_name(key), camera_text(camera)) for key, camera in cameras.items()
+    ]
 
 
 def write_camera_files(

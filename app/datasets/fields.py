@@ -20,6 +20,7 @@ def number(value: Any) -> float:
     Raises:
         ValueError: Anything else, a truth value and a blank among it.
     """
+    # Nearly all are, and an export asks for each corner of each box.
     if type(value) is float and math.isfinite(value):
         return value
     if isinstance(value, bool) or not isinstance(value, (int, float, str)):

@@ -12,7 +12,6 @@ from app.datasets.exact import exact_inverse
 from app.datasets.export_record import ExportRecord
 from app.datasets.frame_names import view_place
 from app.datasets.match_info import PLACE, MatchInfoWriter, record_of
-from app.datasets.safe_path import resolve_inside
 from app.datasets.sn_calibration import (
     CAMERAS,
     LARGEST_UNIT,
@@ -22,7 +21,7 @@ from app.datasets.sn_calibration import (
     spelling,
     split_folder_of,
 )
-from app.datasets.view_files import PutText, put_on_disk
+from app.datasets.view_files import PutText, put_on_disk, write_below
 from app.errors import InputError
 from app.finite import json_text
 from app.soccer.annotation import Lines
@@ -96,13 +95,10 @@ def write_line_files(root: Path, files: Iterable[LineFile]) -> list[Path]:
     Raises:
         UnsafePathError: A stem that would leave the folder.
     """
-    written = []
-    for file in files:
-        path = resolve_inside(root, f"{file.stem}.json")
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(line_file_text(file.lines, file.size, file.others), encoding="utf-8")
-        written.append(path)
-    return written
+    return [
+        write_below(root, f"{file.stem}.json", line_file_text(file.lines, file.size, file.others))
+        for file in files
+    ]
 
 
 def write_sn_calibration(

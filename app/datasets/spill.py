@@ -50,7 +50,7 @@ def disk_errors() -> Iterator[None]:
     """
     try:
         yield
-    except sqlite3.Error as error:
+    except sqlite3.OperationalError as error:
         raise OSError(errno.EIO, str(error)) from error
 
 

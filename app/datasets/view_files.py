@@ -30,11 +30,21 @@ def put_on_disk(root: Path) -> PutText:
     """
 
     def put(path: str, text: str) -> None:
-        target = resolve_inside(root, path)
-        target.parent.mkdir(parents=True, exist_ok=True)
-        target.write_text(text, encoding="utf-8")
+        write_below(root, path, text)
 
     return put
+
+
+def write_below(root: Path, path: str, text: str) -> Path:
+    """Write a file below a folder, and the folders that it lies in; its path.
+
+    Raises:
+        UnsafePathError: The path would leave the folder.
+    """
+    target = resolve_inside(root, path)
+    target.parent.mkdir(parents=True, exist_ok=True)
+    target.write_text(text, encoding="utf-8")
+    return target
 
 
 class ViewFiles:

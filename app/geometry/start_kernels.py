@@ -10,7 +10,7 @@ NEAR_M = 1.0
 """Metres in front of a stand from which a curve counts as seen."""
 SHORT_M = 5.0
 """A shorter curve weighs like one of this length."""
-LEAST_SPREAD = 1e-3
+LEAST_WIDTH = 1e-3
 """Of normalised image coordinates, where nothing lies in front of a stand."""
 
 
@@ -53,7 +53,7 @@ def aim(stands, kinds, shapes, pixels, curve, least_spread_px, focals, starts):
         fx, fy, fz = fx / length, fy / length, fz / length
         pan, tilt = np.arctan2(fx, -fy), np.arccos(fz)
         wide = _width(stand, (fx, fy, fz), pan, tilt, middles, weight)
-        focal = min(max(spread_px / max(wide, LEAST_SPREAD), focals[0]), focals[1])
+        focal = min(max(spread_px / max(wide, LEAST_WIDTH), focals[0]), focals[1])
         # Turn so that the aim appears where the annotation has it, not in the middle.
         starts[s, 0] = pan - np.arctan(column / focal)
         starts[s, 1] = tilt + np.arctan(row / focal)

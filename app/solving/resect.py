@@ -88,6 +88,7 @@ QUICK = Plan(
     narrow=Stage(starts=4, steps=10, scale_px=8.0, tolerance=1e-4),
     final=FINAL,
 )
+"""For what its lines determine well: wherever it begins, it ends in one camera."""
 THOROUGH = Plan(
     scout=replace(QUICK.scout, steps=5),
     search=QUICK.search,
@@ -204,7 +205,9 @@ class ResectionProblem:
         fit = self.search(observations)
         if self.distances(fit.parameters, observations).max() <= POOR_PX * self.unit:
             return fit
-        fits = [fit, self._search(observations, THOROUGH)]
+        fits = [fit]
+        if not is_nearly_open(observations):
+            fits.append(self._search(observations, THOROUGH))
         straight = observations.without(*CIRCLES)
         if (
             len(straight.pixels) < len(observations.pixels)
@@ -215,8 +218,8 @@ class ResectionProblem:
 
     def search(self, observations: Observations) -> Resection:
         """The best camera from the whole bank of stands."""
-        few = measurement_count(observations) < FEW_MEASUREMENTS
-        return self._search(observations, THOROUGH if few else QUICK)
+        plan = THOROUGH if is_nearly_open(observations) else QUICK
+        return self._search(observations, plan)
 
     def _search(self, observations: Observations, plan: Plan) -> Resection:
         thinned = observations.thinned(POINTS_PER_LINE, POINTS_PER_CIRCLE)
@@ -424,6 +427,11 @@ def _at(
 def best(fit: Fit, count: int) -> FloatArray:
     """Parameters of the ``count`` starts of lowest cost, lowest first."""
     return fit.parameters[np.argsort(fit.cost, kind="stable")[:count]]
+
+
+def is_nearly_open(observations: Observations) -> bool:
+    """Whether several cameras may fit nearly as well."""
+    return measurement_count(observations) < FEW_MEASUREMENTS
 
 
 def measurement_count(observations: Observations) -> int:

@@ -34,6 +34,12 @@ structlog.configure(
 )
 
 
+@pytest.fixture(scope="session", autouse=True)
+def _no_setting_of_tests() -> None:
+    """`touchline doctor` finds fault with what is no setting of the product."""
+    os.environ.pop("TOUCHLINE_REAL_DATA", None)
+
+
 ON_BOTH = frozenset(
     {
         "review/editing/test_submit.py",

@@ -32,6 +32,8 @@ T = TypeVar("T")
 CHUNK = 1024 * 1024
 """Bytes that are gathered before they are written."""
 DISK_THREADS = 2
+"""For the files of all uploads: with eight, which take turns with the event loop at each call of the
+disk, readers beside a flood of uploads waited half as long again."""
 _THREADS: RunVar[CapacityLimiter] = RunVar("threads of uploads")
 LOOK_SECONDS = 0.25
 """Between two looks whether the server stops."""
@@ -105,8 +107,7 @@ async def _write(request: Request, writer: UploadWriter) -> None:
 
 
 async def _on_disk(work: Callable[..., T], *arguments: Any) -> T:
-    """Work on files, in one of few threads: eight that take turns with the event loop at each call
-    of the disk let readers wait ten times as long."""
+    """Work on files, in one of ``DISK_THREADS``."""
     try:
         threads = _THREADS.get()
     except LookupError:

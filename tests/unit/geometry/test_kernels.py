@@ -2,37 +2,26 @@
 
 from __future__ import annotations
 
-from types import ModuleType
+from importlib import import_module
+from pkgutil import iter_modules
 
 import pytest
 from numba.core.dispatcher import Dispatcher
 
-from app.geometry import (
-    curve_fit,
-    curve_residuals,
-    damped_solve,
-    lens_kernels,
-    likely_point,
-    point_kernels,
-    smallest_singular,
-    start_kernels,
-)
+from app import geometry
+
+KERNELS = {
+    f"{module.name}.{name}": value
+    for module in iter_modules(geometry.__path__)
+    for name, value in vars(import_module(f"{geometry.__name__}.{module.name}")).items()
+    if isinstance(value, Dispatcher)
+}
 
 
-@pytest.mark.parametrize(
-    "module",
-    [
-        curve_fit,
-        curve_residuals,
-        damped_solve,
-        lens_kernels,
-        likely_point,
-        point_kernels,
-        smallest_singular,
-        start_kernels,
-    ],
-)
-def test_who_solves_keeps_nobody_from_being_answered(module: ModuleType) -> None:
-    kernels = [item for item in vars(module).values() if isinstance(item, Dispatcher)]
-    assert kernels
-    assert all(item.targetoptions.get("nogil") for item in kernels)
+def test_all_are_found() -> None:
+    assert {"curve_fit.descend", "start_kernels.aim", "point_kernels.keep_farthest"} <= set(KERNELS)
+
+
+@pytest.mark.parametrize("name", KERNELS)
+def test_who_solves_keeps_nobody_from_being_answered(name: str) -> None:
+    assert KERNELS[name].targetoptions.get("nogil")
