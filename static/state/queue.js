@@ -112,14 +112,14 @@ export async function openQueue(dataset, q) {
 
 /** Put the pages in sight in the place of all that are there. @param {string} dataset @param {string} q @param {AbortSignal} abort */
 async function readAnew(dataset, q, abort) {
-	const { pages: before, shown } = queue.value;
-	const known = shown === queueKey(dataset, q) ? rowAt(before, activeRow.value) : null;
 	const wanted = pagesOf(sight.first, sight.last);
 	const answers = await Promise.all(wanted.map((page) => readPage(dataset, q, page, abort)));
 	if (abort.aborted) return;
 	const total = answers[answers.length - 1].total;
 	const pages = new Map(wanted.map((page, place) => [page, answers[place].items]));
-	// The active row stays with its group, wherever that stands now.
+	// The active row, which keys may have moved meanwhile, stays with its group, wherever that stands now.
+	const { pages: before, shown } = queue.value;
+	const known = shown === queueKey(dataset, q) ? rowAt(before, activeRow.value) : null;
 	const moved = known ? indexOf(pages, known.id) : -1;
 	activeRow.value = Math.max(0, Math.min(moved < 0 ? activeRow.value : moved, total - 1));
 	opening = false;

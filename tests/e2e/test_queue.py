@@ -172,6 +172,24 @@ class TestBulkVerdicts:
         )
 
 
+class TestWhatOthersDo:
+    def test_a_key_pressed_while_rows_are_read_again_is_not_lost(self, open_page: OpenPage) -> None:
+        page = opened(open_page)
+        hears(page)
+        active = page.locator('.queue-row[data-active="true"]')
+        with holding(page, "**/api/v1/groups?*") as rows:
+            judge(page, 5, "deferred")
+            try:
+                rows.arrive()
+                page.keyboard.press("ArrowDown")
+                expect(active).to_have_attribute("aria-rowindex", "3")
+                rows.release()
+                expect(verdict(page, 5)).to_have_attribute("data-status", "deferred")
+                expect(active).to_have_attribute("aria-rowindex", "3")
+            finally:
+                withdraw_verdict(page, 5)
+
+
 def pages_asked(page: Page) -> list[str]:
     """Addresses of the pages of rows that are asked for from now on."""
     asked: list[str] = []
