@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from itertools import pairwise
 
 from app.geometry.camera import Camera
 from app.soccer.finding import Finding
@@ -43,8 +42,8 @@ class MarkingFit:
             the marking is not annotated or not visible.
         nearest: The closest place on the polyline for each annotated point, to a thousandth of a
             pixel.
-        polyline: The projected marking, clipped at the image border, likewise; empty when not
-            visible.
+        length_px: Length of the projected marking inside the image, pixels; 0 when not visible.
+            Where it lies follows from camera and pitch (``solving.jaccard.project_markings``).
         used: False when the solver left the marking out.
     """
 
@@ -52,18 +51,13 @@ class MarkingFit:
     outcome: str
     distances_px: tuple[float, ...] = ()
     nearest: tuple[ImagePoint, ...] = ()
-    polyline: tuple[ImagePoint, ...] = ()
+    length_px: float = 0.0
     used: bool = True
 
     @property
     def largest_px(self) -> float | None:
         """Largest distance of an annotated point, pixels; None without one."""
         return max(self.distances_px, default=None)
-
-    @property
-    def length_px(self) -> float:
-        """Length of the projected marking, pixels; 0 when it is not visible."""
-        return sum(math.dist(a, b) for a, b in pairwise(self.polyline))
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Mapping
 from dataclasses import replace
-from itertools import islice
 from types import MappingProxyType
 
 import numpy as np
@@ -30,7 +29,6 @@ from app.soccer.solution import (
     Suspect,
 )
 from app.solving.jaccard import (
-    ProjectedMarking,
     jaccard,
     measure_markings,
     outcomes,
@@ -332,13 +330,17 @@ def measure(calibration: Calibration, lines: Lines, pitch: Pitch, size: ImageSiz
     by_gamma = [outcomes(measured, lines, gamma / 100 * size.diagonal) for gamma in GAMMAS_PERCENT]
     left_out = {suspect.marking for suspect in calibration.suspects}
     markings = []
-    drawn = _drawn(measured)
     for marking, outcome in by_gamma[0].items():
         fit = MarkingFit(marking, outcome, used=marking not in left_out)
         if marking in measured:
-            nearest, polyline = drawn[marking]
-            distances_px = tuple(measured[marking].distances.tolist())
-            fit = replace(fit, distances_px=distances_px, nearest=nearest, polyline=polyline)
+            seen = measured[marking]
+            nearest = np.round(seen.nearest, DRAWN_DIGITS).tolist()
+            fit = replace(
+                fit,
+                distances_px=tuple(seen.distances.tolist()),
+                nearest=tuple(map(ImagePoint._make, nearest)),
+                length_px=seen.length,
+            )
         markings.append(fit)
     distances = np.concatenate([np.array(fit.distances_px) for fit in markings] or [np.empty(0)])
     has_lines = any(lines.values())
@@ -390,15 +392,3 @@ def _unobservable(spread: FloatArray) -> tuple[str, ...]:
     if not deviations[LOG_FOCAL] <= MAX_FOCAL_SIGMA:
         words.append("focal length")
     return tuple(words)
-
-
-def _drawn(
-    measured: Mapping[str, ProjectedMarking],
-) -> dict[str, tuple[tuple[ImagePoint, ...], tuple[ImagePoint, ...]]]:
-    """Nearest places and polyline of each marking, as they are drawn: rounded."""
-    if not measured:
-        return {}
-    pixels = [part for seen in measured.values() for part in (seen.nearest, seen.polyline)]
-    points = map(ImagePoint._make, np.round(np.concatenate(pixels), DRAWN_DIGITS).tolist())
-    parts = iter([tuple(islice(points, len(part))) for part in pixels])
-    return {marking: (next(parts), next(parts)) for marking in measured}

@@ -38,6 +38,11 @@ class ProjectedMarking:
     distances: FloatArray
     nearest: FloatArray
 
+    @property
+    def length(self) -> float:
+        """Of the polyline, pixels."""
+        return float(np.hypot(*np.diff(self.polyline, axis=0).T).sum())
+
 
 def project_markings(camera: Camera, pitch: Pitch, size: ImageSize) -> dict[str, FloatArray]:
     """The visible markings as clipped polylines, pixels, in the order of ``MARKINGS``."""

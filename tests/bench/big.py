@@ -1,7 +1,8 @@
 """The big jobs on a dataset of SoccerNet-v3's size: import, solve, freeze, verify, exports.
 
 Prints seconds, seconds of the processor (all processes of the command) and milliseconds of it a group,
-the most memory that they held at once, and what each may take of all of SoccerNet-v3.
+the most memory that they held at once, and what each may take of all of SoccerNet-v3; and what a
+group takes of the disk, imported and solved.
 ``python -m tests.bench.big [GROUPS ...]``; 12,764 groups take ten minutes.
 """
 
@@ -86,6 +87,8 @@ def measure(folder: Path, tree: Path, groups: int) -> None:
         print(line_of(what, cost, groups), flush=True)
         if what == "policy":
             _change_tau(tau)
+        if what in ("import", "solve"):
+            print(f"{'bytes of a group':22}{_bytes(folder / 'home') / groups:8,.0f}", flush=True)
 
 
 def line_of(what: str, cost: Cost, groups: int) -> str:
@@ -95,6 +98,11 @@ def line_of(what: str, cost: Cost, groups: int) -> str:
     return (
         f"{what:22}{cost.seconds:8.1f}{cost.processor:8.1f}{each:8.2f}{cost.megabytes:6.0f}{target}"
     )
+
+
+def _bytes(home: Path) -> int:
+    """Of all files of a home."""
+    return sum(file.stat().st_size for file in home.rglob("*") if file.is_file())
 
 
 def _change_tau(file: Path) -> None:

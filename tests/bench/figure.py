@@ -10,6 +10,7 @@ import numpy as np
 from app.sample.render import render
 from app.soccer.policy import PAPER
 from app.solving.calibrate import calibrate
+from app.solving.jaccard import project_markings
 from tests.scenes import make_scenes
 
 SEED = 20260101
@@ -23,8 +24,9 @@ def main(out: str) -> None:
     view = scene.group.views[0]
     calibration = calibrate(view.station.lines, scene.group.pitch, view.size, PAPER.calibration)
     image = render(scene, view.key).copy()
+    for polyline in project_markings(calibration.camera, scene.group.pitch, view.size).values():
+        _polyline(image, polyline, BLUE)
     for fit in calibration.markings:
-        _polyline(image, np.array(fit.polyline), BLUE)
         points = np.array(view.station.lines.get(fit.marking, ()))
         for point, nearest in zip(points, np.array(fit.nearest), strict=True):
             _polyline(image, np.array([nearest, nearest + GAIN * (point - nearest)]), ORANGE)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Annotated, Any
 
+import numpy as np
 from pydantic import BeforeValidator, Field, ValidationInfo, field_validator, model_validator
 
 from app.api.schemas.document import Document
@@ -16,9 +17,12 @@ from app.review.editing.codec import edit_to_json
 from app.review.editing.fixes import offers
 from app.soccer.camera_sigma import camera_sigma
 from app.soccer.finding import Finding
-from app.soccer.frames import Box
+from app.soccer.frames import Box, ImageSize
 from app.soccer.group import Group
+from app.soccer.pitch import Pitch
 from app.soccer.solution import GAMMAS_PERCENT, BallFit, Calibration, Solution
+from app.solving.calibrate import DRAWN_DIGITS
+from app.solving.jaccard import project_markings
 
 
 def _numbers(box: Any) -> Any:
@@ -39,6 +43,7 @@ Measured = float | None
 """A number that may have no end (the sigma of parallel rays): it travels as null."""
 XY = tuple[float, float]
 XYZ = tuple[float, float, float]
+NOT_SEEN = np.empty((0, 2))
 XYWH = Annotated[tuple[float, float, float, float], BeforeValidator(_numbers)]
 Jac = Annotated[dict[str, float], BeforeValidator(_by_gamma)]
 """By gamma in per cent of the diagonal."""
@@ -79,8 +84,10 @@ class MarkingDocument(Document):
     used: bool
     largest_px: float | None
     distances_px: list[Measured]
-    nearest: list[XY]
-    polyline: list[XY]
+    nearest: list[XY] = Field(description="The closest place on the marking for each point.")
+    polyline: list[XY] = Field(
+        description="The marking as it is seen, ending at the image border; empty where it is not."
+    )
 
 
 class SuspectDocument(Document):
@@ -144,21 +151,35 @@ class CalibrationDocument(Document):
         description="How it and the paint agree; null where none was read for these lines."
     )
 
-    @model_validator(mode="before")
-    @classmethod
-    def _with_sigma(cls, value: Any) -> Any:
-        if isinstance(value, Calibration):
-            return {**vars(value), "sigma": camera_sigma(value)}
-        return value
+
+def _calibration(calibration: Calibration, pitch: Pitch, size: ImageSize) -> CalibrationDocument:
+    """The document of a calibration, with its markings where they are seen."""
+    seen = {}
+    if calibration.camera is not None:
+        seen = project_markings(calibration.camera, pitch, size)
+    markings = [
+        {
+            **vars(fit),
+            "largest_px": fit.largest_px,
+            "polyline": np.round(seen.get(fit.marking, NOT_SEEN), DRAWN_DIGITS).tolist(),
+        }
+        for fit in calibration.markings
+    ]
+    return CalibrationDocument.model_validate(
+        {**vars(calibration), "sigma": camera_sigma(calibration), "markings": markings}
+    )
 
 
-_calibration_document: IdentityCache[Calibration, CalibrationDocument] = IdentityCache(
-    CalibrationDocument.model_validate, size=256
+_kept_document: IdentityCache[Calibration, CalibrationDocument] = IdentityCache(
+    _calibration, size=256
 )
 
 
-def _kept_document(value: Any) -> Any:
-    return _calibration_document(value) if isinstance(value, Calibration) else value
+def _calibration_document(value: Any, info: ValidationInfo) -> Any:
+    if not isinstance(value, Calibration):
+        return value
+    group: Any = info.context
+    return _kept_document(value, group.pitch, group.view(info.data["view"]).size)
 
 
 class BallFitDocument(Document):
@@ -196,7 +217,7 @@ class ViewSolutionDocument(Document):
     view: str
     included: bool
     failed: str | None = Field(description="First gate that dropped this view.")
-    calibration: Annotated[CalibrationDocument, BeforeValidator(_kept_document)]
+    calibration: Annotated[CalibrationDocument, BeforeValidator(_calibration_document)]
     ball: BallFitDocument | None
     expected: ExpectedBallDocument | None
 

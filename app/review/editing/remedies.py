@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from app.geometry.arrays import FloatArray
 from app.review.editing.edit import Edit, SetLines
 from app.review.editing.fixes import Offer, ball_at, edit_of_fix, offers, rank, sentence
 from app.soccer.finding import Fix
@@ -15,6 +16,7 @@ from app.soccer.frames import ImagePoint
 from app.soccer.group import Group, View
 from app.soccer.policy import Policy
 from app.soccer.solution import Calibration, Gate, MarkingFit, Solution, ViewSolution
+from app.solving.jaccard import project_markings
 from app.solving.solve import solve
 
 MOST_TRIALS = 24
@@ -181,24 +183,30 @@ def _of_undrawn(group: Group, view: View, solved: ViewSolution) -> Iterator[_Ide
         (
             fit
             for fit in solved.calibration.markings
-            if fit.outcome == "fp" and _is_undrawn(fit) and fit.marking not in named
+            if _is_undrawn(fit) and fit.marking not in named
         ),
         key=lambda fit: fit.length_px,
         reverse=True,
     )
-    if not undrawn:
+    camera = solved.calibration.camera
+    if not undrawn or camera is None:
         return
     letter = chr(ord("A") + group.views.index(view))
     names = [f"{fit.marking} (visible over {max(fit.length_px, 1):.0f} px)" for fit in undrawn]
     verb = "were" if len(names) > 1 else "was"
     said = f"{' and '.join(names)} {verb} drawn in {letter}"
-    drawn = {fit.marking: fit.polyline[:: len(fit.polyline) // _CLICKS + 1] for fit in undrawn}
+    seen = project_markings(camera, group.pitch, view.size)
+    drawn = {fit.marking: _clicks_on(seen[fit.marking]) for fit in undrawn}
     fix = Fix("draw_marking", view.key, undrawn[0].marking)
     yield _Idea(said, fix, trial=SetLines(view.key, drawn))
 
 
 def _is_undrawn(fit: MarkingFit) -> bool:
-    return not fit.distances_px and bool(fit.polyline)
+    return fit.outcome == "fp" and not fit.distances_px
+
+
+def _clicks_on(polyline: FloatArray) -> tuple[ImagePoint, ...]:
+    return tuple(map(ImagePoint._make, polyline[:: len(polyline) // _CLICKS + 1].tolist()))
 
 
 def _of_lines(group: Group, view: View, solved: ViewSolution) -> Iterator[_Idea]:

@@ -51,7 +51,7 @@ def solution(camera) -> Solution:
         jac=(0.9, 0.95, 1.0),
         error_px=0.1 + 0.2,
         markings=(
-            MarkingFit("Middle line", "tp", (0.5, THIRD), (point, point), (point,) * 3),
+            MarkingFit("Middle line", "tp", (0.5, THIRD), (point, point), THIRD),
             MarkingFit("Side line top", "fn", used=False),
         ),
         suspects=(Suspect("Circle left", None, 0.5, 12.5),),
@@ -172,7 +172,7 @@ class TestValueCodec:
 
     def test_markings_can_be_left_out_whatever_texts_say(self) -> None:
         trap = ',"markings":[],"suspects":[]'
-        fit = MarkingFit(trap, "tp", (0.1,), (ImagePoint(1.0, 2.0),), (ImagePoint(3.0, 4.0),))
+        fit = MarkingFit(trap, "tp", (0.1,), (ImagePoint(1.0, 2.0),), 34.0)
         told = Calibration(
             "lines", None, trap, markings=(fit, fit), suspects=(Suspect(trap, None, 0.5, 3.0),)
         )

@@ -16,6 +16,13 @@ class TestIdentityCache:
         assert [cache(value), cache(value), cache(twin)] == [3, 3, 3]
         assert len(called) == 2
 
+    def test_calls_again_where_something_else_is_beside_it(self) -> None:
+        cache: IdentityCache[list[int], int] = IdentityCache(
+            lambda values, factor: factor * sum(values), size=8
+        )
+        value = [1, 2]
+        assert [cache(value, factor) for factor in (1, 10, 10, 1)] == [3, 30, 30, 3]
+
     def test_a_value_that_is_gone_gives_its_id_to_nobody_else(self) -> None:
         cache: IdentityCache[list[int], int] = IdentityCache(sum, size=2)
         assert [cache([number]) for number in range(100)] == list(range(100))

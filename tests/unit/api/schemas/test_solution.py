@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from app.api.schemas.solution import SolutionDocument
+from app.geometry.polyline import distance_to_polyline
 from app.review.editing.codec import edit_from_json
 from app.soccer.finding import Finding, Fix
 from app.soccer.group import Group
@@ -36,6 +37,37 @@ class TestSolutionDocument:
     def test_jac_is_named_by_its_threshold(self, solution: Solution, group: Group) -> None:
         view = SolutionDocument.of(solution, group).views[0]
         assert list(view.calibration.jac) == ["0.5", "1", "2"]
+
+    def test_a_marking_is_told_as_it_is_seen_up_to_the_border(
+        self, solution: Solution, group: Group
+    ) -> None:
+        shown = 0
+        documents = SolutionDocument.of(solution, group).views
+        for view, document in zip(group.views, documents, strict=True):
+            for fit in document.calibration.markings:
+                polyline = np.array(fit.polyline).reshape(-1, 2)
+                assert (polyline >= 0).all()
+                assert (polyline <= [view.size.width, view.size.height]).all()
+                if fit.nearest:
+                    _, places = distance_to_polyline(np.array(fit.nearest), polyline)
+                    assert np.allclose(places, fit.nearest, atol=2e-3)
+                shown += len(polyline) > 1
+            assert all(fit.polyline for fit in document.calibration.markings if fit.outcome != "fn")
+        assert shown > 4
+
+    def test_the_same_camera_of_another_pitch_is_drawn_anew(
+        self, solution: Solution, group: Group
+    ) -> None:
+        narrow = replace(group, pitch=replace(group.pitch, width=60.0))
+        told = [SolutionDocument.of(solution, one).views[0] for one in (group, narrow, group)]
+        drawn = [[fit.polyline for fit in one.calibration.markings] for one in told]
+        assert drawn[0] == drawn[2] != drawn[1]
+
+    def test_where_no_camera_is_nothing_is_drawn(self, solution: Solution, group: Group) -> None:
+        first = solution.views[0]
+        blind = replace(first, calibration=replace(first.calibration, camera=None))
+        document = SolutionDocument.of(replace(solution, views=(blind,)), group).views[0]
+        assert not any(fit.polyline for fit in document.calibration.markings)
 
     def test_a_camera_says_how_well_it_is_known_where_that_is_known(
         self, solution: Solution, group: Group
