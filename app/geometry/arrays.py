@@ -45,3 +45,8 @@ def require_shape(array: FloatArray, shape: tuple[int | None, ...], name: str) -
     ):
         raise ShapeError(f"{name} has shape {array.shape}, needs {shape}")
     return array
+
+
+def row_by_row(covariance: FloatArray) -> tuple[float, ...]:
+    """A covariance as plain numbers, row by row: what rounding made of its two halves is one."""
+    return tuple(((covariance + covariance.T) / 2).ravel().tolist())

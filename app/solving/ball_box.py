@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from app.errors import DegenerateGeometryError
-from app.geometry.arrays import FloatArray
+from app.geometry.arrays import FloatArray, row_by_row
 from app.geometry.camera import Camera
 from app.geometry.sphere import optimal_diameter, position_from_diameter, tight_box
 from app.soccer.annotation import BallAnnotation
@@ -86,7 +86,7 @@ def expect_ball(
     spread = spread + calibration_spread(calibration, size, point)
     return ExpectedBall(
         place=ImagePoint(x, y),
-        covariance=tuple(spread.ravel().tolist()),
+        covariance=row_by_row(spread),
         box=_exact_box(calibration.camera, point, diameter_m),
     )
 

@@ -8,7 +8,7 @@ from itertools import combinations
 
 import numpy as np
 
-from app.geometry.arrays import FloatArray, IntArray
+from app.geometry.arrays import FloatArray, IntArray, row_by_row
 from app.geometry.likely_point import CameraTable, likely_points
 from app.soccer.policy import Policy
 from app.soccer.solution import BestBall, Pair
@@ -68,7 +68,7 @@ def best_ball(pairs: Sequence[Pair], usable: Sequence[Sight], policy: Policy) ->
     x, y, z = estimate.point.tolist()
     return BestBall(
         point=(x, y, z),
-        covariance=tuple(spread.ravel().tolist()),
+        covariance=row_by_row(spread),
         sigma_m=float(np.sqrt(np.linalg.eigvalsh(spread)[-1])),
         views=used,
         contradicting=tuple(sight.view for sight in usable if sight.view not in used),

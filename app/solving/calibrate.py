@@ -10,7 +10,7 @@ from types import MappingProxyType
 import numpy as np
 
 from app.errors import DegenerateGeometryError
-from app.geometry.arrays import FloatArray
+from app.geometry.arrays import FloatArray, row_by_row
 from app.geometry.camera import Camera
 from app.geometry.resection import LOG_FOCAL, PARAMETERS, X, Z
 from app.soccer.annotation import Lines
@@ -53,7 +53,7 @@ MIN_MEASUREMENTS = 7
 NONE_KNOWN: Mapping[str, Calibration] = MappingProxyType({})
 
 DRAWN_DIGITS = 3
-"""Decimals of a pixel that are kept of what is drawn; distances keep every bit."""
+"""Decimals of a pixel that are kept of places and lengths; distances keep every bit."""
 
 MAX_POSITION_SIGMA_M = 5.0
 MAX_FOCAL_SIGMA = 0.10
@@ -153,10 +153,10 @@ def calibrate_picture(
         replace(
             alone,
             camera=found.done(alone.camera, size),
-            covariance=tuple(spread.ravel().tolist()) if np.isfinite(spread).all() else None,
+            covariance=row_by_row(spread) if np.isfinite(spread).all() else None,
             unobservable=_unobservable(spread),
             picture=None,
-            picture_covariance=tuple(whole.ravel().tolist()) if np.isfinite(whole).all() else None,
+            picture_covariance=row_by_row(whole) if np.isfinite(whole).all() else None,
         ),
         lines,
         pitch,
@@ -191,7 +191,7 @@ def _found(problem: ResectionProblem, fit: Resection, observations: Observations
     return Calibration(
         "lines",
         problem.camera(fit.parameters),
-        covariance=tuple(spread.ravel().tolist()) if np.isfinite(spread).all() else None,
+        covariance=row_by_row(spread) if np.isfinite(spread).all() else None,
         unobservable=_unobservable(spread),
     )
 
@@ -250,7 +250,7 @@ def calibrate_paint(
         clicked,
         source="paint",
         camera=resection.camera(found.parameters),
-        covariance=tuple(found.covariance.ravel().tolist()),
+        covariance=row_by_row(found.covariance),
         unobservable=_unobservable(found.covariance),
         paint=replace(fit, error_px=found.error_px),
     )
@@ -339,7 +339,7 @@ def measure(calibration: Calibration, lines: Lines, pitch: Pitch, size: ImageSiz
                 fit,
                 distances_px=tuple(seen.distances.tolist()),
                 nearest=tuple(map(ImagePoint._make, nearest)),
-                length_px=seen.length,
+                length_px=round(seen.length, DRAWN_DIGITS),
             )
         markings.append(fit)
     distances = np.concatenate([np.array(fit.distances_px) for fit in markings] or [np.empty(0)])

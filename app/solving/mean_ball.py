@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from app.geometry.arrays import row_by_row
 from app.soccer.policy import Policy
 from app.soccer.solution import GATES, Ball3D, BestBall, Pair
 from app.solving.facts import Facts
@@ -50,7 +51,7 @@ def mean_ball(
     x, y, z = verdict.point[0].tolist()
     return Ball3D(
         point=(x, y, z),
-        covariance=tuple(covariance.ravel().tolist()),
+        covariance=row_by_row(covariance[0]),
         sigma_m=float(longest_sigma(covariance)[0]),
         parallax_degrees=float(verdict.parallax[0]),
         views=tuple(keys[place] for place in np.unique(facts.pair_view[verdict.valid]).tolist()),

@@ -12,7 +12,7 @@ from itertools import combinations
 
 import numpy as np
 
-from app.geometry.arrays import FloatArray
+from app.geometry.arrays import FloatArray, row_by_row
 from app.geometry.bundle import best_points, ray_gaps
 from app.geometry.camera import Camera
 from app.geometry.resection import X, Z, projection_jacobians
@@ -212,7 +212,7 @@ def _camera_change(rig: Rig, fit: RigFit, row: int, balls: FloatArray) -> Camera
         key=camera.key,
         before=camera.camera,
         after=after,
-        covariance=tuple(spread.ravel().tolist()),
+        covariance=row_by_row(spread),
         covariance_before=tuple(
             (spread + error_covariance(camera, parameters, balls)).ravel().tolist()
         ),
