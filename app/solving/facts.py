@@ -108,6 +108,16 @@ class Facts:
         bare: BoolArray = self.view_given & ~self.view_known
         return bare
 
+    @cached_property
+    def view_changed(self) -> BoolArray:
+        """Its picture was stretched or cropped, shape (V,)."""
+        changed: BoolArray = np.any(self.view_picture, axis=(1, 2))
+        return changed
+
+    def rows(self, name: str, rows: IntArray) -> Any:
+        """Some rows of a column; of large ones, cheaper than all of it where this is a part."""
+        return getattr(self, name)[rows]
+
     def only(self, kept: BoolArray) -> Facts:
         """The facts of some of the groups, in the same order."""
         part = self.part(kept)
@@ -128,17 +138,28 @@ class _Part:
         self.groups = int(kept.sum())
         views = kept[whole.view_group]
         self._whole = whole
-        self._rows = {"view": views, "pair": kept[whole.pair_group]}
+        self._rows = {
+            "view": np.flatnonzero(views),
+            "pair": np.flatnonzero(kept[whole.pair_group]),
+        }
+        self._views = views
         self._places = {"group": np.cumsum(kept) - 1, "view": np.cumsum(views) - 1}
 
-    def __getattr__(self, name: str) -> Any:
-        if name not in COLUMNS:
-            # What is computed from columns is computed from these.
-            return getattr(Facts, name).func(self)
+    def rows(self, name: str, rows: IntArray) -> Any:
+        """``Facts.rows``; of a column that holds no rows of something else."""
+        if name in self.__dict__:
+            return self.__dict__[name][rows]
+        return getattr(self._whole, name)[self._of(name)[rows]]
+
+    def _of(self, name: str) -> IntArray:
+        """Rows of a column that are its own."""
         per = name.partition("_")[0]
         if per not in self._rows:
-            self._rows[per] = self._rows["view"][self._whole.mark_view]
-        array = getattr(self._whole, name)[self._rows[per]]
+            self._rows[per] = np.flatnonzero(self._views[self._whole.mark_view])
+        return self._rows[per]
+
+    def __getattr__(self, name: str) -> Any:
+        array = getattr(self._whole, name)[self._of(name)]
         if name in _POINTS_TO:
             array = self._places[_POINTS_TO[name]][array]
         self.__dict__[name] = array

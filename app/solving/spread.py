@@ -111,18 +111,18 @@ def known_spreads(facts: Facts, views: IntArray, points: FloatArray) -> FloatArr
         views: Rows of the views, shape (N,).
         points: The ball of each of them, pitch frame, metres, shape (N, 3).
     """
-    numbers = facts.view_parameters[views], facts.view_covariance[views]
-    diagonals, pictures = facts.view_diagonal[views], facts.view_picture[views]
+    numbers = facts.rows("view_parameters", views), facts.rows("view_covariance", views)
+    diagonals = facts.view_diagonal[views]
     spreads = carried_spreads(*numbers, points, diagonals)
-    rows = np.flatnonzero(pictures.any(axis=(1, 2)))
+    rows = np.flatnonzero(facts.view_changed[views])
     if len(rows):
         spreads[rows] = picture_spreads(
             numbers[0][rows],
             numbers[1][rows],
             points[rows],
             diagonals[rows],
-            pictures[rows],
-            facts.view_stretch[views[rows]],
+            facts.rows("view_picture", views[rows]),
+            facts.rows("view_stretch", views[rows]),
         )
     return spreads
 
@@ -363,11 +363,12 @@ def _mean_slopes(facts: Facts, pairs: IntArray) -> tuple[IntArray, FloatArray]:
     for place in range(count.max(initial=0)):
         rows = np.flatnonzero(place < count)
         chosen = pairs[first[rows] + place]
+        points, moved = facts.rows("pair_point", chosen), facts.rows("pair_moved", chosen)
+        sides = facts.pair_view[chosen] == views[rows, None]
         # A pair without the view stays where it is.
-        moved = np.tile(facts.pair_point[chosen, None, None], (2, 2, 1))
-        for side in (0, 1):
-            mine = facts.pair_view[chosen, side] == views[rows]
-            moved[mine] = facts.pair_moved[chosen[mine], side]
-        total[rows] += moved
+        still = ~sides.any(axis=1)
+        by = moved[np.arange(len(chosen)), sides[:, 1].astype(int)]
+        by[still] = points[still, None, None]
+        total[rows] += by
     means = total / count[:, None, None, None]
     return views, (means[:, :, 0] - means[:, :, 1]) / (2 * STEP_PX)

@@ -91,7 +91,30 @@ def judge(
     """
     if jac is None:
         jac = view_jac(facts, policy.jac_gamma_percent)
-    view_failed, pair_failed = failures(facts, jac, policy)
+    return judge_standing(facts, policy, spread, jac, failures(facts, jac, policy))
+
+
+def judge_standing(
+    facts: Facts,
+    policy: Policy,
+    spread: MeanSpread,
+    jac: FloatArray,
+    standing: tuple[IntArray, IntArray],
+    *,
+    first_alone: bool = False,
+) -> Verdict:
+    """``judge`` where it is known which views and pairs stand.
+
+    Args:
+        facts: The groups.
+        policy: The thresholds.
+        spread: Of the same facts.
+        jac: ``view_jac`` at the policy's gamma, shape (V,).
+        standing: ``failures`` of them.
+        first_alone: Only the first gate that a group fails matters: what is dear is not judged
+            where one before it fails.
+    """
+    view_failed, pair_failed = standing
     left = facts.view_included & (view_failed == PASSES)
     point, parallax, distance = _mean(facts, pair_failed == PASSES)
     baseline = _baseline(facts, left)
@@ -101,13 +124,18 @@ def judge(
     failed[_REPROJECTION] = np.isnan(point[:, 0])
     if policy.min_parallax_degrees is not None:
         failed[_PARALLAX] = ~(parallax >= policy.min_parallax_degrees)
+    before: BoolArray = failed[_REPROJECTION]
+    if first_alone:
+        before = np.any(failed[:_SIGMA], axis=0)
     if policy.max_sigma_m is not None:
-        there = np.flatnonzero(~failed[_REPROJECTION])
-        spreads = spread.covariances(pair_failed == PASSES, there, point[there], policy)
+        asked = np.flatnonzero(~before)
+        spreads = spread.covariances(pair_failed == PASSES, asked, point[asked], policy)
         failed[_SIGMA] = True
-        failed[_SIGMA, there] = ~is_within(spreads, policy.max_sigma_m)
+        failed[_SIGMA, asked] = ~is_within(spreads, policy.max_sigma_m)
     if policy.min_p_value is not None:
         used = views_of(facts, pair_failed == PASSES)
+        if first_alone:
+            used &= ~before[facts.view_group]
         likely = residuals_of(facts, used, point, policy).p_value >= policy.min_p_value
         failed[_CHI_SQUARE] = ~likely & ~untestable(facts, used, policy)
     return Verdict(jac, view_failed, pair_failed, failed, baseline, point, parallax, distance)

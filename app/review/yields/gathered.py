@@ -45,6 +45,7 @@ class Gathered:
         bare: The groups that are not.
         noted: Changes that the cache does not know of.
         version: Counts what changes the blocks.
+        whole: The mark at which it held as many groups as the dataset.
     """
 
     folder: Path
@@ -56,6 +57,7 @@ class Gathered:
     bare: YieldTable = EMPTY
     noted: int = 0
     version: int = 0
+    whole: int | None = None
 
     @staticmethod
     def begin(session: Session, folder: Path, dataset_id: int, calibration: str) -> Gathered:
@@ -81,8 +83,10 @@ class Gathered:
         return sum(block.groups for block in self.blocks) + self.bare.groups
 
     def is_whole(self, session: Session) -> bool:
-        """Whether it holds as many groups as the dataset has."""
-        return self.groups == count_groups(session, self.dataset_id)
+        """Whether it holds as many groups as the dataset has; a million are counted once a change."""
+        if self.whole != self.mark and self.groups == count_groups(session, self.dataset_id):
+            self.whole = self.mark
+        return self.whole == self.mark
 
     def left(self, session: Session) -> int:
         """How many groups have to be read until it is in step."""

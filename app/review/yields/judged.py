@@ -18,6 +18,7 @@ from app.solving.verdict import (
     compare_again,
     failures,
     judge,
+    judge_standing,
     view_jac,
     views_of,
 )
@@ -108,7 +109,10 @@ class Judged:
         part = None
         if new.any():
             some = facts.part(new)
-            found = judge(some, policy, MeanSpread(some), jac[new[facts.view_group]])
+            views, pairs = new[facts.view_group], new[facts.pair_group]
+            standing = view_failed[views], pair_failed[pairs]
+            spread = MeanSpread(some)
+            found = judge_standing(some, policy, spread, jac[views], standing, first_alone=True)
             failed[:, new] = found.failed
             numbers = [array.copy() for array in numbers]
             for array, name in zip(numbers, _NUMBERS, strict=True):

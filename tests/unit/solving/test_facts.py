@@ -133,3 +133,15 @@ class TestCodec:
 
 
 CAMERAS = MAIN, BEHIND_GOAL, OPPOSITE
+
+
+class TestPart:
+    def test_rows_of_a_column_are_those_of_all_of_it_read_before_or_not(self) -> None:
+        parts = [group_facts(*random_views(seed)) for seed in range(12)]
+        kept = np.arange(12) % 3 != 1
+        part, whole = join(parts).part(kept), join(parts).only(kept)
+        for name in ("view_covariance", "pair_moved", "pair_point", "view_known"):
+            rows = np.arange(len(getattr(whole, name)))[::-2]
+            told = [part.rows(name, rows), getattr(part, name)[rows], part.rows(name, rows)]
+            for array in told:
+                assert np.array_equal(array, whole.rows(name, rows), equal_nan=True), name

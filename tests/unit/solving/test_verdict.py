@@ -13,7 +13,15 @@ from app.soccer.policy import PAPER, Policy
 from app.soccer.solution import GATES
 from app.solving.facts import Facts, group_facts, join
 from app.solving.spread import MeanSpread
-from app.solving.verdict import PASSES, Verdict, compare_again, judge, view_jac
+from app.solving.verdict import (
+    PASSES,
+    Verdict,
+    compare_again,
+    failures,
+    judge,
+    judge_standing,
+    view_jac,
+)
 from tests.unit.solving.random_groups import random_policy, random_views
 
 
@@ -87,6 +95,16 @@ class TestJudge:
             axis = 1 if item.name == "failed" else 0
             pieces = np.concatenate([getattr(one, item.name) for one in alone], axis=axis)
             assert np.array_equal(getattr(together, item.name), pieces, equal_nan=True), item.name
+
+    @given(st.lists(st.integers(0, 10_000), min_size=1, max_size=8), st.integers(0, 1000))
+    @settings(max_examples=40, deadline=None)
+    def test_where_only_the_first_gate_matters_the_first_is_the_same(self, seeds, seed):
+        policy = random_policy(seed)
+        found = join([group_facts(*random_views(seed)) for seed in seeds])
+        jac = view_jac(found, policy.jac_gamma_percent)
+        standing, spread = failures(found, jac, policy), MeanSpread(found)
+        told = judge_standing(found, policy, spread, jac, standing, first_alone=True)
+        assert told.first.tolist() == judged(found, policy).first.tolist()
 
     @given(st.integers(0, 10_000), st.integers(0, 1000))
     @settings(max_examples=40, deadline=None)
