@@ -25,7 +25,7 @@ from app.api.reply import ASKED, KEPT_HEADERS, Asked
 from app.api.security.access import actor_of
 from app.api.security.bodies import BYTES, VALUE
 from app.api.security.origin import SAFE_METHODS
-from app.errors import OverloadedError, ReviewError, StorageError
+from app.errors import BusyError, OverloadedError, ReviewError, StorageError
 from app.review.answers.answers import claim, end_claim, find_first, keep_first
 from app.store.answers import Answer
 from app.store.codecs import canonical
@@ -126,7 +126,7 @@ class Idempotency:
 
     async def _answer(self, actor: str, key: str, request: _Request, send: Send) -> None:
         try:
-            known = await run_sync(find_first, request.store, key, actor, limiter=self._finding)
+            known = await self._find(request.store, key, actor)
         except StorageError as error:
             await _refuse(error, request.scope, request.receive, send)
             return
@@ -134,6 +134,13 @@ class Idempotency:
             await _again(known, request, send)
         else:
             await self._carry_out(actor, key, request, send)
+
+    async def _find(self, store: Store, key: str, actor: str) -> Answer | None:
+        """What is kept under a key; in a thread only where there is something to wait for."""
+        try:
+            return find_first(store, key, actor, at_once=True)
+        except BusyError:
+            return await run_sync(find_first, store, key, actor, limiter=self._finding)
 
     async def _carry_out(self, actor: str, key: str, request: _Request, send: Send) -> None:
         if request.streamed:

@@ -14,6 +14,11 @@ from app.store.webhook_models import WebhookModel
 from app.store.work import OPEN
 from app.store.work_models import BatchGroupModel, BatchModel, LeaseModel
 
+_BATCH = BatchModel.__table__
+_SINGLE = select(_BATCH.c.id).where(_BATCH.c.state == OPEN, _BATCH.c.verdicts == 1)
+"""Open batches that ask for one verdict."""
+_ANY_SINGLE = _SINGLE.limit(1)
+
 
 def settle_judged(session: Session, states: Mapping[int, str], *, actor: str, at: str) -> None:
     """Groups were judged: in open batches that ask for one verdict their work is over.
@@ -27,17 +32,16 @@ def settle_judged(session: Session, states: Mapping[int, str], *, actor: str, at
         actor: Who gave them.
         at: When they were given.
     """
-    single = select(BatchModel.id).where(BatchModel.state == OPEN, BatchModel.verdicts == 1)
-    if session.scalar(single.limit(1)) is None:
+    if session.scalar(_ANY_SINGLE) is None:
         return
     over = {group for group, state in states.items() if state in ("accepted", "rejected")}
     for ids, settled in ((over, at), (set(states) - over, None)):
         if ids:
-            where = (BatchGroupModel.group_id.in_(numbers_in(ids)), _of(single))
+            where = (BatchGroupModel.group_id.in_(numbers_in(ids)), _of(_SINGLE))
             near = [] if settled is None else _that_wait(session, *where)
             session.execute(update(BatchGroupModel).where(*where).values(settled=settled))
             _tell_done(session, near, actor=actor, at=at)
-    gone = (LeaseModel.group_id.in_(numbers_in(over)), LeaseModel.batch_id.in_(single))
+    gone = (LeaseModel.group_id.in_(numbers_in(over)), LeaseModel.batch_id.in_(_SINGLE))
     session.execute(delete(LeaseModel).where(*gone))
 
 

@@ -211,7 +211,7 @@ class TestRest:
 
     def test_a_solution_is_told_with_null(self, record: ExportRecord, bad: float) -> None:
         solution = poisoned(record.solution, bad)
-        text = SolutionDocument.model_validate(solution).model_dump_json()
+        text = SolutionDocument.of(solution, record.group).model_dump_json()
         assert strict(text)["ball"]["sigma_m"] is None
 
     def test_a_job_keeps_and_tells_null(self, bad: float) -> None:

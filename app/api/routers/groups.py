@@ -73,6 +73,7 @@ def change_group(
     asked: Asked | None,
     present: Callable[[], GroupDocument],
     change: Callable[..., GroupState],
+    then: Callable[[GroupState], object] | None = None,
 ) -> Response:
     """Change a group and answer with it.
 
@@ -80,10 +81,13 @@ def change_group(
         asked: The key under which it was asked for.
         present: Reads the group, to be shown to who comes too late.
         change: Does it; told by ``keep`` how the answer is kept.
+        then: What follows from it.
     """
     reply = Reply(asked, group_answer)
     with current_state(present):
         state = change(keep=reply.keep)
+    if then is not None:
+        then(state)
     return reply.of(state)
 
 
@@ -258,7 +262,10 @@ def put_verdict(
     """Accept, reject with a reason, defer, or take a verdict back."""
     said = (verdict.state, verdict.reason, verdict.note)
     change = partial(set_verdict, services.store, group, *said, if_match=if_match, actor=actor)
-    answer = change_group(asked, lambda: load_document(services.store, group), change)
-    # A verdict on one's own annotation of a group hands it in.
-    after_hand_in(services.store, group, services.paint)
-    return answer
+
+    def hand_in(state: GroupState) -> None:
+        """A verdict on one's own annotation of a group, and on nothing else, hands that in."""
+        if state.is_copy:
+            after_hand_in(services.store, group, services.paint)
+
+    return change_group(asked, lambda: load_document(services.store, group), change, hand_in)

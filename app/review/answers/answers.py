@@ -9,9 +9,19 @@ from app.store.answers import Answer, Kept, find_answer, keep_answer
 from app.store.session import Session, Store
 
 
-def find_first(store: Store, key: str, actor: str) -> Answer | None:
-    """The answer that is kept under a key, or None."""
-    with store.glance() as session:
+def find_first(store: Store, key: str, actor: str, *, at_once: bool = False) -> Answer | None:
+    """The answer that is kept under a key, or None.
+
+    Args:
+        store: The database.
+        key: Of the request.
+        actor: Who sent it.
+        at_once: Not to wait for anything, as on the event loop.
+
+    Raises:
+        BusyError: There was something to wait for.
+    """
+    with store.peek() if at_once else store.glance() as session:
         return find_answer(session, key, actor)
 
 

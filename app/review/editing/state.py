@@ -16,6 +16,7 @@ from app.store.digest import digest
 from app.store.groups import StoredGroup, read_groups
 from app.store.queue import import_findings, is_fixed
 from app.store.session import Session
+from app.store.sight import COPIES
 from app.store.solutions import SolutionKey, read_solutions
 from app.store.stations import StoredStation
 from app.store.verdicts import StoredVerdict, read_last_verdicts
@@ -75,6 +76,11 @@ class GroupState:
     can_redo: bool
     stored: StoredGroup
     """The same group with its rows' keeping."""
+
+    @property
+    def is_copy(self) -> bool:
+        """Whether it is somebody's own annotation of another group."""
+        return self.dataset_id > COPIES
 
 
 @dataclass(frozen=True)
