@@ -19,7 +19,7 @@ import msgspec
 
 from app.geometry.camera import Camera
 from app.soccer.frames import ImagePoint
-from app.store.codecs import as_written, camera_from_json, camera_to_json
+from app.store.codecs import as_written, camera_from_json, camera_to_json, look_through
 
 T = TypeVar("T")
 Codec = tuple[Callable[[Any], Any], Callable[[Any], Any]]
@@ -117,7 +117,10 @@ def _dataclass_codec(kind: Any) -> Codec:
             # The name of a number that is not finite is no number to it.
             return decode(value)
 
-    return encode if later else whole, decode_plain if _is_plain(kind) else decode
+    if not _is_plain(kind):
+        return encode if later else whole, decode
+    look_through(kind)
+    return encode if later else whole, decode_plain
 
 
 def _is_plain(hint: Any) -> bool:
