@@ -213,9 +213,7 @@ def _camera_change(rig: Rig, fit: RigFit, row: int, balls: FloatArray) -> Camera
         before=camera.camera,
         after=after,
         covariance=row_by_row(spread),
-        covariance_before=tuple(
-            (spread + error_covariance(camera, parameters, balls)).ravel().tolist()
-        ),
+        covariance_before=row_by_row(spread + error_covariance(camera, parameters, balls)),
         moved_m=float(np.linalg.norm(after.position - camera.camera.position)),
         turned_degrees=float(np.degrees(np.arccos(np.clip((np.trace(turn) - 1) / 2, -1, 1)))),
         focal_percent=100 * (after.focal_length[0] / camera.camera.focal_length[0] - 1),

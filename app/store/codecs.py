@@ -32,6 +32,7 @@ from app.soccer.reasons import LeftOut
 Json = Any
 """What ``json`` makes: dict, list, str, int, float, bool or None."""
 _LINES = dict[str, tuple[ImagePoint, ...]]
+_LOOKING = Lock()
 
 
 def canonical(value: Json) -> str:
@@ -63,8 +64,8 @@ def look_through(kind: Any) -> None:
         msgspec.convert(None, kind)
 
 
-_LOOKING = Lock()
 look_through(_LINES)
+
 _MISSHAPEN = (
     ArithmeticError,
     AttributeError,

@@ -37,6 +37,7 @@ class IdentityCache(Generic[T, R]):
         made = self._make(value, *beside)
         with self._lock:
             self._kept[key] = value, beside, made
+            self._kept.move_to_end(key)
             if len(self._kept) > self._size:
                 self._kept.popitem(last=False)
         return made

@@ -43,10 +43,10 @@ Measured = float | None
 """A number that may have no end (the sigma of parallel rays): it travels as null."""
 XY = tuple[float, float]
 XYZ = tuple[float, float, float]
-NOT_SEEN = np.empty((0, 2))
 XYWH = Annotated[tuple[float, float, float, float], BeforeValidator(_numbers)]
 Jac = Annotated[dict[str, float], BeforeValidator(_by_gamma)]
 """By gamma in per cent of the diagonal."""
+_NOT_SEEN = np.empty((0, 2))
 
 
 class CameraDocument(Document):
@@ -161,7 +161,7 @@ def _calibration(calibration: Calibration, pitch: Pitch, size: ImageSize) -> Cal
         {
             **vars(fit),
             "largest_px": fit.largest_px,
-            "polyline": np.round(seen.get(fit.marking, NOT_SEEN), DRAWN_DIGITS).tolist(),
+            "polyline": np.round(seen.get(fit.marking, _NOT_SEEN), DRAWN_DIGITS).tolist(),
         }
         for fit in calibration.markings
     ]
