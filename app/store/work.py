@@ -23,14 +23,16 @@ from sqlalchemy import (
 from sqlalchemy.orm import Session
 
 from app.store.dialect.statements import insert as upsert
-from app.store.models import LogModel, QueueModel
+from app.store.models import DatasetModel, LogModel, QueueModel
 from app.store.people_models import PersonModel
 from app.store.take_models import TakeModel
 from app.store.work_models import BatchGroupModel, BatchModel, BatchPersonModel, LeaseModel
 
 OPEN, CLOSED = "open", "closed"
 """States of a batch."""
-_BATCHES = select(*BatchModel.__table__.columns)
+_BATCHES = select(*BatchModel.__table__.columns, DatasetModel.name.label("dataset")).join(
+    DatasetModel, DatasetModel.id == BatchModel.dataset_id
+)
 _LEASES = select(*LeaseModel.__table__.columns).order_by(LeaseModel.id)
 _IDS: BindParameter[Any] = bindparam("ids", expanding=True)
 # What each "next" and each minute of an open page asks is put together once: that takes longer than
@@ -72,12 +74,12 @@ _DONE_KINDS = ("edit", "undo", "redo", "verdict")
 
 
 def batch_of(session: Session, batch_id: int) -> Any | None:
-    """A batch by its id."""
+    """A batch by its id, with the name of its ``dataset``."""
     return session.execute(_BATCH, {"id": batch_id}).one_or_none()
 
 
 def batches_of(session: Session, dataset_ids: Collection[int]) -> Sequence[Any]:
-    """The batches of datasets; open ones and those that are due first come first."""
+    """The batches of datasets, with the names of those; open ones and those that are due first come first."""
     order = (BatchModel.state.desc(), BatchModel.due.is_(None), BatchModel.due, BatchModel.id)
     mine = BatchModel.dataset_id.in_(dataset_ids)
     return session.execute(_BATCHES.where(mine).order_by(*order)).all()
@@ -202,8 +204,8 @@ def hand_in(
 
 def waiting_group(
     session: Session, batch_id: int, person: str, at: str, *, handed_in: bool | None, after: int
-) -> int | None:
-    """The group that a person would take next; None where there is none.
+) -> Any | None:
+    """The group (group_id, handed_in, handed_in_by) that a person would take next, if there is one.
 
     Args:
         session: A write session, so that nobody else takes it meanwhile.
@@ -216,11 +218,11 @@ def waiting_group(
             0: what they have open comes first.
     """
     given = {"batch": batch_id, "person": person, "at": at, "after": after}
-    return session.scalar(_waiting(handed_in, bool(after)), given)
+    return session.execute(_waiting(handed_in, bool(after)), given).one_or_none()
 
 
 @cache
-def _waiting(handed_in: bool | None, goes_on: bool) -> Select[int]:
+def _waiting(handed_in: bool | None, goes_on: bool) -> Select[*tuple[Any, ...]]:
     """Made once for each case: it takes longer to put together than to answer."""
     table = BatchGroupModel
     person: BindParameter[str] = bindparam("person")
@@ -239,7 +241,8 @@ def _waiting(handed_in: bool | None, goes_on: bool) -> Select[int]:
         where.append(table.place != after)
         order.append(case((table.place > after, 0), else_=1))
     order.insert(0, case((mine, int(goes_on)), else_=int(not goes_on)))
-    return select(table.group_id).where(*where).order_by(*order, table.place).limit(1)
+    row = (table.group_id, table.handed_in, table.handed_in_by)
+    return select(*row).where(*where).order_by(*order, table.place).limit(1)
 
 
 def _leased(*where: ColumnElement[bool]) -> ColumnElement[bool]:

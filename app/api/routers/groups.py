@@ -196,14 +196,17 @@ def get_step(group: Id, entry: Id, store: AppStore) -> StepDocument:
 
 
 @router.post(
-    "/{group}/preview", operation_id="previewGroup", responses=responses(404, 409, 413, 415)
+    "/{group}/preview",
+    operation_id="previewGroup",
+    response_model=PreviewDocument,
+    responses=responses(404, 409, 413, 415),
 )
-def preview_group(group: Id, changes: PreviewRequest, services: AppServices) -> PreviewDocument:
+def preview_group(group: Id, changes: PreviewRequest, services: AppServices) -> Response:
     """What the solution would be; nothing is saved."""
     edited, solution = submit.preview(
         services.store, group, lambda found: preview_edits(found, changes), services.paint
     )
-    return PreviewDocument(solution=SolutionDocument.of(solution, edited))
+    return document(PreviewDocument(solution=SolutionDocument.of(solution, edited)))
 
 
 @router.post(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Annotated
 
 from fastapi import APIRouter, Depends, Request, Response
@@ -24,6 +25,7 @@ from app.api.schemas.work import (
 )
 from app.api.security.access import login_of
 from app.review.agreement.weigh import after_hand_in
+from app.review.people.logins import Login
 from app.review.people.roles import Action, may
 from app.review.work import batches, progress
 from app.review.work.batches import Batch, NewBatch
@@ -34,32 +36,36 @@ from app.store.session import Store
 router = APIRouter(tags=["work"])
 
 
+@dataclass(frozen=True)
 class Workers:
-    """Who asks, and what they may in a dataset."""
+    """Who asks, and what they may in a dataset; on a server without accounts there is no ``login``."""
 
-    def __init__(self, request: Request):
-        self._login = login_of(request.scope)
+    login: Login | None
 
     def here(self, dataset_id: int) -> Worker:
         """Them, in a dataset."""
-        if self._login is None:
+        if self.login is None:
             return Worker(LOCAL_USER, alone=True)
-        role = self._login.roles.role_in(dataset_id)
+        role = self.login.roles.role_in(dataset_id)
         annotates, reviews = (may(role, one) for one in (Action.ANNOTATE, Action.REVIEW))
-        return Worker(self._login.name, annotates, reviews)
+        return Worker(self.login.name, annotates, reviews)
 
     def of_batch(self, store: Store, batch: int) -> Worker:
         """Them, in the dataset of a batch."""
         return self.here(batches.dataset_of_batch(store, batch))
 
 
-Asks = Annotated[Workers, Depends()]
+async def _workers(request: Request) -> Workers:
+    return Workers(login_of(request.scope))
 
 
-def _told(services: Services, lease: Lease) -> Lease:
-    """A lease of which everybody has been told who looks."""
+Asks = Annotated[Workers, Depends(_workers)]
+
+
+def _told(services: Services, lease: Lease) -> Response:
+    """The document of a lease of which everybody has been told who looks."""
     services.events.tell_lease(lease)
-    return lease
+    return document(LeaseDocument.model_validate(lease))
 
 
 @router.get("/work", operation_id="getMyWork", responses=responses())
@@ -155,7 +161,7 @@ def list_batch_groups(batch: Id, store: AppStore) -> BatchGroupList:
     response_model=LeaseDocument,
     responses=responses(404, 409, 413, 415),
 )
-def take_next(batch: Id, come: NextGroup, services: AppServices, asks: Asks) -> Lease:
+def take_next(batch: Id, come: NextGroup, services: AppServices, asks: Asks) -> Response:
     """Take the next group that waits for whoever asks, and that nobody else has open.
 
     The lease lasts three minutes, and three more each time that it is taken again.
@@ -170,7 +176,9 @@ def take_next(batch: Id, come: NextGroup, services: AppServices, asks: Asks) -> 
     response_model=LeaseDocument,
     responses=responses(404, 409, 413, 415),
 )
-def take_group(batch: Id, group: Id, how: LeaseRequest, services: AppServices, asks: Asks) -> Lease:
+def take_group(
+    batch: Id, group: Id, how: LeaseRequest, services: AppServices, asks: Asks
+) -> Response:
     """Take a group, or keep it for another three minutes; 409 where somebody has it open."""
     worker = asks.of_batch(services.store, batch)
     taken = Leases(services.store).take(batch, group, worker, take_over=how.take_over)
@@ -195,7 +203,7 @@ def give_back(batch: Id, group: Id, services: AppServices, asks: Asks) -> None:
     response_model=LeaseDocument,
     responses=responses(404, 409, 413, 415),
 )
-def hand_in(batch: Id, group: Id, services: AppServices, actor: Actor, asks: Asks) -> Lease:
+def hand_in(batch: Id, group: Id, services: AppServices, actor: Actor, asks: Asks) -> Response:
     """Say that a group is annotated, so that a reviewer gets it."""
     worker = asks.of_batch(services.store, batch)
     lease = Leases(services.store).hand_in(batch, group, worker, actor=actor)
@@ -209,7 +217,7 @@ def hand_in(batch: Id, group: Id, services: AppServices, actor: Actor, asks: Ask
     response_model=LeaseDocument,
     responses=responses(404, 409),
 )
-def take_back(batch: Id, group: Id, services: AppServices, actor: Actor, asks: Asks) -> Lease:
+def take_back(batch: Id, group: Id, services: AppServices, actor: Actor, asks: Asks) -> Response:
     """Say that a group is not annotated yet, after all."""
     worker = asks.of_batch(services.store, batch)
     leases = Leases(services.store)
@@ -224,7 +232,7 @@ def take_back(batch: Id, group: Id, services: AppServices, actor: Actor, asks: A
 )
 def hand_back(
     batch: Id, group: Id, why: HandBack, services: AppServices, actor: Actor, asks: Asks
-) -> Lease:
+) -> Response:
     """Give a group back to the annotator who handed it in, and tell them why."""
     worker = asks.of_batch(services.store, batch)
     leases = Leases(services.store)

@@ -18,7 +18,6 @@ from app.review.queue.query import MAX_LISTED_LENGTH, parse_query
 from app.soccer.actors import person_of
 from app.store.answers import Keep, keep_nothing
 from app.store.clock import now
-from app.store.datasets import dataset_name
 from app.store.listing import Listing
 from app.store.log import Entry, append
 from app.store.outbox import GIVEN_OUT, HANDED_ON, announce_batch
@@ -309,12 +308,15 @@ def remove_batch(store: Store, batch_id: int, *, actor: str) -> Batch:
         return batch
 
 
-def read_batch(session: Session, batch_id: int) -> Batch:
-    """A batch within a session; raises NotFoundError when there is none."""
+def read_batch(session: Session, batch_id: int, *, with_here: bool = True) -> Batch:
+    """A batch within a session; raises NotFoundError when there is none.
+
+    ``with_here``: False: nobody asks who has which group open.
+    """
     row = batch_of(session, batch_id)
     if row is None:
         raise NotFoundError(f"there is no batch {batch_id}")
-    return _batches(session, [row])[0]
+    return _batches(session, [row], with_here)[0]
 
 
 def read_batches(session: Session, dataset_ids: Collection[int]) -> list[Batch]:
@@ -322,14 +324,14 @@ def read_batches(session: Session, dataset_ids: Collection[int]) -> list[Batch]:
     return _batches(session, batches_of(session, dataset_ids))
 
 
-def _batches(session: Session, rows: Sequence[Any]) -> list[Batch]:
+def _batches(session: Session, rows: Sequence[Any], with_here: bool = True) -> list[Batch]:
     ids = [row.id for row in rows]
     counts = count_work(session, ids)
     names: dict[tuple[int, str], list[str]] = defaultdict(list)
     for row in people_of(session, ids):
         names[row.batch_id, row.part].append(row.name)
     here: dict[int, list[Here]] = defaultdict(list)
-    for row in leases_of(session, ids, now()):
+    for row in leases_of(session, ids, now()) if with_here else ():
         here[row.batch_id].append(Here(row.group_id, row.person, row.taken, row.seen))
     found = []
     for row in rows:
@@ -337,7 +339,6 @@ def _batches(session: Session, rows: Sequence[Any]) -> list[Batch]:
         found.append(
             Batch(
                 **row._mapping,
-                dataset=dataset_name(session, row.dataset_id),
                 annotators=names[row.id, Part.ANNOTATOR],
                 reviewers=names[row.id, Part.REVIEWER],
                 # A dataset that begins again leaves a batch without groups.

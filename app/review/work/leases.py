@@ -110,7 +110,8 @@ class Leases:
             back = returned_to(session, batch, worker.name)
             mine = next((group for group in back if group != after), None)
             if mine is not None:
-                return self._kept(session, batch, mine, Part.ANNOTATOR, worker)
+                row = _group(session, batch, mine)
+                return self._kept(session, batch, row, Part.ANNOTATOR, worker)
         take = next_own(self._store, batch, worker.name)
         return Lease(batch, None if take is None else take.copy_id, Part.ANNOTATOR)
 
@@ -120,9 +121,8 @@ class Leases:
         found = open_for(session, batch, worker, at, after=after)
         if found is None:
             return Lease(batch, None)
-        group, part = found
-        begin(session, batch, group, worker)
-        return self._kept(session, batch, group, part, worker)
+        row, part = found
+        return self._kept(session, batch, row, part, worker)
 
     def take(self, batch_id: int, group: int, worker: Worker, *, take_over: bool = False) -> Lease:
         """Take a lease on a group, or let the one last on that they have.
@@ -142,14 +142,13 @@ class Leases:
             batch = _open_batch(session, batch_id)
             if own_of(session, batch, group, worker.name) is not None:
                 return Lease(batch, group, Part.ANNOTATOR)
-            part = _part_in(session, batch, group, worker)
+            parts, row = _need_parts(batch, worker), _group(session, batch, group)
             others = _others(session, batch, group, worker, self._now())
             if others and not take_over:
                 here = _here(session, batch, group, self._now())
                 raise HeldGroupError(f"{others[0].person} has this group open", here)
             end_leases(session, [row.id for row in others])
-            begin(session, batch, group, worker)
-            return self._kept(session, batch, group, part, worker)
+            return self._kept(session, batch, row, _part_in(parts, row), worker)
 
     def give_back(self, batch_id: int, group: int, worker: Worker) -> Lease:
         """End a lease; it does not matter whether there is one.
@@ -158,7 +157,7 @@ class Leases:
             NotFoundError: There is no such batch.
         """
         with self._store.write(lasting=False) as session:
-            batch = read_batch(session, batch_id)
+            batch = read_batch(session, batch_id, with_here=False)
             end_lease_of(session, batch_id, group, worker.name)
             return Lease(batch, group, here=_here(session, batch, group, self._now()))
 
@@ -220,14 +219,12 @@ class Leases:
             after = read_batch(session, batch_id)
             return Lease(after, group, here=_here(session, after, group, self._now()))
 
-    def _kept(
-        self, session: Session, batch: Batch, group: int, part: Part, worker: Worker
-    ) -> Lease:
-        at = self._clock()
+    def _kept(self, session: Session, batch: Batch, row: Any, part: Part, worker: Worker) -> Lease:
+        at, group = self._clock(), row.group_id
         until = _text(at + LASTS)
         keep_lease(session, batch.id, group, worker.name, at=_text(at), until=until)
-        here, row = _here(session, batch, group, _text(at)), group_in(session, batch.id, group)
-        if row is None or row.handed_in_by is None:
+        here = _here(session, batch, group, _text(at))
+        if row.handed_in_by is None:
             return Lease(batch, group, part, until, here)
         if row.handed_in is not None:
             return Lease(batch, group, part, until, here, row.handed_in_by)
@@ -241,13 +238,12 @@ class Leases:
 
 def open_for(
     session: Session, batch: Batch, worker: Worker, at: str, *, after: int | None = None
-) -> tuple[int, Part] | None:
-    """The group that somebody gets next of a batch, and what they do with it.
+) -> tuple[Any, Part] | None:
+    """The row of the group that somebody gets next of a batch, and what they do with it.
 
-    The one function that decides it. It is called in a write session, in which the lease on what it
-    returns is taken, so that nobody else is given the same meanwhile. A batch that asks for several
-    verdicts on each group has rules of its own; they begin here, where ``batch.verdicts`` says so, and
-    must not return a group of which the person has given theirs.
+    The one function that decides it, where nobody works on copies of their own. It is called in a
+    write session, in which the lease on what it returns is taken, so that nobody else is given the
+    same meanwhile.
 
     Args:
         session: A write session.
@@ -277,14 +273,6 @@ def open_for(
     return None
 
 
-def begin(session: Session, batch: Batch, group: int, worker: Worker) -> None:
-    """Somebody begins with a group of a batch, in the session in which their lease is taken.
-
-    A batch that asks for one verdict needs nothing. One that asks for several makes here, where there
-    is none yet, what is this person's own of the group. May be called again for the same group.
-    """
-
-
 def _others(session: Session, batch: Batch, group: int, worker: Worker, at: str) -> list[Any]:
     """The leases of others that stand in somebody's way; none where each has a copy of their own."""
     if batch.verdicts > 1:
@@ -301,7 +289,7 @@ def _here(session: Session, batch: Batch, group: int, at: str) -> tuple[Here, ..
 
 
 def _open_batch(session: Session, batch_id: int) -> Batch:
-    batch = read_batch(session, batch_id)
+    batch = read_batch(session, batch_id, with_here=False)
     if not batch.is_open:
         raise ConflictError(f'the batch "{batch.name}" is closed')
     return batch
@@ -316,9 +304,8 @@ def _need_parts(batch: Batch, worker: Worker) -> set[Part]:
     return parts
 
 
-def _part_in(session: Session, batch: Batch, group: int, worker: Worker) -> Part:
-    """What somebody does with a group of a batch, as far as it is by now."""
-    parts, row = _need_parts(batch, worker), _group(session, batch, group)
+def _part_in(parts: set[Part], row: Any) -> Part:
+    """What somebody with these parts does with a group of a batch, as far as it is by now."""
     if Part.ANNOTATOR in parts and (row.handed_in is None or Part.REVIEWER not in parts):
         return Part.ANNOTATOR
     return Part.REVIEWER

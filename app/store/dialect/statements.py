@@ -5,7 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any, cast
 
-from sqlalchemy import Executable, Integer, LargeBinary, Select, String, Table, select
+from sqlalchemy import (
+    Executable,
+    Integer,
+    LargeBinary,
+    Select,
+    String,
+    Table,
+    bindparam,
+    select,
+)
 from sqlalchemy.dialects.postgresql import Insert
 from sqlalchemy.dialects.postgresql import insert as _insert
 from sqlalchemy.ext.compiler import compiles
@@ -33,7 +42,16 @@ def insert_or_replace(model: Any) -> Insert:
 def numbers_in(ids: Iterable[int]) -> Select[Any]:
     """Some numbers as a question: one parameter, however many there are, for a statement takes a
     limited number of them."""
-    listed = _Numbers(json_text(list(ids))).table_valued("value")
+    return _numbers_in(json_text(list(ids)))
+
+
+def numbers_given(name: str) -> Select[Any]:
+    """As ``numbers_in``, in a statement that is made once: a parameter that is a JSON array."""
+    return _numbers_in(bindparam(name, type_=String()))
+
+
+def _numbers_in(array: Any) -> Select[Any]:
+    listed = _Numbers(array).table_valued("value")
     return select(listed.c.value)
 
 
