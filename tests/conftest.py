@@ -6,6 +6,7 @@ import gc
 
 import pytest
 from httpx._config import DEFAULT_TIMEOUT_CONFIG
+from sqlalchemy import Engine, event
 
 from tests.on_postgresql import MARK, install, shared_cluster
 from tests.starting import end_nursery
@@ -18,6 +19,14 @@ YOUNG = 50_000
 if (cluster := shared_cluster()) is not None:
     # Before any module of the tests has taken what this changes by its name.
     install(cluster)
+
+
+@event.listens_for(Engine, "before_execute")
+def _require_alike(
+    _connection: object, _clause: object, rows: list[dict[str, object]], *_: object
+) -> None:
+    """What only later rows of a statement have is dropped without a word."""
+    assert all(row.keys() == rows[0].keys() for row in rows), "rows of one statement are not alike"
 
 
 def pytest_configure() -> None:

@@ -16,7 +16,8 @@ from sqlalchemy import Connection, event, inspect
 from app.config import Settings
 from app.store.dialect.dialect import dialect_in, dialect_of
 from app.store.engine import WRITE, make_engine
-from app.store.session import Session, Store
+from app.store.session import Session
+from app.store.store import Store
 from tests.cluster import ADVICE, Cluster, find_programs, running_cluster
 from tests.on_postgresql import shared_cluster
 
@@ -231,16 +232,16 @@ def said_for_sqlite(session: Session) -> Iterator[None]:
 
     A trigger that is dropped is off until the database is emptied.
     """
-    dialect, connection = dialect_in(session), session.connection()
+    dialect = dialect_in(session)
     if dialect.is_file:
         yield
         return
-    event.listen(connection, "before_cursor_execute", _translated, retval=True)
+    event.listen(session, "before_cursor_execute", _translated, retval=True)
     try:
-        with dialect.migrating(connection, new=False):
+        with dialect.migrating(session, new=False):
             yield
     finally:
-        event.remove(connection, "before_cursor_execute", _translated)
+        event.remove(session, "before_cursor_execute", _translated)
 
 
 def _translated(

@@ -39,7 +39,7 @@ _OWN = (
 
 def run(arguments: list[str]) -> int:
     """Run pytest; its exit code."""
-    from app.store.session import Store
+    from app.store.store import Store
 
     with running_cluster() as cluster:
         url = cluster.make(EMPTY, "template0")

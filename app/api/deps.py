@@ -46,7 +46,7 @@ from app.review.yields.store import YieldStore
 from app.soccer.actors import LOCAL_USER, script_name
 from app.solving.warm import warm_up
 from app.store.frames import Frames
-from app.store.session import Store
+from app.store.store import Store
 
 log = structlog.get_logger("touchline.api")
 

@@ -31,7 +31,7 @@ from app.review.queue.changes import (
 )
 from app.review.work.leases import Lease
 from app.store.jobs import OPEN, Job
-from app.store.session import Store
+from app.store.store import Store
 
 log = structlog.get_logger("touchline.events")
 

@@ -29,7 +29,7 @@ from app.errors import BusyError, OverloadedError, ReviewError, StorageError
 from app.review.answers.answers import claim, end_claim, find_first, keep_first
 from app.store.answers import Answer
 from app.store.codecs import canonical
-from app.store.session import Store
+from app.store.store import Store
 
 log = structlog.get_logger("touchline.api")
 

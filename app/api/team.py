@@ -21,7 +21,7 @@ from app.review.people.second_factor import SecondFactors
 from app.review.people.sign_on import LASTS as BEGUN_LASTS
 from app.review.people.sign_on import SignOn
 from app.review.people.sign_on_rules import read_rules
-from app.store.session import Store
+from app.store.store import Store
 
 NAME = "touchline_session"
 ASKER = "touchline_passkey"

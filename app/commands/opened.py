@@ -13,14 +13,14 @@ if TYPE_CHECKING:
     from concurrent.futures import Executor
 
     from app.config import Settings
-    from app.store.session import Store
+    from app.store.store import Store
 
 
 @contextmanager
 def opened_store(settings: Settings | None = None) -> Iterator[Store]:
     """The database of a home; by default the one that the environment names."""
     require_home()
-    from app.store.session import Store
+    from app.store.store import Store
 
     with closing(Store.open(settings or read_settings())) as store:
         yield store

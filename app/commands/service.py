@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from socket import socket
 
     from app.config import Settings
-    from app.store.session import Store
+    from app.store.store import Store
 
 commands = typer.Typer()
 

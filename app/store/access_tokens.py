@@ -7,11 +7,11 @@ from functools import cache
 from typing import Any
 
 from sqlalchemy import Select, bindparam, delete, func, insert, select, update
-from sqlalchemy.orm import Session
 
 from app.store.models import DatasetModel
 from app.store.people_models import AccessTokenModel, PersonModel
 from app.store.rights import with_rights
+from app.store.session import Session
 
 _ALL = (
     select(

@@ -6,10 +6,10 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from sqlalchemy import Select, delete, func, insert, select, update
-from sqlalchemy.orm import Session
 
 from app.store.agreement_models import AgreementLimitsModel, AgreementModel
 from app.store.models import QueueModel
+from app.store.session import Session
 from app.store.take_models import TakeModel
 from app.store.takes import INDEPENDENT
 from app.store.work_models import BatchModel

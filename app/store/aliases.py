@@ -7,11 +7,11 @@ from dataclasses import replace
 from typing import Any
 
 from sqlalchemy import ColumnElement, func, insert, select, update
-from sqlalchemy.orm import Session
 
 from app.store.log import LogEntry
 from app.store.models import QueueModel
 from app.store.people_models import ActorAliasModel, PersonModel
+from app.store.session import Session
 
 _ALIASES = select(ActorAliasModel.actor, ActorAliasModel.at, PersonModel.name.label("shown")).join(
     PersonModel, PersonModel.id == ActorAliasModel.person_id

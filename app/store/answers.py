@@ -9,13 +9,13 @@ from datetime import UTC, datetime, timedelta
 from typing import TypeVar, cast
 
 from sqlalchemy import Table, bindparam, delete, or_, select, text
-from sqlalchemy.orm import Session
 
 from app.finite import json_text
 from app.store.clock import now
 from app.store.codecs import Json, inflate, parse
 from app.store.dialect.statements import insert
 from app.store.job_models import AnswerModel
+from app.store.session import Session
 
 T = TypeVar("T")
 

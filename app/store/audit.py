@@ -7,12 +7,12 @@ from dataclasses import dataclass
 from typing import Any
 
 from sqlalchemy import ColumnElement, literal, or_, select
-from sqlalchemy.orm import Session
 
 from app.soccer.actors import TOKEN
 from app.store.aliases import shown_actor
 from app.store.codecs import unpack
 from app.store.models import DatasetModel, GroupModel, LogModel
+from app.store.session import Session
 from app.store.sight import Sight
 
 

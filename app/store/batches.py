@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from typing import Any
 
 from sqlalchemy import insert, select, update
-from sqlalchemy.orm import Session
 
 from app.finite import json_text
 from app.store.codecs import parse
 from app.store.group_rows import next_id
+from app.store.session import Session
 from app.store.view_models import VerdictBatchModel
 
 Spans = Sequence[tuple[int, int]]

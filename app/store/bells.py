@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from typing import Any
 
 from sqlalchemy import ColumnElement, delete, func, insert, literal, select, update
-from sqlalchemy.orm import Session
 
 from app.store.group_rows import next_id
 from app.store.models import DatasetModel
+from app.store.session import Session
 from app.store.sight import Sight
 from app.store.talk_models import BellModel
 

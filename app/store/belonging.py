@@ -6,11 +6,11 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from sqlalchemy import Select, and_, bindparam, or_, select
-from sqlalchemy.orm import Session
 
 from app.store.job_models import JobModel
 from app.store.models import DatasetModel, GroupModel, StationModel, ViewModel
 from app.store.prediction_models import EvaluationModel, PredictionSetModel
+from app.store.session import Session
 from app.store.version_models import VersionModel
 from app.store.view_models import SavedViewModel, VerdictBatchModel
 from app.store.work_models import BatchModel

@@ -6,10 +6,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from sqlalchemy import select
-from sqlalchemy.orm import Session
 
 from app.store.log import DEEDS
 from app.store.models import GroupModel, LogModel, SolutionModel, ViewModel
+from app.store.session import Session
 
 
 @dataclass(frozen=True)

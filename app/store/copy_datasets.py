@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from sqlalchemy import insert, select
-from sqlalchemy.orm import Session
 
 from app.store.models import DatasetModel
+from app.store.session import Session
 from app.store.take_models import CopyDatasetModel
 
 _COPIES = select(*CopyDatasetModel.__table__.columns, DatasetModel.name).join(

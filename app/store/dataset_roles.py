@@ -6,11 +6,11 @@ from collections.abc import Sequence
 from typing import Any
 
 from sqlalchemy import delete, insert, select
-from sqlalchemy.orm import Session
 
 from app.store.clock import now
 from app.store.models import DatasetModel
 from app.store.people_models import DatasetRoleModel, PersonModel
+from app.store.session import Session
 
 
 def all_dataset_roles(session: Session) -> Sequence[Any]:

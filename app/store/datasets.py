@@ -7,11 +7,11 @@ from functools import lru_cache
 from typing import Any
 
 from sqlalchemy import exists, func, insert, select, update
-from sqlalchemy.orm import Session
 
 from app.soccer.policy import Policy
 from app.store.codecs import as_written, canonical, parse, policy_from_json, policy_to_json
 from app.store.models import DatasetModel, GroupModel
+from app.store.session import Session
 from app.store.sight import COPIES
 from app.store.view_models import COPIES_USED, UsedIdModel
 

@@ -6,9 +6,10 @@ from collections.abc import Iterable, Iterator
 from typing import Any
 
 from sqlalchemy import ColumnElement, and_, func, select
-from sqlalchemy.orm import InstrumentedAttribute, Session
+from sqlalchemy.orm import InstrumentedAttribute
 
 from app.store.prediction_models import EvaluationFrameModel
+from app.store.session import Session
 
 FrameCondition = ColumnElement[bool]
 """Whether a frame is meant; made by the functions here."""

@@ -7,13 +7,13 @@ from dataclasses import asdict, dataclass, fields
 from typing import Any
 
 from sqlalchemy import delete, insert, select
-from sqlalchemy.orm import Session
 
 from app.store.aliases import columns_shown
 from app.store.codecs import Json, canonical, pack, parse, unpack
 from app.store.group_rows import next_id
 from app.store.models import DatasetModel
 from app.store.prediction_models import EvaluationFrameModel, EvaluationModel
+from app.store.session import Session
 
 _BATCH = 2000
 _MOST = 500

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from sqlalchemy import Connection, Engine, inspect, text
-from sqlalchemy.orm import Session
+from sqlalchemy import Engine, inspect, text
 
 from app.config import Settings
 from app.errors import EXAMINE, DamagedError
 from app.store.anchor import Anchor, anchor_of
 from app.store.engine import make_engine, reported
 from app.store.log import verify_chain
+from app.store.session import Session
 from app.store.soundness import count_lost_references, file_faults
 
 _COUNTED = ("dataset", "groups", "view", "station", "verdict", "version", "solution", "log")
@@ -44,8 +44,7 @@ def examine_database(
 
 def _examine(engine: Engine, file: Path) -> tuple[Anchor, dict[str, int]]:
     with Session(engine) as session:
-        connection = session.connection()
-        tables = set(inspect(connection).get_table_names())
+        tables = set(inspect(session).get_table_names())
         if "alembic_version" not in tables or "log" not in tables:
             raise DamagedError(f"{file} is no database of Touchline", hint=EXAMINE)
         faults = file_faults(session, 3, thorough=True)
@@ -55,14 +54,14 @@ def _examine(engine: Engine, file: Path) -> tuple[Anchor, dict[str, int]]:
             raise DamagedError(f"{file} has rows that refer to rows that are gone", hint=EXAMINE)
         verify_chain(session)
         counts = {
-            name: connection.execute(text(f"SELECT count(*) FROM {name}")).scalar_one()
+            name: session.execute(text(f"SELECT count(*) FROM {name}")).scalar_one()
             for name in _COUNTED
             if name in tables
         }
-        return anchor_of(connection) or _without_installation(connection), counts
+        return anchor_of(session) or _without_installation(session), counts
 
 
-def _without_installation(connection: Connection) -> Anchor:
-    schema = connection.execute(text("SELECT version_num FROM alembic_version")).scalar_one()
-    last = connection.execute(text("SELECT id, hash FROM log ORDER BY id DESC LIMIT 1")).first()
+def _without_installation(session: Session) -> Anchor:
+    schema = session.execute(text("SELECT version_num FROM alembic_version")).scalar_one()
+    last = session.execute(text("SELECT id, hash FROM log ORDER BY id DESC LIMIT 1")).first()
     return Anchor("", "", schema, *(tuple(last) if last else (0, "")))

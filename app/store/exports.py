@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from sqlalchemy import false, func, not_, or_, select
-from sqlalchemy.orm import Session
 
 from app.store.listing import Listing
 from app.store.log import DEEDS
 from app.store.models import LogModel, QueueModel
 from app.store.order import Order
+from app.store.session import Session
 
 _NO_WORD = ("freeze", "comment", *DEEDS)
 _ACCEPTED = QueueModel.status == "accepted"

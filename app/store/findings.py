@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable
 
 from sqlalchemy import delete, insert, select
-from sqlalchemy.orm import Session
 
 from app.store.models import ImportFindingModel
+from app.store.session import Session
 
 Noticed = tuple[str | None, str]
 """Key of a view, or None where the whole group is meant; and the sentence."""

@@ -13,7 +13,6 @@ from dataclasses import dataclass
 from typing import Any, cast
 
 from sqlalchemy import Table, insert, select
-from sqlalchemy.orm import Session
 
 from app.soccer.group import Group, Station, View
 from app.soccer.paint_evidence import reading_from_json
@@ -30,6 +29,7 @@ from app.store.codecs import (
     view_from_json,
     view_to_json,
 )
+from app.store.session import Session
 from app.store.solutions import read_calibration_bodies
 from app.store.version_models import FrozenModel
 

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from typing import Any
 
 from sqlalchemy import func, select
-from sqlalchemy.orm import Session
 
 from app.store.change_models import GroupChangeModel
 from app.store.models import DatasetModel, GroupModel, SolutionModel
+from app.store.session import Session
 from app.store.solutions import is_current
 
 

@@ -8,7 +8,6 @@ from functools import cache
 from typing import Any
 
 from sqlalchemy import bindparam, delete, select, update
-from sqlalchemy.orm import Session
 
 from app.soccer.group import Group, View
 from app.soccer.pitch import Pitch
@@ -30,6 +29,7 @@ from app.store.models import (
     ViewModel,
 )
 from app.store.paint import paint_digests
+from app.store.session import Session
 from app.store.stations import save_station
 
 
@@ -206,8 +206,9 @@ def refresh_inputs_hashes(session: Session, group_ids: Sequence[int]) -> None:
         pitch = Pitch(row.pitch_length, row.pitch_width)
         paint = paint_digests(row.paint)
         digest = inputs_hash(pitch, pairs[key], positions, paint, noise.get(key, {}))
-        rows.append({"id": key, "inputs_hash": digest})
-    session.execute(update(GroupModel), rows)
+        rows.append({"of": key, "inputs_hash": digest})
+    if rows:
+        session.execute(update(GroupModel).where(GroupModel.id == bindparam("of")), rows)
 
 
 def bump_groups(session: Session, group_ids: Sequence[int], at: str) -> None:

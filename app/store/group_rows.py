@@ -8,13 +8,13 @@ from functools import cache
 from typing import Any
 
 from sqlalchemy import Select, func, insert, select
-from sqlalchemy.orm import Session
 
 from app.soccer.group import Group, Station, View
 from app.store import codecs
 from app.store.dialect.statements import larger
 from app.store.digest import group_inputs_hash, station_digest, view_digest
 from app.store.models import GroupModel, StationModel, ViewModel
+from app.store.session import Session
 from app.store.view_models import UsedIdModel
 
 

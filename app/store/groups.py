@@ -9,7 +9,6 @@ from functools import lru_cache
 from typing import Any
 
 from sqlalchemy import BindParameter, bindparam, null, select
-from sqlalchemy.orm import Session
 from sqlalchemy.sql import FromClause
 
 from app.errors import NotFoundError
@@ -30,6 +29,7 @@ from app.store.models import (
 )
 from app.store.noise import Factors, factors_of
 from app.store.paint import paint_digests, read_readings
+from app.store.session import Session
 from app.store.stations import StoredStation, stored_station
 
 

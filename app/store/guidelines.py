@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from typing import Any
 
 from sqlalchemy import func, select
-from sqlalchemy.orm import Session
 
 from app.store.clock import now
 from app.store.dialect.statements import insert
+from app.store.session import Session
 from app.store.take_models import CopyDatasetModel, GuidelineModel, GuidelinePictureModel
 
 

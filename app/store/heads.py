@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from typing import Any
 
 from sqlalchemy import bindparam, func, select
-from sqlalchemy.orm import Session
 
 from app.store.models import DatasetModel, GroupModel, SolutionModel, VerdictModel
+from app.store.session import Session
 from app.store.solutions import is_current
 
 _GROUP, _DATASET, _VERDICT = GroupModel.__table__, DatasetModel.__table__, VerdictModel.__table__

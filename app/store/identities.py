@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 from sqlalchemy import delete, insert, select, update
-from sqlalchemy.orm import Session
 
 from app.store.people_models import IdentityModel
+from app.store.session import Session
 
 _ALL = select(*IdentityModel.__table__.columns)
 

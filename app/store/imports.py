@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from typing import Any
 
 from sqlalchemy import func, select
-from sqlalchemy.orm import Session
 
 from app.store.log import LogEntry, read_log
 from app.store.models import GroupModel, LogModel, StationModel, VerdictModel
+from app.store.session import Session
 from app.store.stations import StoredStation, stored_station
 
 VERDICT = (

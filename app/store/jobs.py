@@ -8,7 +8,6 @@ from datetime import UTC, datetime, timedelta
 from typing import Any
 
 from sqlalchemy import case, delete, func, insert, select, update
-from sqlalchemy.orm import Session
 
 from app.finite import finite
 from app.store.aliases import columns_shown
@@ -18,6 +17,7 @@ from app.store.dialect.statements import member
 from app.store.group_rows import next_id
 from app.store.job_models import JobModel
 from app.store.models import DatasetModel
+from app.store.session import Session
 from app.store.sight import EVERYTHING, Sight
 
 WAITING, RUNNING = "waiting", "running"

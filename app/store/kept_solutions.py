@@ -8,12 +8,12 @@ from functools import cached_property
 from typing import Any
 
 from sqlalchemy import select
-from sqlalchemy.orm import Session
 
 from app.soccer.solution import SOLVER_VERSION, Solution
 from app.store import value_codec
 from app.store.codecs import Json, as_written, inflate, parse
 from app.store.models import GroupModel, SolutionModel
+from app.store.session import Session
 from app.store.solutions import EncodedSolution, compress, read_summary
 from app.store.summary import summarize_gates
 

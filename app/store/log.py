@@ -9,20 +9,18 @@ from dataclasses import dataclass
 from typing import Any, cast
 
 from sqlalchemy import ColumnElement, Table, bindparam, func, insert, select
-from sqlalchemy.orm import Session
 
 from app.errors import DamagedError
 from app.store.codecs import Json, canonical, unpack
 from app.store.dialect.dialect import dialect_in
 from app.store.models import LogModel
+from app.store.session import Session
 
 GENESIS = "0" * 64
 """The hash before the first row."""
 
 DEEDS = ("person", "job", "deed")
 """Kinds of entries that say who did something, and change nothing that was said."""
-LOG_END = "touchline_log_end"
-"""Where a session notes id and hash of the last entry that it wrote."""
 _BATCH = 500
 
 
@@ -71,7 +69,7 @@ def append(session: Session, entries: Sequence[Entry]) -> list[int]:
         row = {name: getattr(entry, name) for name in _COLUMNS}
         rows.append({**row, "id": number, "hash": previous, "body": zlib.compress(body)})
     session.execute(insert(_LOG), rows)
-    session.info[LOG_END] = (number, previous)
+    session.log_end = (number, previous)
     return [row["id"] for row in rows]
 
 

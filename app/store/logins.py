@@ -7,11 +7,11 @@ from functools import cache
 from typing import Any
 
 from sqlalchemy import Select, bindparam, delete, insert, select, update
-from sqlalchemy.orm import Session
 
 from app.store.people_models import LoginModel, PersonModel
 from app.store.rights import with_rights
 from app.store.second_factors import MUST_ENROL
+from app.store.session import Session
 
 _FOUND = select(
     LoginModel.id,

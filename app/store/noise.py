@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from sqlalchemy import select, update
-from sqlalchemy.orm import Session
 
 from app.store.codecs import Json, as_written, canonical, parse
 from app.store.models import DatasetModel
+from app.store.session import Session
 
 NOISE = "noise"
 """Kind of the log's entries on noise: what is accepted for a dataset, and one for each group."""

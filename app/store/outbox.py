@@ -6,10 +6,10 @@ from collections.abc import Mapping
 from typing import Any
 
 from sqlalchemy import select
-from sqlalchemy.orm import Session
 
 from app.store.codecs import Json, canonical, parse
 from app.store.datasets import dataset_name
+from app.store.session import Session
 from app.store.webhook_models import WebhookModel
 from app.store.webhooks import insert_delivery
 from app.store.work import batch_of, count_work, people_of

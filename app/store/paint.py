@@ -9,13 +9,13 @@ from functools import lru_cache
 from typing import Any, cast
 
 from sqlalchemy import BindParameter, Table, bindparam, func, select, true
-from sqlalchemy.orm import Session
 
 from app.soccer.paint_evidence import PaintReading, reading_from_text
 from app.store.codecs import as_written, inflate, parse
 from app.store.dialect.statements import any_of, insert, values_of
 from app.store.log import LogEntry, read_log
 from app.store.models import GroupModel, LogModel, PaintEvidenceModel, StationModel, ViewModel
+from app.store.session import Session
 
 PAINT = "paint"
 """Kind of the log's entries that say what was read of a group's pictures."""

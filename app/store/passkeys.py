@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from typing import Any
 
 from sqlalchemy import delete, insert, select, update
-from sqlalchemy.orm import Session
 
 from app.store.people_models import PasskeyModel
+from app.store.session import Session
 
 _ALL = select(*PasskeyModel.__table__.columns)
 

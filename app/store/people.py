@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from typing import Any
 
 from sqlalchemy import delete, exists, func, insert, or_, select, update
-from sqlalchemy.orm import Session
 
 from app.store.clock import now
 from app.store.people_models import IdentityModel, LoginModel, OneTimeLinkModel, PersonModel
+from app.store.session import Session
 
 _PEOPLE = select(*PersonModel.__table__.columns)
 _SEEN = (

@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from sqlalchemy import func, select
-from sqlalchemy.orm import Session
 
 from app.soccer.picture import PictureGeometry
 from app.store.codecs import as_written, parse, picture_from_json
 from app.store.models import GroupModel, StationModel, ViewModel
+from app.store.session import Session
 
 
 @dataclass(frozen=True)

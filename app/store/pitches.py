@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import Any
 
 from sqlalchemy import delete, func, insert, select
-from sqlalchemy.orm import Session
 
 from app.soccer.annotation import Lines
 from app.soccer.frames import ImageSize
@@ -18,6 +17,7 @@ from app.store.digest import digest
 from app.store.log import LogEntry, read_log
 from app.store.models import GroupModel, ImportFindingModel, LogModel, StationModel, ViewModel
 from app.store.pitch_models import PitchEstimateModel
+from app.store.session import Session
 
 PITCH = "pitch"
 """Kind of the log's entries that say how long and wide a pitch is, one for each group."""

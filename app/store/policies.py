@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from sqlalchemy import select, text
-from sqlalchemy.orm import Session
 
 from app.soccer.policy import Policy
 from app.store.aliases import shown_actor
 from app.store.codecs import policy_from_json, unpack
 from app.store.models import LogModel
+from app.store.session import Session
 
 
 @dataclass(frozen=True)

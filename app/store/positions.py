@@ -8,13 +8,13 @@ from itertools import groupby
 from typing import Any
 
 from sqlalchemy import func, select
-from sqlalchemy.orm import Session
 
 from app.soccer.group import SharedPosition
 from app.store.codecs import as_written, parse, positions_from_json
 from app.store.digest import digest
 from app.store.log import LogEntry, read_log
 from app.store.models import GroupModel, LogModel, StationModel, ViewModel
+from app.store.session import Session
 
 POSITION = "position"
 """Kind of the log's entries that say where a match puts cameras, one for each group."""

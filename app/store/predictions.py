@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import Any
 
 from sqlalchemy import ColumnElement, delete, func, insert, select
-from sqlalchemy.orm import Session
 
 from app.geometry.camera import Camera
 from app.store.aliases import columns_shown
@@ -20,6 +19,7 @@ from app.store.prediction_models import (
     PredictionModel,
     PredictionSetModel,
 )
+from app.store.session import Session
 
 _BATCH = 5000
 

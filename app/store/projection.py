@@ -7,7 +7,6 @@ from contextlib import contextmanager
 from typing import Any
 
 from sqlalchemy import delete, insert, select, text
-from sqlalchemy.orm import Session
 
 from app.store.dialect.statements import DeferReferences
 from app.store.groups import StoredGroup, read_groups
@@ -21,6 +20,7 @@ from app.store.models import (
     ViewModel,
 )
 from app.store.pitches import FINDING
+from app.store.session import Session
 from app.store.stations import StoredStation, stored_station
 from app.store.tables import Base
 

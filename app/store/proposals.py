@@ -11,7 +11,7 @@ from dataclasses import asdict, dataclass, fields
 from typing import Any, cast
 
 from sqlalchemy import ColumnElement, Select, Table, and_, case, delete, func, or_, select
-from sqlalchemy.orm import Session, aliased
+from sqlalchemy.orm import aliased
 
 from app.soccer.annotation import Lines
 from app.store.codecs import as_written, canonical, lines_from_json, lines_to_json, parse
@@ -25,6 +25,7 @@ from app.store.models import (
     ViewModel,
 )
 from app.store.proposal_models import ProposalModel
+from app.store.session import Session
 from app.store.solutions import is_current, undetermined
 
 _PROPOSAL = cast(Table, ProposalModel.__table__)

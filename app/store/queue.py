@@ -19,7 +19,6 @@ from sqlalchemy import (
     union_all,
     update,
 )
-from sqlalchemy.orm import Session
 
 from app.store.aliases import shown_actor
 from app.store.dialect.statements import insert_or_replace
@@ -34,6 +33,7 @@ from app.store.models import (
     VerdictModel,
     ViewModel,
 )
+from app.store.session import Session
 from app.store.solutions import is_current, read_summary
 from app.store.summary import Summary
 from app.store.verdicts import StoredVerdict
@@ -80,11 +80,13 @@ def refresh_verdicts(session: Session, group_ids: Sequence[int]) -> None:
             .where(GroupModel.id.in_(ids))
         )
         values = [
-            {"group_id": head.id, **_judged(head, verdicts.get(head.id), edited, head.passes)}
+            {"of": head.id, **_judged(head, verdicts.get(head.id), edited, head.passes)}
             for head in heads.all()
         ]
         if values:
-            session.execute(update(QueueModel), values)
+            session.execute(
+                update(QueueModel).where(QueueModel.group_id == bindparam("of")), values
+            )
 
 
 def update_row(

@@ -14,7 +14,6 @@ from sqlalchemy import (
     select,
     update,
 )
-from sqlalchemy.orm import Session
 
 from app.store.datasets import next_dataset_id
 from app.store.dialect.statements import DeferReferences, insert_or_replace
@@ -25,6 +24,7 @@ from app.store.models import (
     StationModel,
     VerdictModel,
 )
+from app.store.session import Session
 from app.store.sight import COPIES
 from app.store.tables import Base
 from app.store.view_models import COPIES_USED, UsedIdModel

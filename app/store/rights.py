@@ -12,10 +12,10 @@ from dataclasses import dataclass
 from typing import Any
 
 from sqlalchemy import ColumnElement, Select, or_, select
-from sqlalchemy.orm import Session
 
 from app.store.dialect.statements import pairs_of
 from app.store.people_models import DatasetRoleModel, PersonModel
+from app.store.session import Session
 from app.store.take_models import CopyDatasetModel
 
 

@@ -6,11 +6,11 @@ from collections.abc import Sequence
 from typing import Any
 
 from sqlalchemy import delete, insert, select
-from sqlalchemy.orm import Session
 
 from app.store.aliases import shown_actor
 from app.store.clock import now
 from app.store.group_rows import next_id
+from app.store.session import Session
 from app.store.view_models import SavedViewModel
 
 _SAVED = select(

@@ -9,7 +9,6 @@ from collections.abc import Sequence
 from typing import Any
 
 from sqlalchemy import ColumnElement, delete, exists, func, insert, or_, select, update
-from sqlalchemy.orm import Session
 
 from app.store.people_models import (
     PasskeyModel,
@@ -18,6 +17,7 @@ from app.store.people_models import (
     SecondFactorModel,
     TeamSettingModel,
 )
+from app.store.session import Session
 
 REQUIRED = "require_second_factor"
 _MINE = SecondFactorModel.__table__

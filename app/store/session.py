@@ -1,313 +1,45 @@
-"""Store: the database of a home, its reads and its writes."""
+"""Session: what is asked of a database, and said to it, in one transaction."""
 
 from __future__ import annotations
 
-import threading
-from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager
-from dataclasses import replace
+from collections.abc import Callable
+from typing import Self
 
-import structlog
-from sqlalchemy import Engine, event
-from sqlalchemy.exc import TimeoutError as NoConnectionError
-from sqlalchemy.orm import Session as Session
-
-from app.config import Settings
-from app.errors import EXAMINE, BusyError, DamagedError, StorageError
-from app.store.anchor import (
-    move_anchor,
-    read_anchor,
-    renew_anchor,
-    require_own_database,
-    sync_anchor,
-)
-from app.store.dialect.dialect import dialect_of
-from app.store.dialect.sharing import AGAIN
-from app.store.engine import WRITE, make_engine, reported
-from app.store.first_look import require_sound
-from app.store.home import make_file
-from app.store.locks import DatabaseLock
-from app.store.log import LOG_END
-from app.store.migrate import (
-    KNOWN_REVISIONS,
-    SCHEMA_REVISION,
-    bring_up_to_date,
-    newer_schema,
-    schema_revision,
-)
-from app.store.soundness import file_faults
-
-log = structlog.get_logger("touchline.store")
-
-COMMITTED = "committed"
-"""What other processes are told of a commit."""
-TURN_SECONDS = 10.0
-"""How long a thread waits for the writes of others in its process; SQLite waits for other
-processes (``busy_timeout``)."""
+from sqlalchemy import Connection, Engine
 
 
-class Turn:
-    """The turn to write among the threads of one process.
+class Session(Connection):
+    """A connection of its own whose first statement begins a transaction; what is not committed when it
+    ends is taken back.
 
-    Raises:
-        StorageError: Others were writing all the while.
-    """
+    No row is ever an object that follows its changes: an ORM session would look after every
+    statement, which takes longer than most of them.
 
-    def __init__(self) -> None:
-        self._lock = threading.Lock()
-
-    def __enter__(self) -> None:
-        if not self._lock.acquire(timeout=TURN_SECONDS):
-            raise StorageError(
-                "other changes are still being written; this one was not saved",
-                hint="Try again in a moment.",
-            )
-
-    def __exit__(self, *_: object) -> None:
-        self._lock.release()
-
-
-def once_kept(session: Session, tell: Callable[[], None]) -> None:
-    """Call a function once a write session is kept, before the next one of its process begins.
-
-    What was not kept is not told of. It must be quick, and not ask the database.
-    """
-    event.listen(session, "after_commit", lambda _: tell(), once=True)
-
-
-class Store:
-    """The database of one home: short read transactions, and one write at a time.
-
-    Use ``Store.open``; the constructor trusts its engine.
+    Args:
+        engine: The database, with what holds for all statements.
 
     Attributes:
-        turn: Held while something is written; writers of one process wait for it.
-        sharing: What processes with the same database leave to one of them, and tell each other.
+        log_end: Id and hash of the last entry that was written into the log; None: none was.
     """
 
-    def __init__(
-        self,
-        engine: Engine,
-        settings: Settings,
-        lock: DatabaseLock,
-        turn: AbstractContextManager[object],
-    ):
-        self.settings = settings
-        self._engine = engine
-        self._reader = dialect_of(settings).reading(engine)
-        self._writer = engine.execution_options(**WRITE)
-        self._glancer = dialect_of(settings).glancing(engine)
-        self._peeker = dialect_of(settings).peeking(settings)
-        # Connections of its own: one that waits for no disk must never carry what was promised.
-        self._passing = make_engine(settings, lasting=False).execution_options(**WRITE)
-        self.sharing = dialect_of(settings).sharing(engine, lambda: reported(settings))
-        self._lock = lock
-        self.turn = turn
-        self._listeners: list[Callable[[], None]] = []
-        self._anchor = read_anchor(settings.database_file)
-        self._anchor_refused = False
-        self._damage: str | None = None
+    def __init__(self, engine: Engine):
+        super().__init__(engine)
+        self.log_end: tuple[int, str] | None = None
+        self._then: list[Callable[[], None]] = []
 
-    @staticmethod
-    def open(settings: Settings, turn: AbstractContextManager[object] | None = None) -> Store:
-        """Open the database; an empty home is migrated, an older one must be first.
+    def __enter__(self) -> Self:
+        return self
 
-        Args:
-            settings: Where it lies.
-            turn: The turn to write, where it is shared with another process.
+    def once_kept(self, tell: Callable[[], None]) -> None:
+        """Call a function once this is committed, before the next write of its process begins.
 
-        Raises:
-            StorageError: The schema is older or newer than this version's, or SQLite does not keep
-                the promises asked of it.
-            DamagedError: The database is not what was written, or not the one of its home.
-            InputError: The URL is neither one of SQLite nor of PostgreSQL.
+        What was not kept is not told of. It must be quick, and not ask the database.
         """
-        lock = DatabaseLock(settings)
-        engine: Engine | None = None
-        try:
-            engine = _open(settings, lock.alone)
-            lock.share()
-            return Store(engine, settings, lock, Turn() if turn is None else turn)
-        except BaseException:
-            if engine is not None:
-                engine.dispose()
-            lock.release()
-            raise
+        self._then.append(tell)
 
-    @contextmanager
-    def read(self) -> Iterator[Session]:
-        """A session on one consistent snapshot; nothing that it changes is kept."""
-        with self._watched(), Session(self._reader, autoflush=False) as session:
-            yield session
-
-    @contextmanager
-    def glance(self) -> Iterator[Session]:
-        """A session for one statement, which is a snapshot by itself and needs no transaction.
-
-        For what every request asks.
-        """
-        with self._watched(), Session(self._glancer, autoflush=False) as session:
-            yield session
-
-    @contextmanager
-    def peek(self) -> Iterator[Session]:
-        """A session like that of ``glance`` for whoever may wait for nothing, as the event loop.
-
-        Raises:
-            BusyError: There would be something to wait for; ``glance`` waits for it.
-        """
-        if self._peeker is None:
-            raise BusyError("the database answers nothing at once")
-        try:
-            with self._watched(), Session(self._peeker, autoflush=False) as session:
-                yield session
-        except NoConnectionError as error:
-            raise BusyError("another thread is peeking") from error
-
-    @contextmanager
-    def write(self, *, lasting: bool = True) -> Iterator[Session]:
-        """A session that holds the database's write lock from its start and commits at its end.
-
-        Threads of one process wait for their turn here, processes in SQLite. It does not nest.
-
-        Args:
-            lasting: False: nobody waits until it is on the disk, and a power cut may take it back,
-                as a whole. For what nobody would miss; the log is not written so.
-
-        Raises:
-            StorageError: Others were writing all the while; nothing was changed.
-        """
-        self.require_undamaged()
-        writer = self._writer if lasting else self._passing
-        with self.turn, self._watched(), Session(writer) as session:
-            # Take the lock before anything is read, so that what is read is still true when it
-            # is written.
-            session.connection()
-            yield session
-            if not lasting and LOG_END in session.info:
-                raise RuntimeError("what the log says must last")
-            if lasting:
-                self.sharing.tell(session, COMMITTED)
-            session.commit()
-            self._anchored(session)
-        self._tell_listeners()
-
-    def _tell_listeners(self) -> None:
-        for listener in self._listeners:
-            try:
-                listener()
-            except Exception:
-                log.exception("a change was saved, and somebody could not be told")
-
-    def require_undamaged(self) -> None:
-        """Raise DamagedError once the database was seen to be damaged.
-
-        What is left of it is read as long as it can be; another change could only spoil more.
-        """
-        if self._damage is not None:
-            raise DamagedError(f"no change is taken: {self._damage}", hint=EXAMINE)
-
-    def require_whole(self, wanted: Callable[[], bool] = lambda: True) -> None:
-        """Let SQLite look at every page and index; raise DamagedError where it finds a fault.
-
-        It ends early, without a word, once it is no longer ``wanted``.
-        """
-        dialect = dialect_of(self.settings)
-        with self.read() as session, dialect.interrupted(session, lambda: not wanted()):
-            faults = file_faults(session, 1)
-            if faults:
-                file = self.settings.database_file
-                log.error("the database is damaged", file=str(file), fault=faults[0])
-                raise DamagedError(f"{file.name} is damaged", hint=EXAMINE)
-
-    @contextmanager
-    def _watched(self) -> Iterator[None]:
-        try:
-            with reported(self.settings):
-                yield
-        except DamagedError as error:
-            self.note_damage(error)
-            raise
-
-    def note_damage(self, error: DamagedError) -> None:
-        """Refuse writes from now on: something read was not what was written. The first sign stays."""
-        self._damage = self._damage or error.message
-
-    def _anchored(self, session: Session) -> None:
-        """Tell the home how long the log is by now; an anchor that stays behind is right, too."""
-        end = session.info.get(LOG_END)
-        if end is None or self._anchor is None:
-            return
-        self._anchor = replace(self._anchor, entries=end[0], hash=end[1])
-        try:
-            move_anchor(self.settings.database_file, self._anchor)
-        except OSError as error:
-            if not self._anchor_refused:
-                log.warning("home.json cannot be written", error=str(error))
-            self._anchor_refused = True
-        else:
-            self._anchor_refused = False
-
-    def listen(self, listener: Callable[[], None]) -> None:
-        """Call a function after each commit of this process; it must be quick.
-
-        Once ``follow`` was called, after those of others on the same server of databases, too.
-        """
-        self._listeners.append(listener)
-
-    def follow(self) -> None:
-        """Hear of what other processes commit, where the database tells."""
-        self.sharing.hear(self._hear)
-        self.sharing.listen()
-
-    def say(self, word: str) -> None:
-        """Say a word to the other processes, where there may be some; see ``sharing``."""
-        if self.sharing.is_shared:
-            with self.glance() as session:
-                self.sharing.tell(session, word)
-
-    def _hear(self, word: str) -> None:
-        if word in (COMMITTED, AGAIN):
-            self._tell_listeners()
-
-    def close(self) -> None:
-        """Close all connections."""
-        self.sharing.close()
-        for engine in (self._engine, self._passing, self._peeker):
-            if engine is not None:
-                engine.dispose()
-        try:
-            sync_anchor(self.settings.database_file)
-        finally:
-            self._lock.release()
-
-
-def _open(settings: Settings, alone: bool) -> Engine:
-    dialect, engine = dialect_of(settings), make_engine(settings)
-    if dialect.is_file:
-        if alone:
-            require_sound(settings)
-        make_file(settings.database_file)
-    try:
-        with reported(settings):
-            dialect.require_promises(engine)
-            if schema_revision(engine) is None:
-                bring_up_to_date(settings, alone=alone)
-            _require_schema(engine, settings)
-            require_own_database(engine, settings)
-            renew_anchor(engine, settings, alone=alone)
-    except BaseException:
-        engine.dispose()
-        raise
-    return engine
-
-
-def _require_schema(engine: Engine, settings: Settings) -> None:
-    revision = schema_revision(engine)
-    if revision == SCHEMA_REVISION:
-        return
-    if revision in KNOWN_REVISIONS:
-        raise StorageError(
-            "the database was made by an older version of Touchline", hint="Run touchline migrate."
-        )
-    raise newer_schema(str(revision), settings)
+    def commit(self) -> None:
+        """Keep what was written."""
+        super().commit()
+        told, self._then = self._then, []
+        for tell in told:
+            tell()

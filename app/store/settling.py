@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 
 from sqlalchemy import bindparam, delete, exists, select, update
-from sqlalchemy.orm import Session
 
 from app.finite import json_text
 from app.store.dialect.statements import numbers_given
 from app.store.outbox import DONE, announce_batch
+from app.store.session import Session
 from app.store.webhook_models import WebhookModel
 from app.store.work import OPEN
 from app.store.work_models import BatchGroupModel, BatchModel, LeaseModel

@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import cast
 
 from sqlalchemy import Table, delete, func, insert, select
-from sqlalchemy.orm import Session
 
 from app.store.dialect.statements import insert as insert_or_update
 from app.store.people_models import AttemptModel, BegunModel
+from app.store.session import Session
 
 KEPT_SECONDS = 3600.0
 """No limit looks back further."""

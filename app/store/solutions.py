@@ -9,7 +9,6 @@ from functools import lru_cache
 from typing import Any, cast
 
 from sqlalchemy import BindParameter, ColumnElement, Table, and_, bindparam, func, select
-from sqlalchemy.orm import Session
 
 from app.errors import ConflictError
 from app.finite import json_text
@@ -19,6 +18,7 @@ from app.store import value_codec
 from app.store.codecs import as_written, inflate, parse
 from app.store.dialect.statements import insert
 from app.store.models import CalibrationModel, DatasetModel, GroupModel, SolutionModel
+from app.store.session import Session
 from app.store.summary import Summary, summarize
 
 _ELSEWHERE = Calibration(source="", camera=None)

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from sqlalchemy.orm import Session
-
 from app.store.dialect.dialect import dialect_in
+from app.store.session import Session
 
 
 def file_faults(session: Session, most: int = 5, *, thorough: bool = False) -> list[str]:

@@ -6,10 +6,10 @@ from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 
 from sqlalchemy import select
-from sqlalchemy.orm import Session
 
 from app.store.dialect.statements import insert
 from app.store.models import SpareFrameModel
+from app.store.session import Session
 
 BATCH = 1000
 

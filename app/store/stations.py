@@ -8,7 +8,6 @@ from functools import lru_cache
 from typing import Any
 
 from sqlalchemy import select, update
-from sqlalchemy.orm import Session
 
 from app.geometry.camera import Camera
 from app.soccer.annotation import Lines
@@ -20,6 +19,7 @@ from app.store import codecs
 from app.store.digest import station_digest
 from app.store.group_rows import station_values
 from app.store.models import GroupModel, StationModel, ViewModel
+from app.store.session import Session
 
 
 @dataclass(frozen=True)

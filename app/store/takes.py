@@ -6,11 +6,12 @@ from collections.abc import Callable, Collection, Sequence
 from typing import Any
 
 from sqlalchemy import Select, bindparam, exists, func, insert, select, update
-from sqlalchemy.orm import Session, aliased
+from sqlalchemy.orm import aliased
 
 from app.store.clock import now
 from app.store.group_rows import next_id
 from app.store.models import GroupModel
+from app.store.session import Session
 from app.store.take_models import CopyDatasetModel, TakeModel
 from app.store.work_models import BatchGroupModel
 

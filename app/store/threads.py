@@ -7,12 +7,12 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
 from sqlalchemy import Select, delete, func, insert, select, update
-from sqlalchemy.orm import Session
 
 from app.store.aliases import shown_actor
 from app.store.group_rows import next_id
 from app.store.models import DatasetModel, GroupModel, ViewModel
 from app.store.people_models import PersonModel
+from app.store.session import Session
 from app.store.talk_models import CommentMentionModel, CommentModel, ThreadModel
 
 

@@ -17,7 +17,6 @@ from pathlib import Path
 from typing import Any
 
 from sqlalchemy import Connection, Engine, Table, func, insert, inspect, select, text
-from sqlalchemy.orm import Session
 
 from app.config import Settings
 from app.errors import DamagedError, InputError
@@ -28,7 +27,8 @@ from app.store.home import make_file
 from app.store.locks import database_alone, server_lock
 from app.store.log import verify_chain
 from app.store.migrate import UNFINISHED, make_schema, schema_revision
-from app.store.session import Store
+from app.store.session import Session
+from app.store.store import Store
 from app.store.tables import Base
 
 _BATCH = 500
@@ -94,7 +94,7 @@ def _transfer(
     yields: Path,
     tell: Callable[[str, int], None],
 ) -> Transferred:
-    anchor = anchor_of(session.connection())
+    anchor = anchor_of(session)
     if anchor is None:
         raise InputError("the database has no installation yet", hint="Run touchline migrate.")
     dialect.require_promises(target)
@@ -102,14 +102,16 @@ def _transfer(
     copied = 0
     for tables in _steps():
         copied += _copy(session, target, tables, tell)
-    with target.begin() as connection:
-        rows = _require_equal(session, connection)
-        entries = _require_chain(connection, anchor.entries, anchor.hash)
-        dialect.settle(connection, _tables(), anchor.installation)
+    with Session(target) as copy:
+        rows = _require_equal(session, copy)
+        entries = _require_chain(copy, anchor.entries, anchor.hash)
+        dialect.settle(copy, _tables(), anchor.installation)
         # Their marks are those of the changes of another database.
         shutil.rmtree(yields, ignore_errors=True)
-        connection.execute(_REVISION, {"revision": anchor.schema})
-        return Transferred(rows, copied, entries, _versions(connection))
+        copy.execute(_REVISION, {"revision": anchor.schema})
+        versions = _versions(copy)
+        copy.commit()
+    return Transferred(rows, copied, entries, versions)
 
 
 def _begin(target: Engine, dialect: Dialect, installation: str) -> None:
@@ -165,7 +167,7 @@ def _copy(
         for table in tables:
             # Rows went over in this order: so many of the first ones are there.
             present = connection.execute(select(func.count()).select_from(table)).scalar_one()
-            rows = iter(_rows(session.connection(), table, present))
+            rows = iter(_rows(session, table, present))
             while batch := list(islice(rows, _BATCH)):
                 connection.execute(insert(table), batch)
                 copied += len(batch)
@@ -188,7 +190,7 @@ def _require_equal(session: Session, connection: Connection) -> dict[str, int]:
     """Rows by table, where every row of the copy is that of the source."""
     counts = {}
     for table in _tables():
-        ours, theirs = _digest(connection, table), _digest(session.connection(), table)
+        ours, theirs = _digest(connection, table), _digest(session, table)
         if ours != theirs:
             raise DamagedError(
                 f"table {table.name} of the copy is not equal: {ours[0]:,} rows of {theirs[0]:,}",
@@ -207,15 +209,12 @@ def _digest(connection: Connection, table: Table) -> tuple[int, str]:
     return count, digest.hexdigest()
 
 
-def _require_chain(connection: Connection, entries: int, last: str) -> int:
-    with Session(connection) as session:
-        count = verify_chain(session)
-        found = session.connection().execute(
-            text("SELECT hash FROM log WHERE id = :id"), {"id": entries}
-        )
-        if count != entries or (found.scalar() or "") != last:
-            raise DamagedError("the log of the copy does not end as the source's does")
-        return count
+def _require_chain(session: Session, entries: int, last: str) -> int:
+    count = verify_chain(session)
+    found = session.execute(text("SELECT hash FROM log WHERE id = :id"), {"id": entries})
+    if count != entries or (found.scalar() or "") != last:
+        raise DamagedError("the log of the copy does not end as the source's does")
+    return count
 
 
 def _versions(connection: Connection) -> dict[str, str]:

@@ -6,13 +6,13 @@ from dataclasses import dataclass
 from typing import Any
 
 from sqlalchemy import select
-from sqlalchemy.orm import Session
 
 from app.soccer.solution import SOLVER_VERSION
 from app.store.clock import now
 from app.store.codecs import Json, canonical, parse
 from app.store.dialect.statements import insert_or_replace
-from app.store.session import Store
+from app.store.session import Session
+from app.store.store import Store
 from app.store.version_models import VersionCheckModel
 
 

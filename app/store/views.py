@@ -7,13 +7,13 @@ from dataclasses import dataclass
 from typing import Any
 
 from sqlalchemy import ColumnElement, select
-from sqlalchemy.orm import Session
 
 from app.soccer.annotation import BallAnnotation
 from app.soccer.media import Media
 from app.store.codecs import as_written, ball_from_json, parse
 from app.store.conditions import Condition
 from app.store.models import GroupModel, QueueModel, StationModel, ViewModel
+from app.store.session import Session
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,6 @@ from collections.abc import Iterable, Sequence
 from typing import Any, cast
 
 from sqlalchemy import ColumnElement, delete, func, select, tuple_, update
-from sqlalchemy.orm import Session
 
 from app.store.clock import now
 from app.store.codecs import canonical
@@ -14,6 +13,7 @@ from app.store.dialect.statements import insert
 from app.store.job_models import JobModel
 from app.store.log import DEEDS
 from app.store.models import LogModel
+from app.store.session import Session
 from app.store.webhook_models import DeliveryModel, WebhookModel
 
 WAITING, DELIVERED, FAILED = "waiting", "delivered", "failed"

@@ -20,11 +20,11 @@ from sqlalchemy import (
     select,
     update,
 )
-from sqlalchemy.orm import Session
 
 from app.store.dialect.statements import insert as upsert
 from app.store.models import DatasetModel, LogModel, QueueModel
 from app.store.people_models import PersonModel
+from app.store.session import Session
 from app.store.take_models import TakeModel
 from app.store.work_models import BatchGroupModel, BatchModel, BatchPersonModel, LeaseModel
 

@@ -15,7 +15,7 @@ from app.commands.opened import process_pool
 from app.config import Settings
 from app.review.datasets.cluster import Cluster, Place
 from app.review.editing.recompute import solve_dataset
-from app.store.session import Store
+from app.store.store import Store
 from tests.bench.table import print_table
 from tests.e2e.service import run_touchline
 from tests.torture.cluster import members

@@ -23,7 +23,7 @@ from app.review.queue.statistics import statistics
 from app.review.yields.funnel import get_yield
 from app.review.yields.statistics import StatisticsStore
 from app.review.yields.store import YieldStore
-from app.store.session import Store
+from app.store.store import Store
 from tests.bench.table import print_table
 from tests.e2e.service import run_touchline
 

@@ -44,7 +44,7 @@ from app.solving.calibrate import calibrate, calibration_key, measure
 from app.solving.observations import observe
 from app.solving.resect import ResectionProblem
 from app.solving.solve import solve
-from app.store.session import Store
+from app.store.store import Store
 from tests.bench.table import print_table
 from tests.scenes import make_scenes
 

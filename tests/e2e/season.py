@@ -9,7 +9,7 @@ from app.review.editing.recompute import solve_dataset
 from app.review.importing.ingest import ingest
 from app.soccer.frames import ImageSize
 from app.soccer.group import Group, Station, View
-from app.store.session import Store
+from app.store.store import Store
 
 SEASON = 2000
 SIZE = ImageSize(960, 540)

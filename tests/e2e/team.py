@@ -20,7 +20,7 @@ from app.review.people.people import find_person, invite
 from app.review.people.roles import Role
 from app.review.takes.take import begin_take
 from app.review.verdicts.verdict import set_verdict
-from app.store.session import Store
+from app.store.store import Store
 
 OpenPage = Callable[..., Page]
 SECRET = "three plain words"

@@ -8,7 +8,7 @@ from pathlib import Path
 from playwright.sync_api import Page, expect
 
 from app.config import Settings
-from app.store.session import Store
+from app.store.store import Store
 from tests.e2e.screen import passing, until, withdraw_verdict
 from tests.e2e.team import annotate
 from tests.e2e.test_access import serious_in_both

@@ -15,7 +15,7 @@ from app.review.people.people import find_person, invite
 from app.review.people.roles import Role
 from app.review.verdicts.verdict import set_verdict
 from app.store.logins import delete_logins
-from app.store.session import Store
+from app.store.store import Store
 from tests.e2e.screen import Screen, holding, until
 from tests.e2e.team import (
     REFUSED,

@@ -28,7 +28,7 @@ from app.sample.truth import read_truth
 from app.sample.write import write_sample
 from app.soccer.frames import Box, ImageSize
 from app.store.models import ViewModel
-from app.store.session import Store
+from app.store.store import Store
 from tests.evaluation.tiny_detector import write_tiny_detector
 
 GROUPS = 4

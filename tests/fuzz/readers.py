@@ -39,7 +39,7 @@ from app.soccer.media import Media
 from app.soccer.policy import PAPER
 from app.solving.solve import solve
 from app.store.media import read_frame
-from app.store.session import Store
+from app.store.store import Store
 from tests.cameras import SIZE
 from tests.fuzz.case import Case
 

@@ -21,7 +21,7 @@ from app.soccer.annotation import Extras, make_lines
 from app.soccer.group import Group, Station, View
 from app.soccer.policy import PAPER
 from app.solving.solve import solve
-from app.store.session import Store
+from app.store.store import Store
 from tests.balls import box_around
 from tests.cameras import SIZE, looking
 from tests.fuzz.case import Case, Files

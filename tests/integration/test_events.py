@@ -14,7 +14,7 @@ import pytest
 
 from app.config import Settings
 from app.review.importing.ingest import ensure_dataset
-from app.store.session import Store
+from app.store.store import Store
 from tests.integration.conftest import COMMAND, environment
 from tests.waiting import SECONDS
 

@@ -47,7 +47,7 @@ from app.review.versions.freeze import FreezeRequest, freeze
 from app.review.webhooks.messages import Kind
 from app.review.webhooks.webhooks import make_webhook, send_ping
 from app.review.work.batches import NewBatch, make_batch
-from app.store.session import Store
+from app.store.store import Store
 from app.store.uploads import UploadWriter
 from tests.waiting import SECONDS
 

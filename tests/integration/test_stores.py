@@ -35,7 +35,7 @@ from app.soccer.group import Group
 from app.soccer.media import Media
 from app.store.media import content_type, read_frame
 from app.store.object_frames import is_kept
-from app.store.session import Store
+from app.store.store import Store
 from tests.e2e.service import serving
 from tests.moto_server import Door, fill_store, moto_server, store_settings, stored_settings
 

@@ -12,7 +12,7 @@ import numpy as np
 from app.config import Settings
 from app.evaluation.evaluate import Evaluation
 from app.evaluation.figure_png import figure_png
-from app.store.session import Store
+from app.store.store import Store
 from tests.paper.issia import run_issia
 from tests.paper.page import page
 from tests.paper.printed_jac import both_directions

@@ -14,7 +14,7 @@ from app.review.datasets.dataset import get_dataset
 from app.review.editing.recompute import solve_dataset
 from app.review.evaluating.frames import live_truth
 from app.review.importing.ingest import ingest
-from app.store.session import Store
+from app.store.store import Store
 from tests.paper.simulated import SimulatedDetector
 
 FOLDER = (

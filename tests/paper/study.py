@@ -13,7 +13,7 @@ from app.review.evaluating.frames import Truth, live_truth
 from app.review.importing.ingest import ingest
 from app.sample.scene import Scene
 from app.soccer.frames import Box
-from app.store.session import Store
+from app.store.store import Store
 from tests.paper.simulated import SimulatedDetector, camera_from_noisy_lines, looseness
 from tests.scenes import make_scenes
 

@@ -12,7 +12,7 @@ from app.datasets.issia_reader import IssiaOptions, open_issia
 from app.datasets.report import Report
 from app.review.editing.recompute import solve_dataset
 from app.review.importing.ingest import ingest
-from app.store.session import Store
+from app.store.store import Store
 from tests.homes import once_for_all
 
 DATA = Path(os.environ.get("TOUCHLINE_REAL_DATA", Path(__file__).parents[3] / "shared" / "data"))

@@ -18,7 +18,7 @@ from app.review.importing.ingest import ingest
 from app.review.queue.listing import list_ids
 from app.soccer.policy import PAPER
 from app.soccer.solution import Solution
-from app.store.session import Store
+from app.store.store import Store
 from tests.homes import copy_home
 
 DATA = (

@@ -26,7 +26,7 @@ from app.review.versions.freeze import FreezeRequest, freeze
 from app.review.versions.verify import verify
 from app.soccer.split import Split
 from app.store.models import GroupModel
-from app.store.session import Store
+from app.store.store import Store
 from tests.homes import copy_home
 
 DATA = (

@@ -27,7 +27,7 @@ from app.review.people.members import give_role
 from app.review.people.people import invite
 from app.review.people.roles import Role
 from app.review.people.whereabouts import Kind
-from app.store.session import Store
+from app.store.store import Store
 from tests.scenes import make_scenes
 from tests.security.table import Row
 

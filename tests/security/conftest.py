@@ -25,7 +25,7 @@ from app.config import Settings
 from app.datasets.soccernet_v3_writer import write_soccernet_v3
 from app.review.people import passwords
 from app.review.people.roles import Role
-from app.store.session import Store
+from app.store.store import Store
 from tests.e2e.service import NOBODY, run_touchline, serving
 from tests.integration.conftest import bomb, picture
 from tests.provider import CLIENT, SECRET, Provider, providing

@@ -21,7 +21,7 @@ import yaml
 
 from app.api.application import create_app
 from app.config import Settings
-from app.store.session import Store
+from app.store.store import Store
 from tests.databases import count_rows
 from tests.security.asking import JSON, Answer, assert_guarded
 from tests.security.conftest import API, FORMULA, Guarded

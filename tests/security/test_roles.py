@@ -22,7 +22,7 @@ from app.review.people.people import change_person, find_person, renew_link
 from app.review.people.roles import LEAST, Role, Scope
 from app.store.clock import now
 from app.store.log import Entry, append, read_log
-from app.store.session import Store
+from app.store.store import Store
 from tests.security.asking import assert_guarded
 from tests.security.table import MISSING, TABLE, Row, rows
 from tests.security.team import API, BYTES, GUARDED, HIDDEN, SECRET, Team, asked, cookie_in
@@ -240,8 +240,7 @@ class TestSessions:
         team.add("here-only", Role.NONE)
         assert team.ask("GET", f"{API}/jobs/1", role="here-only").status == 404
         assert by_threads == [f"{API}/jobs/1"]
-        with team.store.peek() as session:
-            session.connection()
+        with team.store.peek():
             assert team.ask("GET", address, role="reviewer").status == 200
         assert by_threads == [f"{API}/jobs/1", address]
         assert team.ask("GET", address, Cookie="touchline-session=nobody").status == 401

@@ -21,7 +21,7 @@ from app.review.people.passkeys import Site
 from app.review.people.people import find_person
 from app.review.people.roles import Role
 from app.review.people.second_factor import SecondFactors
-from app.store.session import Store
+from app.store.store import Store
 from tests.authenticator import Authenticator
 from tests.security.asking import Answer, assert_guarded
 from tests.security.team import API, GUARDED, SECRET, Team, asked, cookie_in

@@ -26,7 +26,7 @@ from app.config import Settings
 from app.review.datasets.dataset import list_datasets
 from app.review.editing.doctor import examine
 from app.store.log import read_log
-from app.store.session import Store
+from app.store.store import Store
 from tests.e2e.service import ROOT, SERVE, free_port, run_touchline
 from tests.starting import Process
 

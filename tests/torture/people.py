@@ -29,7 +29,7 @@ from app.config import Settings
 from app.review.people import links, passwords
 from app.review.people.people import invite
 from app.review.people.roles import Role
-from app.store.session import Store
+from app.store.store import Store
 from app.store.verdicts import read_verdicts
 from tests.torture import counting
 from tests.torture.crowd import Load

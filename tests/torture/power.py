@@ -19,7 +19,7 @@ from pathlib import Path
 from app.config import Settings
 from app.errors import StorageError
 from app.store.log import verify_chain
-from app.store.session import Store
+from app.store.store import Store
 from tests.e2e.service import ROOT
 
 SECTOR = 512
@@ -35,7 +35,7 @@ from app.review.editing.submit import load, submit
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import Box
 from app.store.dialect import sqlite
-from app.store.session import Store
+from app.store.store import Store
 
 sqlite.PRAGMAS["synchronous"] = {"FULL": ("FULL", 2), "NORMAL": ("NORMAL", 1)}[sys.argv[3]]
 store = Store.open(Settings(home=Path(sys.argv[1])))

@@ -19,9 +19,8 @@ from pathlib import Path
 from alembic import command
 from alembic.config import Config
 from alembic.operations import Operations
-from sqlalchemy import Connection, MetaData, func, select
+from sqlalchemy import MetaData, func, select
 from sqlalchemy.exc import IntegrityError
-from sqlalchemy.orm import Session
 
 from app.config import Settings
 from app.store.clock import now
@@ -31,6 +30,7 @@ from app.store.home import make_home
 from app.store.log import Entry, append
 from app.store.migrate import KNOWN_REVISIONS, migrate, migrations_folder, schema_revision
 from app.store.restore import restore
+from app.store.session import Session
 from tests.e2e.service import ROOT
 
 MIGRATE = (
@@ -53,20 +53,19 @@ def make_old(settings: Settings, revision: str) -> None:
     config = Config()
     config.set_main_option("script_location", str(migrations_folder()))
     engine = make_engine(settings).execution_options(**WRITE)
-    with engine.begin() as connection:
-        config.attributes["connection"] = connection
+    with Session(engine) as session:
+        config.attributes["connection"] = session
         command.upgrade(config, revision)
-        _fill(connection)
+        _fill(session)
+        session.commit()
     engine.dispose()
 
 
-def _fill(connection: Connection) -> None:
+def _fill(connection: Session) -> None:
     """One row in each table, whose references lead to each other's."""
     schema = MetaData()
     schema.reflect(connection)
-    with Session(bind=connection) as session:
-        append(session, [Entry("dataset", "ann", now(), {}, 1)])
-        session.commit()
+    append(connection, [Entry("dataset", "ann", now(), {}, 1)])
     for table in schema.sorted_tables:
         if connection.execute(select(func.count()).select_from(table)).scalar():
             continue

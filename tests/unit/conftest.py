@@ -18,7 +18,7 @@ from typer.main import get_command
 
 from app.cli import main
 from app.store import migrate
-from app.store.session import Store
+from app.store.store import Store
 from tests.databases import SQLITE, Databases, databases_of, opened_databases
 from tests.kept_child import USERS, KeptChild
 from tests.schemas import copied_schemas, make_schema

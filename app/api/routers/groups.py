@@ -48,7 +48,7 @@ from app.review.editing.state import GroupState
 from app.review.people.roles import Action, may
 from app.review.queue import listing as queue
 from app.review.verdicts.verdict import set_verdict
-from app.store.session import Store
+from app.store.store import Store
 
 router = APIRouter(prefix="/groups", tags=["groups"])
 

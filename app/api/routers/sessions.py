@@ -30,7 +30,7 @@ from app.review.people.logins import Login
 from app.review.people.members import read_single_roles
 from app.review.people.roles import SCOPES, Action, Role, may
 from app.soccer.actors import LOCAL_USER
-from app.store.session import Store
+from app.store.store import Store
 
 router = APIRouter(tags=["sessions"])
 log = structlog.get_logger("touchline.access")

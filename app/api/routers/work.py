@@ -31,7 +31,7 @@ from app.review.work import batches, progress
 from app.review.work.batches import Batch, NewBatch
 from app.review.work.leases import Lease, Leases, Worker
 from app.soccer.actors import LOCAL_USER
-from app.store.session import Store
+from app.store.store import Store
 
 router = APIRouter(tags=["work"])
 

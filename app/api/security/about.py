@@ -20,7 +20,7 @@ from app.review.people.logins import Login
 from app.review.people.roles import Action, DatasetRoles, Role, Sight, require
 from app.review.people.whereabouts import MAX_ID, Kind, Named, Place, find_place, role_at
 from app.review.queue.fields import BLIND
-from app.store.session import Store
+from app.store.store import Store
 
 PATH: Mapping[str, Kind] = {
     "datasets": Kind.DATASET,

@@ -46,7 +46,7 @@ from app.errors import (
 from app.review.people.access_tokens import AccessTokens
 from app.review.people.logins import Login, Logins
 from app.review.people.roles import EVERYTHING, Action, DatasetRoles, Sight, require_scope
-from app.store.session import Store
+from app.store.store import Store
 
 log = structlog.get_logger("touchline.access")
 

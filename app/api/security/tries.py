@@ -11,7 +11,7 @@ from limits.strategies import MovingWindowRateLimiter
 
 from app.errors import TooManyTriesError
 from app.review.people.attempts import Attempts
-from app.store.session import Store
+from app.store.store import Store
 
 OF_A_NAME = parse("10/minute")
 OF_AN_ADDRESS = parse("60/minute")

@@ -21,7 +21,7 @@ from app.review.takes.take import Take
 from app.soccer.actors import person_of
 from app.store.agreement import OPEN, agreements_of, agreements_on
 from app.store.answers import Keep, keep_nothing
-from app.store.session import Store
+from app.store.store import Store
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from app.evaluation.agreement_limits import Disagreement, Limits, disagreements
 from app.evaluation.annotation_distance import GroupDistance, compare_annotations
 from app.review.editing.state import GroupState
 from app.review.editing.submit import load_solved
-from app.store.session import Store
+from app.store.store import Store
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,8 @@ from app.review.datasets.dataset import dataset_id
 from app.store.agreement import limits_of, put_limits
 from app.store.clock import now
 from app.store.log import Entry, append
-from app.store.session import Session, Store
+from app.store.session import Session
+from app.store.store import Store
 
 KIND = "agreement"
 """Kind of the log's entries about agreement; they change no group."""

@@ -6,7 +6,8 @@ from collections.abc import Callable
 
 from app.errors import ConflictError
 from app.store.answers import Answer, Kept, find_answer, keep_answer
-from app.store.session import Session, Store
+from app.store.session import Session
+from app.store.store import Store
 
 
 def find_first(store: Store, key: str, actor: str, *, at_once: bool = False) -> Answer | None:

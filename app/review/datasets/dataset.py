@@ -25,8 +25,9 @@ from app.store.datasets import (
 from app.store.listing import count_states
 from app.store.log import Entry, append
 from app.store.queue import refresh_queue
-from app.store.session import Session, Store
+from app.store.session import Session
 from app.store.sight import COPIES, EVERYTHING, Sight
+from app.store.store import Store
 
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._ -]{0,99}")
 

@@ -15,7 +15,8 @@ from app.store import removal
 from app.store.clock import now
 from app.store.copy_datasets import copies_of
 from app.store.log import Entry, append
-from app.store.session import Session, Store
+from app.store.session import Session
+from app.store.store import Store
 
 KIND = "dataset_deleted"
 CHUNK = 500

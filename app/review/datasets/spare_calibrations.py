@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from app.store.orphans import delete_calibrations, spare_calibrations
-from app.store.session import Store
+from app.store.store import Store
 
 CHUNK = 2000
 """Calibrations a transaction: nobody who saves waits long for it."""

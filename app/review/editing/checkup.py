@@ -22,7 +22,8 @@ from app.store.home import open_to_others
 from app.store.leftovers import leftovers
 from app.store.log import last_time
 from app.store.orphans import spare_calibrations, unread_uploads
-from app.store.session import Session, Store
+from app.store.session import Session
+from app.store.store import Store
 
 ROOM_BYTES = 2**30
 """Room on the disk below which the next import may not fit."""

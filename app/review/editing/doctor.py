@@ -12,8 +12,9 @@ from app.review.editing.ledger import Ledger, read_ledger
 from app.review.editing.recompute import stale_groups
 from app.review.editing.replay import replay
 from app.store.log import newest_entry
-from app.store.session import Session, Store
+from app.store.session import Session
 from app.store.soundness import count_lost_references, file_faults, no_fault, restoring
+from app.store.store import Store
 
 REBUILD = "Run touchline doctor --rebuild: it writes these tables anew from the log."
 SHOWN = 5

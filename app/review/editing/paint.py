@@ -42,7 +42,8 @@ from app.store.paint import (
     read_readings,
 )
 from app.store.queue import refresh_queue
-from app.store.session import Session, Store
+from app.store.session import Session
+from app.store.store import Store
 
 ALLOWANCE = Allowance(memory=2 * 2**30, processor=60.0, silence=180.0)
 """For one picture; the first one of a process may have to wait for kernels to be compiled."""

@@ -14,7 +14,8 @@ from app.soccer.pitch import Pitch
 from app.store.aliases import shown_entries
 from app.store.groups import StoredGroup, read_groups
 from app.store.log import LogEntry, group_entries, station_entries
-from app.store.session import Session, Store
+from app.store.session import Session
+from app.store.store import Store
 
 STATION_EDITS = ("station_edit", "station_undo", "station_redo")
 """Kinds of entries in which somebody changed a static camera, and with it all its groups."""

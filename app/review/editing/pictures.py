@@ -29,7 +29,8 @@ from app.store.log import Entry, append
 from app.store.pictures import MatchPictures, match_pictures
 from app.store.pitches import groups_of_match, match_pitches
 from app.store.queue import refresh_queue
-from app.store.session import Session, Store
+from app.store.session import Session
+from app.store.store import Store
 
 _BATCH = 100
 

@@ -41,7 +41,8 @@ from app.store.pitches import (
     save_estimate,
 )
 from app.store.queue import refresh_queue
-from app.store.session import Session, Store
+from app.store.session import Session
+from app.store.store import Store
 
 _BATCH = 100
 

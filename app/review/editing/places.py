@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from app.errors import NotFoundError
 from app.soccer.media import Media
 from app.store import views
-from app.store.session import Store
+from app.store.store import Store
 
 
 @dataclass(frozen=True)

@@ -40,8 +40,9 @@ from app.store.positions import (
     position_inputs,
 )
 from app.store.queue import refresh_queue
-from app.store.session import Session, Store
+from app.store.session import Session
 from app.store.solutions import read_calibrations
+from app.store.store import Store
 
 _BATCH = 100
 _DIGITS = 4

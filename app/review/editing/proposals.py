@@ -35,7 +35,7 @@ from app.store.proposals import (
     save_proposals,
     views_to_look_at,
 )
-from app.store.session import Store
+from app.store.store import Store
 
 ALLOWANCE = Allowance(memory=2 * 2**30, processor=120.0, silence=240.0)
 """For one picture; the first one of a process may have to wait for kernels to be compiled."""

@@ -23,7 +23,7 @@ from app.solving.calibrate import calibrate_station, calibration_key
 from app.store.codecs import group_from_json, group_to_json, pack, unpack
 from app.store.groups import read_groups
 from app.store.queue import refresh_queue
-from app.store.session import Session, Store
+from app.store.session import Session
 from app.store.solutions import (
     SolutionKey,
     decode_calibration,
@@ -34,6 +34,7 @@ from app.store.solutions import (
     unsolved_groups,
 )
 from app.store.stations import read_stations, station_pitches
+from app.store.store import Store
 
 FIRST_CHUNK, CHUNK, CHUNK_HERE = 2, 40, 8
 """Groups a task: a second of work, or a few when lines must be calibrated. The first ones are

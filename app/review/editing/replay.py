@@ -37,7 +37,8 @@ from app.store.pitches import PITCH
 from app.store.positions import POSITION
 from app.store.projection import rewrite
 from app.store.queue import refresh_queue
-from app.store.session import Session, Store
+from app.store.session import Session
+from app.store.store import Store
 
 
 def replay(session: Session) -> Ledger:

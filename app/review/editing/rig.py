@@ -35,8 +35,9 @@ from app.store.digest import digest
 from app.store.groups import read_groups
 from app.store.imports import known_groups, shared_stations
 from app.store.log import read_entry
-from app.store.session import Session, Store
+from app.store.session import Session
 from app.store.stations import station_pitches
+from app.store.store import Store
 
 CAMERAS, SIGMA = "cameras", "sigma"
 """What can be accepted: the adjusted cameras; or how far those in use may be off, alone."""

@@ -15,8 +15,8 @@ from app.solving.another_tau import has_smaller_tau, retold, undecided
 from app.solving.facts_codec import facts_from_bytes
 from app.store.kept_solutions import KeptSolution, kept_solutions
 from app.store.policies import policy_history
-from app.store.session import Store
 from app.store.solutions import SolutionKey
+from app.store.store import Store
 
 CHUNK = 200
 """Groups a task: a fraction of a second."""

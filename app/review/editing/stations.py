@@ -31,13 +31,14 @@ from app.store.group_revisions import refresh_inputs_hashes
 from app.store.groups import StoredGroup
 from app.store.log import Entry, append
 from app.store.queue import refresh_queue
-from app.store.session import Session, Store
+from app.store.session import Session
 from app.store.solutions import (
     EncodedSolution,
     SolutionKey,
     insert_solutions,
 )
 from app.store.stations import StoredStation, groups_of_station, read_stations, save_station
+from app.store.store import Store
 
 
 @dataclass(frozen=True)

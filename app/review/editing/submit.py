@@ -34,8 +34,9 @@ from app.store.groups import StoredGroup, group_of_view, read_groups
 from app.store.log import Entry, append
 from app.store.paint import FOLLOWS, PAINT, insert_readings
 from app.store.queue import refresh_queue, update_row
-from app.store.session import Session, Store
+from app.store.session import Session
 from app.store.solutions import EncodedSolution, insert_solutions, read_solutions
+from app.store.store import Store
 
 
 @dataclass(frozen=True)

@@ -30,7 +30,8 @@ from app.solving.observations import principal_point
 from app.store.frames import Frames
 from app.store.groups import StoredGroup, group_of_view, read_groups
 from app.store.pitches import groups_of_match
-from app.store.session import Session, Store
+from app.store.session import Session
+from app.store.store import Store
 
 MOST_KNOWN = 12
 """Groups of a match whose cameras say where to look first; one stand needs no more."""

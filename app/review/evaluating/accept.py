@@ -25,7 +25,8 @@ from app.soccer.frames import Box, ImageSize
 from app.soccer.group import View
 from app.store.answers import Keep, keep_nothing
 from app.store.predictions import PredictedBox, PredictionSet, read_box, read_boxes
-from app.store.session import Session, Store
+from app.store.session import Session
+from app.store.store import Store
 from app.store.views import StoredView, dataset_views, find_view
 
 SHOWN = 20

@@ -25,7 +25,8 @@ from app.review.queue.query import parse_query
 from app.soccer.frames import Box
 from app.store.media import read_frame
 from app.store.predictions import PredictionSet
-from app.store.session import Session, Store
+from app.store.session import Session
+from app.store.store import Store
 from app.store.views import StoredView, dataset_views
 
 MIN_SCORE = 0.05

@@ -29,7 +29,8 @@ from app.store.evaluations import (
     find_evaluation,
     read_figure,
 )
-from app.store.session import Session, Store
+from app.store.session import Session
+from app.store.store import Store
 from app.store.value_codec import from_json
 
 MAX_PAGE = 500

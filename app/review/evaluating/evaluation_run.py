@@ -30,7 +30,8 @@ from app.store.predictions import (
     read_boxes,
     read_predicted_cameras,
 )
-from app.store.session import Session, Store
+from app.store.session import Session
+from app.store.store import Store
 from app.store.value_codec import to_json
 
 MAX_NAME = 100

@@ -19,7 +19,7 @@ from app.review.evaluating.evaluation import (
     tables_of,
 )
 from app.store.evaluations import StoredEvaluation
-from app.store.session import Store
+from app.store.store import Store
 from app.store.value_codec import dumps, to_json
 
 

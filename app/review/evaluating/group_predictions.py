@@ -16,7 +16,8 @@ from app.store.predictions import (
     read_group_boxes,
     read_prediction_sets,
 )
-from app.store.session import Session, Store
+from app.store.session import Session
+from app.store.store import Store
 from app.store.views import StoredView, group_dataset, group_views
 
 

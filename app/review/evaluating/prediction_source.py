@@ -18,7 +18,7 @@ from app.review.versions.version import find_version
 from app.soccer.frames import ImageSize
 from app.store.evaluations import StoredEvaluation
 from app.store.predictions import PredictionSet
-from app.store.session import Store
+from app.store.store import Store
 
 ENDINGS = ((".csv", "csv"), (".json", "coco"), (".txt", "yolo"))
 """Formats of predictions by the endings of their files; where several are there, the first."""

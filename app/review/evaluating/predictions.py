@@ -37,7 +37,8 @@ from app.store.predictions import (
     read_prediction_sets,
     read_view_boxes,
 )
-from app.store.session import Session, Store
+from app.store.session import Session
+from app.store.store import Store
 from app.store.views import dataset_views
 
 LISTED = 100

@@ -40,7 +40,8 @@ from app.review.importing.spare import spare_persons
 from app.review.versions.version import find_version
 from app.soccer.ball_boxes import BOX_KINDS
 from app.store.frames import make_picture
-from app.store.session import Session, Store
+from app.store.session import Session
+from app.store.store import Store
 from app.store.views import frame_files
 
 IMAGES = ("none", "copy", "link")

@@ -14,8 +14,9 @@ from app.store.codecs import camera_to_json
 from app.store.group_revisions import bump_groups, refresh_inputs_hashes
 from app.store.log import Entry, append
 from app.store.queue import refresh_queue
-from app.store.session import Session, Store
+from app.store.session import Session
 from app.store.stations import groups_of_station, read_stations, save_station
+from app.store.store import Store
 from app.store.views import dataset_views
 
 BATCH = 500

@@ -35,8 +35,9 @@ from app.store.exports import newest_word
 from app.store.groups import StoredGroup, read_groups
 from app.store.imports import group_verdicts, known_groups, shared_stations
 from app.store.log import LogEntry, group_entries, station_entries
-from app.store.session import Session, Store
+from app.store.session import Session
 from app.store.spare import sorted_spare_rows
+from app.store.store import Store
 
 FORMAT = "touchline"
 FORMAT_VERSION = 1

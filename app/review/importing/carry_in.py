@@ -41,7 +41,8 @@ from app.store.datasets import find_dataset
 from app.store.groups import read_groups
 from app.store.imports import known_groups, shared_stations
 from app.store.queue import refresh_queue
-from app.store.session import Session, Store
+from app.store.session import Session
+from app.store.store import Store
 
 BATCH = 200
 T = TypeVar("T")

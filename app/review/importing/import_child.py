@@ -18,7 +18,7 @@ from app.errors import DamagedError, TooLargeError
 from app.progress import Progress
 from app.review.importing.sources import Source, import_source
 from app.soccer.policy import Policy
-from app.store.session import Store
+from app.store.store import Store
 
 SILENCE = 900.0
 """Seconds in which an import must have read its next batch of groups."""

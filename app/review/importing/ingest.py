@@ -34,7 +34,8 @@ from app.store.log import Entry, append
 from app.store.paint import insert_readings
 from app.store.pitches import edited_pitches, is_pitch_edited
 from app.store.queue import refresh_queue
-from app.store.session import Session, Store
+from app.store.session import Session
+from app.store.store import Store
 
 BATCH = 200
 """Groups a transaction: one import holds the writers up for a fraction of a second at a time."""

@@ -31,7 +31,7 @@ from app.soccer.annotation import Extras
 from app.soccer.frames import ImageSize
 from app.soccer.group import Group
 from app.soccer.policy import PAPER, Policy
-from app.store.session import Store
+from app.store.store import Store
 
 FORMATS: tuple[str, ...] = get_args(ImportFormat)
 STATIC = ("issia", "issia-3d")

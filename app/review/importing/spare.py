@@ -14,8 +14,9 @@ from app.soccer.annotation import Extras
 from app.store.clock import now
 from app.store.codecs import extras_from_json, extras_to_json, pack, unpack
 from app.store.log import Entry, append
-from app.store.session import Session, Store
+from app.store.session import Session
 from app.store.spare import known_spare, put_spare, spare_rows
+from app.store.store import Store
 
 BATCH = 1000
 """Frames a transaction and a log entry."""

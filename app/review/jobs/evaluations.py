@@ -14,7 +14,7 @@ from app.review.jobs.jobs import Jobs
 from app.store.codecs import Json
 from app.store.evaluations import StoredEvaluation
 from app.store.jobs import Job
-from app.store.session import Store
+from app.store.store import Store
 
 EVALUATE, ACCEPT = "evaluate", "bulk"
 

@@ -19,7 +19,7 @@ from app.store.answers import Keep, keep_nothing
 from app.store.codecs import Json
 from app.store.frames import Frames
 from app.store.jobs import EXPORT, Job
-from app.store.session import Store
+from app.store.store import Store
 
 KIND = EXPORT
 

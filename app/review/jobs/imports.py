@@ -24,7 +24,7 @@ from app.soccer.policy import POLICIES
 from app.store.codecs import Json
 from app.store.datasets import find_dataset
 from app.store.jobs import Job
-from app.store.session import Store
+from app.store.store import Store
 from app.store.uploads import get_upload, keep_upload, upload_path
 
 KIND = "import"

@@ -22,8 +22,9 @@ from app.store.jobs import (
     read_jobs,
     update_job,
 )
-from app.store.session import Session, Store
+from app.store.session import Session
 from app.store.sight import EVERYTHING, Sight
+from app.store.store import Store
 
 TICK = 0.25
 """Seconds between two looks at the progress of the running job."""

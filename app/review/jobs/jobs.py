@@ -42,7 +42,8 @@ from app.store.jobs import (
     trim_jobs,
     update_job,
 )
-from app.store.session import Session, Store, once_kept
+from app.store.session import Session
+from app.store.store import Store
 
 log = structlog.get_logger("touchline.jobs")
 
@@ -210,11 +211,11 @@ class Jobs(JobRecords):
 
     def end_with(self, session: Session, ids: Collection[int]) -> None:
         """Let jobs write nothing more, nor begin, once a transaction is kept."""
-        once_kept(session, lambda: self.end_soon(ids))
+        session.once_kept(lambda: self.end_soon(ids))
 
     def end_soon(self, ids: Collection[int]) -> None:
         """Let jobs write nothing more, nor begin: without asking the database, so that it can be
-        called when a transaction is kept (``store.session.once_kept``)."""
+        called when a transaction is kept (``Session.once_kept``)."""
         for run in self._queue.runs:
             if run.id in ids:
                 run.progress.cancelled.set()

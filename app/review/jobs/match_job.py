@@ -14,7 +14,8 @@ from app.store.answers import Keep, keep_nothing
 from app.store.clock import now
 from app.store.codecs import Json
 from app.store.jobs import Job
-from app.store.session import Session, Store
+from app.store.session import Session
+from app.store.store import Store
 
 
 @dataclass(frozen=True)

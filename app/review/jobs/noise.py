@@ -10,7 +10,8 @@ from app.review.policies.noise import Noise, accept_noise
 from app.review.policies.policy import read_policy
 from app.store.answers import Keep, keep_nothing
 from app.store.jobs import Job
-from app.store.session import Session, Store
+from app.store.session import Session
+from app.store.store import Store
 
 
 def request_noise(

@@ -10,7 +10,8 @@ from app.review.jobs.solve import request_solve
 from app.store.answers import Keep, keep_nothing
 from app.store.codecs import Json
 from app.store.jobs import Job
-from app.store.session import Session, Store
+from app.store.session import Session
+from app.store.store import Store
 
 TOLD = (
     *("views", "without_picture", "read"),

@@ -14,7 +14,8 @@ from app.soccer.picture import PictureGeometry
 from app.store.answers import Keep, keep_nothing
 from app.store.codecs import Json, picture_to_json
 from app.store.jobs import Job
-from app.store.session import Session, Store
+from app.store.session import Session
+from app.store.store import Store
 
 
 def request_pictures(

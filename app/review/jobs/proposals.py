@@ -11,7 +11,7 @@ from app.review.jobs.jobs import Jobs
 from app.review.jobs.match_job import MatchesAsked, MatchJob
 from app.store.answers import Keep, keep_nothing
 from app.store.codecs import Json
-from app.store.session import Store
+from app.store.store import Store
 
 
 def stop_and_forget(

@@ -11,7 +11,7 @@ from app.review.jobs.solve import request_solve
 from app.store.answers import Keep, keep_nothing
 from app.store.codecs import Json
 from app.store.jobs import Job
-from app.store.session import Store
+from app.store.store import Store
 
 KIND = "rig"
 

@@ -36,7 +36,8 @@ from app.store.jobs import (
     trim_jobs,
     update_job,
 )
-from app.store.session import Session, Store
+from app.store.session import Session
+from app.store.store import Store
 
 log = structlog.get_logger("touchline.jobs")
 

@@ -25,7 +25,8 @@ from app.store.answers import Keep, Kept, keep_nothing
 from app.store.codecs import Json
 from app.store.datasets import dataset_name
 from app.store.jobs import Job
-from app.store.session import Session, Store
+from app.store.session import Session
+from app.store.store import Store
 
 KIND = "solve"
 Changed = TypeVar("Changed")

@@ -19,7 +19,7 @@ from app.store.answers import forget_answers, shorten_answers
 from app.store.jobs import forget_jobs
 from app.store.leftovers import delete_leftovers
 from app.store.orphans import expire_cache
-from app.store.session import Store
+from app.store.store import Store
 from app.store.uploads import expire_uploads
 from app.store.webhooks import forget_deliveries, has_old_deliveries
 

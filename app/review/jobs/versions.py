@@ -15,7 +15,7 @@ from app.soccer.split import Split
 from app.store.answers import Keep, keep_nothing
 from app.store.codecs import Json
 from app.store.jobs import Job
-from app.store.session import Store
+from app.store.store import Store
 
 FREEZE, VERIFY = "freeze", "verify"
 

@@ -13,7 +13,7 @@ from app.store.first_look import log_file
 from app.store.jobs import count_jobs
 from app.store.listing import count_unsolved
 from app.store.log import newest_entry
-from app.store.session import Store
+from app.store.store import Store
 
 
 @dataclass(frozen=True)

@@ -31,7 +31,8 @@ from app.store.access_tokens import (
 )
 from app.store.people import person_by_id
 from app.store.rights import rights_in
-from app.store.session import Session, Store
+from app.store.session import Session
+from app.store.store import Store
 
 PREFIX = "tl_"
 SHOWN, SECRET, CHECK = 8, 40, 6

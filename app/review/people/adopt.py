@@ -10,7 +10,7 @@ from app.store.aliases import find_alias, insert_alias
 from app.store.clock import now
 from app.store.log import Entry, append
 from app.store.people import person_by_id
-from app.store.session import Store
+from app.store.store import Store
 
 
 def adopted_by(store: Store) -> str | None:

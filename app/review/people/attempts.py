@@ -6,8 +6,8 @@ import time
 from collections.abc import Callable
 
 from app.review.people.tokens import hash_of
-from app.store.session import Store
 from app.store.short_lived import note_attempt, oldest_attempt
+from app.store.store import Store
 
 
 class Attempts:

@@ -10,7 +10,7 @@ from typing import Any
 from app.errors import NotFoundError
 from app.review.people.roles import Sight
 from app.store.audit import AuditQuery, AuditRow, audit_rows
-from app.store.session import Store
+from app.store.store import Store
 from app.store.threads import find_group
 
 MOST_LOOKED_AT = 20_000

@@ -20,7 +20,8 @@ from app.store.bells import (
 )
 from app.store.clock import now
 from app.store.people import person_by_name
-from app.store.session import Session, Store
+from app.store.session import Session
+from app.store.store import Store
 
 KEPT_DAYS = 90
 """So long somebody can read what they were told."""

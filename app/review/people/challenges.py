@@ -13,8 +13,8 @@ from cryptography.fernet import Fernet
 
 from app.review.people.tokens import hash_of
 from app.store.keys import BEGUN, installation_key
-from app.store.session import Store
 from app.store.short_lived import put_begun, take_begun
+from app.store.store import Store
 
 LASTS = timedelta(minutes=5)
 BYTES = 32

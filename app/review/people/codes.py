@@ -17,7 +17,8 @@ import pyotp
 from app.review.people.tokens import hash_of
 from app.store.keys import SECOND_FACTOR, installation_key
 from app.store.second_factors import find_second_factor, use_recovery_code, use_step
-from app.store.session import Session, Store
+from app.store.session import Session
+from app.store.store import Store
 
 DIGITS, SECONDS = 6, 30
 """Of a code, and for how long it is shown."""

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from app.store.clock import now
 from app.store.log import Entry, append
-from app.store.session import Session, Store
+from app.store.session import Session
+from app.store.store import Store
 
 DEED = "deed"
 """Kind of the log's entries about what was made, changed or deleted beside the groups."""

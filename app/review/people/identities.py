@@ -14,7 +14,8 @@ from app.review.people.sign_on_rules import SignOnRules
 from app.store.identities import count_linked, delete_identity, identity_of
 from app.store.logins import delete_logins
 from app.store.people import all_people, count_able, person_by_id
-from app.store.session import Session, Store
+from app.store.session import Session
+from app.store.store import Store
 
 
 @dataclass(frozen=True)

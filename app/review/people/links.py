@@ -24,7 +24,8 @@ from app.store.people import (
     person_by_name,
     update_person,
 )
-from app.store.session import Session, Store
+from app.store.session import Session
+from app.store.store import Store
 
 LASTS = timedelta(days=3)
 FIRST_LASTS = timedelta(hours=24)

@@ -26,7 +26,8 @@ from app.store.logins import (
 from app.store.people import forget_links, person_by_id, person_by_name, update_person
 from app.store.rights import Rights, rights_in, rights_of
 from app.store.second_factors import has_second_factor
-from app.store.session import Session, Store
+from app.store.session import Session
+from app.store.store import Store
 
 LEADING = tuple(role for role in Role if may(role, Action.LEAD))
 """Roles that lead a dataset."""

@@ -12,8 +12,9 @@ from app.soccer.actors import person_of
 from app.store.dataset_roles import all_dataset_roles, members, set_dataset_role
 from app.store.datasets import dataset_names, find_dataset
 from app.store.people import person_by_id
-from app.store.session import Session, Store
+from app.store.session import Session
 from app.store.sight import COPIES
+from app.store.store import Store
 
 
 @dataclass(frozen=True)

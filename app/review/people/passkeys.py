@@ -47,7 +47,8 @@ from app.store.passkeys import (
 )
 from app.store.people import person_by_id
 from app.store.second_factors import count_recovery_codes, put_recovery_codes
-from app.store.session import Session, Store
+from app.store.session import Session
+from app.store.store import Store
 
 log = structlog.get_logger("touchline.access")
 

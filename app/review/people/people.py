@@ -29,7 +29,8 @@ from app.store.people import (
     update_person,
 )
 from app.store.second_factors import people_with_second_factor
-from app.store.session import Session, Store
+from app.store.session import Session
+from app.store.store import Store
 
 
 @dataclass(frozen=True)

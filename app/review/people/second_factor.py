@@ -33,7 +33,8 @@ from app.store.second_factors import (
     put_second_factor,
     set_required,
 )
-from app.store.session import Session, Store
+from app.store.session import Session
+from app.store.store import Store
 
 ISSUER = "Touchline"
 CODES = 10

@@ -33,7 +33,8 @@ from app.store.identities import find_identity, put_identity, use_identity
 from app.store.logins import delete_logins
 from app.store.people import insert_person, person_by_id, person_by_name
 from app.store.second_factors import has_second_factor
-from app.store.session import Session, Store
+from app.store.session import Session
+from app.store.store import Store
 
 log = structlog.get_logger("touchline.access")
 

@@ -16,7 +16,8 @@ from app.review.people.roles import DatasetRoles, Role, Sight
 from app.soccer.actors import is_of
 from app.store.belonging import dataset_of, owner_of_job, versions_like
 from app.store.datasets import find_dataset
-from app.store.session import Session, Store
+from app.store.session import Session
+from app.store.store import Store
 from app.store.uploads import get_upload
 
 MIN_HASH = 8

@@ -20,8 +20,9 @@ from app.solving.resect import REFERENCE_DIAGONAL, view_line_evidence, view_line
 from app.solving.source_noise import Source, SourceFactors, SourceNoise, estimate_sources
 from app.solving.triangulate import sights_of
 from app.store.noise import Factor, Factors, factor_of, read_factors
-from app.store.session import Session, Store
+from app.store.session import Session
 from app.store.solutions import present_solutions
+from app.store.store import Store
 
 MAX_GROUPS = 600
 """Groups that an estimate looks at, spread over the dataset: more say hardly more."""

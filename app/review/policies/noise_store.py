@@ -8,8 +8,8 @@ from threading import Lock
 from app.review.policies.noise import Noise, read_noise
 from app.review.policies.policy import read_policy
 from app.store.log import newest_entry
-from app.store.session import Store
 from app.store.solutions import newest_solution
+from app.store.store import Store
 
 SIZE = 64
 """Datasets whose last answer is kept; the one that was not asked for the longest goes first."""

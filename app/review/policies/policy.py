@@ -9,7 +9,8 @@ from app.review.editing.state import require_etag
 from app.soccer.policy import Policy
 from app.store.digest import digest
 from app.store.policies import PolicyVersion, policy_history
-from app.store.session import Session, Store
+from app.store.session import Session
+from app.store.store import Store
 
 
 @dataclass(frozen=True)

@@ -28,8 +28,8 @@ from app.store.datasets import find_dataset
 from app.store.imports import known_groups
 from app.store.jobs import Job
 from app.store.locks import practice_lock
-from app.store.session import Store
 from app.store.sight import EVERYTHING, Sight
+from app.store.store import Store
 
 KIND = "practice"
 DATASET = "practice"

@@ -10,8 +10,9 @@ from app.review.editing.etags import read_etags
 from app.store.changes import StoredChange, logged_changes, solved_groups
 from app.store.datasets import dataset_names
 from app.store.log import newest_entry
-from app.store.session import Session, Store
+from app.store.session import Session
 from app.store.solutions import newest_solution
+from app.store.store import Store
 
 MANY = 200
 """So many groups of one dataset at once are told as one change of the dataset."""

@@ -13,7 +13,7 @@ from app.soccer.group import Group
 from app.store.conditions import Condition, compares, contains, lists
 from app.store.listing import Listing
 from app.store.order import Order
-from app.store.session import Store
+from app.store.store import Store
 
 BATCH = 100
 

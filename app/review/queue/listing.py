@@ -15,7 +15,7 @@ from app.review.queue import cursor as cursors
 from app.review.queue.query import parse_query
 from app.store.agreement import states_of
 from app.store.listing import Listing, find_place, read_rows
-from app.store.session import Store
+from app.store.store import Store
 from app.store.takes import count_handed_in
 from app.store.threads import count_open
 

@@ -12,7 +12,7 @@ from app.review.queue.bins import ERROR_PERCENT, SIGMA_M, even, places
 from app.review.queue.fields import STATUSES
 from app.review.queue.query import NUMBERS, parse_query
 from app.store.listing import Listing
-from app.store.session import Store
+from app.store.store import Store
 
 
 @dataclass(frozen=True)

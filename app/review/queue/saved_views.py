@@ -15,7 +15,8 @@ from app.store.saved_views import (
     find_saved_view,
     insert_saved_view,
 )
-from app.store.session import Session, Store
+from app.store.session import Session
+from app.store.store import Store
 
 MAX_NAME = 80
 MAX_VIEWS = 200

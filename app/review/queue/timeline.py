@@ -9,7 +9,7 @@ from typing import Any
 from app.review.queue.query import parse_query
 from app.store.conditions import compares
 from app.store.listing import Listing
-from app.store.session import Store
+from app.store.store import Store
 
 _FRAME_DIGITS = 12
 """Frame numbers have fewer; longer runs of digits are names."""

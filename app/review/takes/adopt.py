@@ -31,8 +31,9 @@ from app.store.group_revisions import refresh_inputs_hashes
 from app.store.groups import StoredGroup
 from app.store.log import Entry, append
 from app.store.queue import refresh_queue
-from app.store.session import Session, Store
+from app.store.session import Session
 from app.store.stations import groups_of_station, save_station
+from app.store.store import Store
 from app.store.takes import GOLD, update_take
 from app.store.verdicts import StoredVerdict, insert_verdicts, next_verdict_id, read_last_verdicts
 

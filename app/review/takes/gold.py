@@ -21,7 +21,8 @@ from app.store.codecs import Json, group_from_json, group_to_json
 from app.store.copy_datasets import is_copy
 from app.store.gold import STARTS, gold_heads, gold_truth, mark_gold, unmark_gold
 from app.store.log import Entry, append
-from app.store.session import Session, Store
+from app.store.session import Session
+from app.store.store import Store
 from app.store.takes import GOLD, takes_in
 
 KIND = "gold"

@@ -19,7 +19,7 @@ from app.store.guidelines import (
 )
 from app.store.image_header import check_size, read_header
 from app.store.log import Entry, append
-from app.store.session import Store
+from app.store.store import Store
 from app.store.uploads import upload_path
 
 KIND = "guideline"

@@ -12,7 +12,8 @@ from app.store.clock import now
 from app.store.groups import StoredGroup
 from app.store.log import Entry, append
 from app.store.outbox import HANDED_BACK, announce, stamp
-from app.store.session import Session, Store
+from app.store.session import Session
+from app.store.store import Store
 from app.store.takes import take_of_copy
 
 MAX_REASON = 500

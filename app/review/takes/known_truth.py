@@ -31,7 +31,8 @@ from app.store.gold import STARTS, mark_gold
 from app.store.groups import StoredGroup, read_groups
 from app.store.listing import Listing
 from app.store.log import Entry, append
-from app.store.session import Session, Store
+from app.store.session import Session
+from app.store.store import Store
 from app.store.versions import BATCH, read_rows
 
 MOST = 1000

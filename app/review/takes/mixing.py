@@ -11,7 +11,8 @@ from app.review.editing.submit import solved
 from app.review.takes.take import Take, begin
 from app.soccer.actors import person_of
 from app.store.gold import fresh_gold
-from app.store.session import Session, Store
+from app.store.session import Session
+from app.store.store import Store
 from app.store.takes import GOLD, INDEPENDENT, takes_of_batch
 
 

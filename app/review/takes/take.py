@@ -18,7 +18,8 @@ from app.soccer.actors import person_of
 from app.store.agreement import forget_open
 from app.store.clock import now
 from app.store.groups import StoredGroup, read_groups
-from app.store.session import Session, Store
+from app.store.session import Session
+from app.store.store import Store
 from app.store.takes import (
     GOLD,
     INDEPENDENT,

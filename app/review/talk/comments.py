@@ -18,7 +18,8 @@ from app.store.clock import now
 from app.store.dataset_roles import members
 from app.store.log import Entry, append
 from app.store.people import person_by_name
-from app.store.session import Session, Store
+from app.store.session import Session
+from app.store.store import Store
 from app.store.threads import (
     Place,
     StoredComment,

@@ -21,8 +21,9 @@ from app.store.clock import now
 from app.store.listing import Listing, read_columns
 from app.store.log import Entry, append
 from app.store.queue import edited_groups, refresh_verdicts
-from app.store.session import Session, Store
+from app.store.session import Session
 from app.store.solutions import present_keys
+from app.store.store import Store
 from app.store.verdicts import StoredVerdict, insert_verdicts, next_verdict_id
 
 CHUNK = 500

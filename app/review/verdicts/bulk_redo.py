@@ -12,8 +12,9 @@ from app.review.verdicts.verdict import check_verdict
 from app.store.answers import Keep, SavedProgress, keep_nothing
 from app.store.batches import Batch, Spans, update_batch
 from app.store.listing import read_columns
-from app.store.session import Session, Store
+from app.store.session import Session
 from app.store.solutions import present_keys
+from app.store.store import Store
 from app.store.verdicts import inputs_judged, newest_between
 
 

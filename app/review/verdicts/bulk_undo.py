@@ -11,7 +11,8 @@ from app.store.answers import Keep, keep_nothing
 from app.store.batches import Batch, Spans, find_batch, update_batch
 from app.store.clock import now
 from app.store.log import Entry, append
-from app.store.session import Session, Store
+from app.store.session import Session
+from app.store.store import Store
 from app.store.verdicts import StoredVerdict, judged_between, next_verdict_id, read_verdicts
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from app.store.clock import now
 from app.store.listing import count_reviewed
-from app.store.session import Store
+from app.store.store import Store
 from app.store.verdicts import count_by_judge
 
 

@@ -13,7 +13,8 @@ from app.soccer.reasons import MAX_NOTE, REASONS
 from app.store.answers import Keep, keep_nothing
 from app.store.clock import now
 from app.store.queue import update_verdict
-from app.store.session import Session, Store
+from app.store.session import Session
+from app.store.store import Store
 from app.store.verdicts import StoredVerdict, insert_verdicts, next_verdict_id
 
 STATES = ("unreviewed", "accepted", "rejected", "deferred")

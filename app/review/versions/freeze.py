@@ -38,8 +38,9 @@ from app.store.frozen import (
 from app.store.groups import read_groups
 from app.store.log import Entry, append
 from app.store.media import media_facts
-from app.store.session import Session, Store
+from app.store.session import Session
 from app.store.solutions import known_calibrations, present_bodies, read_calibration_bodies
+from app.store.store import Store
 from app.store.versions import BATCH, has_version, insert_version
 
 MAX_NOTE = 2000

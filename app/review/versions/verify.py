@@ -38,8 +38,9 @@ from app.store.frozen import (
     text_of,
     thaw_group,
 )
-from app.store.session import Session, Store
+from app.store.session import Session
 from app.store.solutions import decode_calibration, encode_calibration, encode_solution
+from app.store.store import Store
 from app.store.verifications import keep_verification
 from app.store.versions import VersionGroup, read_page, said_rows, version_matches
 

@@ -16,8 +16,9 @@ from app.soccer.solution import Solution
 from app.soccer.split import Split
 from app.store.codecs import Json, parse, policy_from_json
 from app.store.frozen import CALIBRATION, json_of, named_texts, read_frozen, thaw_group
-from app.store.session import Session, Store
+from app.store.session import Session
 from app.store.solutions import decode_camera, decode_solution
+from app.store.store import Store
 from app.store.verifications import Verification, read_verifications
 from app.store.versions import VersionGroup, all_versions, dataset_versions, version_row
 

@@ -26,7 +26,8 @@ from app.review.webhooks.secrets import secret_of, sign
 from app.review.work.stalls import tell_stalls
 from app.store.codecs import parse
 from app.store.datasets import dataset_names
-from app.store.session import Session, Store
+from app.store.session import Session
+from app.store.store import Store
 from app.store.webhooks import (
     DELIVERED,
     FAILED,

@@ -16,7 +16,8 @@ from app.store.clock import now
 from app.store.codecs import canonical, parse
 from app.store.datasets import dataset_name
 from app.store.log import newest_entry
-from app.store.session import Session, Store
+from app.store.session import Session
+from app.store.store import Store
 from app.store.webhooks import (
     DELIVERED,
     FAILED,

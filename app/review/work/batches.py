@@ -21,7 +21,8 @@ from app.store.clock import now
 from app.store.listing import Listing
 from app.store.log import Entry, append
 from app.store.outbox import GIVEN_OUT, HANDED_ON, announce_batch
-from app.store.session import Session, Store
+from app.store.session import Session
+from app.store.store import Store
 from app.store.work import (
     CLOSED,
     OPEN,

@@ -16,7 +16,8 @@ from app.review.takes.handed_back import HandedBack, read_handed_back
 from app.review.work.batches import WORK, Batch, Here, Part, read_batch
 from app.review.work.own import hand_in_own, next_own, own_of, returned_to, takes_part
 from app.store.log import Entry, append
-from app.store.session import Session, Store
+from app.store.session import Session
+from app.store.store import Store
 from app.store.work import (
     end_lease_of,
     end_leases,

@@ -13,7 +13,8 @@ from app.review.takes.take import Take, hand_in, read_take, reopen
 from app.review.work.batches import Batch, Part
 from app.soccer.actors import person_of
 from app.store.clock import now
-from app.store.session import Session, Store
+from app.store.session import Session
+from app.store.store import Store
 from app.store.takes import INDEPENDENT, count_left, take_of_copy, takes_of_batch
 from app.store.work import groups_of, groups_returned
 from app.store.work import hand_in as hand_in_group

@@ -17,7 +17,8 @@ from app.review.work.leases import Worker
 from app.review.work.own import own_left, takes_part
 from app.review.work.stalls import Why, last_of, stall_of
 from app.soccer.actors import person_of
-from app.store.session import Session, Store
+from app.store.session import Session
+from app.store.store import Store
 from app.store.takes import open_takes, takes_of_batch
 from app.store.work import datasets_with_batches, entries_of_work, groups_of, groups_returned
 

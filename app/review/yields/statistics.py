@@ -31,7 +31,8 @@ from app.store.datasets import dataset_names
 from app.store.group_changes import changed_ids, count_groups, newest_change
 from app.store.listing import columns_from, read_columns
 from app.store.log import entry_hash, newest_entry
-from app.store.session import Session, Store
+from app.store.session import Session
+from app.store.store import Store
 from app.store.verdicts import judged_since, newest_verdict
 
 FORMAT = 1

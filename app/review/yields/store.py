@@ -22,7 +22,8 @@ from app.soccer.policy import Policy
 from app.soccer.solution import SOLVER_VERSION
 from app.store.datasets import dataset_names, find_dataset, policy_of
 from app.store.group_changes import count_changes, count_groups
-from app.store.session import Session, Store
+from app.store.session import Session
+from app.store.store import Store
 
 MAX_BYTES = 512 * 1024 * 1024
 """What all tables together may hold in memory; beyond it the one that was asked for longest ago

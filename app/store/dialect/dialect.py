@@ -15,11 +15,11 @@ from typing import Protocol, cast
 
 from sqlalchemy import Connection, Engine, Table
 from sqlalchemy.exc import DBAPIError
-from sqlalchemy.orm import Session
 
 from app.config import Settings
 from app.errors import InputError
 from app.store.dialect.sharing import Sharing
+from app.store.session import Session
 
 WRITE = {"touchline_write": True}
 """Options of an engine whose transactions take the write lock at their start."""
@@ -128,7 +128,7 @@ def dialect_of(settings: Settings) -> Dialect:
 
 def dialect_in(session: Session) -> Dialect:
     """How the database of a session is spoken to."""
-    return _named(session.get_bind().dialect.name)
+    return _named(session.dialect.name)
 
 
 def _named(name: str) -> Dialect:

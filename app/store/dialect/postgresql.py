@@ -14,7 +14,6 @@ from typing import Any
 
 from sqlalchemy import URL, Connection, Engine, Table, create_engine, event, make_url
 from sqlalchemy.exc import ArgumentError, DataError, DBAPIError, NoSuchModuleError, OperationalError
-from sqlalchemy.orm import Session
 
 from app.config import Settings
 from app.errors import InputError, StorageError
@@ -23,6 +22,7 @@ from app.store.dialect.postgresql_compiler import Columns, Statements, Types
 from app.store.dialect.postgresql_sharing import Reported, ServerSharing
 from app.store.dialect.postgresql_triggers import carry_out
 from app.store.dialect.sharing import Sharing
+from app.store.session import Session
 
 MIN_SERVER = 15
 """The oldest major version that the tests have seen."""
@@ -137,7 +137,7 @@ class PostgreSQL:
     @contextmanager
     def interrupted(self, session: Session, ends: Callable[[], bool]) -> Iterator[None]:
         """See ``Dialect``; a thread looks, for the driver waits for the server meanwhile."""
-        driver: Any = session.connection().connection.driver_connection
+        driver: Any = session.connection.driver_connection
         done = threading.Event()
 
         def look() -> None:

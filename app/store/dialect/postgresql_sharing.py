@@ -12,10 +12,10 @@ from typing import Any
 import structlog
 from sqlalchemy import Connection, Engine, text
 from sqlalchemy.exc import DBAPIError
-from sqlalchemy.orm import Session
 
 from app.errors import StorageError
 from app.store.dialect.sharing import AGAIN, Hearer
+from app.store.session import Session
 
 log = structlog.get_logger("touchline.store")
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Protocol
 
-from sqlalchemy.orm import Session
+from app.store.session import Session
 
 Hearer = Callable[[str], None]
 AGAIN = ""

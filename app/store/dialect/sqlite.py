@@ -11,12 +11,12 @@ import pysqlite3.dbapi2
 from sqlalchemy import Connection, Engine, FromClause, Table, create_engine, event, text
 from sqlalchemy.dialects.sqlite.base import SQLiteCompiler
 from sqlalchemy.exc import DBAPIError, OperationalError
-from sqlalchemy.orm import Session
 
 from app.config import Settings
 from app.errors import StorageError
 from app.store.dialect.dialect import GLANCE, Failure
 from app.store.dialect.sharing import Alone
+from app.store.session import Session
 
 PRAGMAS: dict[str, tuple[str, object]] = {
     "journal_mode": ("WAL", "wal"),
@@ -104,7 +104,7 @@ class SQLite:
     @contextmanager
     def interrupted(self, session: Session, ends: Callable[[], bool]) -> Iterator[None]:
         """See ``Dialect``."""
-        driver: Any = session.connection().connection.driver_connection
+        driver: Any = session.connection.driver_connection
         driver.set_progress_handler(ends, STEPS)
         try:
             yield

@@ -27,7 +27,7 @@ from app.soccer.annotation import Lines, make_lines
 from app.soccer.group import Group, Station, View
 from app.soccer.media import Media
 from app.soccer.pitch import MARKINGS, Pitch
-from app.store.session import Store
+from app.store.store import Store
 from tests.balls import box_around
 from tests.cameras import SIZE, looking
 

@@ -13,7 +13,7 @@ from app.config import Settings
 from app.errors import StorageError
 from app.review.datasets.dataset import get_dataset
 from app.review.importing.ingest import ingest
-from app.store.session import Store
+from app.store.store import Store
 from tests.waiting import SECONDS
 
 API = "/api/v1"

@@ -8,14 +8,14 @@ from typing import Any
 
 import pytest
 from sqlalchemy import func, select
-from sqlalchemy.orm import Session
 from structlog.testing import capture_logs
 
 from app.api.deps import Services
 from app.review.takes.take import begin_take
 from app.store.job_models import JobModel
 from app.store.models import LogModel
-from app.store.session import Store
+from app.store.session import Session
+from app.store.store import Store
 from app.store.view_models import SavedViewModel
 
 API = "/api/v1"

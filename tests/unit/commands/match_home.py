@@ -12,7 +12,7 @@ from app.review.importing.ingest import ingest
 from app.review.policies.policy import change_policy
 from app.soccer.group import Group, Station, View
 from app.soccer.policy import Policy
-from app.store.session import Store
+from app.store.store import Store
 
 
 def ingest_match(home: Path, match: str, files: Iterable[LineFile]) -> None:

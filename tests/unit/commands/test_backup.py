@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 
 from app.commands.command_line import app
 from app.config import Settings
-from app.store.session import Store
+from app.store.store import Store
 from tests.unit.store.homes import say
 
 pytestmark = pytest.mark.file_of_sqlite("copies of the file")

@@ -13,7 +13,7 @@ from app.commands.command_line import app
 from app.config import Settings
 from app.review.datasets.dataset import list_datasets
 from app.review.importing.ingest import ensure_dataset
-from app.store.session import Store
+from app.store.store import Store
 
 
 @pytest.fixture

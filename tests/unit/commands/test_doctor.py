@@ -14,7 +14,7 @@ from app.config import Settings
 from app.review.importing.ingest import ensure_dataset
 from app.store.dialect.dialect import dialect_of
 from app.store.locks import server_lock
-from app.store.session import Store
+from app.store.store import Store
 
 
 @pytest.fixture

@@ -15,7 +15,7 @@ from app.datasets.soccernet_v3_writer import write_soccernet_v3
 from app.review.editing.recompute import solve_dataset
 from app.review.evaluating.evaluation import tables_of
 from app.review.importing.ingest import ingest
-from app.store.session import Store
+from app.store.store import Store
 from tests.scenes import make_scenes
 
 

@@ -13,7 +13,7 @@ from app.datasets.sn_calibration import LineFile
 from app.datasets.sn_calibration_writer import write_line_files
 from app.review.editing.submit import load
 from app.soccer.picture import PictureGeometry
-from app.store.session import Store
+from app.store.store import Store
 from tests.cameras import SIZE, looking
 from tests.unit.commands.match_home import ingest_match
 from tests.unit.solving.conftest import BEND, click

@@ -11,7 +11,7 @@ import pytest
 from app.config import Settings
 from app.review.importing.ingest import ensure_dataset
 from app.soccer.policy import PAPER, STRICT
-from app.store.session import Store
+from app.store.store import Store
 
 Run = Callable[..., tuple[int, str, str]]
 

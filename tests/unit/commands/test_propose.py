@@ -15,7 +15,7 @@ from app.config import Settings
 from app.review.importing.ingest import ingest
 from app.soccer.group import Group, Station, View
 from app.soccer.media import Media
-from app.store.session import Store
+from app.store.store import Store
 from tests.cameras import SIZE
 from tests.unit.paint.lawns import TRUE, drawn, lawn
 

@@ -14,7 +14,7 @@ from app.config import Settings
 from app.errors import InputError
 from app.review.importing.ingest import ingest
 from app.store.imports import shared_stations
-from app.store.session import Store
+from app.store.store import Store
 from tests.rigs import groups
 
 

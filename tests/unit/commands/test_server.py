@@ -34,7 +34,7 @@ from app.review.people.people import invite
 from app.review.people.roles import DatasetRoles, Role, Scope
 from app.review.versions.version import list_versions
 from app.review.work.batches import get_batch
-from app.store.session import Store
+from app.store.store import Store
 from tests.scenes import make_scenes
 from tests.waiting import SECONDS
 from touchline.client import Client

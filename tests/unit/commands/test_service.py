@@ -17,7 +17,7 @@ import pytest
 from app.config import Settings
 from app.store.dialect.dialect import dialect_of
 from app.store.locks import server_lock
-from app.store.session import Store
+from app.store.store import Store
 from tests.unit.store.homes import say
 
 Run = Callable[..., tuple[int, str, str]]

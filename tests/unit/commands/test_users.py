@@ -24,7 +24,7 @@ from app.review.people.logins import Login, Logins
 from app.review.people.roles import Role, Scope
 from app.review.people.second_factor import SecondFactors
 from app.store.identities import put_identity
-from app.store.session import Store
+from app.store.store import Store
 
 SECRET = "three plain words"
 

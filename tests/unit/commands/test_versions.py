@@ -11,7 +11,7 @@ import pytest
 from sqlalchemy import text
 
 from app.config import Settings
-from app.store.session import Store
+from app.store.store import Store
 from tests.databases import said_for_sqlite
 
 Run = Callable[..., tuple[int, str, str]]

@@ -25,7 +25,7 @@ from app.soccer.group import Group, Station, View
 from app.soccer.media import Media
 from app.soccer.pitch import MARKINGS, Pitch
 from app.store.models import DatasetModel
-from app.store.session import Store
+from app.store.store import Store
 from tests.balls import seen
 from tests.cameras import SIZE, looking
 from tests.databases import Databases

@@ -21,7 +21,7 @@ from app.store.codecs import canonical, policy_to_json
 from app.store.group_rows import NewRows
 from app.store.models import DatasetModel
 from app.store.queue import refresh_queue
-from app.store.session import Store
+from app.store.store import Store
 from tests.cameras import EVERY_COEFFICIENT
 from tests.databases import Databases
 

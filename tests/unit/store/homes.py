@@ -8,7 +8,7 @@ from pathlib import Path
 from app.config import Settings
 from app.store.clock import now
 from app.store.log import Entry, append
-from app.store.session import Store
+from app.store.store import Store
 
 FILES = ("touchline.db", "touchline.db-wal", "home.json")
 

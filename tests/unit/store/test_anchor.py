@@ -11,7 +11,7 @@ from app.errors import DamagedError
 from app.store import anchor
 from app.store.anchor import Anchor, anchor_file, make_anchor, read_anchor, renew_anchor
 from app.store.engine import make_engine
-from app.store.session import Store
+from app.store.store import Store
 from tests.unit.store.homes import say
 
 

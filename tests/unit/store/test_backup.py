@@ -16,7 +16,7 @@ from app.config import Settings
 from app.errors import DamagedError, InputError, StorageError
 from app.store import backup as backup_module
 from app.store.backup import EXPORTS, FRAMES, back_up, verify_backup
-from app.store.session import Store
+from app.store.store import Store
 from tests.unit.store.homes import killed, say
 
 pytestmark = pytest.mark.file_of_sqlite("copies of the file")

@@ -13,7 +13,7 @@ from app.store.datasets import (
     policy_of,
     update_policy,
 )
-from app.store.session import Store
+from app.store.store import Store
 
 
 class TestFindDataset:

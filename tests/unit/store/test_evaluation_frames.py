@@ -2,7 +2,6 @@ from __future__ import annotations
 
 import pytest
 from sqlalchemy import insert, select
-from sqlalchemy.orm import Session
 
 from app.store.evaluation_frames import (
     FrameCondition,
@@ -19,7 +18,8 @@ from app.store.evaluations import (
     insert_evaluation,
 )
 from app.store.prediction_models import EvaluationFrameModel
-from app.store.session import Store
+from app.store.session import Session
+from app.store.store import Store
 
 BARE = {
     **dict.fromkeys(EvaluationFrameModel.__table__.columns.keys()),

@@ -14,7 +14,7 @@ from sqlalchemy import text
 from app.config import Settings
 from app.errors import DamagedError, StorageError
 from app.store.migrate import migrate
-from app.store.session import Store
+from app.store.store import Store
 from tests.unit.store.homes import killed, say
 
 pytestmark = pytest.mark.file_of_sqlite("the file before it is opened")

@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 from app.store.heads import find_head, read_heads
-from app.store.session import Store
+from app.store.store import Store
 from app.store.verdicts import StoredVerdict, insert_verdicts
 
 VERDICT = StoredVerdict(7, 1, "ann", "t", "accepted", None, None, "h", "p", False, None)

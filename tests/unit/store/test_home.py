@@ -6,7 +6,7 @@ import pytest
 
 from app.errors import StorageError
 from app.store.home import file_system, make_home, make_private, open_to_others
-from app.store.session import Store
+from app.store.store import Store
 from tests.unit.store.homes import say
 
 MOUNTS = """\

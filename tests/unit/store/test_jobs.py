@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from app.store.jobs import NewJob, insert_job, read_job, read_jobs, trim_jobs, update_job
-from app.store.session import Store
+from app.store.store import Store
 
 
 def insert(store: Store, kind: str = "solve", **options) -> int:

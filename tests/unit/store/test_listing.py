@@ -8,14 +8,14 @@ from pathlib import Path
 
 import pytest
 from sqlalchemy import event, insert, select
-from sqlalchemy.orm import Session
 
 from app.config import Settings
 from app.store.conditions import compares
 from app.store.listing import Listing, count_states, find_place, read_columns, read_rows
 from app.store.models import GroupModel, QueueModel
 from app.store.order import Order
-from app.store.session import Store
+from app.store.session import Session
+from app.store.store import Store
 
 SIGMA = {1: None, 2: 0.5, 3: 0.1, 4: 0.5}
 
@@ -123,11 +123,8 @@ class TestWhatIsRead:
         shutil.copy(migrated, settings.database_file)
         statements: list[str] = []
         with closing(Store.open(settings)) as store, store.read() as session:
-            connection = session.connection()
-            event.listen(
-                connection, "before_cursor_execute", lambda *told: statements.append(told[2])
-            )
+            event.listen(session, "before_cursor_execute", lambda *told: statements.append(told[2]))
             Listing(session, 1, conditions).count()
-            explain = f"EXPLAIN QUERY PLAN {statements[0]}"
-            plan = connection.exec_driver_sql(explain, (1, 2, 5)).all()
+            explain = f"EXPLAIN QUERY PLAN {statements[-1]}"
+            plan = session.exec_driver_sql(explain, (1, 2, 5)).all()
         assert index in " ".join(row[3] for row in plan)

@@ -21,7 +21,7 @@ from app.store.home import make_home
 from app.store.locks import DatabaseLock
 from app.store.migrate import KNOWN_REVISIONS, migrate, migrations_folder, schema_revision
 from app.store.restore import restore
-from app.store.session import Store
+from app.store.store import Store
 from app.store.tables import Base
 from tests.unit.store.homes import say
 

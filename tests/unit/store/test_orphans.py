@@ -6,8 +6,8 @@ from sqlalchemy import insert, text
 from app.store.models import CalibrationModel, SolutionModel
 from app.store.orphans import delete_calibrations, spare_calibrations
 from app.store.removal import delete_solutions, solutions_of
-from app.store.session import Store
 from app.store.solutions import known_calibrations
+from app.store.store import Store
 
 KEYS = ("a", "b", "c")
 

@@ -14,7 +14,7 @@ from app.store.group_revisions import next_revision, refresh_inputs_hashes, save
 from app.store.groups import read_groups
 from app.store.paint import insert_readings, match_paint, read_readings
 from app.store.removal import delete_rows
-from app.store.session import Store
+from app.store.store import Store
 
 POINTS = {"Middle line": (PaintPoint(1.25, 2.5, 0.0625),)}
 READING = PaintReading("frame", "key", PaintEvidence(POINTS), None, 1 / 3, 0.5)

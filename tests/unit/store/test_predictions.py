@@ -7,7 +7,7 @@ from app.store.predictions import (
     insert_prediction_set,
     read_prediction_sets,
 )
-from app.store.session import Store
+from app.store.store import Store
 
 SET = {
     "dataset_id": 1,

@@ -18,9 +18,9 @@ from app.store.projection import (
     rewrite,
 )
 from app.store.proposals import Proposal, read_proposals, save_proposals
-from app.store.session import Store
 from app.store.soundness import count_lost_references
 from app.store.spare import put_spare
+from app.store.store import Store
 from app.store.verdicts import StoredVerdict, insert_verdicts
 
 VERDICT = StoredVerdict(7, 1, "ann", "t", "accepted", None, None, "h", "p", False, None)

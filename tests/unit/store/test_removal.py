@@ -8,8 +8,8 @@ from app.store.removal import (
     delete_rows,
     keep_used_ids,
 )
-from app.store.session import Store
 from app.store.soundness import count_lost_references
+from app.store.store import Store
 
 
 class TestRemoval:

@@ -16,7 +16,7 @@ from app.errors import DamagedError, InputError, StorageError
 from app.store.backup import FRAMES, back_up
 from app.store.locks import server_lock
 from app.store.restore import restore
-from app.store.session import Store
+from app.store.store import Store
 from tests.unit.store.homes import killed, say
 
 pytestmark = pytest.mark.file_of_sqlite("the file put back from a copy")

@@ -3,8 +3,8 @@ from __future__ import annotations
 import pytest
 from sqlalchemy import text
 
-from app.store.session import Store
 from app.store.soundness import count_lost_references, file_faults
+from app.store.store import Store
 
 
 class TestSoundness:

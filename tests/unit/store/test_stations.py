@@ -1,8 +1,8 @@
 from __future__ import annotations
 
 from app.soccer.pitch import Pitch
-from app.store.session import Store
 from app.store.stations import station_pitches
+from app.store.store import Store
 
 
 class TestStationPitches:

@@ -11,7 +11,7 @@ from app.config import Settings
 from app.errors import DamagedError, InputError, StorageError
 from app.store import transfer as module
 from app.store.group_changes import newest_change
-from app.store.session import Store
+from app.store.store import Store
 from app.store.transfer import transfer
 from tests.databases import POSTGRESQL
 from tests.unit.store.homes import say

@@ -2,8 +2,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from app.store.session import Store
 from app.store.solutions import present_keys
+from app.store.store import Store
 from app.store.verdicts import (
     StoredVerdict,
     count_by_judge,

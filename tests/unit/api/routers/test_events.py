@@ -23,7 +23,7 @@ from app.review.editing.submit import load, submit
 from app.review.policies.policy import change_policy
 from app.review.verdicts.verdict import set_verdict
 from app.soccer.policy import PAPER, STRICT
-from app.store.session import Store
+from app.store.store import Store
 from tests.waiting import SECONDS
 
 EVENTS = "/api/v1/events"

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from app.api.application import create_app
 from app.config import Settings
-from app.store.session import Store
+from app.store.store import Store
 
 API = "/api/v1"
 

@@ -21,7 +21,7 @@ from app.review.people.roles import Role
 from app.review.queue.listing import list_groups
 from app.review.takes.take import Take, begin_take, get_take, list_takes, reopen
 from app.review.verdicts.verdict import set_verdict
-from app.store.session import Store
+from app.store.store import Store
 
 
 def judged(store: Store, group_id: int, person: str, moved: float = 0.0) -> Take:

@@ -18,8 +18,8 @@ from app.review.work.leases import Leases, Worker
 from app.review.work.progress import my_work
 from app.store.bells import read_rings
 from app.store.people import person_by_name
-from app.store.session import Store
 from app.store.sight import EVERYTHING
+from app.store.store import Store
 
 PEOPLE = ("ada", "bo")
 

@@ -5,7 +5,7 @@ import pytest
 from app.errors import ConflictError
 from app.review.answers.answers import find_first, keep_first, keep_with_work
 from app.store.answers import Answer
-from app.store.session import Store
+from app.store.store import Store
 
 ANSWER = Answer("digest", 201, {"etag": '"a"'}, b"{}")
 

@@ -31,8 +31,8 @@ from app.soccer.frames import Box
 from app.soccer.policy import PAPER
 from app.store.log import verify_chain
 from app.store.models import CalibrationModel, LogModel
-from app.store.session import Store
 from app.store.soundness import count_lost_references
+from app.store.store import Store
 from app.store.tables import Base
 
 

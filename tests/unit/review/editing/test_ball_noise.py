@@ -20,7 +20,7 @@ from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import Box
 from app.store.log import read_log
 from app.store.noise import NOISE, Factor, factor_of, factors_to_json, read_factors
-from app.store.session import Store
+from app.store.store import Store
 
 BALL = BallAnnotation(box=Box(500.0, 300.0, 14.0, 14.0))
 OTHER = BallAnnotation(box=Box(510.0, 300.0, 14.0, 14.0))

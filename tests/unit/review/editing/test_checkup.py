@@ -19,7 +19,7 @@ from app.review.people.people import invite
 from app.review.people.roles import Role
 from app.store.home import make_home
 from app.store.identities import put_identity
-from app.store.session import Store
+from app.store.store import Store
 from app.store.uploads import UploadWriter, keep_upload
 from tests.databases import said_for_sqlite
 from tests.provider import CLIENT, SECRET, providing, tell

@@ -11,7 +11,7 @@ from app.review.editing.replay import rebuild
 from app.review.editing.submit import load
 from app.review.verdicts.verdict import set_verdict
 from app.store.dialect.dialect import dialect_of
-from app.store.session import Store
+from app.store.store import Store
 from tests.databases import said_for_sqlite
 
 

@@ -8,7 +8,7 @@ from app.review.editing.state import GroupState
 from app.review.editing.submit import load, submit
 from app.review.importing.ingest import ingest
 from app.review.verdicts.verdict import set_verdict
-from app.store.session import Store
+from app.store.store import Store
 
 
 def etags_of(store: Store, *ids: int) -> dict[int, str]:

@@ -40,7 +40,7 @@ from app.soccer.paint_evidence import NO_FRAME, NO_PAINT
 from app.soccer.policy import PAPER, TOUCHLINE
 from app.store import media
 from app.store.groups import read_groups
-from app.store.session import Store
+from app.store.store import Store
 from tests.scenes import make_scenes
 
 

@@ -11,7 +11,7 @@ from app.review.editing.stations import load_station, submit_station
 from app.review.editing.submit import load, submit, undo
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import Box, ImagePoint
-from app.store.session import Store
+from app.store.store import Store
 
 HERE = (ImagePoint(1.5, 2.5), ImagePoint(3.0, 4.0))
 BALL = BallAnnotation(box=Box(500.0, 300.0, 14.0, 14.0))

@@ -37,7 +37,7 @@ from app.soccer.media import Media
 from app.store.digest import station_digest
 from app.store.frozen import freeze_said, thaw_group
 from app.store.log import verify_chain
-from app.store.session import Store
+from app.store.store import Store
 from tests.cameras import SIZE
 from tests.unit.api.conftest import lines_of
 from tests.unit.paint.lawns import TRUE, drawn, lawn

@@ -22,7 +22,7 @@ from app.soccer.annotation import BallAnnotation, Extras, make_lines
 from app.soccer.frames import Box, ImagePoint
 from app.soccer.policy import STRICT
 from app.store.noise import Factor
-from app.store.session import Store
+from app.store.store import Store
 from tests.databases import said_for_sqlite
 
 

@@ -14,7 +14,7 @@ from app.review.policies.policy import change_policy
 from app.review.queue.listing import list_groups
 from app.soccer.policy import PAPER
 from app.solving.solve import solve
-from app.store.session import Store
+from app.store.store import Store
 from tests.databases import said_for_sqlite
 
 TIGHT = replace(PAPER, name="tight", tau_percent=0.6)

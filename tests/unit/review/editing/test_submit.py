@@ -32,7 +32,7 @@ from app.soccer.picture import OPEN
 from app.soccer.policy import STRICT
 from app.solving.solve import solve
 from app.store import solutions
-from app.store.session import Store
+from app.store.store import Store
 from tests.databases import said_for_sqlite
 
 BALL = BallAnnotation(box=Box(500.0, 300.0, 14.0, 14.0))

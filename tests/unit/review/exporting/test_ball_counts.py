@@ -22,7 +22,7 @@ from app.soccer.annotation import BallAnnotation, make_lines
 from app.soccer.ball_boxes import ball_boxes, ball_fit, has_ball_3d
 from app.soccer.frames import Box, ImagePoint
 from app.soccer.group import Group, Station, View
-from app.store.session import Store
+from app.store.store import Store
 from tests.balls import seen
 from tests.cameras import SIZE
 from tests.unit.review.conftest import MATCH, OPPOSITE, drawn

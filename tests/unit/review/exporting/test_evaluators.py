@@ -15,7 +15,7 @@ from app.review.datasets.score_files import score_files
 from app.review.exporting.export import export
 from app.soccer.annotation import Extras
 from app.soccer.frames import ImageSize
-from app.store.session import Store
+from app.store.store import Store
 from tests.readers import read_by
 
 FOLDERS = ["test-1280x720", "train-1280x720"]

@@ -41,7 +41,7 @@ from app.soccer.pitch import Pitch
 from app.soccer.policy import STRICT
 from app.store.findings import group_findings
 from app.store.models import LogModel
-from app.store.session import Store
+from app.store.store import Store
 
 BALL, OTHER = (BallAnnotation(box=Box(500.0 + n, 300.0, 14.0, 14.0)) for n in (0, 9))
 

@@ -18,7 +18,7 @@ from app.review.importing import import_child
 from app.review.importing.import_child import Outcome, import_apart
 from app.review.importing.sources import Source, import_source
 from app.soccer.group import Group
-from app.store.session import Store
+from app.store.store import Store
 from tests.waiting import SECONDS
 
 
@@ -135,10 +135,7 @@ class TestImportApart:
             running.start()
             assert asked.wait(SECONDS)
             with store.read() as session:
-                assert (
-                    session.connection().exec_driver_sql("SELECT count(*) FROM dataset").scalar()
-                    == 0
-                )
+                assert session.exec_driver_sql("SELECT count(*) FROM dataset").scalar() == 0
         running.join(SECONDS)
         assert [item.name for item in list_datasets(store)] == ["apart"]
 

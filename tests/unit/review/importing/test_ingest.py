@@ -18,7 +18,7 @@ from app.soccer.annotation import BallAnnotation, make_lines
 from app.soccer.frames import Box, ImagePoint
 from app.soccer.group import Group
 from app.soccer.media import Media
-from app.store.session import Store
+from app.store.store import Store
 
 
 def again(store: Store, *groups: Group):

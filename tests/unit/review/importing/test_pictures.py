@@ -13,7 +13,7 @@ from app.review.queue.listing import list_groups
 from app.review.verdicts.bulk import NO_PICTURE, Refusal, give_verdicts, plan_verdicts
 from app.review.verdicts.verdict import set_verdict
 from app.soccer.group import Group
-from app.store.session import Store
+from app.store.store import Store
 
 
 def without(group: Group, *keys: str) -> Group:

@@ -23,7 +23,7 @@ from app.soccer.annotation import BallAnnotation, Extras, make_lines
 from app.soccer.frames import Box, ImageSize
 from app.soccer.group import Group
 from app.store.models import GroupModel, LogModel
-from app.store.session import Store
+from app.store.store import Store
 
 SIZE = ImageSize(1280, 720)
 Fill = Callable[..., list[int]]

@@ -25,7 +25,8 @@ from app.review.jobs.job_run import JobProgress
 from app.review.jobs.jobs import Jobs
 from app.store.codecs import Json
 from app.store.jobs import Job, NewJob, insert_job
-from app.store.session import Session, Store
+from app.store.session import Session
+from app.store.store import Store
 from tests.waiting import SECONDS
 
 

@@ -19,7 +19,7 @@ from app.soccer.media import Media
 from app.soccer.policy import TOUCHLINE
 from app.store.jobs import NewJob, insert_job
 from app.store.log import read_log
-from app.store.session import Store
+from app.store.store import Store
 from tests.unit.review.editing.test_positions import match
 from tests.unit.review.jobs.steps import Held, stopped_at_its_first_step
 from tests.waiting import SECONDS

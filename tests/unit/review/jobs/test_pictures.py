@@ -20,7 +20,7 @@ from app.review.jobs.pictures import PICTURES, request_pictures
 from app.soccer.group import Group, Station, View
 from app.soccer.picture import PictureGeometry
 from app.store.jobs import Job
-from app.store.session import Store
+from app.store.store import Store
 from tests.cameras import SIZE, looking
 from tests.unit.solving.conftest import BEND, click
 from tests.waiting import SECONDS

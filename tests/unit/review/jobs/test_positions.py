@@ -13,7 +13,7 @@ from app.review.importing.ingest import ingest
 from app.review.jobs.jobs import Jobs
 from app.review.jobs.positions import POSITIONS, take_positions_back
 from app.review.policies.policy import change_policy
-from app.store.session import Store
+from app.store.store import Store
 from tests.unit.review.editing.test_positions import SHARING, match
 from tests.unit.review.jobs.steps import Held
 from tests.waiting import SECONDS

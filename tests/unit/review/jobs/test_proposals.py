@@ -15,7 +15,7 @@ from app.review.jobs.jobs import Jobs
 from app.review.jobs.proposals import PROPOSALS, stop_and_forget
 from app.soccer.group import Group, Station, View
 from app.soccer.media import Media
-from app.store.session import Store
+from app.store.store import Store
 from tests.cameras import SIZE
 from tests.unit.review.editing.test_paint import Here
 from tests.unit.review.jobs.steps import Held, stopped_at_its_first_step

@@ -11,7 +11,7 @@ from app.errors import ConflictError, JobCancelled
 from app.review.jobs.job_run import JobProgress
 from app.review.jobs.shared_jobs import SharedJobs
 from app.store.jobs import Job, update_job
-from app.store.session import Store
+from app.store.store import Store
 from tests.waiting import SECONDS
 
 

@@ -16,7 +16,7 @@ from app.review.jobs import solve as solve_job
 from app.review.jobs.job_run import JobProgress
 from app.review.jobs.jobs import Jobs
 from app.review.jobs.solve import request_solve, resume_solving, solve_leftovers
-from app.store.session import Store
+from app.store.store import Store
 from tests.waiting import SECONDS
 
 

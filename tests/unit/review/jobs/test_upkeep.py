@@ -20,7 +20,7 @@ from app.review.jobs.upkeep import Tidied, Upkeep, tidy
 from app.store.answers import Answer, find_answer, keep_answer
 from app.store.job_models import AnswerModel, JobModel
 from app.store.jobs import NewJob, insert_job, update_job
-from app.store.session import Store
+from app.store.store import Store
 
 OLD = time.time() - 40 * 86_400
 

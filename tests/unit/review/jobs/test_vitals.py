@@ -19,7 +19,7 @@ from app.soccer.policy import STRICT
 from app.store.clock import now
 from app.store.dialect.dialect import dialect_of
 from app.store.models import GroupModel, QueueModel
-from app.store.session import Store
+from app.store.store import Store
 from tests.waiting import SECONDS
 
 

@@ -21,7 +21,7 @@ from app.review.people.roles import SCOPES, Action, DatasetRoles, Role, Scope, r
 from app.soccer.actors import person_of
 from app.store.log import read_log
 from app.store.people import update_person
-from app.store.session import Store
+from app.store.store import Store
 from tests.databases import all_that_is_kept
 
 READ = [Scope.READ]

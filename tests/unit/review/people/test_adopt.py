@@ -19,7 +19,7 @@ from app.review.verdicts.reviewers import list_reviewers
 from app.review.verdicts.verdict import set_verdict
 from app.review.versions.freeze import FreezeRequest, freeze
 from app.store.jobs import NewJob, insert_job, read_jobs
-from app.store.session import Store
+from app.store.store import Store
 from app.store.versions import all_versions
 from tests.scenes import make_scenes
 

@@ -8,7 +8,7 @@ from sqlalchemy import text
 
 from app.review.people.attempts import Attempts
 from app.review.people.challenges import LASTS, Challenges, Written
-from app.store.session import Store
+from app.store.store import Store
 
 
 class TestAttempts:

@@ -18,7 +18,7 @@ from app.review.talk.comments import begin_thread
 from app.review.verdicts.verdict import set_verdict
 from app.review.work.batches import NewBatch, change_batch, make_batch, remove_batch
 from app.store.audit import AuditQuery
-from app.store.session import Store
+from app.store.store import Store
 
 ALL = AuditQuery()
 

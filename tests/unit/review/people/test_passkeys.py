@@ -21,7 +21,7 @@ from app.review.people.passkeys import Passkeys, Site
 from app.review.people.people import change_person, find_person, invite
 from app.review.people.roles import Role
 from app.review.people.second_factor import SecondFactors
-from app.store.session import Store
+from app.store.store import Store
 from tests.authenticator import PRESENT, VERIFIED, Authenticator, b64
 
 SECRET = "correct horse battery"

@@ -26,7 +26,7 @@ from app.review.people.people import change_person, find_person, invite, list_pe
 from app.review.people.roles import Action, DatasetRoles, Role, may, require
 from app.store.log import read_log
 from app.store.people import update_person
-from app.store.session import Store
+from app.store.store import Store
 from tests.databases import all_that_is_kept
 
 SECRET = "correct horse battery"

@@ -21,7 +21,7 @@ from app.review.people.logins import Login, Logins
 from app.review.people.people import find_person, invite
 from app.review.people.roles import Role
 from app.review.people.second_factor import SecondFactors
-from app.store.session import Store
+from app.store.store import Store
 from tests.databases import all_that_is_kept
 
 SECRET = "correct horse battery"

@@ -23,8 +23,8 @@ from app.solving.ball_noise import Miss
 from app.solving.resect import REFERENCE_DIAGONAL
 from app.solving.spread import CLICK_DIAGONAL
 from app.store.log import Entry, append
-from app.store.session import Store
 from app.store.solutions import present_solutions
+from app.store.store import Store
 from tests.cameras import SIZE
 from tests.unit.review.conftest import BEHIND, MAIN, OPPOSITE, drawn
 

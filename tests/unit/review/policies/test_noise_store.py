@@ -10,7 +10,7 @@ from app.review.importing.ingest import ensure_dataset
 from app.review.policies import noise_store
 from app.review.policies.noise import apply_noise
 from app.review.policies.noise_store import NoiseStore
-from app.store.session import Store
+from app.store.store import Store
 from tests.unit.review.policies.test_noise import make
 
 

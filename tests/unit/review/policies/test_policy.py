@@ -16,7 +16,7 @@ from app.review.queue.listing import list_groups
 from app.soccer.policy import PAPER, STRICT
 from app.solving import calibrate
 from app.store.models import CalibrationModel, LogModel, SolutionModel
-from app.store.session import Store
+from app.store.store import Store
 
 TIGHT = policy_with(PAPER, {"tau_percent": 0.1}, name="tight")
 

@@ -22,8 +22,8 @@ from app.review.queue.changes import (
 from app.review.verdicts.verdict import set_verdict
 from app.soccer.policy import STRICT
 from app.store.log import newest_entry
-from app.store.session import Store
 from app.store.solutions import newest_solution
+from app.store.store import Store
 
 
 def since(store: Store, after: int) -> list[Change]:

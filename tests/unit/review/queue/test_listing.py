@@ -16,7 +16,7 @@ from app.review.queue.query import SORTS
 from app.review.verdicts.verdict import set_verdict
 from app.soccer.solution import GATES
 from app.store.models import GroupModel, QueueModel
-from app.store.session import Store
+from app.store.store import Store
 
 COUNT = 60
 SEASON = 12_764

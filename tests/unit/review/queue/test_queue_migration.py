@@ -20,7 +20,7 @@ from app.store.engine import make_engine
 from app.store.migrate import KNOWN_REVISIONS, migrate, schema_revision
 from app.store.models import QUEUE_NUMBERS
 from app.store.queue import refresh_queue
-from app.store.session import Store
+from app.store.store import Store
 
 pytestmark = pytest.mark.file_of_sqlite("homes of released versions, which had a file")
 

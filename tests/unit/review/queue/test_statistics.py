@@ -9,7 +9,7 @@ from app.review.queue.listing import list_groups
 from app.review.queue.query import NUMBERS
 from app.review.queue.statistics import MEASURES, X_EDGES, Y_EDGES, statistics
 from app.store.models import QueueModel
-from app.store.session import Store
+from app.store.store import Store
 
 
 @pytest.fixture

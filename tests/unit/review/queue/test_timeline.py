@@ -8,7 +8,7 @@ from app.review.editing.submit import load
 from app.review.importing.ingest import ingest
 from app.review.queue.timeline import read_timeline
 from app.review.verdicts.verdict import set_verdict
-from app.store.session import Store
+from app.store.store import Store
 from tests.unit.review.queue.test_listing import fill_queue
 
 FRAMES = (12, 10, 11, 40)

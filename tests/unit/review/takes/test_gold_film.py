@@ -26,7 +26,7 @@ from app.review.work.leases import Leases, Worker
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import ImagePoint
 from app.soccer.media import Media
-from app.store.session import Store
+from app.store.store import Store
 from tests.e2e.film import write_film
 
 FIRST, GOLD = 100, 110

@@ -31,7 +31,7 @@ from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import Box, ImagePoint
 from app.soccer.media import Media
 from app.solving.jaccard import project_markings
-from app.store.session import Store
+from app.store.store import Store
 from tests.scenes import make_scenes
 
 SAMPLE = GoldChoice(Source.SAMPLE, start="bare")

@@ -18,7 +18,8 @@ from app.review.queue.listing import list_groups
 from app.review.talk import comments
 from app.store.log import newest_entry, verify_chain
 from app.store.people import person_by_name
-from app.store.session import Session, Store
+from app.store.session import Session
+from app.store.store import Store
 
 
 @pytest.fixture

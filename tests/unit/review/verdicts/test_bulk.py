@@ -6,8 +6,7 @@ from dataclasses import replace
 from typing import Any
 
 import pytest
-from sqlalchemy import insert, text
-from sqlalchemy.orm import Session
+from sqlalchemy import func, insert, select, text
 
 from app.errors import ConflictError, InputError, NotFoundError
 from app.review.editing.edit import SetBall
@@ -24,7 +23,8 @@ from app.review.verdicts.verdict import set_verdict
 from app.store.log import verify_chain
 from app.store.models import GroupModel, QueueModel
 from app.store.queue import refresh_queue
-from app.store.session import Store
+from app.store.session import Session
+from app.store.store import Store
 
 
 def judge(store: Store, group: int, state: str, actor: str = "ann", **more: Any) -> None:
@@ -311,4 +311,4 @@ def _many(store: Store, count: int) -> None:
     with store.write() as session:
         session.execute(insert(GroupModel), rows)
         refresh_queue(session, [row["id"] for row in rows])
-        assert session.query(QueueModel).count() == count
+        assert session.scalar(select(func.count()).select_from(QueueModel)) == count

@@ -19,7 +19,7 @@ from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import Box
 from app.soccer.policy import PAPER
 from app.soccer.reasons import REASONS
-from app.store.session import Store
+from app.store.store import Store
 
 BALL = BallAnnotation(box=Box(500.0, 300.0, 14.0, 14.0))
 

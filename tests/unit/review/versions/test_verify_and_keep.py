@@ -14,7 +14,7 @@ from app.review.versions.verify import verify_and_keep
 from app.review.versions.version import get_version, list_versions
 from app.soccer.solution import SOLVER_VERSION, Solution
 from app.solving.solve import NO_CALIBRATIONS, solve
-from app.store.session import Store
+from app.store.store import Store
 
 
 def beside(group, policy, calibrations: Mapping = NO_CALIBRATIONS) -> Solution:

@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 from standardwebhooks import Webhook as Verifier
 
-from app.store.session import Store
+from app.store.store import Store
 from tests.waiting import SECONDS
 
 

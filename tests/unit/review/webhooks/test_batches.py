@@ -20,7 +20,7 @@ from app.review.webhooks.sender import WebhookSender
 from app.review.webhooks.webhooks import make_webhook
 from app.review.work.batches import NewBatch, change_batch, make_batch
 from app.review.work.leases import Leases, Worker
-from app.store.session import Store
+from app.store.store import Store
 from tests.unit.review.webhooks.conftest import Receiver
 
 OF_WORK = {

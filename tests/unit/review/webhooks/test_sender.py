@@ -33,7 +33,7 @@ from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import Box
 from app.store.jobs import NewJob, insert_job, update_job
 from app.store.keys import WEBHOOKS
-from app.store.session import Store
+from app.store.store import Store
 from tests.unit.review.webhooks.conftest import Receiver
 from tests.waiting import SECONDS
 

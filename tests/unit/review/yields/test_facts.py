@@ -13,7 +13,7 @@ from app.review.yields.table import YieldTable
 from app.solving.facts import COLUMNS, group_facts, join
 from app.store.group_changes import groups_from
 from app.store.models import SolutionModel
-from app.store.session import Store
+from app.store.store import Store
 from tests.databases import said_for_sqlite
 
 

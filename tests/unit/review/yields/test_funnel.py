@@ -28,7 +28,7 @@ from app.solving.facts import group_facts, join
 from app.solving.solve import solve
 from app.solving.spread import MeanSpread
 from app.solving.verdict import PASSES, Verdict, judge, view_jac
-from app.store.session import Store
+from app.store.store import Store
 from tests.scenes import make_scenes
 
 SEEDS = 9

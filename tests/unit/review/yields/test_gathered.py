@@ -22,7 +22,7 @@ from app.review.yields.funnel import get_yield
 from app.review.yields.gathered import Gathered
 from app.review.yields.store import YieldStore
 from app.soccer.policy import PAPER, CalibrationPolicy
-from app.store.session import Store
+from app.store.store import Store
 from tests.waiting import SECONDS
 
 SPLITS = ("train", "valid", "test")

@@ -21,7 +21,7 @@ from app.review.verdicts.bulk_undo import undo_batch
 from app.review.yields import statistics as kept
 from app.review.yields.statistics import StatisticsStore
 from app.soccer.policy import PAPER
-from app.store.session import Store
+from app.store.store import Store
 
 SPLITS = ("train", "valid", "test")
 

@@ -17,7 +17,7 @@ from app.store.models import DatasetModel
 from app.store.people_models import DatasetRoleModel, PersonModel
 from app.store.restore import restore
 from app.store.rights import Rights, rights_of
-from app.store.session import Store
+from app.store.store import Store
 from app.store.take_models import CopyDatasetModel
 from tests.databases import POSTGRESQL
 from tests.unit.store.homes import say
@@ -61,7 +61,7 @@ class TestText:
 class TestConnections:
     def test_one_that_comes_back_after_the_end_is_closed(self, store: Store) -> None:
         with closing(Store.open(store.settings)) as other, other.read() as late:
-            driver: Any = late.connection().connection.driver_connection
+            driver: Any = late.connection.driver_connection
             other.close()
             assert not driver.closed
         assert driver.closed

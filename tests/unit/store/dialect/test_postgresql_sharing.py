@@ -10,7 +10,7 @@ import pytest
 from sqlalchemy import text
 
 from app.store.dialect.sharing import AGAIN
-from app.store.session import COMMITTED, Store
+from app.store.store import COMMITTED, Store
 from tests.databases import POSTGRESQL
 from tests.unit.store.homes import say
 from tests.waiting import SECONDS

@@ -18,7 +18,7 @@ from app.store.anchor import read_anchor
 from app.store.dialect.sqlite import PRAGMAS
 from app.store.log import Entry, append, read_log
 from app.store.migrate import KNOWN_REVISIONS, migrate, migrations_folder
-from app.store.session import Store
+from app.store.store import Store
 from tests.databases import said_for_sqlite
 from tests.unit.store.homes import say
 
@@ -88,7 +88,7 @@ class TestOpen:
                 attempt(store.settings)
 
     def test_an_older_schema_asks_for_a_migration(self, store: Store, monkeypatch) -> None:
-        monkeypatch.setattr("app.store.session.SCHEMA_REVISION", "0999")
+        monkeypatch.setattr("app.store.store.SCHEMA_REVISION", "0999")
         with pytest.raises(StorageError, match="older version") as caught:
             Store.open(store.settings)
         assert caught.value.hint == "Run touchline migrate."
@@ -113,7 +113,7 @@ class TestRequireWhole:
         self, store: Store, monkeypatch
     ) -> None:
         store.require_whole()
-        monkeypatch.setattr("app.store.session.file_faults", lambda *_: ["Tree 5 is torn"])
+        monkeypatch.setattr("app.store.store.file_faults", lambda *_: ["Tree 5 is torn"])
         with pytest.raises(DamagedError, match=r"touchline\.db is damaged$"):
             store.require_whole()
         with pytest.raises(DamagedError, match="no change is taken"):
@@ -192,7 +192,7 @@ class TestWrite:
     def test_a_turn_that_does_not_come_is_a_storage_error(
         self, store: Store, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        monkeypatch.setattr("app.store.session.TURN_SECONDS", 0.01)
+        monkeypatch.setattr("app.store.store.TURN_SECONDS", 0.01)
         refused = pytest.raises(StorageError, match="other changes are still being written")
         with store.write(), ThreadPoolExecutor(1) as other, refused:
             other.submit(add, store, "late").result()
@@ -225,12 +225,13 @@ class TestWrite:
     def test_an_acknowledged_write_survives_a_killed_process(self, store, settings) -> None:
         script = (
             "import os, sys; from pathlib import Path; from app.config import Settings;"
-            "from app.store.session import Store; from sqlalchemy import text\n"
+            "from app.store.store import Store; from sqlalchemy import text\n"
             "store = Store.open(Settings(home=Path(sys.argv[1])))\n"
             "with store.write() as session:\n"
             f"    session.execute(text({INSERT.format('acknowledged')!r}))\n"
             "print('saved', flush=True)\n"
-            "writing = store.write().__enter__()\n"
+            "held = store.write()\n"
+            "writing = held.__enter__()\n"
             f"writing.execute(text({INSERT.format('lost')!r}))\n"
             "os.kill(os.getpid(), 9)\n"
         )
@@ -255,7 +256,7 @@ class TestPeek:
         with ExitStack() as held, store.write() as writing:
             writing.execute(text(INSERT.format("not yet")))
             for _ in range(20):
-                held.enter_context(store.read()).connection()
+                held.enter_context(store.read())
             with store.peek() as session:
                 found = session.scalars(text("SELECT name FROM dataset")).all()
                 promise = session.execute(text("PRAGMA busy_timeout")).scalar()
@@ -271,10 +272,8 @@ class TestPeek:
 
     @pytest.mark.file_of_sqlite("a server of databases is always waited for")
     def test_who_would_wait_for_another_thread_is_told(self, store: Store) -> None:
-        with store.peek() as first:
-            first.connection()
-            with pytest.raises(BusyError), store.peek() as second:
-                second.connection()
+        with store.peek(), pytest.raises(BusyError), store.peek():
+            pytest.fail("it was answered")
 
     def test_where_every_statement_is_waited_for_it_is_refused(
         self, store: Store, monkeypatch: pytest.MonkeyPatch
@@ -297,7 +296,7 @@ class TestAfterTheCommit:
         with capture_logs() as logs:
             for _round in range(2):
                 with monkeypatch.context() as broken:
-                    broken.setattr("app.store.session.move_anchor", refuse)
+                    broken.setattr("app.store.store.move_anchor", refuse)
                     say(store)
                     say(store)
                 say(store)
