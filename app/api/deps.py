@@ -17,6 +17,7 @@ from fastapi import Depends, Header, Path, Query, Request
 
 from app.api.errors import PreconditionRequiredError
 from app.api.events import Events
+from app.api.previews import Previews
 from app.api.security.access import login_of, sight_of
 from app.config import Settings
 from app.errors import BusyError, InputError
@@ -67,6 +68,7 @@ class Services:
     settings: Settings
     store: Store
     frames: Frames
+    previews: Previews
     predictions: PredictionReader
     exports: ExportFolder
     jobs: Jobs
@@ -88,11 +90,12 @@ class Services:
         """Open everything over one home; ``pool`` is for jobs that are worth processes."""
         store = Store.open(settings)
         jobs = SharedJobs(store, pool=pool) if store.sharing.is_shared else Jobs(store, pool=pool)
-        exports = ExportFolder(settings.exports)
+        exports, frames = ExportFolder(settings.exports), Frames(settings)
         return Services(
             settings,
             store,
-            Frames(settings),
+            frames,
+            Previews(settings, store, PaintFollower(frames)),
             PredictionReader(settings),
             exports,
             jobs,
@@ -163,6 +166,7 @@ class Services:
         self.upkeep.stop()
         self.jobs.close()
         self.upkeep.close()
+        self.previews.close()
         self.frames.close()
         self.predictions.close()
         self.store.close()

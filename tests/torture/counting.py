@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -43,27 +44,33 @@ def count(file: str) -> None:
 
 def processor(pid: int) -> float:
     """Seconds of the processor that a process and all below it have taken, ended ones too."""
+    ticks = 0
+    for one in family(pid):
+        with suppress(FileNotFoundError, ProcessLookupError):
+            ticks += sum(map(int, _fields(Path(f"/proc/{one}/stat"))[11:15]))
+    return ticks / os.sysconf("SC_CLK_TCK")
+
+
+def family(pid: int) -> list[int]:
+    """A process and all below it."""
     parents: dict[int, int] = {}
-    ticks: dict[int, int] = {}
     for stat in Path("/proc").glob("[0-9]*/stat"):
-        try:
-            # The name, in brackets, may hold anything.
-            fields = stat.read_text().rpartition(")")[2].split()
-        except (FileNotFoundError, ProcessLookupError):
-            continue
-        number = int(stat.parent.name)
-        parents[number] = int(fields[1])
-        ticks[number] = sum(map(int, fields[11:15]))
-    counted, left = 0, [pid]
-    while left:
-        one = left.pop()
-        counted += ticks.get(one, 0)
-        left += [child for child, parent in parents.items() if parent == one]
-    return counted / os.sysconf("SC_CLK_TCK")
+        with suppress(FileNotFoundError, ProcessLookupError):
+            parents[int(stat.parent.name)] = int(_fields(stat)[1])
+    found = [pid]
+    for one in found:
+        found += [child for child, parent in parents.items() if parent == one]
+    return found
+
+
+def _fields(stat: Path) -> list[str]:
+    # The name, in brackets, may hold anything.
+    return stat.read_text().rpartition(")")[2].split()
 
 
 class Meter:
-    """What a server has used since it was looked at last.
+    """What a server and its processes have used since it was looked at last; statements are those of
+    the server itself.
 
     Args:
         home: Of the server.
@@ -72,7 +79,7 @@ class Meter:
 
     def __init__(self, home: Path, pid: int):
         self._counts = np.memmap(home / FILE, dtype=np.uint64, mode="r", shape=_SHAPE)
-        self._tasks = Path(f"/proc/{pid}/task")
+        self._pid = pid
         self._before = self._read()
 
     def lap(self) -> np.ndarray:
@@ -82,7 +89,6 @@ class Meter:
         return used
 
     def _read(self) -> np.ndarray:
-        busy = sum(
-            int((task / "schedstat").read_text().split()[0]) for task in self._tasks.iterdir()
-        )
+        tasks = [task for one in family(self._pid) for task in Path(f"/proc/{one}/task").iterdir()]
+        busy = sum(int((task / "schedstat").read_text().split()[0]) for task in tasks)
         return np.array([*self._counts.astype(float), busy / 1e6])

@@ -22,7 +22,6 @@ from app.api.deps import (
     Services,
     etag_matches,
 )
-from app.api.edits import preview_edits
 from app.api.problem import Responses, responses
 from app.api.reply import Asked, AskedUnder, Reply, document
 from app.api.schemas.group import GroupDocument
@@ -201,12 +200,12 @@ def get_step(group: Id, entry: Id, store: AppStore) -> StepDocument:
     response_model=PreviewDocument,
     responses=responses(404, 409, 413, 415),
 )
-def preview_group(group: Id, changes: PreviewRequest, services: AppServices) -> Response:
+async def preview_group(
+    group: Id, changes: PreviewRequest, services: AppServices, request: Request
+) -> Response:
     """What the solution would be; nothing is saved."""
-    edited, solution = submit.preview(
-        services.store, group, lambda found: preview_edits(found, changes), services.paint
-    )
-    return document(PreviewDocument(solution=SolutionDocument.of(solution, edited)))
+    found = await services.previews.answer(request, group, changes)
+    return Response(found, media_type="application/json")
 
 
 @router.post(

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import asyncio
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
-from typing import Annotated, Any
+from typing import Annotated
 
 from anyio import to_thread
 from fastapi import APIRouter, Body, Query, Request, Response
@@ -26,8 +25,8 @@ from app.api.routers.groups import CHANGED, CONFLICTS, change_group, load_docume
 from app.api.schemas.annotation import BallEdit, LinesEdit
 from app.api.schemas.group import GroupDocument
 from app.api.schemas.view import NeighbourList, ViewEdit, frames_away
+from app.api.wanted import while_wanted
 from app.child import ChildEnded
-from app.child_pool import PoolTask
 from app.errors import ImageError, NotFoundError, StorageError, TooLargeError
 from app.review.editing.edit import (
     Edit,
@@ -50,8 +49,6 @@ WIDTH_STEP = 16
 """Asked widths are rounded up to a multiple, so that few sizes fill the cache."""
 MIN_WIDTH, MAX_WIDTH = 16, 4096
 SECONDS = 3600
-LOOK_SECONDS = 0.25
-"""Between two looks whether the client still waits."""
 CLIENT_GONE = 499
 """What the log calls the answer that nobody reads."""
 NO_NEIGHBOURS = "This dataset has no frames before or after this one."
@@ -268,19 +265,6 @@ def told_with_view(key: str) -> Iterator[None]:
         # The cause decides between a full disk and one that fails.
         cause = error.__cause__ or error
         raise type(error)(f"view {key}: {error.message}", hint=error.hint) from cause
-
-
-async def while_wanted(request: Request, task: PoolTask) -> Any:
-    """The result of a task; None where it is given up because the client has left."""
-    result: asyncio.Future[Any] = asyncio.wrap_future(task.future)
-    try:
-        while not result.done():
-            await asyncio.wait({result}, timeout=LOOK_SECONDS)
-            if not result.done() and await request.is_disconnected():
-                return None
-        return result.result()
-    finally:
-        task.leave()
 
 
 def clamp_width(width: int | None) -> int | None:

@@ -48,6 +48,7 @@ class PaintFollower:
         return replace(group, paint={**group.paint, **read}) if read else group
 
     def _read(self, tasks: list[PaintTask]) -> Iterator[tuple[str, PaintReading]]:
+        """By view what was read of those whose picture could be read in time."""
         end = monotonic() + SECONDS
         try:
             asked = [(task, self._frames.ask_to(read_view_paint, task)) for task in tasks]
@@ -62,6 +63,20 @@ class PaintFollower:
                 continue
             if reading is not None:
                 yield task.view.key, reading
+
+
+class WithoutPictures(PaintFollower):
+    """Where no picture can be read: ``missed`` says that one would have been.
+
+    A camera of clicks alone would be another answer than the one that is asked for.
+    """
+
+    def __init__(self) -> None:
+        self.missed = False
+
+    def _read(self, tasks: list[PaintTask]) -> Iterator[tuple[str, PaintReading]]:
+        self.missed = True
+        return iter(())
 
 
 def _stale(

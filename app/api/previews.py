@@ -1,0 +1,128 @@
+"""Previews: what a drag asks ten times a second, solved where it keeps nobody else waiting.
+
+Among many people drags are most of what a server computes, and one interpreter computes one thing
+at a time. A server of a team has a process for them (decision 0056); the first drag starts it, and
+until it is ready they are solved here, as on a server that somebody runs alone.
+"""
+
+from __future__ import annotations
+
+import gc
+from concurrent.futures import Future
+
+import structlog
+from fastapi import Request
+from starlette.concurrency import run_in_threadpool
+
+from app.api.edits import preview_edits
+from app.api.schemas.preview import PreviewDocument, PreviewRequest
+from app.api.schemas.solution import SolutionDocument
+from app.api.wanted import while_wanted
+from app.child import Allowance, ChildEnded
+from app.child_pool import ChildPool
+from app.config import Settings
+from app.errors import OverloadedError
+from app.review.editing.follow_paint import PaintFollower, WithoutPictures
+from app.review.editing.submit import preview
+from app.solving.warm import warm_up
+from app.store.store import Store
+
+log = structlog.get_logger("touchline.previews")
+
+ALLOWANCE = Allowance(memory=2 * 2**30, processor=60.0, silence=120.0)
+"""For one preview; the first one of a process may have to wait for kernels to be compiled."""
+WAITING = 100
+"""Previews that may wait for the process; before they do, they wait in their lane."""
+
+_stores: dict[str, Store] = {}
+"""In the process of previews: the database, once it was opened."""
+
+
+class Previews:
+    """Solves what-ifs of single groups; nothing is saved.
+
+    Args:
+        settings: Whether there is a process for them.
+        store: Has the groups.
+        paint: Reads the paint of edited lines again, which the process cannot.
+    """
+
+    def __init__(self, settings: Settings, store: Store, paint: PaintFollower):
+        self._settings, self._store, self._paint = settings, store, paint
+        apart = settings.team and settings.web_workers == 1
+        self._pool = ChildPool(ALLOWANCE, 1, WAITING, "previews") if apart else None
+        self._begun = False
+        self.is_ready = False
+        """Whether the process is there."""
+
+    async def answer(self, request: Request, group_id: int, changes: PreviewRequest) -> bytes:
+        """The document of a what-if; empty where nobody waits for it any more.
+
+        Raises:
+            NotFoundError: There is no such group.
+            InputError: It has no such view, or the changes are too many.
+            SharedStationError: See ``submit.preview``.
+            OverloadedError: The process ended.
+        """
+        self._begin()
+        if self._pool is not None and self.is_ready:
+            given = (self._settings, group_id, changes)
+            task = self._pool.submit(solve_apart, *given, explain=_ended)
+            found: bytes | None = await while_wanted(request, task)
+            if found is not None:
+                return found
+            if await request.is_disconnected():
+                return b""
+        return await run_in_threadpool(_solve, self._store, group_id, changes, self._paint)
+
+    def close(self) -> None:
+        """End the process."""
+        if self._pool is not None:
+            self._pool.close()
+
+    def _begin(self) -> None:
+        """Start the process, when it is wanted first."""
+        if self._pool is not None and not self._begun:
+            self._begun = True
+            begun = self._pool.submit(make_ready, self._settings, explain=_ended, bounded=False)
+            begun.future.add_done_callback(self._note)
+
+    def _note(self, begun: Future[None]) -> None:
+        if begun.cancelled():
+            return
+        error = begun.exception()
+        self.is_ready = error is None
+        if error is not None:
+            log.warning("there is no process for previews", error=str(error))
+
+
+def make_ready(settings: Settings) -> None:
+    """In the process: open the database and load the solver's kernels."""
+    _opened(settings)
+    warm_up()
+    gc.collect()
+    gc.freeze()
+
+
+def solve_apart(settings: Settings, group_id: int, changes: PreviewRequest) -> bytes | None:
+    """In the process: ``_solve``; None where pictures would have to be read."""
+    without = WithoutPictures()
+    found = _solve(_opened(settings), group_id, changes, without)
+    return None if without.missed else found
+
+
+def _opened(settings: Settings) -> Store:
+    key = settings.model_dump_json()
+    if key not in _stores:
+        _stores[key] = Store.open(settings)
+    return _stores[key]
+
+
+def _solve(store: Store, group_id: int, changes: PreviewRequest, paint: PaintFollower) -> bytes:
+    edited, solution = preview(store, group_id, lambda found: preview_edits(found, changes), paint)
+    document = PreviewDocument(solution=SolutionDocument.of(solution, edited))
+    return document.model_dump_json().encode()
+
+
+def _ended(error: ChildEnded) -> OverloadedError:
+    return OverloadedError(f"this preview {error}", hint="Nothing was changed. Try it again.")

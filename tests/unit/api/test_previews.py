@@ -1,0 +1,93 @@
+import multiprocessing
+import os
+import time
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any
+
+import pytest
+from fastapi import FastAPI
+
+from app.api.previews import Previews
+from tests.waiting import SECONDS
+
+API = "/api/v1"
+
+
+def preview(api, view: str = "7.png", group: int = 1) -> Any:
+    """The answer to a ball that is dragged a little."""
+    ball = {"box": [801.5, 322.0, 14.0, 14.5]}
+    return api.post(f"{API}/groups/{group}/preview", json={"views": {view: {"ball": ball}}})
+
+
+def alike(answer: Any) -> Any:
+    """An answer without what names this one alone."""
+    found = {**answer.json(), "instance": None}
+    return answer.status_code, answer.headers["content-type"], found
+
+
+def break_down(*_: object) -> None:
+    os._exit(3)
+
+
+@pytest.fixture
+def apart(app: FastAPI) -> Iterator[Previews]:
+    """What a server of a team has."""
+    services = app.state.services
+    settings = services.settings.model_copy(update={"team": True})
+    made = Previews(settings, services.store, services.paint)
+    app.state.services = replace(services, previews=made)
+    yield made
+    made.close()
+
+
+@pytest.fixture
+def ready(apart: Previews, api) -> Previews:
+    """It, once its process answers."""
+    assert preview(api).status_code == 200
+    end = time.monotonic() + SECONDS
+    while not apart.is_ready:
+        assert time.monotonic() < end, "there is no process for previews"
+        time.sleep(0.02)
+    return apart
+
+
+class TestAlone:
+    def test_there_is_no_process(self, app, api) -> None:
+        before = multiprocessing.active_children()
+        assert preview(api).status_code == 200
+        assert multiprocessing.active_children() == before
+        assert not app.state.services.previews.is_ready
+
+
+class TestApart:
+    def test_who_begins_is_answered_before_the_process_is_there(self, apart, api) -> None:
+        answer = preview(api)
+        assert (answer.status_code, apart.is_ready) == (200, False)
+
+    def test_the_process_answers_as_the_server_does(self, app, ready, api, monkeypatch) -> None:
+        asked = ({}, {"group": 99}, {"view": "no such view"})
+        apart = [alike(preview(api, **one)) for one in asked]
+        monkeypatch.setattr(ready, "is_ready", False)
+        assert apart == [alike(preview(api, **one)) for one in asked]
+        assert [status for status, *_ in apart] == [200, 404, 400]
+
+    def test_it_sees_what_was_saved_since(self, ready, api) -> None:
+        before = preview(api).json()["solution"]
+        group = api.get(f"{API}/groups/1").json()
+        api.patch(
+            f"{API}/views/{group['views'][1]['id']}/ball",
+            json={"box": [500.0, 300.0, 14.0, 14.0]},
+            headers={"If-Match": group["etag"]},
+        ).raise_for_status()
+        assert preview(api).json()["solution"]["pairs"] != before["pairs"]
+
+    def test_one_that_broke_down_is_said_and_another_takes_its_place(
+        self, ready, api, monkeypatch
+    ) -> None:
+        with monkeypatch.context() as broken:
+            broken.setattr("app.api.previews.solve_apart", break_down)
+            answer = preview(api)
+        assert (answer.status_code, "Retry-After" in answer.headers) == (503, True)
+        assert answer.json()["detail"].startswith("this preview made the process crash")
+        assert preview(api).status_code == 200
