@@ -14,10 +14,10 @@ import structlog
 from fastapi import Request
 from starlette.concurrency import run_in_threadpool
 
+from app.api.child_pool import while_wanted
 from app.api.edits import preview_edits
 from app.api.schemas.preview import PreviewDocument, PreviewRequest
 from app.api.schemas.solution import SolutionDocument
-from app.api.wanted import while_wanted
 from app.child import Allowance, ChildEnded
 from app.child_pool import ChildPool
 from app.config import Settings

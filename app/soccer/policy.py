@@ -100,6 +100,11 @@ class CalibrationPolicy:
     )
     """What the points of a marking have in common of that variance; None: weighed image by image."""
 
+    @cached_property
+    def spelling(self) -> str:
+        """The ``repr``, which every key of a calibration has: spelt out once."""
+        return repr(self)
+
 
 @dataclass(frozen=True)
 class Policy:

@@ -359,28 +359,27 @@ def calibration_key(
     shared: SharedPosition | None = None,
 ) -> str:
     """Digest of all that ``calibrate_station`` reads: the same key, the same calibration."""
-    parts: list[object] = [SOLVER_VERSION, station.size, pitch, policy]
     # Plain tuples are spelt out in half the time.
-    lines = station.lines
-    parts.append([(marking, [*map(tuple, lines[marking])]) for marking in sorted(lines)])
+    lines = [(marking, [*map(tuple, points)]) for marking, points in sorted(station.lines.items())]
+    parts = [*map(repr, (SOLVER_VERSION, station.size, pitch)), policy.spelling, repr(lines)]
     if station.given is not None and station.calibration == "given":
-        parts.append(station.given.parameters.tolist())
+        parts.append(repr(station.given.parameters.tolist()))
         if station.given.is_wide:
-            parts.append(station.given.lens)
+            parts.append(repr(station.given.lens))
         if station.given_covariance is not None:
-            parts.append(station.given_covariance)
+            parts.append(repr(station.given_covariance))
         return _key(parts)
     if station.picture is not None:
-        parts.append(station.picture)
+        parts.append(repr(station.picture))
     elif shared is not None:
-        parts.append(shared)
+        parts.append(repr(shared))
     if (policy.line_sigma_px, policy.line_share) != (None, None):
-        parts.append(("line noise", policy.line_sigma_px, policy.line_share))
+        parts.append(repr(("line noise", policy.line_sigma_px, policy.line_share)))
     return _key(parts)
 
 
-def _key(parts: list[object]) -> str:
-    return hashlib.sha256(repr(parts).encode()).hexdigest()[:32]
+def _key(parts: list[str]) -> str:
+    return hashlib.sha256(f"[{', '.join(parts)}]".encode()).hexdigest()[:32]
 
 
 def _unobservable(spread: FloatArray) -> tuple[str, ...]:

@@ -33,13 +33,14 @@ Json = Any
 """What ``json`` makes: dict, list, str, int, float, bool or None."""
 _LINES = dict[str, tuple[ImagePoint, ...]]
 _LOOKING = Lock()
+_CANONICAL = json.JSONEncoder(
+    sort_keys=True, separators=(",", ":"), ensure_ascii=False, allow_nan=False
+)
 
 
 def canonical(value: Json) -> str:
     """The one JSON text of a value: sorted keys, no spaces, no NaN."""
-    return json.dumps(
-        value, sort_keys=True, separators=(",", ":"), ensure_ascii=False, allow_nan=False
-    )
+    return _CANONICAL.encode(value)
 
 
 def parse(text: str | bytes) -> Json:

@@ -8,12 +8,12 @@ from typing import Any
 from anyio import to_thread
 from fastapi import APIRouter, Request, Response
 
+from app.api.child_pool import while_wanted
 from app.api.deps import AppServices, Id
 from app.api.problem import responses
 from app.api.routers.views import CLIENT_GONE, told_with_view
 from app.api.schemas.annotation import points_of
 from app.api.schemas.view_paint import PaintDocument, PaintRequest, ProposalDocument
-from app.api.wanted import while_wanted
 from app.child_pool import PoolTask
 from app.review.editing.view_paint import PaintQuestion, paint_question, proposal_question
 from app.store.frames import Frames

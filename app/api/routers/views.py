@@ -11,6 +11,7 @@ from typing import Annotated
 from anyio import to_thread
 from fastapi import APIRouter, Body, Query, Request, Response
 
+from app.api.child_pool import while_wanted
 from app.api.deps import (
     Actor,
     AppServices,
@@ -25,7 +26,6 @@ from app.api.routers.groups import CHANGED, CONFLICTS, change_group, load_docume
 from app.api.schemas.annotation import BallEdit, LinesEdit
 from app.api.schemas.group import GroupDocument
 from app.api.schemas.view import NeighbourList, ViewEdit, frames_away
-from app.api.wanted import while_wanted
 from app.child import ChildEnded
 from app.errors import ImageError, NotFoundError, StorageError, TooLargeError
 from app.review.editing.edit import (

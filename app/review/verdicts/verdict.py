@@ -9,9 +9,12 @@ from app.review.editing.copies import require_unsettled
 from app.review.editing.etags import require_said, require_unchanged
 from app.review.editing.state import GroupState
 from app.review.editing.submit import read_solved
+from app.soccer.group import Group
 from app.soccer.reasons import MAX_NOTE, REASONS
+from app.soccer.solution import Solution
 from app.store.answers import Keep, keep_nothing
 from app.store.clock import now
+from app.store.groups import StoredGroup
 from app.store.queue import update_verdict
 from app.store.session import Session
 from app.store.store import Store
@@ -53,19 +56,19 @@ def set_verdict(
     while True:
         # Accepting weighs the gates, so they must be known.
         record, solution = read_solved(store, group_id, needed=state == "accepted")
-        seen = record.state(solution)
-        override = _override(seen, verdict)
-        _require_seen(seen, verdict)
+        stored, what = record.stored, f"group {record.stored.group.key}"
+        override = _override(solution, verdict)
+        _require_seen(stored.group, verdict)
         with store.write() as session:
-            policy_hash = require_unchanged(session, group_id, if_match, f"group {seen.key}")
-            require_said(session, group_id, record.said, if_match, f"group {seen.key}")
-            require_unsettled(session, seen.dataset_id, group_id)
+            policy_hash = require_unchanged(session, group_id, if_match, what)
+            require_said(session, group_id, record.said, if_match, what)
+            require_unsettled(session, stored.dataset_id, group_id)
             # Under another policy other gates may fail.
-            if policy_hash == seen.policy.hash:
-                given = _given(session, seen, verdict, override, actor)
-                insert_verdicts(session, seen.dataset_id, [given], actor=actor, at=given.at)
+            if policy_hash == stored.policy.hash:
+                given = _given(session, stored, verdict, override, actor)
+                insert_verdicts(session, stored.dataset_id, [given], actor=actor, at=given.at)
                 passes = None if solution is None else solution.passes
-                update_verdict(session, record.stored, given, passes)
+                update_verdict(session, stored, given, passes)
                 after = replace(record, verdicts=(given, *record.verdicts)).state(solution)
                 keep(after)(session)
                 return after
@@ -93,11 +96,11 @@ def check_verdict(state: str, reason: str | None, note: str | None) -> Verdict:
     return Verdict(state, reason, note)
 
 
-def _override(state: GroupState, verdict: Verdict) -> str | None:
+def _override(solution: Solution | None, verdict: Verdict) -> str | None:
     """The gate that an acceptance overrides, or None."""
-    if verdict.state != "accepted" or state.solution is None or state.solution.passes:
+    if verdict.state != "accepted" or solution is None or solution.passes:
         return None
-    gate = state.solution.first_failing
+    gate = solution.first_failing
     if verdict.note is None:
         sentence = gate.sentence if gate is not None else "it fails"
         raise InputError(
@@ -108,9 +111,9 @@ def _override(state: GroupState, verdict: Verdict) -> str | None:
     return gate.name if gate is not None else "unknown"
 
 
-def _require_seen(state: GroupState, verdict: Verdict) -> None:
+def _require_seen(group: Group, verdict: Verdict) -> None:
     """Refuse a bare acceptance of a group that nobody can have looked at."""
-    seen = any(view.media is not None for view in state.group.views)
+    seen = any(view.media is not None for view in group.views)
     if verdict.state == "accepted" and verdict.note is None and not seen:
         raise InputError(
             "this group has no picture in any view, so nobody can have looked at it; accepting "
@@ -121,16 +124,16 @@ def _require_seen(state: GroupState, verdict: Verdict) -> None:
 
 
 def _given(
-    session: Session, seen: GroupState, verdict: Verdict, override: str | None, actor: str
+    session: Session, stored: StoredGroup, verdict: Verdict, override: str | None, actor: str
 ) -> StoredVerdict:
     return StoredVerdict(
         id=next_verdict_id(session),
-        group_id=seen.id,
+        group_id=stored.id,
         actor=actor,
         at=now(),
         **vars(verdict),
-        inputs_hash=seen.stored.inputs_hash,
-        policy_hash=seen.policy.hash,
-        fixed=seen.stored.edited and verdict.state == "accepted" and override is None,
+        inputs_hash=stored.inputs_hash,
+        policy_hash=stored.policy.hash,
+        fixed=stored.edited and verdict.state == "accepted" and override is None,
         override=override,
     )

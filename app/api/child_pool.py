@@ -1,4 +1,4 @@
-"""Wanted: tasks of children, for as long as whoever asked for them is there."""
+"""Child pool: what a request waits for of it, for as long as whoever asked is there."""
 
 from __future__ import annotations
 
