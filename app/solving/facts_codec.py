@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from zlib_ng import zlib_ng
 
 from app.errors import EXAMINE, DamagedError
 from app.geometry.arrays import FloatArray, IntArray
@@ -34,7 +35,7 @@ def facts_to_bytes(facts: Facts) -> bytes:
     while names[-1] in LATER and _is_silent(facts, names[-1]):
         names.pop()
     columns = [getattr(facts, name).ravel() for name in names]
-    return zlib.compress(np.concatenate([counts, *columns]).astype(_NUMBERS).tobytes())
+    return zlib_ng.compress(np.concatenate([counts, *columns]).astype(_NUMBERS).tobytes())
 
 
 def facts_from_bytes(contents: Sequence[bytes]) -> Facts:

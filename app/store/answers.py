@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import zlib
 from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from typing import TypeVar, cast
 
 from sqlalchemy import Table, bindparam, delete, or_, select, text
+from zlib_ng import zlib_ng
 
 from app.finite import json_text
 from app.store.clock import now
@@ -21,7 +21,7 @@ T = TypeVar("T")
 
 KEPT_HOURS = 24
 """How long an answer is kept; what an edit builds on (If-Match) still stops a later repetition."""
-_FAST = 1
+_FAST = 2
 _UNDER_WAY = 102
 _ANSWER = cast(Table, AnswerModel.__table__)
 
@@ -99,7 +99,7 @@ def keep_answer(session: Session, key: str, actor: str, answer: Answer) -> bool:
         "request_digest": answer.request_digest,
         "status": answer.status,
         "headers": json_text(answer.headers, ascii_=True),
-        "body": zlib.compress(answer.body or b"", _FAST),
+        "body": zlib_ng.compress(answer.body or b"", _FAST),
         "at": now(),
         "oldest": _oldest(),
     }

@@ -15,6 +15,7 @@ from typing import Any
 
 import msgspec
 import numpy as np
+from zlib_ng import zlib_ng
 
 from app.errors import EXAMINE, DamagedError, GeometryError, InputError
 from app.geometry.camera import Camera, camera_covariance
@@ -93,7 +94,7 @@ def as_written() -> Iterator[None]:
 
 def pack(value: Json) -> bytes:
     """A value as compressed canonical JSON."""
-    return zlib.compress(canonical(value).encode())
+    return zlib_ng.compress(canonical(value).encode())
 
 
 def unpack(data: bytes) -> Json:

@@ -7,12 +7,12 @@ to machine, and the digest must not.
 from __future__ import annotations
 
 import hashlib
-import zlib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, cast
 
 from sqlalchemy import Table, insert, select
+from zlib_ng import zlib_ng
 
 from app.soccer.group import Group, Station, View
 from app.soccer.paint_evidence import reading_from_json
@@ -183,4 +183,4 @@ def json_of(body: bytes) -> Json:
 
 def body_of(text: str) -> bytes:
     """Frozen JSON of a text."""
-    return zlib.compress(text.encode())
+    return zlib_ng.compress(text.encode())

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import hashlib
-import zlib
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, cast
 
 from sqlalchemy import ColumnElement, Table, bindparam, func, insert, select
+from zlib_ng import zlib_ng
 
 from app.errors import DamagedError
 from app.store.codecs import Json, canonical, unpack
@@ -67,7 +67,7 @@ def append(session: Session, entries: Sequence[Entry]) -> list[int]:
         body = canonical(entry.body).encode()
         previous = chain_hash(previous, number, entry, body)
         row = {name: getattr(entry, name) for name in _COLUMNS}
-        rows.append({**row, "id": number, "hash": previous, "body": zlib.compress(body)})
+        rows.append({**row, "id": number, "hash": previous, "body": zlib_ng.compress(body)})
     session.execute(insert(_LOG), rows)
     session.log_end = (number, previous)
     return [row["id"] for row in rows]

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import zlib
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, cast
 
 from sqlalchemy import BindParameter, Table, bindparam, func, select, true
+from zlib_ng import zlib_ng
 
 from app.soccer.paint_evidence import PaintReading, reading_from_text
 from app.store.codecs import as_written, inflate, parse
@@ -43,7 +43,7 @@ def insert_readings(session: Session, dataset_id: int, readings: Iterable[PaintR
                     "digest": digest,
                     "dataset_id": dataset_id,
                     "reason": reading.reason,
-                    "body": zlib.compress(reading.text.encode()),
+                    "body": zlib_ng.compress(reading.text.encode()),
                 }
                 for digest, reading in unique.items()
             ],

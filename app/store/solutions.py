@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import zlib
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any, cast
 
 from sqlalchemy import BindParameter, ColumnElement, Table, and_, bindparam, func, select
+from zlib_ng import zlib_ng
 
 from app.errors import ConflictError
 from app.finite import json_text
@@ -121,7 +121,7 @@ def decode_camera(body: bytes) -> Calibration:
 
 def compress(value: object) -> bytes:
     """A value of ``value_codec.to_json`` as it is stored."""
-    return zlib.compress(value_codec.dumps(value).encode())
+    return zlib_ng.compress(value_codec.dumps(value).encode())
 
 
 def insert_solutions(
