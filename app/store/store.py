@@ -13,6 +13,7 @@ from sqlalchemy.exc import TimeoutError as NoConnectionError
 
 from app.config import Settings
 from app.errors import EXAMINE, BusyError, DamagedError, StorageError
+from app.place import leave_place
 from app.store.anchor import (
     move_anchor,
     read_anchor,
@@ -179,6 +180,7 @@ class Store:
                 raise RuntimeError("what the log says must last")
             if lasting:
                 self.sharing.tell(session, COMMITTED)
+                leave_place()
             session.commit()
             self._anchored(session)
         self._tell_listeners()

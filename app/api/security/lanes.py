@@ -9,7 +9,9 @@ more makes all of them slower, with the event loop (decision 0049).
 
 from __future__ import annotations
 
+import asyncio
 import re
+from contextlib import suppress
 from dataclasses import dataclass
 
 import anyio
@@ -19,6 +21,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from app.api.problem import make_problem, problem_response
 from app.api.security.origin import SAFE_METHODS
+from app.place import hold_place
 
 PATIENCE = 10.0
 """Seconds that a request waits for its turn."""
@@ -41,11 +44,14 @@ class Lane:
         name: What they are called in the metrics.
         width: How many are at work at a time, each in a thread of its own.
         queue: How many more may wait for their turn.
+        served: How many are at work where a server of databases is waited for at each statement; None:
+            as many as elsewhere.
     """
 
     name: str
     width: int
     queue: int
+    served: int | None = None
 
 
 LOOKS = Lane("looks", 2, 200)
@@ -54,8 +60,11 @@ PAGES = Lane("pages", 2, 200)
 """The page of the browser application, whichever address it is asked for under."""
 READS = Lane("reads", 4, 200)
 """All other reading: lists and counts of many groups, which the database takes its time for."""
+EDITS = Lane("edits", 1, 100, served=3)
+"""What people do to one group, view or lease all day: read, solved and encoded one after the other. Who
+waits for the disk or a picture has left already (``app.place``)."""
 CHANGES = Lane("changes", 3, 100)
-"""One at a time is written; the others read, solve and encode meanwhile."""
+"""All others; they may take their time."""
 PREVIEWS = Lane("previews", 1, 100)
 """What a drag asks: some milliseconds of solving."""
 QUESTIONS = Lane("questions", 2, 100)
@@ -75,6 +84,7 @@ LANES = (
     LOOKS,
     PAGES,
     READS,
+    EDITS,
     CHANGES,
     PREVIEWS,
     QUESTIONS,
@@ -85,8 +95,11 @@ LANES = (
     LOGINS,
     SIGN_ONS,
 )
-THREADS = sum(lane.width for lane in LANES) + 6
-"""A thread for each request at work, and some for files of the browser application."""
+AWAY = 8
+"""So many of a lane may have left it before they were done."""
+THREADS = sum(max(lane.width, lane.served or 0) for lane in LANES) + 2 * AWAY + 6
+"""A thread for each request at work, for edits and changes that have left, and some for files of the
+browser application."""
 
 _API = re.compile(r"/api/v\d+/")
 _NO_PAGE = re.compile(r"/(?:healthz|readyz|metrics)$|/(?:assets|static)/")
@@ -94,6 +107,10 @@ _STREAM = re.compile(r"/events$")
 _IMAGE = re.compile(r"/(?:image|figures/[^/]+|views/[^/]+/(?:neighbours|paint|propose))$")
 _ZIP = re.compile(r"/exports/[^/]+/content$")
 _PREVIEW = re.compile(r"/preview$")
+_EDIT = re.compile(
+    r"/(?:views/[^/]+(?:/ball|/lines)?|groups/[^/]+/(?:verdict|undo|redo)"
+    r"|batches/[^/]+/(?:next|groups/[^/]+/lease))$"
+)
 _QUESTION = re.compile(r"/(?:comparison|influence|remedies|yield|noise)$")
 _LOOK = re.compile(r"/(?:groups/(?!ids$)|views/|stations/|session$|bell$|work$)")
 _LOGIN = re.compile(r"/(?:session|session/password|links/use)$")
@@ -119,21 +136,29 @@ def lane_of(method: str, path: str) -> Lane | None:
         return LOGINS
     if _SIGN_ON.search(path):
         return SIGN_ONS
-    return UPLOADS if method == "POST" and _UPLOAD.search(path) else CHANGES
+    if method == "POST" and _UPLOAD.search(path):
+        return UPLOADS
+    return EDITS if _EDIT.search(path) else CHANGES
 
 
 class Door:
-    """The door of one lane: who is at work, who waits, and how many were turned away."""
+    """The door of one lane: who is at work, who waits, and how many were turned away.
 
-    def __init__(self, lane: Lane):
+    Args:
+        lane: The lane.
+        served: Whether a server of databases answers.
+    """
+
+    def __init__(self, lane: Lane, served: bool = False):
         self.lane = lane
-        self.waiting = self.refused = 0
-        self._free = anyio.Semaphore(lane.width, fast_acquire=True)
+        self.waiting = self.refused = self.away = 0
+        self._width = lane.served if served and lane.served else lane.width
+        self._free = anyio.Semaphore(self._width, fast_acquire=True)
 
     @property
     def busy(self) -> int:
         """How many are at work."""
-        return self.lane.width - self._free.value
+        return self._width - self._free.value
 
     async def enter(self) -> bool:
         """Wait for a turn; False where too many wait, or it took too long."""
@@ -159,10 +184,10 @@ class Door:
 
 
 class Doors:
-    """The doors of all lanes of one server."""
+    """The doors of all lanes of one server; ``served``: see ``Door``."""
 
-    def __init__(self) -> None:
-        self.all = tuple(Door(lane) for lane in LANES)
+    def __init__(self, served: bool = False) -> None:
+        self.all = tuple(Door(lane, served) for lane in LANES)
         self._of = {door.lane: door for door in self.all}
 
     def of(self, scope: Scope) -> Door | None:
@@ -176,7 +201,8 @@ class Doors:
 class Lanes:
     """Lets each request wait for its turn; 503 where too many of its kind wait already.
 
-    The turn ends when the answer begins: sending it to a slow client takes nobody's place.
+    The turn ends when the answer begins, for sending it to a slow client takes nobody's place; and
+    before, where the work says that it waits for something else (``leave_place``).
     """
 
     def __init__(self, app: ASGIApp, doors: Doors):
@@ -191,6 +217,7 @@ class Lanes:
             await _refusal(scope, door.lane)(scope, receive, send)
             return
         place = _Place(door)
+        hold_place(place.leave_from_anywhere)
 
         async def watch(message: Message) -> None:
             place.end()
@@ -219,9 +246,28 @@ class _Place:
     """One request's place in its lane; it is given back once."""
 
     def __init__(self, door: Door):
-        self._door: Door | None = door
+        self._door, self._has, self._is_over = door, True, False
+        self._loop = asyncio.get_running_loop()
+
+    def leave_from_anywhere(self) -> None:
+        """Give it back before the work is done, from another thread; too many may not do so."""
+        # A loop that has stopped lets nobody in any more.
+        with suppress(RuntimeError):
+            self._loop.call_soon_threadsafe(self._leave)
+
+    def _leave(self) -> None:
+        if self._has and self._door.away < AWAY:
+            self._door.away += 1
+            self._has = False
+            self._door.leave()
 
     def end(self) -> None:
-        if self._door is not None:
+        """The work is done."""
+        if self._is_over:
+            return
+        self._is_over = True
+        if self._has:
+            self._has = False
             self._door.leave()
-            self._door = None
+        else:
+            self._door.away -= 1

@@ -50,7 +50,9 @@ def test_says_how_long_the_files_are(read) -> None:
     assert read("touchline_file_bytes", file="database") > 0
 
 
-@pytest.mark.parametrize("lane", ["reads", "changes", "previews", "images", "uploads", "zips"])
+@pytest.mark.parametrize(
+    "lane", ["reads", "edits", "changes", "previews", "images", "uploads", "zips"]
+)
 def test_says_who_is_at_work_and_who_waits(read, lane: str) -> None:
     for name in ("lane_busy", "lane_waiting", "lane_refused_total"):
         assert read(f"touchline_{name}", lane=lane) == 0

@@ -5,6 +5,7 @@ import sys
 import threading
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
+from contextvars import copy_context
 from pathlib import Path
 
 import pysqlite3.dbapi2 as sqlite
@@ -14,6 +15,7 @@ from structlog.testing import capture_logs
 
 from app.config import Settings
 from app.errors import BusyError, DamagedError, InputError, StorageError
+from app.place import hold_place
 from app.store.anchor import read_anchor
 from app.store.dialect.sqlite import PRAGMAS
 from app.store.log import Entry, append, read_log
@@ -162,6 +164,18 @@ class TestWrite:
             other.execute("BEGIN IMMEDIATE")
         other.execute("BEGIN IMMEDIATE")
         other.close()
+
+    def test_who_waits_for_the_disk_gives_their_place_back_before(self, store: Store) -> None:
+        left: list[list[str]] = []
+
+        def write(*, lasting: bool) -> None:
+            hold_place(lambda: left.append(names(store)))
+            with store.write(lasting=lasting) as session:
+                session.execute(text(INSERT.format(f"lasting {lasting}")))
+
+        for lasting in (False, True):
+            copy_context().run(write, lasting=lasting)
+        assert left == [["lasting False"]]
 
     def test_reading_does_not_lock(self, store: Store) -> None:
         with store.read() as session:

@@ -6,6 +6,7 @@ import asyncio
 from collections.abc import Awaitable, Callable
 from typing import Any
 
+import anyio
 import pytest
 from starlette.testclient import TestClient
 from starlette.types import Receive, Scope, Send
@@ -13,7 +14,9 @@ from starlette.types import Receive, Scope, Send
 from app.api.application import PREFIX
 from app.api.security import lanes
 from app.api.security.lanes import (
+    AWAY,
     CHANGES,
+    EDITS,
     IMAGES,
     LANES,
     LOOKS,
@@ -24,10 +27,14 @@ from app.api.security.lanes import (
     STREAMS,
     UPLOADS,
     ZIPS,
+    Door,
     Doors,
     Lanes,
     lane_of,
 )
+from app.place import leave_place
+
+EDIT = f"{PREFIX}/views/1/ball"
 
 
 class TestLaneOf:
@@ -42,7 +49,14 @@ class TestLaneOf:
             ("GET", "/groups", READS),
             ("GET", "/groups/ids", READS),
             ("GET", "/datasets/a/team-work", READS),
-            ("PATCH", "/views/1/ball", CHANGES),
+            ("PATCH", "/views/1/ball", EDITS),
+            ("PATCH", "/views/1", EDITS),
+            ("PUT", "/groups/1/verdict", EDITS),
+            ("POST", "/groups/1/undo", EDITS),
+            ("POST", "/batches/1/next", EDITS),
+            ("PUT", "/batches/1/groups/2/lease", EDITS),
+            ("POST", "/groups/1/adoption", CHANGES),
+            ("PATCH", "/stations/1/lines", CHANGES),
             ("DELETE", "/uploads/a", CHANGES),
             ("POST", "/datasets/a/verdicts", CHANGES),
             ("POST", "/groups/1/preview", PREVIEWS),
@@ -90,9 +104,13 @@ class Work:
     def __init__(self) -> None:
         self.begun: list[str] = []
         self.may_answer, self.may_end = asyncio.Event(), asyncio.Event()
+        self.away = False
+        """Whether they say that they wait for something else."""
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         self.begun.append(scope["path"])
+        if self.away:
+            await asyncio.to_thread(leave_place)
         await self.may_answer.wait()
         await send({"type": "http.response.start", "status": 200, "headers": []})
         await self.may_end.wait()
@@ -149,7 +167,7 @@ class TestLanes:
     def test_changes_that_wait_leave_reads_alone(self) -> None:
         async def test(service: Service) -> None:
             for _ in range(CHANGES.width + 5):
-                service.ask("PATCH", "/views/1")
+                service.ask("PATCH", "/stations/1")
             service.ask("GET", "/groups/1")
             await service.settle()
             assert len(service.work.begun) == CHANGES.width + 1
@@ -161,6 +179,41 @@ class TestLanes:
             assert (door.busy, door.waiting, door.refused) == (0, 0, 0)
 
         run(test)
+
+    def test_who_waits_for_a_disk_lets_the_next_one_in_but_not_everybody(self) -> None:
+        async def test(service: Service) -> None:
+            service.work.away = True
+            for _ in range(EDITS.width + AWAY + 1):
+                service.ask("PATCH", "/views/1/ball")
+            while len(service.work.begun) < EDITS.width + AWAY:
+                await asyncio.sleep(0.01)
+            # Time enough for one more, if it were let in.
+            await asyncio.sleep(0.1)
+            door = service.doors.of({"type": "http", "method": "PATCH", "path": EDIT})
+            assert door is not None
+            # One more is at work, has asked to leave, and had to stay.
+            assert len(service.work.begun) == EDITS.width + AWAY
+            assert (door.busy, door.away, door.waiting) == (EDITS.width, AWAY, 1)
+            await service.end()
+            assert service.statuses == [200] * (EDITS.width + AWAY + 1)
+            assert (door.busy, door.away, door.waiting) == (0, 0, 0)
+
+        run(test)
+
+    def test_more_edits_are_let_in_where_a_server_of_databases_is_waited_for(self) -> None:
+        edit = {"type": "http", "method": "PATCH", "path": EDIT}
+        here, there = (Doors(served).of(edit) for served in (False, True))
+        assert here is not None and there is not None
+
+        async def let_in(door: Door) -> int:
+            return sum([await waiting_for(door) for _ in range(5)])
+
+        async def waiting_for(door: Door) -> bool:
+            with anyio.move_on_after(0.01):
+                return await door.enter()
+            return False
+
+        assert [asyncio.run(let_in(door)) for door in (here, there)] == [1, EDITS.served]
 
     def test_zips_that_are_not_written_yet_leave_reads_alone(self) -> None:
         async def test(service: Service) -> None:
