@@ -10,6 +10,7 @@ more makes all of them slower, with the event loop (decision 0049).
 from __future__ import annotations
 
 import asyncio
+import os
 import re
 from contextlib import suppress
 from dataclasses import dataclass
@@ -58,8 +59,8 @@ LOOKS = Lane("looks", 2, 200)
 """What one group, view or camera is, and what a window asks again and again."""
 PAGES = Lane("pages", 2, 200)
 """The page of the browser application, whichever address it is asked for under."""
-READS = Lane("reads", 4, 200)
-"""All other reading: lists and counts of many groups, which the database takes its time for."""
+READS = Lane("reads", min(4, max(2, os.cpu_count() or 2)), 200)
+"""All other reading: lists and counts of many groups, which the database takes a processor for."""
 EDITS = Lane("edits", 1, 100, served=3)
 """What people do to one group, view or lease all day: read, solved and encoded one after the other. Who
 waits for the disk or a picture has left already (``app.place``)."""
@@ -69,7 +70,7 @@ PREVIEWS = Lane("previews", 1, 100)
 """What a drag asks: some milliseconds of solving."""
 QUESTIONS = Lane("questions", 2, 100)
 """What is answered by solving many times, or many groups; it takes up to seconds."""
-STREAMS = Lane("streams", 4, 200)
+STREAMS = Lane("streams", 1, 200)
 """Those that begin: who listens takes nobody's place. All windows of a team come back at the same
 moment when a server starts again, and what each asks first would keep readers waiting."""
 IMAGES = Lane("images", 6, 200)
