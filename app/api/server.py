@@ -19,7 +19,7 @@ from app.solving.warm import warm_up
 
 WAITING = 256
 """Connections that may wait to be accepted."""
-ACCEPTED_AT_ONCE = 8
+ACCEPTED_AT_ONCE = 1
 """Connections that are accepted before those that are open are looked after again: who comes with
 five hundred at once makes nobody wait for all of them."""
 SWITCH_SECONDS = 0.001
