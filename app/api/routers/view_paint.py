@@ -8,8 +8,8 @@ from typing import Any
 from anyio import to_thread
 from fastapi import APIRouter, Request, Response
 
-from app.api.child_pool import while_wanted
 from app.api.deps import AppServices, Id
+from app.api.pool_answer import while_wanted
 from app.api.problem import responses
 from app.api.routers.views import CLIENT_GONE, told_with_view
 from app.api.schemas.annotation import points_of

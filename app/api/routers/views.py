@@ -11,7 +11,6 @@ from typing import Annotated
 from anyio import to_thread
 from fastapi import APIRouter, Body, Query, Request, Response
 
-from app.api.child_pool import while_wanted
 from app.api.deps import (
     Actor,
     AppServices,
@@ -20,6 +19,7 @@ from app.api.deps import (
     Services,
     etag_matches,
 )
+from app.api.pool_answer import while_wanted
 from app.api.problem import Responses, responses
 from app.api.reply import Asked, AskedUnder
 from app.api.routers.groups import CHANGED, CONFLICTS, change_group, load_document

@@ -99,8 +99,8 @@ LANES = (
 AWAY = 8
 """So many of a lane may have left it before they were done."""
 THREADS = sum(max(lane.width, lane.served or 0) for lane in LANES) + 2 * AWAY + 6
-"""A thread for each request at work, for edits and changes that have left, and some for files of the
-browser application."""
+"""A thread for each request at work, for as many edits and changes as may have left, and some for files
+of the browser application."""
 
 _API = re.compile(r"/api/v\d+/")
 _NO_PAGE = re.compile(r"/(?:healthz|readyz|metrics)$|/(?:assets|static)/")

@@ -9,6 +9,7 @@ import pytest
 from fastapi import FastAPI
 
 from app.api.previews import Previews
+from app.errors import DamagedError
 from tests.waiting import SECONDS
 
 API = "/api/v1"
@@ -28,6 +29,10 @@ def alike(answer: Any) -> Any:
 
 def break_down(*_: object) -> None:
     os._exit(3)
+
+
+def see_damage(*_: object) -> None:
+    raise DamagedError("a row is torn")
 
 
 @pytest.fixture
@@ -81,6 +86,14 @@ class TestApart:
             headers={"If-Match": group["etag"]},
         ).raise_for_status()
         assert preview(api).json()["solution"]["pairs"] != before["pairs"]
+
+    def test_damage_that_the_process_sees_stops_changes_here(
+        self, app, ready, api, monkeypatch
+    ) -> None:
+        monkeypatch.setattr("app.api.previews.solve_apart", see_damage)
+        assert preview(api).status_code == 503
+        with pytest.raises(DamagedError, match="no change is taken: a row is torn"):
+            app.state.services.store.require_undamaged()
 
     def test_one_that_broke_down_is_said_and_another_takes_its_place(
         self, ready, api, monkeypatch

@@ -1,4 +1,4 @@
-"""Child pool: what a request waits for of it, for as long as whoever asked is there."""
+"""Pool answer: what a child pool makes for a request, for as long as whoever asked is there."""
 
 from __future__ import annotations
 
