@@ -21,7 +21,7 @@ from app.api.schemas.solution import SolutionDocument
 from app.child import Allowance, ChildEnded
 from app.child_pool import ChildPool
 from app.config import Settings
-from app.errors import DamagedError, OverloadedError
+from app.errors import OverloadedError
 from app.review.editing.follow_paint import PaintFollower, WithoutPictures
 from app.review.editing.submit import preview
 from app.solving.warm import warm_up
@@ -63,17 +63,12 @@ class Previews:
             InputError: It has no such view, or the changes are too many.
             SharedStationError: See ``submit.preview``.
             OverloadedError: The process ended.
-            DamagedError: A row is not what was written; the server takes no change from then on.
         """
         self._begin()
         if self._pool is not None and self.is_ready:
             given = (self._settings, group_id, changes)
             task = self._pool.submit(solve_apart, *given, explain=_ended)
-            try:
-                found: bytes | None = await while_wanted(request, task)
-            except DamagedError as error:
-                self._store.note_damage(error)
-                raise
+            found: bytes | None = await while_wanted(request, task)
             if found is not None:
                 return found
             if await request.is_disconnected():
