@@ -10,6 +10,8 @@ from typing import Any
 import pytest
 from playwright.sync_api import Error, Page, expect
 
+from tests.e2e.screen import TWO_FRAMES
+
 OpenPage = Callable[..., Page]
 
 AXE = Path(__file__).resolve().parents[2] / "static" / "node_modules" / "axe-core" / "axe.min.js"
@@ -47,8 +49,16 @@ def soon(page: Page, faults: str) -> list[str]:
     """What a script finds once the page has come to rest; the last of it, where it never does."""
     with suppress(Error):
         page.wait_for_function(f"() => ({faults})().length === 0")
+        return []
     found: list[str] = page.evaluate(faults)
     return found
+
+
+def resize(page: Page, width: int, height: int) -> None:
+    """Give the page another size, and time to hear of it: what stood before must not be judged."""
+    page.set_viewport_size({"width": width, "height": height})
+    page.wait_for_function(f"() => innerWidth === {width} && innerHeight === {height}")
+    page.evaluate(TWO_FRAMES)
 
 
 def shown(open_page: OpenPage, name: str) -> Page:
@@ -100,7 +110,7 @@ def fits(page: Page) -> None:
     """Everybody can use the screen as it stands, in both schemes and at every size."""
     found: dict[str, Any] = {"axe": serious_in_both(page)}
     for width, height in SIZES:
-        page.set_viewport_size({"width": width, "height": height})
+        resize(page, width, height)
         found[f"cut off at {width}"] = soon(page, CUT_OFF)
         found[f"scrolls twice at {width}"] = soon(page, NESTED_SCROLLERS)
         found[f"wider than {width}"] = soon(page, TOO_WIDE)

@@ -14,6 +14,7 @@ from tests.e2e.test_access import (
     BEYOND_ITS_FRAME,
     NESTED_SCROLLERS,
     SIZES,
+    resize,
     serious_in_both,
     soon,
 )
@@ -48,7 +49,7 @@ class TestEveryPage:
             page.wait_for_selector(waited)
             found = {"axe": serious_in_both(page)}
             for width, height in SIZES:
-                page.set_viewport_size({"width": width, "height": height})
+                resize(page, width, height)
                 found[f"too wide at {width}"] = soon(page, TOO_WIDE)
                 found[f"scrolls twice at {width}"] = soon(page, NESTED_SCROLLERS)
                 found[f"cut off at {width}"] = soon(page, BEYOND_ITS_FRAME)
@@ -60,7 +61,7 @@ def usable(page: Page) -> None:
     found = {"axe": serious_in_both(page)}
     before = page.viewport_size
     for width, height in SIZES:
-        page.set_viewport_size({"width": width, "height": height})
+        resize(page, width, height)
         found[f"too wide at {width}"] = soon(page, TOO_WIDE)
         found[f"scrolls twice at {width}"] = soon(page, NESTED_SCROLLERS)
         found[f"cut off at {width}"] = soon(page, BEYOND_ITS_FRAME)
