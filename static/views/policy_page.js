@@ -152,7 +152,9 @@ function PolicyOf({ one }) {
 		const [{ items, fields }, { policy, etag }] = await Promise.all([getPolicies(signal), getPolicy(one.id, signal)]);
 		return { shipped: items, fields, policy, etag };
 	}, [one.id]);
-	const { job, busy, error, send } = useSavePolicy(() => { loaded.reload(); loadDatasets(); });
+	const { job, error, send, ...saving } = useSavePolicy(() => { loaded.reload(); loadDatasets(); });
+	// What was saved is in force only once it was read: until then the policy that stands here is an old one.
+	const busy = saving.busy || loaded.waiting;
 	if (loaded.error) return html`<${Trouble} title="The policy cannot be read" error=${loaded.error} retry=${loaded.reload} />`;
 	if (!loaded.value) return html`<${Loading} what="the policy" />`;
 	const { shipped, fields, policy, etag } = loaded.value;
