@@ -34,8 +34,7 @@ run: setup
 
 # Two halves side by side, each in as many processes as there are cores: servers and browsers that
 # are tested are processes too. Files in their order, so that the long ones (integration, security)
-# come first and no process is left with one at the end. Every line says which half speaks. The browser's
-# is the shorter one: it goes on with the tests on real data.
+# come first and no process is left with one at the end. Every line says which half speaks.
 PROCESSES = $(shell n=$$(getconf _NPROCESSORS_ONLN); echo $$(( n < 2 ? 2 : n < 8 ? n : 8 )))
 # What tests write lies in memory where that has much room: they wait for no disk.
 ROOMY = $(shell df -Pk /dev/shm 2>/dev/null | awk 'NR == 2 && $$4 > 8000000 { print "yes" }')
@@ -48,10 +47,10 @@ test: setup chromium postgresql generators readers moto
 	@echo "Every test has passed."
 
 test-python:
-	@$(PYTEST) --ignore=tests/e2e --ignore=tests/real 2>&1 | sed -u 's/^/python  | /'
+	@$(PYTEST) --ignore=tests/e2e 2>&1 | sed -u 's/^/python  | /'
 
 test-browser:
-	@{ $(BIN)/npm --prefix static test && $(PYTEST) tests/e2e tests/real; } 2>&1 | sed -u 's/^/browser | /'
+	@{ $(BIN)/npm --prefix static test && $(PYTEST) tests/e2e; } 2>&1 | sed -u 's/^/browser | /'
 
 # The browser tests before pages whose every request, frame, picture and event is late: who does not wait falls.
 test-late: setup chromium
