@@ -229,14 +229,16 @@ class Cluster(Executor):
             if task is None or task.sent is not done:
                 # It was sent again meanwhile.
                 return
-        if done.status not in ("finished", "error"):
+        # While its result is fetched, a scheduler that goes makes it a lost one.
+        arrived = done.status
+        if arrived not in ("finished", "error"):
             self._lost.set()
             return
         try:
             value = done.result(timeout=_CONNECT_S)
         except Exception as error:
             gone = self._client.status != "running" or isinstance(error, _GONE)
-            if gone and done.status == "finished":
+            if gone and arrived == "finished":
                 self._lost.set()
             else:
                 # Also a result that cannot be read, which would be none better a second time.

@@ -125,6 +125,25 @@ class TestCluster:
         with Cluster(place) as executor, pytest.raises((TimeoutError, NotFoundError)):
             executor.submit(work, 7).result(SECONDS)
 
+    def test_what_is_lost_while_it_is_fetched_is_done_again(
+        self, place: Place, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        from distributed import Future as Sent
+
+        fetch, lost = Sent.result, list[Sent]()
+
+        def lose_the_first(sent: Sent, timeout: float | None = None) -> object:
+            if not lost:
+                lost.append(sent)
+                sent._state.lose()
+                raise OSError("the scheduler went")
+            return fetch(sent, timeout)
+
+        monkeypatch.setattr(Sent, "result", lose_the_first)
+        with Cluster(place) as workers:
+            assert workers.submit(double, 4).result(SECONDS) == 8
+        assert lost
+
     def test_a_worker_of_another_version_does_nothing(
         self, place: Place, monkeypatch: pytest.MonkeyPatch
     ) -> None:
