@@ -19,7 +19,6 @@ from app.config import Settings
 from app.errors import BusyError, InputError
 from app.review import jobs
 from app.review.jobs import upkeep
-from app.review.jobs.jobs import Jobs
 from app.review.jobs.match_job import MatchJob
 
 
@@ -47,9 +46,9 @@ class TestServices:
         self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         made: set[str] = set()
-        for name in ("makes", "resumes"):
-            monkeypatch.setattr(Jobs, name, lambda _, kind, work_of: made.add(kind))
         services = Services.open(Settings(home=tmp_path / "home"))
+        for name in ("makes", "resumes"):
+            monkeypatch.setattr(services.jobs, name, lambda kind, work_of: made.add(kind))
         services.start()
         services.close()
         modules = [
