@@ -130,7 +130,8 @@ class TestCluster:
     ) -> None:
         from distributed import Future as Sent
 
-        fetch, lost = Sent.result, list[Sent]()
+        fetch = Sent.result
+        lost: list[Sent] = []
 
         def lose_the_first(sent: Sent, timeout: float | None = None) -> object:
             if not lost:
