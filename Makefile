@@ -13,7 +13,7 @@ NPM := PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/npm
 .PHONY: setup run test test-python test-browser test-late test-postgresql check audit release generators readers moto bench mutate torture fuzz paper chromium postgresql clean
 .DEFAULT_GOAL := run
 
-setup: .venv/ready static/node_modules/.ready
+setup: .venv/ready static/node_modules/.ready static/built/about.json
 
 .venv/ready: requirements.lock pyproject.toml
 	@test -n "$(PYTHON)" || { echo "Touchline needs Python 3.11, 3.12 or 3.13 with venv (Debian: apt-get install python3-venv)."; exit 1; }
@@ -28,6 +28,11 @@ static/node_modules/.ready: static/package-lock.json .venv/ready
 	@echo "Installing browser libraries into static/node_modules"
 	@cd static && PATH="$(CURDIR)/$(BIN):$$PATH" npm ci --no-audit --no-fund --loglevel=error
 	@touch $@
+
+# The modules in a few files. Where they cannot be joined, pages ask for the modules themselves.
+MODULES = $(shell find static \( -name node_modules -o -name built -o -name built.new \) -prune -o -name '*.js' -print)
+static/built/about.json: static/build.mjs static/node_modules/.ready $(MODULES)
+	@PATH="$(CURDIR)/$(BIN):$$PATH" npm --prefix static run --silent build || echo "The modules could not be joined; pages will ask for each of them."
 
 run: setup
 	@$(BIN)/touchline serve --sample

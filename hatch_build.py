@@ -15,7 +15,9 @@ from typing import Any
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
 LIBRARIES = "node_modules"
-TOOLING = frozenset({".npmrc", "package.json", "tsconfig.json"})
+JOINED = "built"
+"""The folder of the application's modules, joined into few files (``npm run build``)."""
+TOOLING = frozenset({".npmrc", "build.mjs", "package.json", "tsconfig.json"})
 """Files that only development needs. The libraries' lock file stays: it is a part of what the
 server calls the version of the application."""
 LICENCE = "[Ll][Ii][Cc][Ee][Nn][CcSs][Ee]*"
@@ -34,7 +36,7 @@ class TouchlineBuildHook(BuildHookInterface[Any]):
         if version == "editable":
             return
         root = Path(self.root)
-        taken = list(library_files(root / "static"))
+        taken = [*library_files(root / "static"), *joined_files(root / "static")]
         if self.target_name == "wheel":
             taken += own_files(root / "static")
             taken += sorted(root.glob("migrations/*.*")) + sorted(root.glob("migrations/*/*.py"))
@@ -49,8 +51,22 @@ def own_files(static: Path) -> list[Path]:
     return [
         path
         for path in found
-        if LIBRARIES not in path.relative_to(static).parts and path.name not in TOOLING
+        if path.relative_to(static).parts[0] not in (LIBRARIES, JOINED) and path.name not in TOOLING
     ]
+
+
+def joined_files(static: Path) -> list[Path]:
+    """The modules of the application, joined.
+
+    Raises:
+        FileNotFoundError: They have not been.
+    """
+    found = sorted(path for path in (static / JOINED).rglob("*") if path.is_file())
+    if not found:
+        raise FileNotFoundError(
+            "The browser's modules are not joined: run 'npm run build' in static/ (make setup)."
+        )
+    return found
 
 
 def library_files(static: Path) -> Iterator[Path]:

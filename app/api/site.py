@@ -9,6 +9,7 @@ import re
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from app.api.joined_modules import JoinedModules
 from app.api.security.headers import content_security_policy
 from app.folders import own_folder
 
@@ -49,10 +50,10 @@ class IndexPage:
     def make(folder: Path, version: str, *, team: bool = False) -> IndexPage:
         """The page of a folder, with the policy that admits its import map.
 
-        Its modules are asked for below an address that names their version, so that browsers
-        keep them for good and a start costs no question per module. Its style sheets come as
-        one, in the place of the last. On the server of a ``team`` it says so, and then asks who
-        is there before it shows anything.
+        Its modules, joined where they were, are asked for below an address that names their
+        version, so that browsers keep them for good and a start costs no question per module. Its
+        style sheets come as one, in the place of the last. On the server of a ``team`` it says so,
+        and then asks who is there before it shows anything.
 
         Raises:
             OSError: The page or one of its sheets cannot be read.
@@ -63,6 +64,8 @@ class IndexPage:
         if sheets:
             last = sheets[-1].end()
             html = _SHEET.sub(b"", html[:last]) + _ALL_SHEETS + html[last:]
+        if (joined := JoinedModules.read(folder)) is not None:
+            html = joined.put_into(html)
         modules = tuple(found.decode() for found in _MODULE.findall(html))
         html = html.replace(b'"/static/', f'"/assets/{version}/'.encode())
         if team:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import shutil
 import subprocess
@@ -24,7 +25,7 @@ from tests.e2e.service import ROOT
 
 SECONDS = 300
 LOAD_ALL = """(modules) => {
-  const folder = new URL('.', document.querySelector('script[src$="/main.js"]').src);
+  const folder = new URL('..', document.querySelector('script[src$="/built/main.js"]').src);
   return Promise.all(modules.map(async (name) => { await import(new URL(name, folder).href); }));
 }"""
 ASK = """from app.commands import command_line
@@ -140,10 +141,10 @@ def names(wheel: Path) -> list[str]:
 
 
 def own_modules(dist: Path) -> list[str]:
-    """The modules of the application in a wheel, without those of libraries."""
+    """The modules of the application in a wheel, as they were written."""
     held = names(next(dist.glob(WHEEL)))
     scripts = [name.removeprefix("app/static/") for name in held if name.endswith(".js")]
-    return [name for name in scripts if not name.startswith("node_modules/")]
+    return [name for name in scripts if not name.startswith(("node_modules/", "built/"))]
 
 
 class TestWheel:
@@ -155,9 +156,17 @@ class TestWheel:
             parts = name.split("/")
             depth = 5 if parts[3].startswith("@") else 4
             assert "/".join([*parts[:depth], "LICENSE"]) in held
-        tools = ("typescript", "axe-core", "package.json", "tsconfig.json", ".npmrc", "tests/")
+        tools = ("typescript", "esbuild", "axe-core", "package.json", "tsconfig.json")
+        tools += (".npmrc", "build.mjs", "tests/")
         assert [name for name in held if any(tool in name for tool in tools)] == []
         assert any(name.endswith("dist-info/licenses/LICENSE") for name in held)
+
+    def test_the_modules_are_in_it_joined_and_apart(self, dist: Path) -> None:
+        with zipfile.ZipFile(next(dist.glob(WHEEL))) as archive:
+            about = json.loads(archive.read("app/static/built/about.json"))
+            held = archive.namelist()
+        joined = [f"built/{name}" for name in ("main.js", "ahead.js", *about["needed_first"])]
+        assert {f"app/static/{name}" for name in ("main.js", *joined)} <= {*held}
 
     def test_without_the_libraries_nothing_is_built(self, sources: Path, tmp_path: Path) -> None:
         bare = tmp_path / "bare"
@@ -217,6 +226,6 @@ class TestInstallation:
             assert screen.document()["solution"] is not None
             page.goto("/help/words")
             page.locator(".help-words dt").first.wait_for()
-            # Pages load most of their modules, and the libraries of those, when somebody asks.
-            page.evaluate(LOAD_ALL, own_modules(dist))
+            # Beside the joined ones that the page has; to load the first again would begin again.
+            page.evaluate(LOAD_ALL, [name for name in own_modules(dist) if name != "main.js"])
             assert faults == []

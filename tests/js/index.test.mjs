@@ -70,7 +70,8 @@ describe('package-lock.json', () => {
 /** Every file of ours with that ending. */
 function ours(ending, folder = STATIC) {
 	return readdirSync(folder, { withFileTypes: true }).flatMap((entry) => {
-		if (entry.name === 'node_modules') return [];
+		// Libraries, and the same files joined.
+		if (['node_modules', 'built', 'built.new'].includes(entry.name)) return [];
 		const path = join(folder, entry.name);
 		if (entry.isDirectory()) return ours(ending, path);
 		return entry.name.endsWith(ending) ? [path] : [];

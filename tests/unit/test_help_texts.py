@@ -35,6 +35,7 @@ PLAIN_WORDS = """
     attempts lived processes shared sharing short web
     addresses messages secrets sender
     challenges enrol
+    joined
     proof provider identities sign
     access account accounts join link links login logins passwords people person roles team tokens
     bearer codes me remote rules tries users
@@ -86,7 +87,8 @@ def glossary_words() -> list[str]:
 def source_files(tree: str) -> list[Path]:
     """The Python and JavaScript files of a part of the product."""
     found = (path for ending in ("py", "js") for path in (ROOT / tree).rglob(f"*.{ending}"))
-    return [path.relative_to(ROOT) for path in found if "node_modules" not in path.parts]
+    others = {"node_modules", "built"}
+    return [path.relative_to(ROOT) for path in found if not others & {*path.parts}]
 
 
 class TestPages:
