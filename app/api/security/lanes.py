@@ -47,12 +47,15 @@ class Lane:
         queue: How many more may wait for their turn.
         served: How many are at work where a server of databases is waited for at each statement; None:
             as many as elsewhere.
+        pause: Seconds until who cannot even wait is told so. A refusal costs the event loop about as
+            much as any answer, and who has hundreds of them at once asks again at once.
     """
 
     name: str
     width: int
     queue: int
     served: int | None = None
+    pause: float = 0.0
 
 
 LOOKS = Lane("looks", 2, 200)
@@ -74,7 +77,7 @@ STREAMS = Lane("streams", 1, 200)
 """Those that begin: who listens takes nobody's place. All windows of a team come back at the same
 moment when a server starts again, and what each asks first would keep readers waiting."""
 IMAGES = Lane("images", 6, 200)
-UPLOADS = Lane("uploads", 8, 8)
+UPLOADS = Lane("uploads", 8, 8, pause=2.0)
 ZIPS = Lane("zips", 16, 100)
 """Those of exports, which a request may find still being written."""
 LOGINS = Lane("logins", 4, 50)
@@ -168,6 +171,7 @@ class Door:
             return True
         if self.waiting >= self.lane.queue:
             self.refused += 1
+            await anyio.sleep(self.lane.pause)
             return False
         self.waiting += 1
         try:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Awaitable, Callable
+from time import monotonic
 from typing import Any
 
 import anyio
@@ -228,10 +229,28 @@ class TestLanes:
 
     def test_one_more_than_may_wait_is_told_to_come_back(self) -> None:
         async def test(service: Service) -> None:
-            for _ in range(UPLOADS.width + UPLOADS.queue + 1):
-                service.ask("POST", "/uploads")
+            for _ in range(CHANGES.width + CHANGES.queue + 1):
+                service.ask("POST", "/datasets")
             await service.settle()
             assert service.statuses == [503]
+            await service.end()
+
+        run(test)
+
+    def test_who_uploads_one_too_many_is_told_so_slowly_and_keeps_nobody_waiting(self) -> None:
+        async def test(service: Service) -> None:
+            began = monotonic()
+            for _ in range(UPLOADS.width + UPLOADS.queue + 3):
+                service.ask("POST", "/uploads")
+            await service.settle()
+            assert service.statuses == []
+            service.ask("GET", "/groups/1")
+            await service.settle()
+            assert len(service.work.begun) == UPLOADS.width + 1
+            while len(service.statuses) < 3:
+                await asyncio.sleep(0.05)
+            assert service.statuses == [503, 503, 503]
+            assert monotonic() - began >= UPLOADS.pause
             await service.end()
 
         run(test)
