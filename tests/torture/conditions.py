@@ -214,7 +214,7 @@ def _fill(http: httpx.Client, ballast: Path, tell: Callable[[str], None]) -> lis
 def clock_set_back(home: Path, tell: Callable[[str], None] = lambda _: None) -> list[str]:
     """Three days earlier while people work: order, repetition, jobs and events stay right."""
     clock = home.with_name("clock")
-    clock.write_text("0")
+    _set(clock, 0)
     server = Server(home, CLOCK.format(str(clock)))
     server.start()
     try:
@@ -225,11 +225,18 @@ def clock_set_back(home: Path, tell: Callable[[str], None] = lambda _: None) -> 
         server.kill()
 
 
+def _set(clock: Path, aside: int) -> None:
+    """At once: a server that read half of it would fail in whatever asks for the time."""
+    written = clock.with_suffix(".new")
+    written.write_text(str(aside))
+    written.replace(clock)
+
+
 def _turn_back(http: httpx.Client, clock: Path, tell: Callable[[str], None]) -> list[str]:
     person = _Person(http)
     faults = person.edit(200, key="before")
     first = person.last
-    clock.write_text(str(-3 * DAY))
+    _set(clock, -3 * DAY)
     faults += person.edit(200, key="after")
     again = http.patch(first.request.url, content=first.request.content, headers=_sent(first))
     if again.content != first.content or "idempotency-replayed" not in again.headers:

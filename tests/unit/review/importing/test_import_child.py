@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import threading
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import pytest
 
-from app.child import Child
 from app.datasets.soccernet_v3_writer import write_soccernet_v3
 from app.errors import DamagedError, JobCancelled, TooLargeError
 from app.progress import Progress
@@ -53,6 +54,12 @@ def tree(tmp_path: Path, make_group: Callable[..., Group]) -> Path:
 def store(there: Store) -> Store:
     """An installation of its own: the child opens it, and looks at its files first."""
     return there
+
+
+def take_and_keep(*told: Any) -> None:
+    """An import that has its turn to write, and never gives it back."""
+    told[-1]("take")
+    time.sleep(SECONDS)
 
 
 def meet_damage(*_: object) -> None:
@@ -142,12 +149,22 @@ class TestImportApart:
     def test_one_that_is_told_to_end_ends_and_lets_others_write(
         self, store: Store, tree: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        # A process that waits already may be done before anybody says that it shall end.
-        monkeypatch.setattr(import_child, "Child", Child)
+        own, taken = store.turn, threading.Event()
+
+        class Turn:
+            def __enter__(self) -> None:
+                own.__enter__()
+                taken.set()
+
+            def __exit__(self, *_: object) -> None:
+                own.__exit__(None, None, None)
 
         def stop() -> None:
-            raise JobCancelled
+            if taken.is_set():
+                raise JobCancelled
 
+        monkeypatch.setattr(store, "turn", Turn())
+        monkeypatch.setattr(import_child, "import_here", take_and_keep)
         with pytest.raises(JobCancelled):
             apart(store, tree, stop=stop)
         with store.write():
