@@ -3,14 +3,21 @@
 from __future__ import annotations
 
 import gc
+import sys
 
 import pytest
 from httpx._config import DEFAULT_TIMEOUT_CONFIG
 from sqlalchemy import Engine, event
 
+from tests.made_once import make_once
 from tests.on_postgresql import MARK, install, shared_cluster
-from tests.starting import end_nursery
+from tests.spawning import start_loaded
+from tests.starting import end_nursery, nursery
 from tests.waiting import SECONDS
+
+make_once()
+if sys.platform == "linux":
+    start_loaded(lambda: nursery().children)
 
 YOUNG = 50_000
 """New objects before the collector looks at them: seventy times as many as by default."""

@@ -20,15 +20,17 @@ import io
 import json
 import os
 import pkgutil
-import re
+import shutil
 import signal
 import socket
 import subprocess
 import sys
+import tempfile
 import time
 from pathlib import Path
 from typing import Any, ClassVar
 
+from tests.spawning import fork_children, listen_for_children, read_mask, start_loaded
 from tests.waiting import SECONDS
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -59,13 +61,11 @@ class Process(subprocess.Popen[Any]):
             "arguments": args[3:],
             "environment": dict(os.environ if environment is None else environment),
             "session": session,
-            "mask": _mask(),
+            "mask": read_mask(),
         }
-        if Process.nursery is None:
-            Process.nursery = Nursery()
         read, _, _, told, _, complained = ends
         standard = [own if end == -1 else end for own, end in enumerate((read, told, complained))]
-        self.pid = Process.nursery.bear(asked, standard)
+        self.pid = nursery().bear(asked, standard)
         self._child_created = True
         self._close_pipe_fds(*ends)  # type: ignore[attr-defined]
 
@@ -104,10 +104,11 @@ def _bound(environment: Any) -> dict[str, str]:
     return {name: text for name, text in environment.items() if not name.startswith(FREE)}
 
 
-def _mask() -> int:
-    """Permissions that new files of this process do not have, read without changing them."""
-    status = Path("/proc/self/status").read_text()
-    return int(re.findall(r"^Umask:\s+(\d+)$", status, re.MULTILINE)[0], 8)
+def nursery() -> Nursery:
+    """The process that forks for this one; the first that asks starts it."""
+    if Process.nursery is None:
+        Process.nursery = Nursery()
+    return Process.nursery
 
 
 class Nursery:
@@ -117,13 +118,16 @@ class Nursery:
         self._line, far = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         self._line.settimeout(SECONDS)
         program = "from tests.starting import wait_for_requests; exec(wait_for_requests())"
-        with far:
+        self._folder = tempfile.mkdtemp(prefix="touchline-")
+        listener, self.children = listen_for_children(self._folder)
+        with far, listener:
+            files = far.fileno(), listener.fileno()
             self._process = subprocess.Popen(
-                [sys.executable, "-c", program, str(far.fileno())],
+                [sys.executable, "-c", program, *map(str, files), self.children],
                 cwd=ROOT,
                 # Threads would not live on in a fork.
                 env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},
-                pass_fds=(far.fileno(),),
+                pass_fds=files,
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.DEVNULL,
             )
@@ -144,6 +148,7 @@ class Nursery:
         """End it; what it has borne lives on."""
         self._line.close()
         self._process.wait()
+        shutil.rmtree(self._folder)
 
 
 def _adopt(orphans: bool) -> None:
@@ -157,6 +162,7 @@ def wait_for_requests() -> str:
     # Ctrl+C reaches every process of a terminal; this one ends with its parent.
     interrupted = signal.signal(signal.SIGINT, signal.SIG_IGN)
     _load()
+    needed, address = fork_children(int(sys.argv[2])), sys.argv[3]
     while True:
         message, files, _, _ = socket.recv_fds(line, MOST, 3)
         if not message:
@@ -164,7 +170,12 @@ def wait_for_requests() -> str:
         between = os.fork()
         if not between:
             _leave_behind(line)
-            program = _become(json.loads(message), files)
+            os.close(needed)
+            asked = json.loads(message)
+            if not asked["session"]:
+                # Children of one that leads a session would have to belong to it, too.
+                start_loaded(lambda: address)
+            program = _become(asked, files)
             # Whoever was started in the background of a script ignores it, and so do its children.
             signal.signal(signal.SIGINT, interrupted)
             line.send(b"born")

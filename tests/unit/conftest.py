@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from functools import cache
+from multiprocessing.context import SpawnProcess
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +23,7 @@ from app.store.store import Store
 from tests.databases import SQLITE, Databases, databases_of, opened_databases
 from tests.kept_child import USERS, KeptChild
 from tests.schemas import copied_schemas, make_schema
+from tests.spawning import ANEW
 
 # As the server logs. The default draws a traceback with all its variables, half a second each.
 structlog.configure(
@@ -109,6 +111,12 @@ def _schemas_are_copied() -> Iterator[None]:
     """An empty home is migrated once in a process."""
     with copied_schemas():
         yield
+
+
+@pytest.fixture
+def children_start_anew(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Children start as the product starts them: for tests of that, and of what they may use."""
+    monkeypatch.setattr(SpawnProcess, "_Popen", staticmethod(ANEW))
 
 
 @pytest.fixture

@@ -25,6 +25,8 @@ from app.errors import (
 )
 from tests.waiting import SECONDS
 
+pytestmark = pytest.mark.usefixtures("children_start_anew")
+
 MEBI = 2**20
 ENDLESS = re.compile(r"(a+)+$"), "a" * 60 + "b"
 """A pattern that never comes to an end, and never lets another thread of its process run."""

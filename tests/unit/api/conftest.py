@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from anyio.from_thread import BlockingPortal, start_blocking_portal
 from fastapi import FastAPI
 from starlette.types import ASGIApp
 
@@ -44,10 +45,23 @@ INDEX = b"""<!doctype html>
 """
 
 
+@pytest.fixture(scope="session")
+def event_loop_of_all() -> Iterator[BlockingPortal]:
+    """An event loop beside the tests; a client that has none starts one for every request."""
+    with start_blocking_portal() as portal:
+        yield portal
+
+
 @pytest.fixture
-def client_of() -> Callable[[ASGIApp], TestClient]:
+def client_of(event_loop_of_all: BlockingPortal) -> Callable[[ASGIApp], TestClient]:
     """A client that talks to an application as a browser on the same machine does."""
-    return lambda app: TestClient(app, base_url=BASE, raise_server_exceptions=False)
+
+    def make(app: ASGIApp) -> TestClient:
+        client = TestClient(app, base_url=BASE, raise_server_exceptions=False)
+        client.portal = event_loop_of_all
+        return client
+
+    return make
 
 
 @pytest.fixture
