@@ -35,7 +35,7 @@ PLAIN_WORDS = """
     attempts lived processes shared sharing short web
     addresses messages secrets sender
     challenges enrol
-    joined
+    joined turns
     proof provider identities sign
     access account accounts join link links login logins passwords people person roles team tokens
     bearer codes me remote rules tries users

@@ -1,7 +1,8 @@
 """Lanes: how many requests of a kind are at work at a time, and how many may wait.
 
 Threads are few. A request waits for its turn on the event loop, where waiting costs next to
-nothing, so that changes behind a held write lock never take the threads that reads need.
+nothing, so that changes behind a held write lock never take the threads that reads need. People have
+their turns one after the other, however many requests each of them sends.
 
 Lanes of what is computed are narrow: threads that compute take turns within one process, and each
 more makes all of them slower, with the event loop (decision 0049).
@@ -21,7 +22,9 @@ from starlette.responses import HTMLResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from app.api.problem import make_problem, problem_response
+from app.api.security.access import login_of
 from app.api.security.origin import SAFE_METHODS
+from app.api.security.turns import Turns
 from app.place import hold_place
 
 PATIENCE = 10.0
@@ -155,37 +158,39 @@ class Door:
 
     def __init__(self, lane: Lane, served: bool = False):
         self.lane = lane
-        self.waiting = self.refused = self.away = 0
-        self._width = lane.served if served and lane.served else lane.width
-        self._free = anyio.Semaphore(self._width, fast_acquire=True)
+        self.refused = self.away = 0
+        self._turns = Turns(lane.served if served and lane.served else lane.width, lane.queue)
 
     @property
     def busy(self) -> int:
         """How many are at work."""
-        return self._width - self._free.value
+        return self._turns.width - self._turns.free
 
-    async def enter(self) -> bool:
-        """Wait for a turn; False where too many wait, or it took too long."""
-        if self._free.value:
-            await self._free.acquire()
+    @property
+    def waiting(self) -> int:
+        """How many wait for their turn."""
+        return self._turns.waiting
+
+    async def enter(self, who: str = "") -> bool:
+        """Wait for a turn; False where too many wait, or it took too long.
+
+        Args:
+            who: The person whose request it is; those of nobody wait together.
+        """
+        if self._turns.take():
             return True
-        if self.waiting >= self.lane.queue:
+        if not self._turns.has_room(who):
             self.refused += 1
             await anyio.sleep(self.lane.pause)
             return False
-        self.waiting += 1
-        try:
-            with anyio.move_on_after(PATIENCE):
-                await self._free.acquire()
-                return True
-        finally:
-            self.waiting -= 1
+        if await self._turns.wait(who, PATIENCE):
+            return True
         self.refused += 1
         return False
 
     def leave(self) -> None:
         """Let the next one in."""
-        self._free.release()
+        self._turns.give()
 
 
 class Doors:
@@ -218,7 +223,8 @@ class Lanes:
         if door is None:
             await self.app(scope, receive, send)
             return
-        if not await door.enter():
+        login = login_of(scope)
+        if not await door.enter("" if login is None else login.name):
             await _refusal(scope, door.lane)(scope, receive, send)
             return
         place = _Place(door)

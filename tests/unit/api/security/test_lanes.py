@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Awaitable, Callable
+from dataclasses import dataclass
 from time import monotonic
 from typing import Any
 
@@ -14,6 +15,7 @@ from starlette.types import Receive, Scope, Send
 
 from app.api.application import PREFIX
 from app.api.security import lanes
+from app.api.security.access import LOGIN
 from app.api.security.lanes import (
     AWAY,
     CHANGES,
@@ -117,6 +119,13 @@ class Work:
         await self.may_end.wait()
 
 
+@dataclass
+class Named:
+    """What lanes ask of whoever is logged in."""
+
+    name: str
+
+
 class Service:
     """Requests against ``Lanes`` without a socket."""
 
@@ -127,9 +136,13 @@ class Service:
         self.bodies: list[bytes] = []
         self.tasks: list[asyncio.Task[None]] = []
 
-    def ask(self, method: str, path: str, prefix: str = PREFIX, accept: str = "*/*") -> None:
+    def ask(
+        self, method: str, path: str, prefix: str = PREFIX, accept: str = "*/*", who: str = ""
+    ) -> None:
         headers = [(b"accept", accept.encode())]
         scope = {"type": "http", "method": method, "path": prefix + path, "headers": headers}
+        if who:
+            scope[LOGIN] = Named(who)
 
         async def send(message: Any) -> None:
             if message["type"] == "http.response.start":
@@ -178,6 +191,16 @@ class TestLanes:
             await service.end()
             assert service.statuses == [200] * (CHANGES.width + 6)
             assert (door.busy, door.waiting, door.refused) == (0, 0, 0)
+
+        run(test)
+
+    def test_who_sends_many_requests_waits_behind_himself(self) -> None:
+        async def test(service: Service) -> None:
+            for path, who in (("/views/1", "ann"),) * 3 + (("/views/2", "bob"),):
+                service.ask("PATCH", path, who=who)
+            await service.settle()
+            await service.end()
+            assert [path[-1] for path in service.work.begun] == ["1", "1", "2", "1"]
 
         run(test)
 
