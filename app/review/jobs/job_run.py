@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -84,6 +84,7 @@ class JobRun:
     id: int
     kind: str
     dataset_id: int | None
+    actor: str
     work: Work
     progress: JobProgress
     over: threading.Event = field(default_factory=threading.Event)
@@ -123,20 +124,50 @@ def _failure(detail: str, hint: str | None, pointer: str | None = None) -> dict[
 
 @dataclass(frozen=True)
 class RunQueue:
-    """Which jobs of this process wait, and which one runs."""
+    """Which jobs of this process wait, and which run."""
 
     waiting: tuple[JobRun, ...] = ()
-    running: JobRun | None = None
+    running: tuple[JobRun, ...] = ()
 
     @property
     def runs(self) -> tuple[JobRun, ...]:
-        """Those that wait and the one that runs."""
-        return self.waiting if self.running is None else (*self.waiting, self.running)
+        """Those that wait and those that run."""
+        return (*self.waiting, *self.running)
+
+    @property
+    def ready(self) -> list[JobRun]:
+        """Those that wait, and for nothing of their own dataset that runs."""
+        taken = {run.dataset_id for run in self.running} - {None}
+        return [run for run in self.waiting if run.dataset_id not in taken]
+
+    def ready_beside(self, kinds: Collection[str]) -> list[JobRun]:
+        """Those of some kinds that are ready, and of whose dataset nothing was asked for before."""
+        first: dict[int | None, int] = {}
+        for run in self.waiting:
+            first[run.dataset_id] = min(run.id, first.get(run.dataset_id, run.id))
+        return [
+            run
+            for run in self.ready
+            if run.kind in kinds and (run.dataset_id is None or run.id == first[run.dataset_id])
+        ]
+
+    def running_of(self, job_id: int) -> JobRun | None:
+        """The run of a job, where it runs."""
+        return next((run for run in self.running if run.id == job_id), None)
 
     def joined_by(self, *runs: JobRun) -> RunQueue:
         """With more that wait."""
         return replace(self, waiting=(*self.waiting, *runs))
 
+    def begun(self, run: JobRun) -> RunQueue:
+        """With one running that waited."""
+        left = self.left_by(run)
+        return replace(left, running=(*left.running, run))
+
     def left_by(self, run: JobRun) -> RunQueue:
-        """Without one that waits."""
-        return replace(self, waiting=tuple(item for item in self.waiting if item is not run))
+        """Without one that waits or runs."""
+        waiting, running = (
+            tuple(item for item in items if item is not run)
+            for items in (self.waiting, self.running)
+        )
+        return RunQueue(waiting, running)

@@ -1,4 +1,7 @@
-"""Jobs: work that outlasts a request, one piece at a time, with progress, cancel and a record.
+"""Jobs: work that outlasts a request, with progress, cancel and a record.
+
+One runs at a time, and beside it one that only reads (``BESIDE``) where no earlier job of its dataset
+is left. Those who wait have their turns person by person.
 
 The record of a job is a row of the database; the work itself is a function of this process. A
 server that stops leaves its jobs where they are, and the next one takes up again those whose kind
@@ -11,7 +14,7 @@ import threading
 from collections.abc import Callable, Collection, Iterable, Iterator
 from concurrent.futures import Executor
 from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext, suppress
-from dataclasses import replace
+from time import monotonic
 from typing import Any
 
 import structlog
@@ -51,6 +54,10 @@ CAPACITY = 32
 """Jobs that may wait; one more is told to come back."""
 CLOSE_SECONDS = 10.0
 """How long a server that stops waits for the running job's next step."""
+THEIRS = 4
+"""One person leaves this part of the waiting places (one of so many) to others."""
+BESIDE = frozenset({"export"})
+"""Kinds that only read and that somebody waits for; a long import or solve does not keep them waiting."""
 PROMPT = frozenset({"solve"})
 """Kinds that go before the others: somebody looks at the numbers and waits."""
 KEPT = {"solve": 200, "bulk": 200, "verify": 200}
@@ -79,7 +86,9 @@ class Jobs(JobRecords):
         # Never held while the database is asked: requests and the event loop wait for it.
         self._changed = threading.Condition()
         self._closing = threading.Event()
-        self._worker: threading.Thread | None = None
+        self._workers: list[threading.Thread] = []
+        self._turns: dict[str, int] = {}
+        """When each person had a turn last, by the number of the turn."""
         self._resumers: dict[str, Callable[[Job], Work]] = {}
         self._beginners: list[Callable[[], None]] = []
 
@@ -156,14 +165,14 @@ class Jobs(JobRecords):
             enter = entry.enter_context(self._entry())
             known = self._waiting_for(session, new) if once else None
             if not once:
-                self._require_room(session)
+                self._require_room(session, actor)
             job = need_job(session, insert_job(session, new) if known is None else known)
             if known is None:
                 note_job(session, actor, job.id, kind, title, dataset_id)
             keep(job)(session)
             if known is None:
                 progress = JobProgress(job.id, self._closing)
-                enter(JobRun(job.id, kind, dataset_id, work, progress))
+                enter(JobRun(job.id, kind, dataset_id, actor, work, progress))
         if known is not None:
             return job
         self._announce(job)
@@ -181,10 +190,10 @@ class Jobs(JobRecords):
             raise ConflictError(f"job {job_id} is over already")
         with self._changed:
             run = next((item for item in self._queue.waiting if item.id == job_id), None)
-            running = self._queue.running
+            running = self._queue.running_of(job_id)
             if run is not None:
                 self._queue = self._queue.left_by(run)
-            elif running is not None and running.id == job_id:
+            elif running is not None:
                 running.progress.cancelled.set()
         if run is not None:
             self._finish(run, state=CANCELLED, sentence="Cancelled before it began.")
@@ -193,8 +202,8 @@ class Jobs(JobRecords):
     def belongs(self, job_id: int, dataset_id: int) -> None:
         """Note whose a running job is, where its dataset came to be while it ran."""
         self._save(job_id, dataset_id=dataset_id)
-        running = self._queue.running
-        if running is not None and running.id == job_id:
+        running = self._queue.running_of(job_id)
+        if running is not None:
             running.dataset_id = dataset_id
 
     def ids_of(self, dataset_id: int, *kinds: str) -> list[int]:
@@ -238,14 +247,12 @@ class Jobs(JobRecords):
         """End all jobs of a dataset and wait until none of them runs any more.
 
         Raises:
-            ConflictError: The running one has not ended in time.
+            ConflictError: One that runs has not ended in time.
         """
         self.cancel_kind(dataset_id)
-        running = self._queue.running
-        if running is None or running.dataset_id != dataset_id:
-            return
-        if not running.over.wait(CLOSE_SECONDS):
-            raise ConflictError(f"job {running.id} of this dataset is still running")
+        for run in self._queue.running:
+            if run.dataset_id == dataset_id and not run.over.wait(CLOSE_SECONDS):
+                raise ConflictError(f"job {run.id} of this dataset is still running")
 
     def wait(self, job_id: int, seconds: float) -> Job:
         """A job once it is over, or as it stands after some seconds."""
@@ -263,19 +270,20 @@ class Jobs(JobRecords):
         return not self._queue.runs
 
     def close(self) -> None:
-        """Stop after the running job's next step; its record says where it was.
+        """Stop after the next step of the jobs that run; their records say where they were.
 
         A job that takes no step for long is left to itself.
         """
         with self._changed:
             self._closing.set()
             self._changed.notify_all()
-        if self._worker is not None:
-            self._worker.join(CLOSE_SECONDS)
-            running = self._queue.running
-            if self._worker.is_alive() and running is not None:
-                log.warning("a job did not end in time", job=running.id)
-                self._take_back(running)
+        until = monotonic() + CLOSE_SECONDS
+        for worker in self._workers:
+            worker.join(max(until - monotonic(), 0.0))
+        if any(worker.is_alive() for worker in self._workers):
+            for run in self._queue.running:
+                log.warning("a job did not end in time", job=run.id)
+                self._take_back(run)
 
     def _waiting_for(self, session: Session, new: NewJob) -> int | None:
         """Id of the waiting job of a kind and dataset; one without a dataset is its maker's."""
@@ -287,13 +295,22 @@ class Jobs(JobRecords):
                 return run.id
         return None
 
-    def _require_room(self, session: Session) -> None:
-        waiting = self._count_waiting(session)
-        if waiting >= self._capacity:
-            raise OverloadedError(f"{waiting} jobs wait already", hint="Send it again in a while.")
+    def _require_room(self, session: Session, actor: str) -> None:
+        waiting = self._who_waits(session)
+        own = waiting.count(actor)
+        if len(waiting) >= self._capacity:
+            raise OverloadedError(
+                f"{len(waiting)} jobs wait already", hint="Send it again in a while."
+            )
+        if own >= self._capacity - self._capacity // THEIRS:
+            raise OverloadedError(
+                f"{own} jobs that you asked for wait already",
+                hint="Send it again when some of them are done.",
+            )
 
-    def _count_waiting(self, _session: Session) -> int:
-        return len(self._queue.waiting)
+    def _who_waits(self, _session: Session) -> list[str]:
+        """Who asked for each job that waits."""
+        return [run.actor for run in self._queue.waiting]
 
     @contextmanager
     def _entry(self) -> Iterator[Callable[[JobRun], None]]:
@@ -337,38 +354,49 @@ class Jobs(JobRecords):
 
     def _run(self, job: Job) -> JobRun:
         work = self._resumers[job.kind](job)
-        return JobRun(job.id, job.kind, job.dataset_id, work, JobProgress(job.id, self._closing))
+        progress = JobProgress(job.id, self._closing)
+        return JobRun(job.id, job.kind, job.dataset_id, job.actor, work, progress)
 
     def _wake(self) -> None:
-        if self._worker is None and self._queue.waiting:
-            # A daemon: a job that does not come to its next step must not hold the process.
-            self._worker = threading.Thread(target=self._work, name="jobs", daemon=True)
-            self._worker.start()
+        if not self._workers and self._queue.waiting:
+            for ready in (lambda: self._queue.ready, lambda: self._queue.ready_beside(BESIDE)):
+                # Daemons: a job that does not come to its next step must not hold the process.
+                worker = threading.Thread(
+                    target=self._work, args=(ready,), name="jobs", daemon=True
+                )
+                self._workers.append(worker)
+                worker.start()
         self._changed.notify_all()
 
-    def _work(self) -> None:
-        while (run := self._next()) is not None:
+    def _work(self, ready: Callable[[], list[JobRun]]) -> None:
+        while (run := self._next(ready)) is not None:
             try:
                 self._carry_out(run)
             except Exception:
                 log.exception("the record of a job could not be written", job=run.id)
             finally:
                 with self._changed:
-                    self._queue = replace(self._queue, running=None)
+                    self._queue = self._queue.left_by(run)
+                    # What was of its dataset may run beside another now.
+                    self._changed.notify_all()
                 run.over.set()
 
-    def _next(self) -> JobRun | None:
-        """The next job to run; None when the server stops."""
+    def _next(self, ready: Callable[[], list[JobRun]]) -> JobRun | None:
+        """The next job to run, of those that may; None when the server stops."""
         with self._changed:
-            self._changed.wait_for(self._is_somebodys_turn)
+            self._changed.wait_for(
+                lambda: self._closing.is_set() or (not self._entering and ready())
+            )
             if self._closing.is_set():
                 return None
-            run = min(self._queue.waiting, key=lambda item: (item.kind not in PROMPT, item.id))
-            self._queue = replace(self._queue.left_by(run), running=run)
+            run = min(ready(), key=self._turn_of)
+            self._turns[run.actor] = max(self._turns.values(), default=0) + 1
+            self._queue = self._queue.begun(run)
             return run
 
-    def _is_somebodys_turn(self) -> bool:
-        return self._closing.is_set() or bool(self._queue.waiting and not self._entering)
+    def _turn_of(self, run: JobRun) -> tuple[bool, int, int]:
+        """Its place among those that may run: the smallest is the next."""
+        return run.kind not in PROMPT, self._turns.get(run.actor, 0), run.id
 
     def _carry_out(self, run: JobRun) -> None:
         if not self._begin(run):

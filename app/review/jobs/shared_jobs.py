@@ -262,9 +262,9 @@ class SharedJobs(Jobs):
                 self._join(job)
 
     def _follow_ending(self, job: Job) -> None:
-        running = self._queue.running
-        if job.ending and running is not None and running.id == job.id:
-            running.progress.cancelled.set()
+        run = self._queue.running_of(job.id)
+        if job.ending and run is not None:
+            run.progress.cancelled.set()
 
     def _join(self, job: Job) -> None:
         lost = self._lost
@@ -281,7 +281,7 @@ class SharedJobs(Jobs):
             self._save_end(job.id, **ended)
             return
         progress = SharedProgress(job.id, lost, self._store)
-        run = JobRun(job.id, job.kind, job.dataset_id, work, progress)
+        run = JobRun(job.id, job.kind, job.dataset_id, job.actor, work, progress)
         with self._changed:
             self._queue = self._queue.joined_by(run)
             self._wake()
@@ -308,8 +308,9 @@ class SharedJobs(Jobs):
                 return job.id
         return None
 
-    def _count_waiting(self, session: Session) -> int:
-        return len(read_jobs(session, states=(WAITING,), limit=MOST))
+    def _who_waits(self, session: Session) -> list[str]:
+        """See ``Jobs``."""
+        return [job.actor for job in read_jobs(session, states=(WAITING,), limit=MOST)]
 
     def _begin(self, run: JobRun) -> bool:
         """See ``Jobs``: another process may have ended or begun it."""
