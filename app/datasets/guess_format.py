@@ -4,35 +4,30 @@ from __future__ import annotations
 
 import os
 import re
-import struct
-import zipfile
 from collections.abc import Iterable, Iterator
 from itertools import islice
 from pathlib import Path
 
-from app.nested_zip import open_zip
+from app.datasets.safe_path import MAX_PART
+from app.datasets.zip_names import first_names
 from app.object_store.path import StoredPath
 
 MAX_NAMES = 2000
 """Names that are looked at; a large folder must not hold a request up."""
 MAX_DEPTH = 4
-MAX_DIRECTORY = 32 * 1024**2
-"""Bytes of the list of a zip's members, which is read whole or not at all."""
-_END = struct.Struct("<4s4H2LH")
-_END_MARK = b"PK\x05\x06"
 _NAMES: tuple[tuple[str, re.Pattern[str]], ...] = (
-    ("touchline", re.compile(r"(?:.*/)?touchline\.json")),
-    ("soccernet-v3d", re.compile(r"(?:.*/)?(?:Labels-v3D\.json|SNv3D\.csv)")),
-    ("soccernet-v3", re.compile(r"(?:.*/)?Labels-v3\.json")),
-    ("gamestate", re.compile(r"(?:.*/)?Labels-GameState\.json")),
-    ("issia-3d", re.compile(r"(?:.*/)?ISSIA-3D\.csv")),
+    ("touchline", re.compile(r"touchline\.json")),
+    ("soccernet-v3d", re.compile(r"Labels-v3D\.json|SNv3D\.csv")),
+    ("soccernet-v3", re.compile(r"Labels-v3\.json")),
+    ("gamestate", re.compile(r"Labels-GameState\.json")),
+    ("issia-3d", re.compile(r"ISSIA-3D\.csv")),
     ("issia", re.compile(r".*\.xgtf(?:\.gz)?", re.IGNORECASE)),
     ("parquet", re.compile(r".*\.parquet", re.IGNORECASE)),
-    ("coco", re.compile(r"(?:.*/)?(?:instances_[^/]*|annotations[^/]*|[^/]*coco[^/]*)\.json")),
-    ("sn-calibration", re.compile(r"(?:.*/)?(?:\d{1,9}|match_info)\.json")),
-    ("cameras", re.compile(r"(?:.*/)?(?:camera_[^/]*|issia_calibration)\.json")),
+    ("coco", re.compile(r"(?:instances_|annotations|(?=.*coco)).*\.json")),
+    ("sn-calibration", re.compile(r"(?:\d{1,9}|match_info)\.json")),
+    ("cameras", re.compile(r"(?:camera_.*|issia_calibration)\.json")),
 )
-"""The first one that any name fits: exports hold cameras beside their labels."""
+"""By the last part of a name; the first one that any fits: exports hold cameras beside labels."""
 
 
 def guess_format(path: Path | StoredPath) -> str | None:
@@ -42,7 +37,8 @@ def guess_format(path: Path | StoredPath) -> str | None:
 
 def guess_of_names(found: Iterable[str]) -> str | None:
     """The same of names of files."""
-    names = list(found)
+    parts = (name.rpartition("/")[2] for name in found)
+    names = [part for part in parts if len(part) <= MAX_PART]
     for name, pattern in _NAMES:
         if any(map(pattern.fullmatch, names)):
             return name
@@ -57,11 +53,8 @@ def _names(path: Path | StoredPath) -> Iterable[str]:
     if path.suffix.lower() != ".zip" or not path.is_file():
         return [path.name]
     try:
-        if _directory_bytes(path) > MAX_DIRECTORY:
-            return []
-        with open_zip(path) as archive:
-            return archive.namelist()
-    except (zipfile.BadZipFile, NotImplementedError, OSError, ValueError):
+        return first_names(path, MAX_NAMES)
+    except OSError:
         return []
 
 
@@ -70,17 +63,6 @@ def _stored_names(path: StoredPath) -> Iterable[str]:
         return [path.name]
     start = len(path.key) + 1 if path.key else 0
     return (item.key[start:] for item in path.store.below(path.key))
-
-
-def _directory_bytes(path: Path) -> int:
-    """Size of the list of a zip's members, as the record at its end says; 0 without one."""
-    with path.open("rb") as file:
-        file.seek(0, os.SEEK_END)
-        # A comment of at most 64 KiB may follow the record.
-        file.seek(max(file.tell() - _END.size - 0xFFFF, 0))
-        tail = file.read()
-    place = tail.rfind(_END_MARK)
-    return 0 if place < 0 or len(tail) < place + _END.size else _END.unpack_from(tail, place)[5]
 
 
 def _below(root: Path, inside: str, depth: int) -> Iterator[str]:

@@ -148,8 +148,9 @@ def media_facts(media: Media) -> dict[str, int]:
     if is_stored(media):
         return {}
     try:
+        status = _stat(Path(media.path))
         if media.member is None:
-            return {"bytes": _stat(Path(media.path)).st_size}
+            return {"bytes": status.st_size}
         size, crc = _ARCHIVES.facts(Path(media.path), media.member)
     except (NotFoundError, ImageError, StorageError):
         return {}
@@ -162,7 +163,9 @@ def has_member(media: Media, member: str) -> bool:
     Raises:
         NotFoundError, ImageError, StorageError: The archive is not there, damaged or unreadable.
     """
-    return _ARCHIVES.has(Path(media.path), member)
+    path = Path(media.path)
+    _stat(path)
+    return _ARCHIVES.has(path, member)
 
 
 def _checked(data: bytes, settings: Settings, name: str) -> bytes:
@@ -181,9 +184,9 @@ def _source(media: Media, settings: Settings) -> bytes:
     if is_stored(media):
         return read_object(media, settings)
     path = Path(media.path)
+    size = _stat(path).st_size
     if media.member is not None:
         return _ARCHIVES.read(path, media.member, settings.max_file_bytes)
-    size = _stat(path).st_size
     if size > settings.max_file_bytes:
         raise TooLargeError(f"{path.name} is larger than {settings.max_file_bytes} bytes")
     try:

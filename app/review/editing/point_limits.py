@@ -1,6 +1,7 @@
 """Point limits: far above what people draw, far below what keeps the solver busy for seconds.
 
-A dataset may bring more: such lines can be thinned out and moved, and get no further points.
+A dataset may bring more, as far as ``importing.group_limits`` lets it: such lines can be thinned out
+and moved, and get no further points.
 """
 
 from __future__ import annotations

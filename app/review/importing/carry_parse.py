@@ -10,9 +10,10 @@ from app.datasets.file_tree import FileTree
 from app.datasets.json_text import read_json
 from app.datasets.report import Report
 from app.errors import DatasetFormatError, InputError, ReviewError
-from app.review.editing.edit import CALIBRATIONS, MAX_POINTS
+from app.review.editing.edit import CALIBRATIONS
 from app.review.editing.lineage import logged_group, pitch_size
 from app.review.importing.carry import EDIT_KINDS, FORMAT, FORMAT_VERSION, HEAD
+from app.review.importing.group_limits import MAX_POINTS, MAX_VIEWS, points_of
 from app.review.policies.text import CUSTOM, policy_values, policy_with
 from app.review.verdicts.verdict import STATES
 from app.soccer.annotation import Extras
@@ -24,7 +25,7 @@ from app.store.codecs import Json, extras_from_json, policy_from_json, station_f
 from app.store.imports import VERDICT
 
 MAX_LINE = 32 * 1024 * 1024
-MAX_VIEWS, MAX_BALLS, MAX_SIDE, MAX_TEXT = 100, 100, 20_000, 1000
+MAX_BALLS, MAX_SIDE, MAX_TEXT = 100, 20_000, 1000
 MAX_STATES = 100_000
 _MISSHAPEN = (ArithmeticError, AttributeError, LookupError, ReviewError, TypeError, ValueError)
 """What reading a value raises that is not of the shape that it should have."""
@@ -211,9 +212,13 @@ def _checked(station: Station) -> Station:
     if station.calibration not in CALIBRATIONS:
         raise InputError("has a calibration that Touchline does not know")
     _require_truth_values("a station", station.flipped, station.shared)
-    for marking, points in station.lines.items():
-        if canonical_marking(marking) != marking or len(points) > MAX_POINTS:
-            raise InputError(f"has {marking}, which is not a pitch marking or has too many points")
+    for marking in station.lines:
+        if canonical_marking(marking) != marking:
+            raise InputError(f"has {marking}, which is not a pitch marking")
+    if (count := points_of(station.lines)) > MAX_POINTS:
+        raise InputError(
+            f"has {count:,} points in the lines of {station.key}, and a view may have {MAX_POINTS:,}"
+        )
     if [*station.proposed] != [name for name in station.lines if name in station.proposed]:
         raise InputError("has lines that were proposed and are not there")
     return station

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 from itertools import islice
 from pathlib import Path
 
+from app.datasets.report import Report
 from app.object_store.address import is_address
 from app.progress import Progress
 from app.review.datasets.dataset import insert_dataset
@@ -17,6 +18,7 @@ from app.review.editing.pitches import give_pitch
 from app.review.editing.shared_stations import SharedStations
 from app.review.editing.upstream import KIND, Kept, follow_group
 from app.review.importing.body import import_body, places_of
+from app.review.importing.group_limits import MAX_VIEWS, GroupLimits
 from app.review.importing.missing import GONE, note_gone, of_read_matches
 from app.review.policies.first_policy import first_policy
 from app.soccer.group import Group, View
@@ -81,6 +83,7 @@ def ingest(
     progress: Progress | None = None,
     dry_run: bool = False,
     policy: Policy | None = PAPER,
+    told: Report | None = None,
 ) -> IngestReport:
     """Bring groups into a dataset, which the first of them makes when there is none of that name.
 
@@ -96,9 +99,11 @@ def ingest(
         progress: Called after each batch.
         dry_run: Say what would happen, and keep nothing.
         policy: Of a dataset that is made; None: as its first pictures suggest.
+        told: What the files hold; hears what of a group is left out, beyond its ``GroupLimits``.
     """
     report, seen, done = IngestReport(), set[str](), 0
-    sound, stations = _sound(groups, seen, report), set[str]()
+    limits = GroupLimits(source, Report() if told is None else told)
+    sound, stations = _sound(groups, seen, report, limits), set[str]()
     while batch := list(islice(sound, BATCH)):
         with attempt(store, keep=not dry_run) as session:
             identity = _ensure_dataset(session, dataset, actor, policy or first_policy(batch))
@@ -166,7 +171,9 @@ def _note_missing(
     return missing
 
 
-def _sound(groups: Iterable[Group], seen: set[str], report: IngestReport) -> Iterator[Group]:
+def _sound(
+    groups: Iterable[Group], seen: set[str], report: IngestReport, limits: GroupLimits
+) -> Iterator[Group]:
     """Groups that can be stored, their media by absolute path."""
     for group in groups:
         keys = [view.key for view in group.views]
@@ -175,9 +182,12 @@ def _sound(groups: Iterable[Group], seen: set[str], report: IngestReport) -> Ite
         elif len(set(keys)) < len(keys):
             report.problems.append(f"group {group.key} has two views of one name")
         else:
+            # One that is left out is not missing: the source brought it.
             seen.add(group.key)
-            report.without_picture += all(view.media is None for view in group.views)
-            yield replace(group, views=tuple(map(_absolute, group.views)))
+            held = limits.held(group)
+            if held is not None:
+                report.without_picture += all(view.media is None for view in held.views)
+                yield replace(held, views=tuple(map(_absolute, held.views)))
 
 
 def _absolute(view: View) -> View:
@@ -261,6 +271,12 @@ def _follow(
 ) -> None:
     stored, at = read_groups(session, [group_id])[group_id], now()
     followed = follow_group(stored, incoming)
+    if (count := len(followed.group.views)) > MAX_VIEWS:
+        report.problems.append(
+            f"group {incoming.key} would have {count} views with those that people edited, a group "
+            f"may have {MAX_VIEWS}; it stays as it is"
+        )
+        return
     if (pitch := _edited_pitch(session, stored, incoming)) is not None:
         followed = replace(followed, group=replace(followed.group, pitch=pitch))
     if incoming.match == stored.group.match:

@@ -208,6 +208,7 @@ def import_source(
         progress=progress,
         dry_run=dry_run,
         policy=policy,
+        told=report,
     )
     if folder is not None and not dry_run:
         ingest_spare(store, dataset, _spare(folder), source=source.label, actor=actor)

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import zipfile
 from collections.abc import Callable
 from pathlib import Path
 
@@ -18,8 +19,10 @@ CASES = [
     ("sn-calibration", "valid/00002.json"),
     ("cameras", "camera_00002.json"),
     ("coco", "annotations/instances_train.json"),
+    ("coco", "my-coco-file.json"),
     ("parquet", "views.parquet"),
     (None, "notes.txt"),
+    (None, "coco.json.txt"),
 ]
 
 
@@ -40,13 +43,18 @@ class TestGuessFormat:
             (tmp_path / name).write_text("{}")
         assert guess_format(tmp_path) == "sn-calibration"
 
-    def test_a_zip_with_too_long_a_list_is_not_looked_into(
+    def test_a_zip_with_a_long_list_is_guessed_from_its_first_names(
         self, make_zip: Callable[..., Path], monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        path = make_zip({"Labels-v3.json": "x", "b.txt": "x"})
-        monkeypatch.setattr(module, "MAX_DIRECTORY", 100)
-        monkeypatch.setattr(module.zipfile, "ZipFile", lambda *_: pytest.fail("opened"))
-        assert guess_format(path) is None
+        path = make_zip({"a.txt": "x", "Labels-v3.json": "x", "SNv3D.csv": "x"})
+        monkeypatch.setattr(module, "MAX_NAMES", 2)
+        monkeypatch.setattr(zipfile, "ZipFile", lambda *_: pytest.fail("the whole list is read"))
+        assert guess_format(path) == "soccernet-v3"
+
+    def test_a_name_that_fits_on_no_disk_is_not_looked_at(
+        self, make_zip: Callable[..., Path]
+    ) -> None:
+        assert guess_format(make_zip({f"a/{'camera_' * 40}.json": "x"})) is None
 
     def test_a_damaged_zip_and_a_missing_file_are_nothing(self, tmp_path: Path) -> None:
         (tmp_path / "a.zip").write_bytes(b"PK\x03\x04")

@@ -16,7 +16,14 @@ from app.errors import ImageError, NotFoundError, TooLargeError
 from app.soccer.media import Media
 from app.store import media as media_module
 from app.store.archives import Archives
-from app.store.media import content_type, decode_picture, frame_name, media_facts, read_frame
+from app.store.media import (
+    content_type,
+    decode_picture,
+    frame_name,
+    has_member,
+    media_facts,
+    read_frame,
+)
 
 # Left half dark, right half bright: a flip is seen.
 PICTURE = np.concatenate(
@@ -230,6 +237,21 @@ class TestReadFrame:
         path.symlink_to(secret)
         with pytest.raises(NotFoundError, match=r"7\.png is a link now"):
             read_frame(Media(str(path)), width, False, settings)
+
+    def test_an_archive_swapped_for_a_link_is_not_followed(
+        self, tmp_path, archive, settings
+    ) -> None:
+        path = tmp_path / "swapped.zip"
+        path.symlink_to(archive)
+        media = Media(str(path), "v3_frames/7.png")
+        for asked in (
+            lambda: read_frame(media, None, False, settings),
+            lambda: read_frame(media, 40, False, settings),
+            lambda: has_member(media, "v3_frames/7.png"),
+        ):
+            with pytest.raises(NotFoundError, match=r"swapped\.zip is a link now"):
+                asked()
+        assert media_facts(media) == {}
 
     def test_a_folder_swapped_for_a_link_does_not_lead_out(self, tmp_path, settings) -> None:
         outside, root = tmp_path / "outside", tmp_path / "root"

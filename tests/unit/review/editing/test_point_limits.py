@@ -64,20 +64,24 @@ class TestEveryDoor:
 
     LINES = {"Middle line": points(MARKING_POINTS + 1)}  # noqa: RUF012
 
-    def test_an_edit(self, store, fill, make_group) -> None:
+    def test_an_edit_of_too_many_points_is_refused_and_changes_nothing(
+        self, store, fill, make_group
+    ) -> None:
         state = load(store, fill(make_group(7))[0])
         with pytest.raises(TooManyPointsError, match=r"view 7\.png"):
             edit = SetLines("7.png", self.LINES)
             submit(store, state.id, edit, if_match=state.etag, actor="ann")
         assert load(store, state.id) == state
 
-    def test_a_preview(self, store, fill, make_group) -> None:
+    def test_a_preview_of_too_many_points_is_refused(self, store, fill, make_group) -> None:
         (group,) = fill(make_group(7))
         with pytest.raises(TooManyPointsError, match=r"view 7\.png"):
             edits = [SetBall("7.png", None), SetLines("7.png", self.LINES)]
             preview(store, group, lambda _: edits)
 
-    def test_a_static_camera(self, store, fill, make_static) -> None:
+    def test_an_edit_of_a_static_camera_with_too_many_points_is_refused(
+        self, store, fill, make_static
+    ) -> None:
         state = load(store, fill(make_static(10))[0])
         station = load_station(store, state.station_ids["cam1"])
         with pytest.raises(TooManyPointsError, match="camera cam1"):

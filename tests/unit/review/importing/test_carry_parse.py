@@ -12,6 +12,7 @@ from app.datasets.report import Report
 from app.datasets.trees import open_tree
 from app.errors import DatasetFormatError, InputError
 from app.review.importing.carry_parse import FORMAT, FORMAT_VERSION, HEAD, _station, read_head
+from app.review.importing.group_limits import MAX_POINTS
 from app.soccer.frames import ImageSize
 from app.soccer.group import Station
 from app.soccer.policy import PAPER
@@ -56,3 +57,13 @@ class TestStation:
         for wrong in (["Circle left"], "Middle line", ["Middle line", "Middle line"], [7]):
             with pytest.raises(InputError, match="were proposed and are not there"):
                 _station({**value, "proposed": wrong})
+
+    def test_lines_have_no_more_points_than_those_of_other_imports(self) -> None:
+        points = [[float(place), 2.0] for place in range(MAX_POINTS // 2)]
+        value = station_to_json(Station("cam1", ImageSize(96, 54)))
+        lines = {"Middle line": points, "Side line top": points}
+        assert len(_station({**value, "lines": lines}).lines) == 2
+        with pytest.raises(
+            InputError, match="1,001 points in the lines of cam1, and a view may have 1,000"
+        ):
+            _station({**value, "lines": {**lines, "Side line left": points[:1]}})

@@ -5,6 +5,7 @@ from dataclasses import replace
 import pytest
 from sqlalchemy import text
 
+from app.datasets.report import Report
 from app.errors import NotFoundError
 from app.review.datasets.dataset import get_dataset, list_datasets
 from app.review.editing.edit import IncludeView, SetBall, SetLines, SetStationLines
@@ -129,6 +130,21 @@ class TestIngest:
         assert (report.new, len(report.problems)) == (1, 1)
         assert "7.png appears twice" in report.problems[0]
 
+    def test_a_group_of_too_many_views_is_left_out_and_is_not_missing(
+        self, store, make_group, monkeypatch
+    ) -> None:
+        again(store, make_group(7), make_group(8))
+        monkeypatch.setattr("app.review.importing.group_limits.MAX_VIEWS", 1)
+        one = replace(make_group(9), views=make_group(9).views[:1])
+        told = Report()
+        groups = [make_group(7), make_group(8), one]
+        report = ingest(store, "demo", groups, source="test", actor="ann", told=told)
+        assert (report.new, report.missing) == (1, 0)
+        assert [problem.record for problem in told.problems] == [
+            make_group(7).key,
+            make_group(8).key,
+        ]
+
     def test_progress_counts_the_groups_done(self, store, make_group) -> None:
         calls: list[int] = []
         groups = [make_group(7), make_group(8)]
@@ -241,6 +257,20 @@ class TestAChangedSource:
         assert report.findings == 1
         kept = load(store, state.id).group
         assert [view.key for view in kept.views] == ["7.png", "7_1.png"]
+
+    def test_views_that_people_edited_do_not_add_up_beyond_what_a_group_may_have(
+        self, store, state, make_group, monkeypatch
+    ) -> None:
+        submit(store, state.id, SetBall("7_1.png", None), if_match=state.etag, actor="ann")
+        before = load(store, state.id).group
+        monkeypatch.setattr("app.review.importing.ingest.MAX_VIEWS", 2)
+        view = make_group().views[0]
+        other = replace(make_group(), views=(view, replace(view, key="other.png")))
+        report = again(store, other)
+        assert (report.changed, report.findings) == (0, 0)
+        assert load(store, state.id).group == before
+        (problem,) = report.problems
+        assert "would have 3 views with those that people edited, a group may have 2" in problem
 
     def test_a_static_camera_that_changed_makes_its_groups_stale(
         self, store, fill, make_static

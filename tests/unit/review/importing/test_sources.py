@@ -15,7 +15,7 @@ from app.review.editing.edit import SetBall
 from app.review.editing.recompute import solve_dataset
 from app.review.editing.submit import load, submit
 from app.review.exporting.export import export
-from app.review.importing.ingest import BATCH, ingest
+from app.review.importing.ingest import ingest
 from app.review.importing.sources import FORMATS, Source, import_source
 from app.review.importing.spare import SpareFrame, ingest_spare, spare_frames
 from app.review.queue.listing import list_groups
@@ -208,9 +208,21 @@ class TestImportSource:
         import_source(store, "whole", source, store.settings)
         assert hashes(store, "demo") == hashes(store, "whole")
 
-    def test_the_batch_is_smaller_than_a_match(self) -> None:
-        # What a kill loses, and how long it holds the writers up.
-        assert BATCH <= 200
+    def test_lines_of_too_many_points_are_told_and_the_rest_is_imported(
+        self, store, tmp_path
+    ) -> None:
+        dense = [{"x": place / 2000, "y": 0.5} for place in range(2000)]
+        lines = {"Middle line": dense, "Side line top": dense[:2]}
+        (tmp_path / "00002.json").write_text(json.dumps(lines))
+        source = Source("sn-calibration", tmp_path, size=SIZE)
+        imported = import_source(store, "demo", source, store.settings)
+        values = imported.values()
+        assert (values["new"], values["outcome"]) == (1, "partial")
+        assert [(item["record"], item["field"]) for item in values["skipped"]] == [
+            ("00002", "view 00002, Middle line")
+        ]
+        (group,) = groups_of(store, "demo").values()
+        assert group.views[0].station.lines.keys() == {"Side line top"}
 
 
 class TestDryRun:
