@@ -74,6 +74,7 @@ check: setup
 	$(BIN)/lint-imports
 	$(BIN)/npm --prefix static run check
 	$(BIN)/python -m tests.release licences
+	@echo "Nobody was asked for published weaknesses of libraries: make audit"
 
 # Programs that only a release needs, apart: they would double what everybody installs.
 .venv-release/ready: requirements-release.lock .venv/ready

@@ -10,6 +10,7 @@ from time import monotonic
 from typing import Any
 
 from app.child import Allowance, Child, ChildEnded
+from app.child_figures import ChildFigures
 from app.errors import OverloadedError
 
 PATIENCE = 1.0
@@ -35,10 +36,17 @@ class PoolTask:
         self._left.set()
         self.future.cancel()
 
-    def run(self, child: Child, work: Callable[..., Any], arguments: tuple[Any, ...]) -> None:
+    def run(
+        self,
+        child: Child,
+        work: Callable[..., Any],
+        arguments: tuple[Any, ...],
+        figures: ChildFigures,
+    ) -> None:
         """Do it in a child, if somebody still waits."""
         if not self.future.set_running_or_notify_cancel():
             return
+        figures.wait_no_more()
         began = monotonic()
 
         def stop() -> None:
@@ -46,7 +54,8 @@ class PoolTask:
                 raise CancelledError
 
         try:
-            result = child.run(work, *arguments, stop=stop)
+            with figures.working():
+                result = child.run(work, *arguments, stop=stop)
         except ChildEnded as error:
             self.future.set_exception(self._explain(error))
         except BaseException as error:
@@ -63,10 +72,18 @@ class ChildPool:
         children: How many work at once.
         waiting: How many tasks may wait for one that is free.
         what: What they make, for the refusal.
+        figures: Where they are counted.
     """
 
-    def __init__(self, allowance: Allowance, children: int, waiting: int, what: str):
-        self._what = what
+    def __init__(
+        self,
+        allowance: Allowance,
+        children: int,
+        waiting: int,
+        what: str,
+        figures: ChildFigures,
+    ):
+        self._what, self._figures = what, figures
         self._threads = ThreadPoolExecutor(children, "child")
         self._most = children + waiting
         self._tasks: set[PoolTask] = set()
@@ -103,6 +120,7 @@ class ChildPool:
                     hint="Try again in a moment.",
                 )
             self._tasks.add(task)
+            self._figures.wait()
         task.future.add_done_callback(lambda _: self._forget(task))
         self._threads.submit(self._run, task, work, arguments)
         return task
@@ -122,10 +140,13 @@ class ChildPool:
     def _run(self, task: PoolTask, work: Callable[..., Any], arguments: tuple[Any, ...]) -> None:
         child = self._free.get()
         try:
-            task.run(child, work, arguments)
+            task.run(child, work, arguments, self._figures)
         finally:
             self._free.put(child)
 
     def _forget(self, task: PoolTask) -> None:
+        if task.future.cancelled():
+            # Before it was begun: what was is ended with an error.
+            self._figures.wait_no_more()
         with self._lock:
             self._tasks.discard(task)

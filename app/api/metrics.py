@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from contextlib import suppress
 from typing import Any
 
 from fastapi import FastAPI, Request
@@ -13,10 +14,13 @@ from prometheus_client.registry import Collector
 from prometheus_fastapi_instrumentator.middleware import PrometheusInstrumentatorMiddleware
 
 from app.api.deps import Services
+from app.api.events import Counts
 from app.api.pages import ELSEWHERE
 from app.api.security.lanes import Doors
+from app.child_figures import FIGURES
 from app.errors import StorageError
 from app.review.jobs.vitals import Home, read_home
+from app.store.store import Store
 
 MAX_ADDRESSES = 2000
 """Whose routes are remembered: addresses hold names of datasets, too."""
@@ -28,7 +32,7 @@ _NUMBER = re.compile(r"/[0-9]+(?=/|$)")
 def install_metrics(app: FastAPI, doors: Doors) -> None:
     """Count requests by route, each application for itself, and watch its services."""
     registry = app.state.metrics = CollectorRegistry()
-    registry.register(ServerCollector(app.state.services, doors))
+    registry.register(ServerCollector(app, doors))
     excluded = [re.compile(path) for path in ("/metrics", "/healthz", "/readyz")]
     app.add_middleware(RequestMetrics, registry=registry, excluded_handlers=excluded)
 
@@ -66,8 +70,8 @@ class RequestMetrics(PrometheusInstrumentatorMiddleware):
 class ServerCollector(Collector):
     """Reads the server's own numbers when it is asked; those of the database while it answers."""
 
-    def __init__(self, services: Services, doors: Doors):
-        self._services, self._doors = services, doors
+    def __init__(self, app: FastAPI, doors: Doors):
+        self._app, self._doors = app, doors
 
     def describe(self) -> Iterator[Metric]:
         """Nothing beforehand: what there is is read when it is asked for."""
@@ -75,15 +79,11 @@ class ServerCollector(Collector):
 
     def collect(self) -> Iterator[Metric]:
         """Every number of this moment."""
+        services: Services = self._app.state.services
         yield from self._lanes()
-        yield from self._streams()
-        try:
-            home = read_home(self._services.store)
-        except StorageError:
-            yield _gauge("database_up", "1 while the database answers.", 0)
-            return
-        yield _gauge("database_up", "1 while the database answers.", 1)
-        yield from _home(home)
+        yield from _streams(services.events.counts)
+        yield from _children()
+        yield from _database(services.store)
 
     def _lanes(self) -> Iterator[Metric]:
         doors = self._doors.all
@@ -94,12 +94,40 @@ class ServerCollector(Collector):
         refused = {door.lane.name: door.refused for door in doors}
         yield _counter("lane_refused", "Requests that were told to come back.", "lane", refused)
 
-    def _streams(self) -> Iterator[Metric]:
-        counts = self._services.events.counts
-        yield _gauge("event_streams", "Windows that listen for events.", counts.open)
-        ended = {"opened": counts.opened, "resumed": counts.resumed, "lost": counts.lost}
-        text = "Event streams that were opened, came back, or were let go for being too slow."
-        yield _counter("event_stream", text, "what", ended)
+
+def _streams(counts: Counts) -> Iterator[Metric]:
+    yield _gauge("event_streams", "Windows that listen for events.", counts.open)
+    ended = {"opened": counts.opened, "resumed": counts.resumed, "lost": counts.lost}
+    text = "Event streams that were opened, came back, or were let go for being too slow."
+    yield _counter("event_stream", text, "what", ended)
+
+
+def _children() -> Iterator[Metric]:
+    busy = {kind: figures.busy for kind, figures in FIGURES.items()}
+    yield _gauges("children_busy", "Tasks at work in processes of their own.", "kind", busy)
+    waiting = {kind: figures.waiting for kind, figures in FIGURES.items()}
+    yield _gauges("children_waiting", "Tasks that wait for such a process.", "kind", waiting)
+    ended = CounterMetricFamily(
+        "touchline_children_ended",
+        "Such processes that ended in the midst of a task.",
+        labels=["kind", "reason"],
+    )
+    for kind, figures in FIGURES.items():
+        for reason, number in figures.ended.items():
+            ended.add_metric([kind, reason], number)
+    yield ended
+
+
+def _database(store: Store) -> Iterator[Metric]:
+    home = None
+    with suppress(StorageError):
+        home = read_home(store)
+    yield _gauge("database_up", "1 while the database answers.", int(home is not None))
+    # After it was read, which may have shown damage.
+    text = "1 from the first sign on that the database is damaged."
+    yield _gauge("database_damaged", text, int(store.is_damaged))
+    if home is not None:
+        yield from _home(home)
 
 
 def _home(home: Home) -> Iterator[Metric]:

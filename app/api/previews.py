@@ -19,6 +19,7 @@ from app.api.pool_answer import while_wanted
 from app.api.schemas.preview import PreviewDocument, PreviewRequest
 from app.api.schemas.solution import SolutionDocument
 from app.child import Allowance, ChildEnded
+from app.child_figures import FIGURES
 from app.child_pool import ChildPool
 from app.config import Settings
 from app.errors import OverloadedError
@@ -50,7 +51,8 @@ class Previews:
     def __init__(self, settings: Settings, store: Store, paint: PaintFollower):
         self._settings, self._store, self._paint = settings, store, paint
         apart = settings.team and settings.web_workers == 1
-        self._pool = ChildPool(ALLOWANCE, 1, WAITING, "previews") if apart else None
+        figures = FIGURES["previews"]
+        self._pool = ChildPool(ALLOWANCE, 1, WAITING, "previews", figures) if apart else None
         self._begun = False
         self.is_ready = False
         """Whether the process is there."""

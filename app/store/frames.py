@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from app.child import Allowance, ChildEnded
+from app.child_figures import FIGURES
 from app.child_pool import ChildPool, PoolTask
 from app.config import Settings
 from app.errors import ImageError, ReviewError, StorageError, TooLargeError
@@ -66,9 +67,11 @@ class Frames:
 
     def __init__(self, settings: Settings):
         self._settings = settings
-        self._pool = ChildPool(ALLOWANCE, settings.image_workers, WAITING, "pictures")
-        self._readers = ChildPool(READING, READERS, WAITING, "pictures")
-        self._fetchers = ChildPool(FETCHING, FETCHERS, WAITING, "pictures")
+        self._pool = ChildPool(
+            ALLOWANCE, settings.image_workers, WAITING, "pictures", FIGURES["pictures"]
+        )
+        self._readers = ChildPool(READING, READERS, WAITING, "pictures", FIGURES["readers"])
+        self._fetchers = ChildPool(FETCHING, FETCHERS, WAITING, "pictures", FIGURES["fetchers"])
         self._refused: OrderedDict[str, ReviewError] = OrderedDict()
         self._lock = threading.Lock()
 

@@ -192,6 +192,11 @@ class Store:
             except Exception:
                 log.exception("a change was saved, and somebody could not be told")
 
+    @property
+    def is_damaged(self) -> bool:
+        """Whether the database was seen to be damaged."""
+        return self._damage is not None
+
     def require_undamaged(self) -> None:
         """Raise DamagedError once the database was seen to be damaged.
 

@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from app.child import Allowance, ChildEnded
+from app.child_figures import ChildFigures
 from app.child_pool import ChildPool
 from app.errors import ImageError, OverloadedError
 
@@ -18,8 +19,13 @@ ALLOWANCE = Allowance(memory=300 * 2**20, processor=60.0, silence=60.0)
 
 
 @pytest.fixture
-def pool() -> Iterator[ChildPool]:
-    made = ChildPool(ALLOWANCE, 1, 2, "pictures")
+def figures() -> ChildFigures:
+    return ChildFigures()
+
+
+@pytest.fixture
+def pool(figures: ChildFigures) -> Iterator[ChildPool]:
+    made = ChildPool(ALLOWANCE, 1, 2, "pictures", figures)
     yield made
     made.close()
 
@@ -98,6 +104,42 @@ class TestSubmit:
         with pytest.raises(ImageError, match=r"^7\.png made the process crash that read it$"):
             task.future.result(60)
         assert pool.submit(os.getpid).future.result(60) != os.getpid()
+
+
+class TestFigures:
+    def test_who_is_at_work_and_who_waits_is_counted(
+        self, pool: ChildPool, figures: ChildFigures, tmp_path: Path
+    ) -> None:
+        gate = Gate(tmp_path)
+        tasks = [pool.submit(pass_gate, gate, "a") for _ in range(3)]
+        with pytest.raises(OverloadedError):
+            pool.submit(pass_gate, gate, "b")
+        gate.wait_until_reached()
+        assert (figures.busy, figures.waiting) == (1, 2)
+        for _ in range(2):
+            tasks[1].leave()
+        assert (figures.busy, figures.waiting) == (1, 1)
+        gate.open.touch()
+        assert [tasks[number].future.result(60) for number in (0, 2)] == ["a", "a"]
+        assert (figures.busy, figures.waiting) == (0, 0)
+
+    def test_a_child_that_ends_is_counted_before_anybody_hears_of_it(
+        self, pool: ChildPool, figures: ChildFigures
+    ) -> None:
+        with pytest.raises(ChildEnded):
+            pool.submit(os.abort).future.result(60)
+        assert (figures.busy, figures.waiting, figures.ended["crash"]) == (0, 0, 1)
+
+    def test_one_that_was_ended_because_nobody_waits_is_not(
+        self, pool: ChildPool, figures: ChildFigures, tmp_path: Path
+    ) -> None:
+        task = pool.submit(pass_gate, Gate(tmp_path), "a")
+        Gate(tmp_path).wait_until_reached()
+        task.leave()
+        with pytest.raises(CancelledError):
+            task.future.result(60)
+        assert (figures.busy, figures.waiting) == (0, 0)
+        assert set(figures.ended.values()) == {0}
 
 
 class TestClose:

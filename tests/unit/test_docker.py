@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import os
 import re
+import shlex
 import stat
 import subprocess
 from configparser import RawConfigParser
@@ -25,6 +27,15 @@ def services() -> dict[str, Any]:
     text = (FOLDER / "compose.yaml").read_text("utf-8")
     found: dict[str, Any] = yaml.safe_load(text)["services"]
     return found
+
+
+def assert_bounded_log(service: dict[str, Any]) -> None:
+    """What a service says stays below 200 MB on this machine's disk."""
+    log = service["logging"]
+    assert log["driver"] == "local"
+    size = re.fullmatch(r"(\d+)m", log["options"]["max-size"])
+    assert size
+    assert 0 < int(size[1]) * int(log["options"]["max-file"]) <= 200
 
 
 class TestCompose:
@@ -54,6 +65,10 @@ class TestCompose:
 
     def test_neither_takes_the_whole_machine(self, services: dict[str, Any]) -> None:
         assert all({"mem_limit", "pids_limit"} <= service.keys() for service in services.values())
+
+    def test_neither_fills_the_disk_with_what_it_says(self, services: dict[str, Any]) -> None:
+        for service in services.values():
+            assert_bounded_log(service)
 
     def test_backups_lie_beside_the_home(self, services: dict[str, Any]) -> None:
         assert "${TOUCHLINE_BACKUPS:-backups}:/backups" in services["touchline"]["volumes"]
@@ -110,6 +125,7 @@ class TestScale:
             assert service["cap_drop"] == ["ALL"], name
             assert service["security_opt"] == ["no-new-privileges:true"], name
             assert {"mem_limit", "pids_limit", "restart"} <= service.keys(), name
+            assert_bounded_log(service)
             assert "healthcheck" in service or name == "touchline", name
             added = service.get("cap_add", [])
             assert added == (["NET_BIND_SERVICE"] if name in AS_ROOT else []), name
@@ -239,18 +255,77 @@ class TestDockerfile:
         assert not re.search(r"\bapt|\bpip\b|\bmake\b", last)
 
 
+def read_unit(name: str) -> RawConfigParser:
+    """A file for systemd; of what is said twice the last one counts."""
+    unit = RawConfigParser(strict=False)
+    unit.optionxform = str  # type: ignore[assignment,method-assign]
+    assert unit.read(FOLDER / name)
+    return unit
+
+
+def environment_of_unit(name: str) -> dict[str, str]:
+    """What a unit gives its program, with systemd's names for folders."""
+    said = read_unit(name)["Service"]["Environment"]
+    return {name: text for name, _, text in (item.partition("=") for item in said.split())}
+
+
 class TestUnit:
     def test_the_service_writes_to_its_own_folders_alone(self) -> None:
-        unit = RawConfigParser(strict=False)
-        unit.optionxform = str  # type: ignore[assignment,method-assign]
-        unit.read(FOLDER / "touchline.service")
+        unit = read_unit("touchline.service")
         service = unit["Service"]
         assert service["User"] not in ("", "root")
         assert service["ProtectSystem"] == "strict"
         assert service["NoNewPrivileges"] == "yes"
         assert "ReadWritePaths" not in service
-        assert f"%S/{service['StateDirectory']}" in service["Environment"]
         assert {"TasksMax", "MemoryMax"} <= service.keys()
         assert {"StartLimitIntervalSec", "StartLimitBurst"} <= unit["Unit"].keys()
         assert service["RestartPreventExitStatus"] == "2"
-        assert f"%C/{service['CacheDirectory']}" in service["Environment"]
+        given, made = environment_of_unit("touchline.service"), service["StateDirectory"].split()
+        assert {given["TOUCHLINE_HOME"], given["TMPDIR"]} == {f"%S/{name}" for name in made}
+        assert given["NUMBA_CACHE_DIR"] == f"%C/{service['CacheDirectory']}"
+
+    def test_what_may_be_large_is_made_on_the_disk_of_the_home(self) -> None:
+        given = environment_of_unit("touchline.service")
+        assert given["TMPDIR"].startswith(f"{given['TOUCHLINE_HOME']}/")
+
+    def test_settings_of_the_operator_are_read_where_they_are_given(self) -> None:
+        for name in ("touchline.service", "touchline-backup.service"):
+            assert read_unit(name)["Service"]["EnvironmentFile"] == "-/etc/touchline/environment"
+
+
+class TestBackupUnit:
+    @pytest.fixture
+    def service(self) -> Any:
+        return read_unit("touchline-backup.service")["Service"]
+
+    def test_is_of_the_home_and_the_user_of_the_server(self, service: Any) -> None:
+        assert service["User"] == read_unit("touchline.service")["Service"]["User"]
+        mine, its = (
+            environment_of_unit(name) for name in ("touchline-backup.service", "touchline.service")
+        )
+        assert mine.items() <= its.items()
+
+    def test_makes_a_backup_each_time_and_deletes_those_that_are_old(
+        self, service: Any, tmp_path: Path
+    ) -> None:
+        def run(command: str) -> None:
+            said = command.replace("/srv/backups", str(tmp_path))
+            words = shlex.split(said.replace("%%", "%").replace("$$", "$"))
+            subprocess.run(words, check=True)
+
+        old, other = tmp_path / "touchline-2020-01-01T030000.zip", tmp_path / "other.zip"
+        for path in (old, other):
+            path.touch()
+            os.utime(path, (0, 0))
+        assert "/opt/touchline/bin/touchline backup " in service["ExecStart"]
+        run(service["ExecStart"].replace("/opt/touchline/bin/touchline backup", "/usr/bin/touch"))
+        run(service["ExecStartPost"])
+        (made,) = tmp_path.glob("touchline-*.zip")
+        assert re.fullmatch(r"touchline-\d{4}-\d\d-\d\dT\d{6}\.zip", made.name)
+        assert other.exists()
+
+    def test_every_night_has_one(self) -> None:
+        timer = read_unit("touchline-backup.timer")
+        assert re.fullmatch(r"\*-\*-\* \d\d:\d\d", timer["Timer"]["OnCalendar"])
+        assert timer["Timer"]["Persistent"] == "true"
+        assert timer["Install"]["WantedBy"] == "timers.target"

@@ -34,6 +34,6 @@ def get_readiness(store: AppStore) -> Readiness:
     responses={**responses(), 200: {"content": {CONTENT_TYPE_LATEST: {}}}},
 )
 def get_metrics(request: Request) -> Response:
-    """Requests, lanes, event streams, jobs, files and room, in Prometheus' text format."""
+    """Requests, lanes, event streams, processes, jobs, files and room, in Prometheus' text format."""
     registry: CollectorRegistry = request.app.state.metrics
     return Response(generate_latest(registry), media_type=CONTENT_TYPE_LATEST)

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from app.child import Allowance, ChildEnded
+from app.child_figures import FIGURES
 from app.child_pool import ChildPool, PoolTask
 from app.errors import ConflictError, ImageError
 from app.progress import Progress
@@ -167,7 +168,7 @@ def read_paint(
     with store.read() as session:
         ids = group_ids(session, found.id, matches)
     run, count, done = run or now(), children or store.settings.image_workers, 0
-    with closing(ChildPool(ALLOWANCE, count, 0, "pictures")) as pool:
+    with closing(ChildPool(ALLOWANCE, count, 0, "pictures", FIGURES["paint"])) as pool:
         for start in range(0, len(ids), _A_CHILD * count):
             some = ids[start : start + _A_CHILD * count]
             readings = _readings(store, pool, _tasks(store, some, found))

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from app.child import Allowance, ChildEnded
+from app.child_figures import FIGURES
 from app.child_pool import ChildPool
 from app.errors import ImageError, NotFoundError
 from app.paint.propose import SEARCH_VERSION
@@ -147,7 +148,7 @@ def propose_views(
         asked = views_to_look_at(session, found.id, matches)
     count, total = children or store.settings.image_workers, sum(len(views) for _, views in asked)
     run = ProposalRun()
-    with closing(ChildPool(ALLOWANCE, count, 0, "pictures")) as pool:
+    with closing(ChildPool(ALLOWANCE, count, 0, "pictures", FIGURES["proposals"])) as pool:
         for start in range(0, len(asked), _A_CHILD * count):
             tasks = _tasks(store, found, dict(asked[start : start + _A_CHILD * count]))
             answers = _answers(store, pool, tasks)

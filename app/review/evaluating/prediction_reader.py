@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from app.child import Allowance, ChildEnded
+from app.child_figures import FIGURES
 from app.child_pool import ChildPool
 from app.config import Settings
 from app.datasets.file_tree import Limits
@@ -92,7 +93,8 @@ class PredictionReader:
 
     def __init__(self, settings: Settings):
         allowance = Allowance(settings.import_memory, SECONDS, SILENCE)
-        self._pool = ChildPool(allowance, 1, WAITING, "sets of predictions")
+        figures = FIGURES["predictions"]
+        self._pool = ChildPool(allowance, 1, WAITING, "sets of predictions", figures)
 
     def read(self, files: PredictionFiles, names: FrameNames, limits: Limits) -> Found:
         """``read_files``, within limits.

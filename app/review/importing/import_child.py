@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 from app.child import Allowance, Child, ChildEnded
+from app.child_figures import FIGURES
 from app.config import Settings
 from app.errors import DamagedError, TooLargeError
 from app.progress import Progress
@@ -87,17 +88,9 @@ def import_apart(
                 progress(*word)
 
         try:
-            outcome: Outcome = child.run(
-                import_here,
-                settings,
-                dataset,
-                source,
-                actor,
-                dry_run,
-                policy,
-                heard=hear,
-                stop=stop,
-            )
+            given = (settings, dataset, source, actor, dry_run, policy)
+            with FIGURES["imports"].working():
+                outcome: Outcome = child.run(import_here, *given, heard=hear, stop=stop)
         except DamagedError as error:
             store.note_damage(error)
             raise

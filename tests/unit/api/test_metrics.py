@@ -2,18 +2,36 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import os
+import re
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import closing
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
+from anyio.from_thread import BlockingPortal
+from fastapi import FastAPI
 from prometheus_client import CollectorRegistry
 from prometheus_client.parser import text_string_to_metric_families
 from starlette.requests import Request
 from starlette.testclient import TestClient
 
 from app.api import metrics
-from app.errors import StorageError
+from app.api.deps import Services
+from app.api.previews import Previews
+from app.api.security.lanes import EDITS, LANES
+from app.child import ChildEnded
+from app.child_figures import KINDS
+from app.child_pool import ChildPool
+from app.errors import DamagedError, StorageError
+from app.store.store import Store
+from tests.waiting import SECONDS
 
 API = "/api/v1"
+PAGE = Path(__file__).parents[3] / "docs" / "operations.md"
 
 
 @pytest.fixture
@@ -45,22 +63,124 @@ def test_says_how_long_the_log_is_and_how_much_room_is_left(read) -> None:
     assert read("touchline_disk_free_bytes") > 0
 
 
-@pytest.mark.file_of_sqlite("how large the file is")
-def test_says_how_long_the_files_are(read) -> None:
-    assert read("touchline_file_bytes", file="database") > 0
+@pytest.mark.file_of_sqlite("how large the files are")
+def test_says_how_long_the_files_are(app: FastAPI, read) -> None:
+    store = app.state.services.store
+    with store.write(lasting=False) as session:
+        session.exec_driver_sql("UPDATE dataset SET name = name")
+    file = store.settings.database_file
+    for name, path in {"database": file, "wal": file.with_name(f"{file.name}-wal")}.items():
+        assert read("touchline_file_bytes", file=name) == path.stat().st_size > 0
 
 
-@pytest.mark.parametrize(
-    "lane", ["reads", "edits", "changes", "previews", "images", "uploads", "zips"]
-)
-def test_says_who_is_at_work_and_who_waits(read, lane: str) -> None:
+@pytest.mark.parametrize("lane", [lane.name for lane in LANES])
+def test_every_lane_begins_with_nobody(read, lane: str) -> None:
     for name in ("lane_busy", "lane_waiting", "lane_refused_total"):
         assert read(f"touchline_{name}", lane=lane) == 0
 
 
-def test_counts_windows_that_listen(read) -> None:
-    for what in ("opened", "resumed", "lost"):
-        assert read("touchline_event_stream_total", what=what) == 0
+def test_says_who_is_at_work_who_waits_and_who_was_told_to_come_back(app: FastAPI) -> None:
+    door = SimpleNamespace(lane=EDITS, busy=1, waiting=2, refused=3)
+    registry = CollectorRegistry()
+    registry.register(metrics.ServerCollector(app, SimpleNamespace(all=(door,))))
+    for name, value in (("busy", 1), ("waiting", 2), ("refused_total", 3)):
+        assert registry.get_sample_value(f"touchline_lane_{name}", {"lane": "edits"}) == value
+
+
+def test_counts_windows_that_listen(app: FastAPI, read, event_loop_of_all: BlockingPortal) -> None:
+    events = app.state.services.events
+
+    def counted() -> list[float]:
+        told = ("opened", "resumed", "lost")
+        number = read("touchline_event_streams")
+        return [number, *(read("touchline_event_stream_total", what=what) for what in told)]
+
+    assert counted() == [0, 0, 0, 0]
+    feed = event_loop_of_all.call(lambda: events.subscribe(None, events.position, resumed=True))
+    assert counted() == [1, 1, 1, 0]
+    feed.lost = True
+    events.unsubscribe(feed)
+    assert counted() == [0, 1, 1, 1]
+
+
+def test_counts_jobs_by_kind_and_state(app: FastAPI, read) -> None:
+    jobs, begun, end = app.state.services.jobs, threading.Event(), threading.Event()
+
+    def work(_progress: object) -> None:
+        begun.set()
+        assert end.wait(SECONDS)
+
+    def fail(_progress: object) -> None:
+        raise StorageError("the disk is gone")
+
+    first = jobs.submit("export", "Work", work, actor="ann")
+    last = jobs.submit("import", "Work", fail, actor="ann")
+    assert begun.wait(SECONDS)
+    assert read("touchline_jobs", kind="export", state="running") == 1
+    assert read("touchline_jobs", kind="import", state="waiting") == 1
+    end.set()
+    for job in (first, last):
+        jobs.wait(job.id, SECONDS)
+    assert read("touchline_jobs", kind="export", state="done") == 1
+    assert read("touchline_jobs", kind="import", state="failed") == 1
+
+
+def test_says_how_long_requests_of_a_route_took(api: TestClient, read) -> None:
+    labels = {"handler": f"{API}/groups/{{group}}/history", "method": "GET"}
+
+    def counted() -> float:
+        api.get(f"{API}/groups/1/history").raise_for_status()
+        everything = read("http_request_duration_seconds_bucket", le="+Inf", **labels)
+        assert everything == read("http_request_duration_seconds_count", **labels)
+        assert read("http_request_duration_seconds_sum", **labels) > 0
+        assert read("http_request_duration_seconds_bucket", le="1.0", **labels) <= everything
+        return everything
+
+    before = counted()
+    assert counted() == before + 1
+
+
+def break_down(*_: object) -> None:
+    os.abort()
+
+
+@pytest.fixture
+def previews(app: FastAPI) -> Iterator[Previews]:
+    """What a server of a team has."""
+    services = app.state.services
+    settings = services.settings.model_copy(update={"team": True})
+    with closing(Previews(settings, services.store, services.paint)) as made:
+        yield made
+
+
+POOLS: dict[str, Callable[[Services, Previews], Any]] = {
+    "pictures": lambda services, _: services.frames._pool,
+    "readers": lambda services, _: services.frames._readers,
+    "fetchers": lambda services, _: services.frames._fetchers,
+    "predictions": lambda services, _: services.predictions._pool,
+    "previews": lambda _, previews: previews._pool,
+}
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_kind_of_children_begins_with_nobody(read, kind: str) -> None:
+    for name in ("busy", "waiting"):
+        assert read(f"touchline_children_{name}", kind=kind) == 0
+
+
+@pytest.mark.parametrize("kind", POOLS)
+def test_a_child_that_ends_in_the_midst_of_its_task_counts_for_its_pool(
+    app: FastAPI, read, previews: Previews, kind: str
+) -> None:
+    def ended() -> dict[str, float]:
+        name = "touchline_children_ended_total"
+        return {other: read(name, kind=other, reason="crash") for other in KINDS}
+
+    before, pool = ended(), POOLS[kind](app.state.services, previews)
+    assert isinstance(pool, ChildPool)
+    with pytest.raises(ChildEnded):
+        pool.submit(break_down).future.result(SECONDS)
+    assert ended() == {**before, kind: before[kind] + 1}
 
 
 def test_requests_count_for_their_route_whatever_number_is_in_their_address(
@@ -114,3 +234,61 @@ def test_a_database_that_does_not_answer_is_a_number_and_no_error(
     monkeypatch.setattr("app.api.metrics.read_home", fail)
     assert read("touchline_database_up") == 0
     assert read("touchline_lane_busy", lane="reads") == 0
+
+
+def test_a_database_that_was_seen_to_be_damaged_is_said_while_it_answers(
+    app: FastAPI, api: TestClient, read
+) -> None:
+    assert read("touchline_database_damaged") == 0
+    app.state.services.store.note_damage(DamagedError("a row is torn"))
+    assert api.get("/readyz").status_code == 503
+    assert (read("touchline_database_damaged"), read("touchline_database_up")) == (1, 1)
+
+
+def test_damage_that_the_numbers_themselves_meet_is_said_at_once(
+    app: FastAPI, read, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def meet(store: Store) -> None:
+        error = DamagedError("a row is torn")
+        store.note_damage(error)
+        raise error
+
+    monkeypatch.setattr("app.api.metrics.read_home", meet)
+    assert (read("touchline_database_damaged"), read("touchline_database_up")) == (1, 0)
+
+
+class TestOperations:
+    """docs/operations.md and what a server says."""
+
+    @pytest.fixture
+    def said(self, api: TestClient) -> set[str]:
+        """Names of all metrics, and of the numbers that they consist of."""
+        api.get(f"{API}/groups/1").raise_for_status()
+        families = list(text_string_to_metric_families(api.get("/metrics").text))
+        samples = {sample.name for family in families for sample in family.samples}
+        return {name for name in samples if not name.endswith("_created")} | {
+            family.name for family in families if family.type == "gauge"
+        }
+
+    @pytest.fixture
+    def named(self) -> set[str]:
+        """What the page calls a metric."""
+        return set(re.findall(r"\b(?:touchline|http)_[a-z_]+", PAGE.read_text("utf-8")))
+
+    def test_every_metric_that_it_names_is_there(self, said: set[str], named: set[str]) -> None:
+        assert named >= {"http_requests_total", "http_request_duration_seconds_bucket"}
+        assert named - said == set()
+
+    def test_every_metric_of_the_product_is_named(self, said: set[str], named: set[str]) -> None:
+        own = {name for name in said if name.startswith("touchline_")}
+        assert len(own) >= 17
+        assert own - named == set()
+
+    def test_every_lane_and_every_kind_of_children_has_a_line(self) -> None:
+        text = PAGE.read_text("utf-8")
+        rows = {
+            name
+            for row in re.findall(r"^\| (`[a-z].*?) \|", text, re.M)
+            for name in re.findall(r"`([a-z-]+)`", row)
+        }
+        assert {*KINDS, *(lane.name for lane in LANES)} - rows == set()

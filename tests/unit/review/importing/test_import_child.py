@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -11,6 +12,7 @@ from typing import Any
 
 import pytest
 
+from app.child_figures import FIGURES
 from app.datasets.soccernet_v3_writer import write_soccernet_v3
 from app.errors import DamagedError, JobCancelled, TooLargeError
 from app.progress import Progress
@@ -60,6 +62,10 @@ def take_and_keep(*told: Any) -> None:
     """An import that has its turn to write, and never gives it back."""
     told[-1]("take")
     time.sleep(SECONDS)
+
+
+def break_down(*_: object) -> None:
+    os.abort()
 
 
 def meet_damage(*_: object) -> None:
@@ -178,6 +184,15 @@ class TestImportApart:
             apart(there, tree)
         with pytest.raises(DamagedError, match="no change is taken"), there.write():
             pass
+
+    def test_one_that_breaks_down_is_counted(
+        self, store: Store, tree: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(import_child, "import_here", break_down)
+        before = FIGURES["imports"].ended["crash"]
+        with pytest.raises(TooLargeError, match="made the process crash"):
+            apart(store, tree)
+        assert FIGURES["imports"].ended["crash"] == before + 1
 
     def test_what_needs_too_much_memory_is_a_sentence(
         self, store: Store, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
