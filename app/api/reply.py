@@ -91,6 +91,11 @@ def document(
     return Response(content.model_dump_json(), status, headers, "application/json")
 
 
+def nothing(_outcome: object) -> Response:
+    """The answer of what leaves nothing to say: 204."""
+    return Response(status_code=204)
+
+
 async def get_asked(request: Request) -> Asked | None:
     """The key under which a request was sent, or None."""
     asked: Asked | None = request.scope.get(ASKED)

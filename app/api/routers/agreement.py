@@ -8,7 +8,7 @@ from fastapi import APIRouter, Query, Response
 
 from app.api.deps import MAX_ID, Actor, AppServices, AppStore, DatasetPath, Id
 from app.api.problem import responses
-from app.api.reply import AskedUnder, Reply, document
+from app.api.reply import AskedUnder, Reply, document, nothing
 from app.api.routers.groups import ETAG, group_answer
 from app.api.schemas.agreement import (
     AgreementDocument,
@@ -25,6 +25,7 @@ from app.evaluation.agreement_limits import Limits
 from app.review.agreement import adjudicate, limits
 from app.review.agreement.compare import compare_groups
 from app.review.agreement.summary import agreement_csv, agreement_of
+from app.review.takes.take import TakeView
 
 router = APIRouter(tags=["agreement"])
 CSV_FILE = "text/csv"
@@ -80,9 +81,13 @@ def get_agreement_file(dataset: DatasetPath, store: AppStore, of_batch: OfBatch 
     response_model=LimitsDocument,
     responses=responses(404, 413, 415),
 )
-def put_limits(dataset: DatasetPath, asked: LimitsEdit, store: AppStore, actor: Actor) -> Limits:
+def put_limits(
+    dataset: DatasetPath, edit: LimitsEdit, store: AppStore, actor: Actor, asked: AskedUnder
+) -> Response:
     """How far annotations may lie apart and still agree; counts for what is handed in from now on."""
-    return limits.set_limits(store, dataset, Limits(**asked.model_dump()), actor=actor)
+    reply = Reply[Limits](asked, lambda found: document(LimitsDocument.model_validate(found)))
+    wanted = Limits(**edit.model_dump())
+    return reply.of(limits.set_limits(store, dataset, wanted, actor=actor, keep=reply.keep))
 
 
 @router.get(
@@ -133,6 +138,10 @@ def decide(
     status_code=204,
     responses=responses(403, 404, 409, 413, 415),
 )
-def hand_back(group: Id, back: TakeHandBack, store: AppStore, actor: Actor) -> None:
+def hand_back(
+    group: Id, back: TakeHandBack, store: AppStore, actor: Actor, asked: AskedUnder
+) -> Response:
     """Hand one of the annotations back to its person; it is compared again when it is handed in."""
-    adjudicate.hand_back(store, group, back.take, back.reason, actor=actor)
+    reply: Reply[TakeView] = Reply(asked, nothing)
+    take = adjudicate.hand_back(store, group, back.take, back.reason, actor=actor, keep=reply.keep)
+    return reply.made or nothing(take)

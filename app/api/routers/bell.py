@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from fastapi import APIRouter, Query
+from fastapi import APIRouter, Query, Response
 
 from app.api.deps import MAX_ID, AppStore
 from app.api.problem import responses
+from app.api.reply import AskedUnder, Reply, document
 from app.api.routers.sessions import Me
 from app.api.schemas.bell import BellDocument, BellRead
 from app.api.team import AppTeam
@@ -37,6 +38,9 @@ def get_bell(
     response_model=BellDocument,
     responses=responses(401, 409, 413, 415),
 )
-def read_bell(said: BellRead, store: AppStore, _team: AppTeam, me: Me) -> Bell:
+def read_bell(
+    said: BellRead, store: AppStore, _team: AppTeam, me: Me, asked: AskedUnder
+) -> Response:
     """One has seen some of it, or all."""
-    return bell.read_all(store, me, said.ids)
+    reply = Reply[Bell](asked, lambda seen: document(BellDocument.model_validate(seen)))
+    return reply.of(bell.read_all(store, me, said.ids, keep=reply.keep))

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from fastapi import APIRouter, Query
+from fastapi import APIRouter, Query, Response
 
 from app.api.deps import Actor, AppServices, AppStore, DatasetPath, QueryText, Sees
 from app.api.problem import responses
+from app.api.reply import AskedUnder, Reply, document
 from app.api.schemas.dataset import (
     DatasetDeletion,
     DatasetDocument,
@@ -17,7 +18,7 @@ from app.api.schemas.dataset import (
 )
 from app.review.datasets import dataset as review
 from app.review.datasets import delete as deletion
-from app.review.datasets.delete import read_contents
+from app.review.datasets.delete import DatasetContents, read_contents
 from app.review.queue.progress import summary
 
 router = APIRouter(prefix="/datasets", tags=["datasets"])
@@ -48,26 +49,35 @@ def get_summary(dataset: DatasetPath, store: AppStore, query: QueryText = "") ->
     return SummaryDocument(progress=counted, histograms=counted.histograms)
 
 
-@router.delete("/{dataset}", operation_id="deleteDataset", responses=responses(404, 409, 413, 415))
+@router.delete(
+    "/{dataset}",
+    operation_id="deleteDataset",
+    response_model=DeletedDocument,
+    responses=responses(404, 409, 413, 415),
+)
 def delete_dataset(
     dataset: DatasetPath,
     request: DatasetDeletion,
     services: AppServices,
     actor: Actor,
+    asked: AskedUnder,
     dry_run: Annotated[bool, Query(description="Only report what would be deleted.")] = False,
-) -> DeletedDocument:
+) -> Response:
     """Delete a dataset with everything that belongs to it; `confirm` is its name, else 409.
 
     Its jobs are cancelled first. Cannot be undone; the log of what was said stays.
     """
     contents = read_contents(services.store, dataset)
+    reply = Reply[DatasetContents](
+        asked, lambda gone: document(DeletedDocument(dry_run=dry_run, **vars(gone)))
+    )
     if not dry_run:
         exports = services.jobs.every(dataset_id=contents.id, kind="export")
         if request.confirm == contents.name:
             services.jobs.cancel_all(contents.id)
         contents = deletion.delete_dataset(
-            services.store, contents.id, confirm=request.confirm, actor=actor
+            services.store, contents.id, confirm=request.confirm, actor=actor, keep=reply.keep
         )
         for export in exports:
             services.exports.forget(str(export))
-    return DeletedDocument(dry_run=dry_run, **vars(contents))
+    return reply.of(contents)

@@ -12,6 +12,7 @@ from app.api.cursor import parse_cursor
 from app.api.deps import MAX_ID, Actor, AppServices, AppStore, DatasetPath, Id
 from app.api.jobs import by_job, job_answer
 from app.api.problem import Responses, responses
+from app.api.reply import AskedUnder, Reply, nothing
 from app.api.schemas.evaluation import (
     ComparisonDocument,
     EvaluationBody,
@@ -83,6 +84,7 @@ def start_evaluation(
     request: EvaluationBody,
     services: AppServices,
     actor: Actor,
+    asked: AskedUnder,
 ) -> Response:
     """Evaluate predictions against a frozen version, or the dataset as it is now.
 
@@ -91,8 +93,9 @@ def start_evaluation(
     store, named = services.store, request.version
     version = None if named is None else version_called(store, str(named), dataset)
     wanted = request.value(version)
-    job = request_evaluation(services.jobs, store, dataset, wanted, actor=actor)
-    return job_answer(job)
+    reply = Reply(asked, job_answer)
+    job = request_evaluation(services.jobs, store, dataset, wanted, actor=actor, keep=reply.keep)
+    return reply.of(job)
 
 
 @router.get(
@@ -112,9 +115,11 @@ def get_evaluation(evaluation: Id, store: AppStore) -> StoredEvaluation:
     status_code=204,
     responses=responses(404),
 )
-def delete_evaluation(evaluation: Id, store: AppStore, actor: Actor) -> None:
+def delete_evaluation(evaluation: Id, store: AppStore, actor: Actor, asked: AskedUnder) -> Response:
     """Delete an evaluation; its predictions stay."""
-    review.remove_evaluation(store, evaluation, actor=actor)
+    reply: Reply[None] = Reply(asked, nothing)
+    review.remove_evaluation(store, evaluation, actor=actor, keep=reply.keep)
+    return reply.of(None)
 
 
 @router.get(

@@ -13,7 +13,7 @@ from app.api.cursor import parse_cursor
 from app.api.deps import Actor, AppServices, Sees, Services
 from app.api.jobs import ACCEPTED, job_address
 from app.api.problem import Responses, responses
-from app.api.reply import AskedUnder, Reply, document
+from app.api.reply import AskedUnder, Reply, document, nothing
 from app.api.routers.jobs import Cursor, DatasetFilter, Limit
 from app.api.schemas.export import (
     ExportDocument,
@@ -106,7 +106,9 @@ def get_export(export: ExportId, services: AppServices) -> ExportDocument:
     response_class=Response,
     responses={**responses(404, 409), 204: {"description": "It is gone."}},
 )
-def delete_export(export: ExportId, services: AppServices, actor: Actor) -> Response:
+def delete_export(
+    export: ExportId, services: AppServices, actor: Actor, asked: AskedUnder
+) -> Response:
     """Delete the file of an export, or one that failed altogether; 409 while it is being written."""
     document = _document(services, export)
     if document.state in ("waiting", "running"):
@@ -116,8 +118,9 @@ def delete_export(export: ExportId, services: AppServices, actor: Actor) -> Resp
     if document.state in ("failed", "cancelled"):
         services.jobs.forget(int(export))
     services.exports.forget(export)
-    record_deed(services.store, actor, "export deleted", None, export=export)
-    return Response(status_code=204)
+    reply: Reply[None] = Reply(asked, nothing)
+    record_deed(services.store, actor, "export deleted", None, keep=reply.keep(None), export=export)
+    return reply.of(None)
 
 
 async def written(export: ExportId, services: AppServices) -> str:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from fastapi import APIRouter
+from fastapi import APIRouter, Response
 
 from app.api.deps import Actor, AppStore, DatasetPath, Id
 from app.api.problem import responses
+from app.api.reply import AskedUnder, Reply, document
 from app.api.schemas.take import (
     GoldChoiceDocument,
     GoldChosenDocument,
@@ -37,12 +38,19 @@ def get_report(dataset: DatasetPath, store: AppStore) -> gold.GoldReport:
     responses=responses(404, 409, 413, 415),
 )
 def choose(
-    dataset: DatasetPath, choice: GoldChoiceDocument, store: AppStore, actor: Actor
-) -> GoldChosen:
+    dataset: DatasetPath,
+    choice: GoldChoiceDocument,
+    store: AppStore,
+    actor: Actor,
+    asked: AskedUnder,
+) -> Response:
     """Make gold groups of those whose truth is known, also while batches are under way."""
     values = choice.model_dump(exclude={"q", "source"})
     wanted = GoldChoice(gold.Source(choice.source), query=choice.q, **values)
-    return mark_known(store, dataset, wanted, actor=actor)
+    reply = Reply[GoldChosen](
+        asked, lambda chosen: document(GoldChosenDocument.model_validate(chosen))
+    )
+    return reply.of(mark_known(store, dataset, wanted, actor=actor, keep=reply.keep))
 
 
 @router.put(
@@ -51,9 +59,10 @@ def choose(
     response_model=GoldGroupDocument,
     responses=responses(404, 409, 413, 415),
 )
-def mark(group: Id, edit: GoldEdit, store: AppStore, actor: Actor) -> gold.GoldGroup:
+def mark(group: Id, edit: GoldEdit, store: AppStore, actor: Actor, asked: AskedUnder) -> Response:
     """Say that what a group holds now, with its verdict, is true."""
-    return gold.mark(store, group, edit.start, actor=actor)
+    reply = Reply(asked, _gold_answer)
+    return reply.of(gold.mark(store, group, edit.start, actor=actor, keep=reply.keep))
 
 
 @router.delete(
@@ -62,6 +71,11 @@ def mark(group: Id, edit: GoldEdit, store: AppStore, actor: Actor) -> gold.GoldG
     response_model=GoldGroupDocument,
     responses=responses(404),
 )
-def unmark(group: Id, store: AppStore, actor: Actor) -> gold.GoldGroup:
+def unmark(group: Id, store: AppStore, actor: Actor, asked: AskedUnder) -> Response:
     """Let a gold group be an ordinary one again; what people made of it is shown no more."""
-    return gold.unmark(store, group, actor=actor)
+    reply = Reply(asked, _gold_answer)
+    return reply.of(gold.unmark(store, group, actor=actor, keep=reply.keep))
+
+
+def _gold_answer(group: gold.GoldGroup) -> Response:
+    return document(GoldGroupDocument.model_validate(group))

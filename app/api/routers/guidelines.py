@@ -6,8 +6,9 @@ from typing import Annotated
 
 from fastapi import APIRouter, Path, Query, Request, Response
 
-from app.api.deps import Actor, AppStore, DatasetPath, etag_matches
+from app.api.deps import Actor, AppServices, AppStore, DatasetPath, etag_matches
 from app.api.problem import responses
+from app.api.reply import AskedUnder, Reply, document
 from app.api.schemas.take import (
     GuidelinePictureDocument,
     GuidelinesDocument,
@@ -45,12 +46,16 @@ def get_guidelines(
     responses=responses(404, 409, 413, 415),
 )
 def write_guidelines(
-    dataset: DatasetPath, edit: GuidelinesEdit, store: AppStore, actor: Actor
-) -> guidelines.Guidelines:
+    dataset: DatasetPath, edit: GuidelinesEdit, store: AppStore, actor: Actor, asked: AskedUnder
+) -> Response:
     """Write another version; 409 where somebody wrote one meanwhile."""
-    return guidelines.write_guidelines(
-        store, dataset, edit.text, based_on=edit.based_on, actor=actor
+    reply = Reply[guidelines.Guidelines](
+        asked, lambda written: document(GuidelinesDocument.model_validate(written))
     )
+    written = guidelines.write_guidelines(
+        store, dataset, edit.text, based_on=edit.based_on, actor=actor, keep=reply.keep
+    )
+    return reply.of(written)
 
 
 @router.post(
@@ -58,13 +63,19 @@ def write_guidelines(
     operation_id="addGuidelinePicture",
     response_model=GuidelinePictureDocument,
     status_code=201,
-    responses=responses(404, 409, 413, 415),
+    responses=responses(404, 409, 413, 415, 503),
 )
 def add_picture(
-    dataset: DatasetPath, new: NewGuidelinePicture, store: AppStore
-) -> guidelines.GuidelinePicture:
+    dataset: DatasetPath, new: NewGuidelinePicture, services: AppServices, asked: AskedUnder
+) -> Response:
     """Keep an uploaded picture; the text shows it by its digest."""
-    return guidelines.add_picture(store, dataset, new.upload)
+    reply = Reply[guidelines.GuidelinePicture](
+        asked, lambda picture: document(GuidelinePictureDocument.model_validate(picture), 201)
+    )
+    kept = guidelines.add_picture(
+        services.store, dataset, new.upload, services.frames, keep=reply.keep
+    )
+    return reply.of(kept)
 
 
 @router.get(

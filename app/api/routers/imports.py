@@ -9,6 +9,7 @@ from fastapi import APIRouter, Query, Response
 from app.api.deps import Actor, AppServices, DryRun
 from app.api.jobs import by_job, job_answer
 from app.api.problem import responses
+from app.api.reply import AskedUnder, Reply
 from app.api.schemas.imports import FolderDocument, ImportBody
 from app.review.importing.folders import FolderListing, list_folder
 from app.review.jobs.imports import request_import
@@ -40,6 +41,7 @@ def start_import(
     request: ImportBody,
     services: AppServices,
     actor: Actor,
+    asked: AskedUnder,
     dry_run: DryRun = False,
 ) -> Response:
     """Read files into a dataset, which is made when there is none of that name.
@@ -47,11 +49,13 @@ def start_import(
     The job's result is the report: read, imported, new, changed, unchanged, findings, and what
     was skipped with file, record and reason. A dry run reports the same and keeps nothing.
     """
+    reply = Reply(asked, job_answer)
     job = request_import(
         services.jobs,
         services.store,
         services.settings,
         request.value(dry_run=dry_run),
         actor=actor,
+        keep=reply.keep,
     )
-    return job_answer(job)
+    return reply.of(job)

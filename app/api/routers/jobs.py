@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from fastapi import APIRouter, Query
+from fastapi import APIRouter, Query, Response
 
 from app.api.cursor import parse_cursor
 from app.api.deps import Actor, AppServices, Id, Sees
 from app.api.problem import responses
+from app.api.reply import AskedUnder, Reply, document
 from app.api.schemas.job import JobDocument, JobKind, JobPage, JobState
 from app.review.datasets.dataset import dataset_id
 from app.review.people.deeds import record_deed
@@ -56,9 +57,17 @@ def get_job(job: Id, services: AppServices) -> Job:
 @router.delete(
     "/{job}", operation_id="cancelJob", response_model=JobDocument, responses=responses(404, 409)
 )
-def cancel_job(job: Id, services: AppServices, actor: Actor) -> Job:
+def cancel_job(job: Id, services: AppServices, actor: Actor, asked: AskedUnder) -> Response:
     """End a job: one that waits at once, one that runs at its next step; 409 when it is over."""
     ended = services.jobs.cancel(job)
-    where = ended.dataset_id
-    record_deed(services.store, actor, "job cancelled", where, job=job, title=ended.title)
-    return ended
+    reply = Reply[Job](asked, lambda found: document(JobDocument.model_validate(found)))
+    record_deed(
+        services.store,
+        actor,
+        "job cancelled",
+        ended.dataset_id,
+        keep=reply.keep(ended),
+        job=job,
+        title=ended.title,
+    )
+    return reply.of(ended)

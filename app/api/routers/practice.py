@@ -7,6 +7,7 @@ from fastapi import APIRouter, Response
 from app.api.deps import Actor, AppServices, Id, Sees
 from app.api.jobs import by_job, job_answer
 from app.api.problem import responses
+from app.api.reply import AskedUnder, Reply
 from app.api.schemas.practice import LessonDocument, PracticeBody, PracticeDocument
 from app.review.editing.submit import load
 from app.review.practice.practice import (
@@ -36,15 +37,23 @@ def get_practice(services: AppServices, sight: Sees) -> Practice:
     operation_id="startPractice",
     **by_job(409, 413, 415, 503),
 )
-def start_practice(request: PracticeBody, services: AppServices, actor: Actor) -> Response:
+def start_practice(
+    request: PracticeBody, services: AppServices, actor: Actor, asked: AskedUnder
+) -> Response:
     """Make the dataset `practice`; sent again it changes nothing, with `again` it begins afresh.
 
     The job's result has `dataset`, `groups` and `first`, the id of the first lesson's group.
     """
+    reply = Reply(asked, job_answer)
     job = request_practice(
-        services.jobs, services.store, services.settings, again=request.again, actor=actor
+        services.jobs,
+        services.store,
+        services.settings,
+        again=request.again,
+        actor=actor,
+        keep=reply.keep,
     )
-    return job_answer(job)
+    return reply.of(job)
 
 
 @router.get(

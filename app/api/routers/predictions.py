@@ -10,7 +10,7 @@ from fastapi import APIRouter, Query, Response
 from app.api.deps import Actor, AppServices, AppStore, DatasetPath, DryRun, Id, IfMatch
 from app.api.jobs import ACCEPTED, job_answer
 from app.api.problem import responses
-from app.api.reply import AskedUnder
+from app.api.reply import AskedUnder, Reply, document, nothing
 from app.api.routers.groups import CHANGED, CONFLICTS, change_group, load_document
 from app.api.schemas.group import GroupDocument
 from app.api.schemas.job import JobDocument
@@ -28,7 +28,7 @@ from app.api.schemas.prediction import (
 from app.config import Settings
 from app.review.editing.places import find_view
 from app.review.evaluating import predictions as review
-from app.review.evaluating.accept import accept, accept_box, plan_accept
+from app.review.evaluating.accept import AcceptReport, accept, accept_box, plan_accept
 from app.review.evaluating.group_predictions import group_predictions
 from app.review.evaluating.prediction_reader import PredictionFiles
 from app.review.jobs.evaluations import request_accept
@@ -64,14 +64,15 @@ def add_predictions(
     request: PredictionRequest,
     services: AppServices,
     actor: Actor,
-    response: Response,
-) -> PredictionSet:
+    asked: AskedUnder,
+) -> Response:
     """Read uploaded files into a new set of predictions.
 
     What is wrong is left out and listed with file, record and field; frames that the dataset does
     not have are counted and listed. 400 where nothing can be used, 413 where reading takes too
     much memory or time, 503 while too many others are read. No solve reads predictions.
     """
+    reply = Reply(asked, _added)
     found = review.add_predictions(
         services.store,
         dataset,
@@ -79,9 +80,14 @@ def add_predictions(
         _files(services.settings, request),
         actor=actor,
         read=services.predictions.read,
+        keep=reply.keep,
     )
-    response.headers["Location"] = f"/api/v1/predictions/{found.id}"
-    return found
+    return reply.of(found)
+
+
+def _added(found: PredictionSet) -> Response:
+    headers = {"Location": f"/api/v1/predictions/{found.id}"}
+    return document(PredictionSetDocument.model_validate(found), 201, headers)
 
 
 @router.post(
@@ -101,6 +107,7 @@ def accept_predictions(
     request: AcceptBody,
     services: AppServices,
     actor: Actor,
+    asked: AskedUnder,
     dry_run: DryRun = False,
 ) -> AcceptOutcome | Response:
     """Make annotations of predictions, as edits in the log that can be undone.
@@ -112,9 +119,11 @@ def accept_predictions(
     if dry_run or request.dry_run:
         return AcceptOutcome.planned(plan_accept(store, request.dataset, value))
     if request.views is not None:
-        return AcceptOutcome.done(accept(store, request.dataset, value, actor=actor))
-    job = request_accept(services.jobs, store, request.dataset, value, actor=actor)
-    return job_answer(job)
+        done = Reply[AcceptReport](asked, lambda report: document(AcceptOutcome.done(report)))
+        return done.of(accept(store, request.dataset, value, actor=actor, keep=done.keep))
+    reply = Reply(asked, job_answer)
+    job = request_accept(services.jobs, store, request.dataset, value, actor=actor, keep=reply.keep)
+    return reply.of(job)
 
 
 @router.get(
@@ -134,9 +143,13 @@ def get_predictions(predictions: Id, store: AppStore) -> PredictionSet:
     status_code=204,
     responses=responses(404),
 )
-def delete_predictions(predictions: Id, store: AppStore, actor: Actor) -> None:
+def delete_predictions(
+    predictions: Id, store: AppStore, actor: Actor, asked: AskedUnder
+) -> Response:
     """Throw a set away; evaluations of it stay, and so do balls that were accepted from it."""
-    review.delete_predictions(store, predictions, actor=actor)
+    reply: Reply[None] = Reply(asked, nothing)
+    review.delete_predictions(store, predictions, actor=actor, keep=reply.keep)
+    return reply.of(None)
 
 
 @router.get(

@@ -6,7 +6,7 @@ from fastapi import APIRouter, Request, Response
 
 from app.api.deps import Actor, AppServices, AppStore, DatasetPath, Id
 from app.api.problem import responses
-from app.api.reply import AskedUnder, Reply
+from app.api.reply import AskedUnder, Reply, document
 from app.api.routers.groups import ETAG, group_answer
 from app.api.schemas.group import GroupDocument
 from app.api.schemas.take import HandBack, TakeDocument, TakeList
@@ -40,9 +40,11 @@ def list_takes(dataset: DatasetPath, store: AppStore, request: Request, actor: A
     status_code=201,
     responses=responses(404, 409),
 )
-def begin(group: Id, store: AppStore, actor: Actor) -> takes.TakeView:
+def begin(group: Id, store: AppStore, actor: Actor, asked: AskedUnder) -> Response:
     """Begin an own annotation of a group, on a copy that nobody else sees; the one begun, if so."""
-    return takes.shown(store, takes.begin_take(store, group, person=actor))
+    reply = Reply[takes.TakeView](asked, lambda take: _take_answer(take, 201))
+    take = takes.begin_take(store, group, person=actor, keep=reply.keep)
+    return reply.made or _take_answer(takes.shown(store, take), 201)
 
 
 @router.get(
@@ -62,12 +64,13 @@ def get_take(group: Id, store: AppStore) -> takes.TakeView:
     response_model=TakeDocument,
     responses=responses(403, 404),
 )
-def hand_in(group: Id, services: AppServices, actor: Actor) -> takes.TakeView:
+def hand_in(group: Id, services: AppServices, actor: Actor, asked: AskedUnder) -> Response:
     """Say that one's own annotation is done; a verdict on it does the same."""
-    store = services.store
-    handed = takes.hand_in(store, takes.get_take_of(store, group).id, actor=actor)
+    store, reply = services.store, Reply(asked, _take_answer)
+    take = takes.get_take_of(store, group)
+    handed = takes.hand_in(store, take.id, actor=actor, keep=reply.keep)
     after_hand_in(store, group, services.paint)
-    return takes.shown(store, handed)
+    return reply.made or _take_answer(takes.shown(store, handed))
 
 
 @router.post(
@@ -77,11 +80,17 @@ def hand_in(group: Id, services: AppServices, actor: Actor) -> takes.TakeView:
     responses=responses(404, 409, 413, 415),
 )
 def hand_back(
-    group: Id, store: AppStore, actor: Actor, why: HandBack | None = None
-) -> takes.TakeView:
+    group: Id, store: AppStore, actor: Actor, asked: AskedUnder, why: HandBack | None = None
+) -> Response:
     """Let the person of an annotation that was handed in go on with it, and tell them why."""
     take, reason = takes.get_take_of(store, group), "" if why is None else why.reason
-    return takes.shown(store, hand_back_take(store, take.id, reason, actor=actor))
+    reply = Reply(asked, _take_answer)
+    back = hand_back_take(store, take.id, reason, actor=actor, keep=reply.keep)
+    return reply.made or _take_answer(takes.shown(store, back))
+
+
+def _take_answer(take: takes.TakeView, status: int = 200) -> Response:
+    return document(TakeDocument.model_validate(take), status)
 
 
 @router.post(

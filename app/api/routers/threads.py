@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from fastapi import APIRouter
+from functools import partial
+
+from fastapi import APIRouter, Response
 
 from app.api.deps import Actor, AppStore, Id
 from app.api.problem import responses
+from app.api.reply import AskedUnder, Reply, document, nothing
 from app.api.schemas.thread import (
     NewComment,
     NewThread,
@@ -15,6 +18,7 @@ from app.api.schemas.thread import (
     ThreadList,
 )
 from app.review.talk import comments
+from app.store.threads import StoredThread
 
 router = APIRouter(prefix="/groups/{group}", tags=["comments"])
 
@@ -35,53 +39,75 @@ def list_threads(group: Id, store: AppStore, actor: Actor) -> ThreadList:
 @router.post(
     "/threads",
     operation_id="beginThread",
+    response_model=ThreadDocument,
     status_code=201,
     responses=responses(404, 409, 413, 415),
 )
-def begin_thread(group: Id, new: NewThread, store: AppStore, actor: Actor) -> ThreadDocument:
+def begin_thread(
+    group: Id, new: NewThread, store: AppStore, actor: Actor, asked: AskedUnder
+) -> Response:
     """Say something about the group, a view of it, or a place there.
 
     Whom it mentions is told, where they see the dataset.
     """
     at = None if new.at is None else (new.at.x, new.at.y)
-    thread = comments.begin_thread(store, group, new.text, actor=actor, view=new.view, at=at)
-    return ThreadDocument.of(thread, actor)
+    reply = Reply(asked, partial(_told, actor=actor, status=201))
+    thread = comments.begin_thread(
+        store, group, new.text, actor=actor, view=new.view, at=at, keep=reply.keep
+    )
+    return reply.of(thread)
 
 
 @router.patch(
-    "/threads/{thread}", operation_id="changeThread", responses=responses(404, 409, 413, 415)
+    "/threads/{thread}",
+    operation_id="changeThread",
+    response_model=ThreadDocument,
+    responses=responses(404, 409, 413, 415),
 )
 def change_thread(
-    group: Id, thread: Id, change: ThreadEdit, store: AppStore, actor: Actor
-) -> ThreadDocument:
+    group: Id, thread: Id, change: ThreadEdit, store: AppStore, actor: Actor, asked: AskedUnder
+) -> Response:
     """Settle a thread, or open it again."""
-    found = comments.resolve(store, group, thread, change.resolved, actor=actor)
-    return ThreadDocument.of(found, actor)
+    reply = Reply(asked, partial(_told, actor=actor))
+    found = comments.resolve(store, group, thread, change.resolved, actor=actor, keep=reply.keep)
+    return reply.of(found)
 
 
 @router.post(
     "/threads/{thread}/comments",
     operation_id="replyToThread",
+    response_model=ThreadDocument,
     status_code=201,
     responses=responses(404, 409, 413, 415),
 )
-def reply(group: Id, thread: Id, new: NewComment, store: AppStore, actor: Actor) -> ThreadDocument:
+def reply(
+    group: Id, thread: Id, new: NewComment, store: AppStore, actor: Actor, asked: AskedUnder
+) -> Response:
     """Say something in a thread; who spoke there before is told."""
-    found = comments.reply(store, group, thread, new.text, actor=actor)
-    return ThreadDocument.of(found, actor)
+    answer = Reply(asked, partial(_told, actor=actor, status=201))
+    found = comments.reply(store, group, thread, new.text, actor=actor, keep=answer.keep)
+    return answer.of(found)
 
 
 @router.patch(
     "/threads/{thread}/comments/{comment}",
     operation_id="changeComment",
+    response_model=ThreadDocument,
     responses=responses(403, 404, 409, 413, 415),
 )
 def change_comment(
-    group: Id, thread: Id, comment: Id, new: NewComment, store: AppStore, actor: Actor
-) -> ThreadDocument:
+    group: Id,
+    thread: Id,
+    comment: Id,
+    new: NewComment,
+    store: AppStore,
+    actor: Actor,
+    asked: AskedUnder,
+) -> Response:
     """Give a comment of one's own another text; it is marked as edited."""
-    found = comments.change(store, group, thread, comment, new.text, actor=actor)
-    return ThreadDocument.of(found, actor)
+    reply = Reply(asked, partial(_told, actor=actor))
+    found = comments.change(store, group, thread, comment, new.text, actor=actor, keep=reply.keep)
+    return reply.of(found)
 
 
 @router.delete(
@@ -90,6 +116,14 @@ def change_comment(
     status_code=204,
     responses=responses(403, 404),
 )
-def delete_comment(group: Id, thread: Id, comment: Id, store: AppStore, actor: Actor) -> None:
+def delete_comment(
+    group: Id, thread: Id, comment: Id, store: AppStore, actor: Actor, asked: AskedUnder
+) -> Response:
     """Delete a comment of one's own; a thread in which nothing else is said goes with it."""
-    comments.remove(store, group, thread, comment, actor=actor)
+    reply: Reply[None] = Reply(asked, nothing)
+    comments.remove(store, group, thread, comment, actor=actor, keep=reply.keep)
+    return reply.of(None)
+
+
+def _told(thread: StoredThread, *, actor: str, status: int = 200) -> Response:
+    return document(ThreadDocument.of(thread, actor), status)

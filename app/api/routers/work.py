@@ -9,7 +9,7 @@ from fastapi import APIRouter, Depends, Request, Response
 
 from app.api.deps import Actor, AppServices, AppStore, DatasetPath, Id, Sees, Services
 from app.api.problem import responses
-from app.api.reply import AskedUnder, Reply, document
+from app.api.reply import AskedUnder, Reply, document, nothing
 from app.api.schemas.take import HandBack
 from app.api.schemas.work import (
     BatchEdit,
@@ -62,10 +62,14 @@ async def _workers(request: Request) -> Workers:
 Asks = Annotated[Workers, Depends(_workers)]
 
 
-def _told(services: Services, lease: Lease) -> Response:
-    """The document of a lease of which everybody has been told who looks."""
-    services.events.tell_lease(lease)
+def _lease_answer(lease: Lease) -> Response:
     return document(LeaseDocument.model_validate(lease))
+
+
+def _told(services: Services, lease: Lease, reply: Reply[Lease] | None = None) -> Response:
+    """The answer with a lease of which everybody has been told who looks."""
+    services.events.tell_lease(lease)
+    return _lease_answer(lease) if reply is None else reply.of(lease)
 
 
 @router.get("/work", operation_id="getMyWork", responses=responses())
@@ -102,6 +106,10 @@ def make_batch(
     return reply.of(batches.make_batch(store, dataset, wanted, actor=actor, keep=reply.keep))
 
 
+def _batch_answer(batch: Batch) -> Response:
+    return document(WorkBatchDocument.model_validate(batch))
+
+
 def _made(batch: Batch) -> Response:
     headers = {"Location": f"/api/v1/batches/{batch.id}"}
     return document(WorkBatchDocument.model_validate(batch), 201, headers)
@@ -134,19 +142,26 @@ def get_batch(batch: Id, store: AppStore) -> Batch:
     response_model=WorkBatchDocument,
     responses=responses(404, 409, 413, 415),
 )
-def change_batch(batch: Id, change: BatchEdit, store: AppStore, actor: Actor) -> Batch:
+def change_batch(
+    batch: Id, change: BatchEdit, store: AppStore, actor: Actor, asked: AskedUnder
+) -> Response:
     """Give a batch on to others, close it, or name it otherwise."""
     values = change.model_dump(exclude_unset=True)
     never, none = ({name: None}.items() <= values.items() for name in ("due", "gold_every"))
-    return batches.change_batch(store, batch, actor=actor, never_due=never, no_gold=none, **values)
+    reply = Reply(asked, _batch_answer)
+    changed = batches.change_batch(
+        store, batch, actor=actor, never_due=never, no_gold=none, keep=reply.keep, **values
+    )
+    return reply.of(changed)
 
 
 @router.delete(
     "/batches/{batch}", operation_id="deleteBatch", status_code=204, responses=responses(404)
 )
-def delete_batch(batch: Id, store: AppStore, actor: Actor) -> None:
+def delete_batch(batch: Id, store: AppStore, actor: Actor, asked: AskedUnder) -> Response:
     """Delete a batch; what was said of its groups stays."""
-    batches.remove_batch(store, batch, actor=actor)
+    reply: Reply[Batch] = Reply(asked, nothing)
+    return reply.of(batches.remove_batch(store, batch, actor=actor, keep=reply.keep))
 
 
 @router.get("/batches/{batch}/groups", operation_id="listBatchGroups", responses=responses(404))
@@ -203,12 +218,14 @@ def give_back(batch: Id, group: Id, services: AppServices, asks: Asks) -> None:
     response_model=LeaseDocument,
     responses=responses(404, 409, 413, 415),
 )
-def hand_in(batch: Id, group: Id, services: AppServices, actor: Actor, asks: Asks) -> Response:
+def hand_in(
+    batch: Id, group: Id, services: AppServices, actor: Actor, asks: Asks, asked: AskedUnder
+) -> Response:
     """Say that a group is annotated, so that a reviewer gets it."""
-    worker = asks.of_batch(services.store, batch)
-    lease = Leases(services.store).hand_in(batch, group, worker, actor=actor)
+    worker, reply = asks.of_batch(services.store, batch), Reply(asked, _lease_answer)
+    lease = Leases(services.store).hand_in(batch, group, worker, actor=actor, keep=reply.keep)
     after_hand_in(services.store, group, services.paint)
-    return _told(services, lease)
+    return _told(services, lease, reply)
 
 
 @router.delete(
@@ -217,11 +234,15 @@ def hand_in(batch: Id, group: Id, services: AppServices, actor: Actor, asks: Ask
     response_model=LeaseDocument,
     responses=responses(404, 409),
 )
-def take_back(batch: Id, group: Id, services: AppServices, actor: Actor, asks: Asks) -> Response:
+def take_back(
+    batch: Id, group: Id, services: AppServices, actor: Actor, asks: Asks, asked: AskedUnder
+) -> Response:
     """Say that a group is not annotated yet, after all."""
-    worker = asks.of_batch(services.store, batch)
-    leases = Leases(services.store)
-    return _told(services, leases.hand_in(batch, group, worker, actor=actor, done=False))
+    worker, reply = asks.of_batch(services.store, batch), Reply(asked, _lease_answer)
+    lease = Leases(services.store).hand_in(
+        batch, group, worker, actor=actor, done=False, keep=reply.keep
+    )
+    return _told(services, lease, reply)
 
 
 @router.post(
@@ -231,9 +252,17 @@ def take_back(batch: Id, group: Id, services: AppServices, actor: Actor, asks: A
     responses=responses(404, 409, 413, 415),
 )
 def hand_back(
-    batch: Id, group: Id, why: HandBack, services: AppServices, actor: Actor, asks: Asks
+    batch: Id,
+    group: Id,
+    why: HandBack,
+    services: AppServices,
+    actor: Actor,
+    asks: Asks,
+    asked: AskedUnder,
 ) -> Response:
     """Give a group back to the annotator who handed it in, and tell them why."""
-    worker = asks.of_batch(services.store, batch)
-    leases = Leases(services.store)
-    return _told(services, leases.hand_back(batch, group, worker, why.reason, actor=actor))
+    worker, reply = asks.of_batch(services.store, batch), Reply(asked, _lease_answer)
+    lease = Leases(services.store).hand_back(
+        batch, group, worker, why.reason, actor=actor, keep=reply.keep
+    )
+    return _told(services, lease, reply)

@@ -17,7 +17,7 @@ from app.review.people.members import list_members
 from app.review.people.roles import Action, may
 from app.review.takes.adopt import adopt_take
 from app.review.takes.hand_back import hand_back_take
-from app.review.takes.take import Take
+from app.review.takes.take import Take, TakeView
 from app.soccer.actors import person_of
 from app.store.agreement import OPEN, agreements_of, agreements_on
 from app.store.answers import Keep, keep_nothing
@@ -181,8 +181,18 @@ def take_over(
     )
 
 
-def hand_back(store: Store, group_id: int, take_id: int, reason: str = "", *, actor: str) -> Take:
+def hand_back(
+    store: Store,
+    group_id: int,
+    take_id: int,
+    reason: str = "",
+    *,
+    actor: str,
+    keep: Keep[TakeView] = keep_nothing,
+) -> Take:
     """Hand one of the annotations that disagree back to its person; the group waits no longer.
+
+    ``keep`` keeps the answer in the transaction.
 
     Raises:
         NotFoundError: Nothing of the group waits for a decision, or it is no such annotation.
@@ -193,7 +203,7 @@ def hand_back(store: Store, group_id: int, take_id: int, reason: str = "", *, ac
         raise ForbiddenError(case.refused)
     if take_id not in [take.id for take in case.takes]:
         raise NotFoundError(f"annotation {take_id} is not one that waits for a decision here")
-    return hand_back_take(store, take_id, reason, actor=actor)
+    return hand_back_take(store, take_id, reason, actor=actor, keep=keep)
 
 
 def _others(store: Store, dataset: int, takes: Sequence[Take]) -> list[str]:

@@ -7,6 +7,7 @@ from dataclasses import asdict
 from app.evaluation.agreement_limits import Limits
 from app.review.datasets.dataset import dataset_id
 from app.store.agreement import limits_of, put_limits
+from app.store.answers import Keep, keep_nothing
 from app.store.clock import now
 from app.store.log import Entry, append
 from app.store.session import Session
@@ -22,10 +23,21 @@ def read_limits(session: Session, dataset: int) -> Limits:
     return Limits() if row is None else Limits(**row._mapping)
 
 
-def set_limits(store: Store, dataset: str | int, limits: Limits, *, actor: str) -> Limits:
-    """Let other limits count for whatever is handed in from now on."""
+def set_limits(
+    store: Store,
+    dataset: str | int,
+    limits: Limits,
+    *,
+    actor: str,
+    keep: Keep[Limits] = keep_nothing,
+) -> Limits:
+    """Let other limits count for whatever is handed in from now on.
+
+    ``keep`` keeps the answer in its transaction.
+    """
     number, at = dataset_id(store, dataset), now()
     with store.write() as session:
         put_limits(session, number, {**asdict(limits), "changed": at, "changed_by": actor})
         append(session, [Entry(KIND, actor, at, {"did": "limits", **asdict(limits)}, number)])
+        keep(limits)(session)
     return limits

@@ -12,6 +12,7 @@ from app.review.datasets.dataset import dataset_id, insert_dataset, read_dataset
 from app.review.datasets.spare_calibrations import delete_spare_calibrations
 from app.soccer.policy import Policy
 from app.store import removal
+from app.store.answers import Keep, keep_nothing
 from app.store.clock import now
 from app.store.copy_datasets import copies_of
 from app.store.log import Entry, append
@@ -49,6 +50,7 @@ def delete_dataset(
     confirm: str,
     actor: str,
     afresh: Policy | None = None,
+    keep: Keep[DatasetContents] = keep_nothing,
 ) -> DatasetContents:
     """Delete a dataset with everything that belongs to it; returns what that was.
 
@@ -62,6 +64,7 @@ def delete_dataset(
         actor: Who wants it.
         afresh: Policy of an empty dataset of the same name, which is made in its place with its
             roles, tokens and webhooks; None: none is.
+        keep: Keeps the answer in the last transaction.
 
     Raises:
         NotFoundError: There is no such dataset.
@@ -89,6 +92,7 @@ def delete_dataset(
         removal.delete_rows(session, identity)
         if afresh is not None:
             assert insert_dataset(session, contents.name, afresh, actor) == heir
+        keep(contents)(session)
     delete_spare_calibrations(store)
     return contents
 

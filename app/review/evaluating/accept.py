@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 from app.errors import ConflictError, InputError, NotFoundError, StaleRevisionError
 from app.evaluation.prediction_run import box_problem
@@ -23,7 +24,7 @@ from app.review.queue.query import parse_query
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import Box, ImageSize
 from app.soccer.group import View
-from app.store.answers import Keep, keep_nothing
+from app.store.answers import Keep, Kept, keep_nothing
 from app.store.predictions import PredictedBox, PredictionSet, read_box, read_boxes
 from app.store.session import Session
 from app.store.store import Store
@@ -133,6 +134,7 @@ def accept(
     *,
     actor: str,
     progress: Progress | None = None,
+    keep: Keep[AcceptReport] = keep_nothing,
 ) -> AcceptReport:
     """Make an edit of every prediction that a person accepts; done again it changes nothing.
 
@@ -143,6 +145,7 @@ def accept(
         actor: Who accepts them.
         progress: Called with groups done and in all; an error that it raises ends it, and what
             was accepted before stays.
+        keep: Keeps the answer with the last edit.
 
     Raises:
         As ``plan_accept``.
@@ -151,11 +154,16 @@ def accept(
     refused = Counter(plan.refused)
     views = 0
     changed: set[int] = set()
-    for number, (group_id, items) in enumerate(_by_group(plan.changes)):
+    groups = list(_by_group(plan.changes))
+    for number, (group_id, items) in enumerate(groups):
         if progress is not None:
             progress(number, plan.groups, "Accepting predictions.")
         for item in items:
-            why = _accept(store, item, plan.predictions.name, request, actor)
+            kept: Keep[GroupState] = keep_nothing
+            if item is groups[-1][1][-1]:
+                report = AcceptReport(views + 1, len(changed | {group_id}), dict(refused))
+                kept = partial(_kept_with, keep, report)
+            why = _accept(store, item, plan.predictions.name, request, actor, kept)
             if why is None:
                 views += 1
                 changed.add(group_id)
@@ -265,8 +273,17 @@ def _by_group(items: Sequence[Accepted]) -> Iterator[tuple[int, list[Accepted]]]
     yield from groups.items()
 
 
+def _kept_with(keep: Keep[AcceptReport], report: AcceptReport, _state: GroupState) -> Kept:
+    return keep(report)
+
+
 def _accept(
-    store: Store, item: Accepted, name: str, request: AcceptRequest, actor: str
+    store: Store,
+    item: Accepted,
+    name: str,
+    request: AcceptRequest,
+    actor: str,
+    keep: Keep[GroupState],
 ) -> str | None:
     """Submit one edit; why not, where the view is no longer as planned or the edit impossible."""
     edit = SetBall(item.view, accepted_ball(item.box, name))
@@ -278,7 +295,7 @@ def _accept(
         if not _still_fits(state, item, request):
             break
         try:
-            submit(store, item.group_id, edit, if_match=state.etag, actor=actor)
+            submit(store, item.group_id, edit, if_match=state.etag, actor=actor, keep=keep)
         except StaleRevisionError:
             continue
         except InputError:

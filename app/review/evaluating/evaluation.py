@@ -20,6 +20,7 @@ from app.evaluation.table import Table
 from app.review.datasets.dataset import read_dataset
 from app.review.people.deeds import note_deed
 from app.store import evaluation_frames as frame_rows
+from app.store.answers import Keep, keep_nothing
 from app.store.codecs import Json
 from app.store.evaluation_frames import FrameCondition
 from app.store.evaluations import (
@@ -98,8 +99,10 @@ def get_evaluation(store: Store, evaluation_id: int) -> StoredEvaluation:
         return read_evaluation(session, evaluation_id)
 
 
-def remove_evaluation(store: Store, evaluation_id: int, *, actor: str) -> None:
-    """Delete a run.
+def remove_evaluation(
+    store: Store, evaluation_id: int, *, actor: str, keep: Keep[None] = keep_nothing
+) -> None:
+    """Delete a run; ``keep`` keeps the answer in its transaction.
 
     Raises:
         NotFoundError: There is none.
@@ -108,6 +111,7 @@ def remove_evaluation(store: Store, evaluation_id: int, *, actor: str) -> None:
         found = read_evaluation(session, evaluation_id)
         delete_evaluation(session, evaluation_id)
         note_deed(session, actor, "evaluation deleted", found.dataset_id, evaluation=evaluation_id)
+        keep(None)(session)
 
 
 def tables_of(evaluation: StoredEvaluation) -> list[Table]:

@@ -24,6 +24,7 @@ from app.review.datasets.dataset import read_dataset
 from app.review.evaluating.prediction_reader import PredictionFiles, Read, read_files
 from app.review.people.deeds import note_deed
 from app.soccer.frames import ImageSize
+from app.store.answers import Keep, keep_nothing
 from app.store.clock import now
 from app.store.codecs import Json, canonical
 from app.store.predictions import (
@@ -56,6 +57,7 @@ def add_predictions(
     source: str | None = None,
     reuse: bool = False,
     read: Read = read_files,
+    keep: Keep[PredictionSet] = keep_nothing,
 ) -> PredictionSet:
     """Read files into a new set.
 
@@ -69,6 +71,7 @@ def add_predictions(
         reuse: Answer the set that came of the very same reading, where there is one, and find
             another name where the name is taken.
         read: Reads the files, here or in another process.
+        keep: Keeps the answer with a new set.
 
     Raises:
         InputError: A file cannot be used, no box or camera belongs to a frame of the dataset, or
@@ -97,6 +100,7 @@ def add_predictions(
         unknown=len(boxes.unknown) + len(cameras.unknown),
         actor=actor,
         reuse=reuse,
+        keep=keep,
     )
 
 
@@ -114,6 +118,7 @@ def save_predictions(
     unknown: int = 0,
     actor: str,
     reuse: bool = False,
+    keep: Keep[PredictionSet] = keep_nothing,
 ) -> PredictionSet:
     """Keep what was read, or found by a detector, as a new set.
 
@@ -155,7 +160,9 @@ def save_predictions(
             {view: found for view, found in boxes.items() if view in present},
             {view: camera for view, camera in cameras.items() if view in present},
         )
-        return read_set(session, identity)
+        made = read_set(session, identity)
+        keep(made)(session)
+        return made
 
 
 def frame_names(store: Store, dataset: str | int) -> FrameNames:
@@ -209,8 +216,12 @@ def find_predictions(store: Store, dataset: str | int, name: str) -> PredictionS
     return found
 
 
-def delete_predictions(store: Store, set_id: int, *, actor: str) -> None:
+def delete_predictions(
+    store: Store, set_id: int, *, actor: str, keep: Keep[None] = keep_nothing
+) -> None:
     """Throw a set away; evaluations of it stay, and so do balls that were accepted from it.
+
+    ``keep`` keeps the answer in its transaction.
 
     Raises:
         NotFoundError: There is none.
@@ -219,6 +230,7 @@ def delete_predictions(store: Store, set_id: int, *, actor: str) -> None:
         found = read_set(session, set_id)
         delete_prediction_set(session, set_id)
         note_deed(session, actor, "predictions deleted", found.dataset_id, name=found.name)
+        keep(None)(session)
 
 
 def view_predictions(store: Store, view_id: int) -> list[tuple[PredictionSet, list[PredictedBox]]]:

@@ -11,6 +11,7 @@ from app.review.evaluating.evaluation import list_evaluations
 from app.review.evaluating.evaluation_run import EvaluationRequest, check_evaluation, run_evaluation
 from app.review.jobs.job_run import JobProgress, Work
 from app.review.jobs.jobs import Jobs
+from app.store.answers import Keep, keep_nothing
 from app.store.codecs import Json
 from app.store.evaluations import StoredEvaluation
 from app.store.jobs import Job
@@ -20,9 +21,17 @@ EVALUATE, ACCEPT = "evaluate", "bulk"
 
 
 def request_evaluation(
-    jobs: Jobs, store: Store, dataset: str, request: EvaluationRequest, *, actor: str
+    jobs: Jobs,
+    store: Store,
+    dataset: str,
+    request: EvaluationRequest,
+    *,
+    actor: str,
+    keep: Keep[Job] = keep_nothing,
 ) -> Job:
     """Evaluate, soon; what can be refused is refused at once.
+
+    ``keep`` keeps the answer with the job.
 
     Raises:
         InputError, NotFoundError: As ``run_evaluation`` does.
@@ -36,13 +45,20 @@ def request_evaluation(
         dataset_id=found.id,
         actor=actor,
         request=asdict(request),
+        keep=keep,
     )
 
 
 def request_accept(
-    jobs: Jobs, store: Store, dataset: str, request: AcceptRequest, *, actor: str
+    jobs: Jobs,
+    store: Store,
+    dataset: str,
+    request: AcceptRequest,
+    *,
+    actor: str,
+    keep: Keep[Job] = keep_nothing,
 ) -> Job:
-    """Accept predictions, soon.
+    """Accept predictions, soon; ``keep`` keeps the answer with the job.
 
     Raises:
         InputError, NotFoundError: As ``plan_accept`` does.
@@ -56,6 +72,7 @@ def request_accept(
         dataset_id=found.id,
         actor=actor,
         request={"accept": asdict(request)},
+        keep=keep,
     )
 
 

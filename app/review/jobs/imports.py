@@ -21,6 +21,7 @@ from app.review.jobs.paint import PAINT
 from app.review.jobs.solve import request_solve
 from app.soccer.frames import ImageSize
 from app.soccer.policy import POLICIES
+from app.store.answers import Keep, keep_nothing
 from app.store.codecs import Json
 from app.store.datasets import find_dataset
 from app.store.jobs import Job
@@ -74,6 +75,7 @@ def request_import(
     request: ImportRequest,
     *,
     actor: str,
+    keep: Keep[Job] = keep_nothing,
 ) -> Job:
     """Import, soon; what can be refused is refused at once.
 
@@ -83,6 +85,7 @@ def request_import(
         settings: Where uploads lie, and which folders may be read.
         request: What to import.
         actor: Who imports.
+        keep: Keeps the answer with the job.
 
     Raises:
         InputError: Format, name or path cannot be used.
@@ -101,6 +104,7 @@ def request_import(
         dataset_id=None if row is None else int(row.id),
         actor=actor,
         request=request.values(),
+        keep=keep,
     )
 
 

@@ -10,6 +10,7 @@ from enum import StrEnum
 from app.review.people.logins import Login, read_roles
 from app.review.people.roles import Role
 from app.soccer.actors import person_of
+from app.store.answers import Keep, keep_nothing
 from app.store.bells import (
     Ring,
     count_unread,
@@ -91,16 +92,31 @@ def tell(
 
 def read_bell(store: Store, login: Login, limit: int = 50, before: int | None = None) -> Bell:
     """What somebody was told in the last 90 days, of what they see at this moment."""
-    mine = (login.person_id, login.sight, _oldest())
     with store.read() as session:
-        return Bell(read_rings(session, *mine, limit, before), count_unread(session, *mine))
+        return _read(session, login, limit, before)
 
 
-def read_all(store: Store, login: Login, ids: Sequence[int] | None = None) -> Bell:
-    """They have seen some of what they were told, or (None) all of it."""
+def read_all(
+    store: Store,
+    login: Login,
+    ids: Sequence[int] | None = None,
+    *,
+    keep: Keep[Bell] = keep_nothing,
+) -> Bell:
+    """They have seen some of what they were told, or (None) all of it.
+
+    ``keep`` keeps the answer in its transaction.
+    """
     with store.write() as session:
         mark_read(session, login.person_id, login.sight, ids, now())
-    return read_bell(store, login)
+        bell = _read(session, login)
+        keep(bell)(session)
+        return bell
+
+
+def _read(session: Session, login: Login, limit: int = 50, before: int | None = None) -> Bell:
+    mine = (login.person_id, login.sight, _oldest())
+    return Bell(read_rings(session, *mine, limit, before), count_unread(session, *mine))
 
 
 def _oldest() -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from app.store.answers import Kept, keep_nothing
 from app.store.clock import now
 from app.store.log import Entry, append
 from app.store.session import Session
@@ -11,6 +12,7 @@ DEED = "deed"
 """Kind of the log's entries about what was made, changed or deleted beside the groups."""
 JOB = "job"
 """Kind of the log's entries about jobs that somebody asked for."""
+_NOTHING = keep_nothing(None)
 
 
 def note_deed(
@@ -37,8 +39,18 @@ def note_job(
 
 
 def record_deed(
-    store: Store, actor: str, did: str, dataset_id: int | None, **what: str | int | None
+    store: Store,
+    actor: str,
+    did: str,
+    dataset_id: int | None,
+    *,
+    keep: Kept = _NOTHING,
+    **what: str | int | None,
 ) -> None:
-    """The same where what happens is in no transaction: a file that goes, a job that is stopped."""
+    """The same where what happens is in no transaction: a file that goes, a job that is stopped.
+
+    ``keep`` keeps the answer with the word.
+    """
     with store.write() as session:
         note_deed(session, actor, did, dataset_id, **what)
+        keep(session)

@@ -23,6 +23,7 @@ from app.sample.practice import LESSONS, write_practice
 from app.sample.scene import SceneTruth
 from app.sample.truth import TRUTH, read_truth
 from app.soccer.policy import PAPER
+from app.store.answers import Keep, keep_nothing
 from app.store.codecs import Json
 from app.store.datasets import find_dataset
 from app.store.imports import known_groups
@@ -70,9 +71,17 @@ class Practice:
 
 
 def request_practice(
-    jobs: Jobs, store: Store, settings: Settings, *, again: bool, actor: str
+    jobs: Jobs,
+    store: Store,
+    settings: Settings,
+    *,
+    again: bool,
+    actor: str,
+    keep: Keep[Job] = keep_nothing,
 ) -> Job:
     """Make the practice dataset soon; what is there already stays, unless it shall begin again.
+
+    ``keep`` keeps the answer with the job.
 
     Raises:
         ConflictError: There is a dataset of that name with other groups.
@@ -85,6 +94,7 @@ def request_practice(
         actor=actor,
         request={"again": again},
         once=True,
+        keep=keep,
     )
 
 

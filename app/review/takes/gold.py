@@ -16,6 +16,7 @@ from app.review.editing.submit import load_solved
 from app.review.takes.copying import aligned
 from app.review.takes.errors import AnnotationError, TrueView, error_of, world_error
 from app.soccer.frames import ImagePoint
+from app.store.answers import Keep, keep_nothing
 from app.store.clock import now
 from app.store.codecs import Json, group_from_json, group_to_json
 from app.store.copy_datasets import is_copy
@@ -106,8 +107,17 @@ class GoldReport:
     people: tuple[PersonResults, ...]
 
 
-def mark(store: Store, group_id: int, start: str, *, actor: str) -> GoldGroup:
+def mark(
+    store: Store,
+    group_id: int,
+    start: str,
+    *,
+    actor: str,
+    keep: Keep[GoldGroup] = keep_nothing,
+) -> GoldGroup:
     """Say that what a group holds now is true; annotators begin with what ``start`` leaves of it.
+
+    ``keep`` keeps the answer in its transaction.
 
     Raises:
         NotFoundError: There is no such group.
@@ -129,11 +139,17 @@ def mark(store: Store, group_id: int, start: str, *, actor: str) -> GoldGroup:
         # Not an entry of the group: everybody who sees it reads its history.
         body = {"group": group_id, "did": "marked", "start": start}
         append(session, [Entry(KIND, actor, now(), body, state.dataset_id)])
-        return _need_gold(session, state.dataset_id, group_id)
+        marked = _need_gold(session, state.dataset_id, group_id)
+        keep(marked)(session)
+    return marked
 
 
-def unmark(store: Store, group_id: int, *, actor: str) -> GoldGroup:
+def unmark(
+    store: Store, group_id: int, *, actor: str, keep: Keep[GoldGroup] = keep_nothing
+) -> GoldGroup:
     """Let a gold group be an ordinary one again; what was measured by it is shown no more.
+
+    ``keep`` keeps the answer in its transaction.
 
     Raises:
         NotFoundError: It is none.
@@ -144,6 +160,7 @@ def unmark(store: Store, group_id: int, *, actor: str) -> GoldGroup:
         unmark_gold(session, group_id)
         body = {"group": group_id, "did": "unmarked"}
         append(session, [Entry(KIND, actor, now(), body, state.dataset_id)])
+        keep(gone)(session)
     return gone
 
 

@@ -7,7 +7,10 @@ from dataclasses import dataclass
 
 from app.errors import ConflictError, InputError, NotFoundError, TooLargeError
 from app.review.datasets.dataset import need_dataset
+from app.soccer.media import Media
+from app.store.answers import Keep, keep_nothing
 from app.store.clock import now
+from app.store.frames import Frames
 from app.store.guidelines import (
     count_pictures,
     find_picture,
@@ -17,8 +20,8 @@ from app.store.guidelines import (
     insert_picture,
     told_dataset,
 )
-from app.store.image_header import check_size, read_header
 from app.store.log import Entry, append
+from app.store.session import Session
 from app.store.store import Store
 from app.store.uploads import upload_path
 
@@ -77,19 +80,17 @@ def read_guidelines(store: Store, dataset: str | int, number: int | None = None)
         NotFoundError: There is no such dataset or version.
     """
     with store.read() as session:
-        told = told_dataset(session, need_dataset(session, dataset))
-        heads = guideline_heads(session, told)
-        versions = tuple(GuidelineVersion(**row._mapping) for row in heads)
-        if number is None:
-            number = versions[0].number if versions else 0
-        text = "" if number == 0 else guideline_text(session, told, number)
-    if text is None:
-        raise NotFoundError(f"there is no version {number} of these guidelines")
-    return Guidelines(told, number, text, versions)
+        return _read(session, told_dataset(session, need_dataset(session, dataset)), number)
 
 
 def write_guidelines(
-    store: Store, dataset: str | int, text: str, *, based_on: int, actor: str
+    store: Store,
+    dataset: str | int,
+    text: str,
+    *,
+    based_on: int,
+    actor: str,
+    keep: Keep[Guidelines] = keep_nothing,
 ) -> Guidelines:
     """Write another version of a dataset's guidelines, which counts from now on.
 
@@ -99,6 +100,7 @@ def write_guidelines(
         text: Markdown.
         based_on: Number of the version that was changed; 0: there was none.
         actor: Who writes.
+        keep: Keeps the answer in the transaction.
 
     Raises:
         NotFoundError: There is no such dataset.
@@ -122,30 +124,42 @@ def write_guidelines(
             digest = hashlib.sha256(text.encode()).hexdigest()
             body = {"number": newest + 1, "digest": digest}
             append(session, [Entry(KIND, actor, now(), body, told)])
-    return read_guidelines(store, told)
+        written = _read(session, told)
+        keep(written)(session)
+        return written
 
 
-def add_picture(store: Store, dataset: str | int, upload: str) -> GuidelinePicture:
+def add_picture(
+    store: Store,
+    dataset: str | int,
+    upload: str,
+    frames: Frames,
+    *,
+    keep: Keep[GuidelinePicture] = keep_nothing,
+) -> GuidelinePicture:
     """Keep an uploaded picture for a dataset's guidelines, under the digest of its bytes.
+
+    ``frames`` decodes it where it can take nobody down; ``keep`` keeps the answer in its
+    transaction.
 
     Raises:
         NotFoundError: There is no such dataset or upload.
-        ImageError: It is no picture.
+        ImageError: It is no picture, or damaged.
         TooLargeError: It is too large.
+        OverloadedError: Too many pictures wait to be decoded.
         ConflictError: There are too many.
     """
     path = upload_path(store.settings, upload)
     if path.stat().st_size > MAX_PICTURE:
         raise TooLargeError(f"a picture of guidelines has at most {MAX_PICTURE:,} bytes")
-    body = path.read_bytes()
-    header = read_header(body, path.name)
-    check_size(header, store.settings, path.name)
-    picture = GuidelinePicture(hashlib.sha256(body).hexdigest(), header.kind, body)
+    found = frames.ask(Media(str(path)), None, False).future.result()
+    picture = GuidelinePicture(hashlib.sha256(found.data).hexdigest(), found.kind, found.data)
     with store.write() as session:
         told = told_dataset(session, need_dataset(session, dataset))
         if count_pictures(session, told) >= MAX_PICTURES:
             raise ConflictError(f"guidelines have at most {MAX_PICTURES} pictures")
-        insert_picture(session, told, picture.digest, picture.type, body)
+        insert_picture(session, told, picture.digest, picture.type, picture.body)
+        keep(picture)(session)
     return picture
 
 
@@ -161,3 +175,14 @@ def read_picture(store: Store, dataset: str | int, digest: str) -> GuidelinePict
     if row is None:
         raise NotFoundError("these guidelines have no such picture")
     return GuidelinePicture(digest, row.type, row.body)
+
+
+def _read(session: Session, told: int, number: int | None = None) -> Guidelines:
+    """A version of the guidelines of the dataset whose they are; None: the newest."""
+    versions = tuple(GuidelineVersion(**row._mapping) for row in guideline_heads(session, told))
+    if number is None:
+        number = versions[0].number if versions else 0
+    text = "" if number == 0 else guideline_text(session, told, number)
+    if text is None:
+        raise NotFoundError(f"there is no version {number} of these guidelines")
+    return Guidelines(told, number, text, versions)

@@ -6,8 +6,9 @@ from app.errors import ConflictError, InputError
 from app.review.people.bell import RingKind, tell
 from app.review.takes.adopt import KIND
 from app.review.takes.handed_back import DID
-from app.review.takes.take import Take, need_group, read_take, reopen_take
+from app.review.takes.take import Take, TakeView, need_group, read_take, reopen_take, show
 from app.soccer.actors import person_of
+from app.store.answers import Keep, keep_nothing
 from app.store.clock import now
 from app.store.groups import StoredGroup
 from app.store.log import Entry, append
@@ -20,11 +21,18 @@ MAX_REASON = 500
 """Letters of the sentence that says why."""
 
 
-def hand_back_take(store: Store, take_id: int, reason: str = "", *, actor: str) -> Take:
+def hand_back_take(
+    store: Store,
+    take_id: int,
+    reason: str = "",
+    *,
+    actor: str,
+    keep: Keep[TakeView] = keep_nothing,
+) -> Take:
     """Let the person of an annotation that was handed in go on with it, and tell them why.
 
     A comparison of it that waits for a decision waits no longer: it is made anew once it is handed
-    in again.
+    in again. ``keep`` keeps the answer in the transaction.
 
     Raises:
         NotFoundError: There is no such take.
@@ -39,7 +47,9 @@ def hand_back_take(store: Store, take_id: int, reason: str = "", *, actor: str) 
         reopen_take(session, take)
         copy = take.copy_id
         note_hand_back(session, KIND, copy, take.person, said, actor=actor, batch=take.batch_id)
-        return read_take(session, take_id)
+        back = read_take(session, take_id)
+        keep(show(session, back))(session)
+        return back
 
 
 def note_hand_back(

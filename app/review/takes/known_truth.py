@@ -24,6 +24,7 @@ from app.sample.scene import SceneTruth
 from app.sample.truth import TRUTH, read_truth
 from app.soccer.group import Group
 from app.store.agreement import AGREED, DECIDED, states_of
+from app.store.answers import Keep, keep_nothing
 from app.store.clock import now
 from app.store.codecs import Json, group_to_json
 from app.store.copy_datasets import is_copy
@@ -70,11 +71,19 @@ class GoldChosen:
     left_out: int
 
 
-def mark_known(store: Store, dataset: str | int, choice: GoldChoice, *, actor: str) -> GoldChosen:
+def mark_known(
+    store: Store,
+    dataset: str | int,
+    choice: GoldChoice,
+    *,
+    actor: str,
+    keep: Keep[GoldChosen] = keep_nothing,
+) -> GoldChosen:
     """Make gold groups of those whose truth is known, also while batches are under way.
 
     Of a sample those are left out whose pictures do not show one moment, or were taken from one
-    place; of a version those upon which nobody agreed or decided, and what is not in it.
+    place; of a version those upon which nobody agreed or decided, and what is not in it. ``keep``
+    keeps the answer in the transaction.
 
     Raises:
         InputError: There is no such start, version or query, or nothing is known of any group.
@@ -95,13 +104,15 @@ def mark_known(store: Store, dataset: str | int, choice: GoldChoice, *, actor: s
         truths = dict(islice(found, choice.size))
     if not truths:
         raise _nothing(choice.source)
+    chosen = GoldChosen(tuple(truths), len(asked) - len(truths))
     with store.write() as session:
         for group_id, truth in truths.items():
             mark_gold(session, group_id, number, choice.start, truth, actor)
         body: Json = {"did": "marked", "start": choice.start, "source": str(choice.source)}
         body |= {"groups": [*truths], "version": choice.version}
         append(session, [Entry(KIND, actor, now(), body, number)])
-    return GoldChosen(tuple(truths), len(asked) - len(truths))
+        keep(chosen)(session)
+    return chosen
 
 
 def _of_sample(session: Session, group_ids: Sequence[int]) -> Iterator[tuple[int, Json]]:

@@ -16,6 +16,7 @@ from app.review.takes.copying import CopyOrder, copy_group, start_of
 from app.review.takes.handed_back import HandedBack, read_handed_back
 from app.soccer.actors import person_of
 from app.store.agreement import forget_open
+from app.store.answers import Keep, keep_nothing
 from app.store.clock import now
 from app.store.groups import StoredGroup, read_groups
 from app.store.session import Session
@@ -97,6 +98,7 @@ def begin_take(
     since: str | None = None,
     blind: bool = True,
     nameless: bool = False,
+    keep: Keep[TakeView] = keep_nothing,
 ) -> Take:
     """Let a person begin their own annotation of a group; the one that they have already, if so.
 
@@ -109,6 +111,7 @@ def begin_take(
         since: When the batch began: edits of the original from then on are not seen.
         blind: Begin with the group as it was then, else as the last take of it left it.
         nameless: The copy does not say which group it is of.
+        keep: Keeps the answer in the transaction.
 
     Raises:
         NotFoundError: There is no such group.
@@ -125,6 +128,7 @@ def begin_take(
             blind=blind,
             nameless=nameless,
         )
+        keep(show(session, take))(session)
     solved(store, take.copy_id)
     return take
 
@@ -173,8 +177,10 @@ def begin(
     return read_take(session, take_id)
 
 
-def hand_in(store: Store, take_id: int, *, actor: str) -> Take:
+def hand_in(store: Store, take_id: int, *, actor: str, keep: Keep[TakeView] = keep_nothing) -> Take:
     """Say that one's own annotation is done; from then on it stays as it is.
+
+    ``keep`` keeps the answer in the transaction.
 
     Raises:
         NotFoundError: There is no such take.
@@ -186,11 +192,13 @@ def hand_in(store: Store, take_id: int, *, actor: str) -> Take:
             raise ForbiddenError(f"{take.person} hands this in, nobody else")
         if take.handed_in is None:
             update_take(session, take_id, handed_in=now())
-        return read_take(session, take_id)
+        handed = read_take(session, take_id)
+        keep(show(session, handed))(session)
+        return handed
 
 
-def reopen(store: Store, take_id: int) -> Take:
-    """Let the person of a take go on with it.
+def reopen(store: Store, take_id: int, *, keep: Keep[TakeView] = keep_nothing) -> Take:
+    """Let the person of a take go on with it; ``keep`` keeps the answer in the transaction.
 
     Raises:
         NotFoundError: There is no such take.
@@ -198,7 +206,9 @@ def reopen(store: Store, take_id: int) -> Take:
     """
     with store.write() as session:
         reopen_take(session, read_take(session, take_id))
-        return read_take(session, take_id)
+        opened = read_take(session, take_id)
+        keep(show(session, opened))(session)
+        return opened
 
 
 def reopen_take(session: Session, take: Take) -> None:
@@ -262,7 +272,12 @@ def list_takes(
 def shown(store: Store, take: Take) -> TakeView:
     """A take as it is shown."""
     with store.read() as session:
-        return _shown(session, [take])[0]
+        return show(session, take)
+
+
+def show(session: Session, take: Take) -> TakeView:
+    """``shown`` within a session."""
+    return _shown(session, [take])[0]
 
 
 def _shown(session: Session, takes: Sequence[Take]) -> list[TakeView]:

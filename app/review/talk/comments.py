@@ -1,6 +1,7 @@
 """Comments: what people say to each other about a group, in threads that are open until settled.
 
-Each word goes into the log, like everything that people say; the tables show how it stands.
+Each word goes into the log, like everything that people say; the tables show how it stands. Where a
+function takes ``keep``, that keeps the answer in the transaction of what was said.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from app.review.people.bell import RingKind, tell
 from app.review.people.logins import read_roles
 from app.review.people.roles import Role
 from app.soccer.actors import is_of, person_of
+from app.store.answers import Keep, keep_nothing
 from app.store.clock import now
 from app.store.dataset_roles import members
 from app.store.log import Entry, append
@@ -83,6 +85,7 @@ def begin_thread(
     actor: str,
     view: str | None = None,
     at: tuple[float, float] | None = None,
+    keep: Keep[StoredThread] = keep_nothing,
 ) -> StoredThread:
     """Say something about a group, a view of it, or a place there (pixels of its annotated size).
 
@@ -100,10 +103,18 @@ def begin_thread(
         thread_id = insert_thread(session, group, view, at, now())
         where = {"view": view, "at": None if at is None else [*at]}
         _say(session, group, thread_id, text, actor, (), **where)
-        return _need_thread(session, group_id, thread_id)
+        return _answered(session, group_id, thread_id, keep)
 
 
-def reply(store: Store, group_id: int, thread_id: int, text: str, *, actor: str) -> StoredThread:
+def reply(
+    store: Store,
+    group_id: int,
+    thread_id: int,
+    text: str,
+    *,
+    actor: str,
+    keep: Keep[StoredThread] = keep_nothing,
+) -> StoredThread:
     """Say something in a thread; who spoke there before is told.
 
     Raises:
@@ -120,11 +131,17 @@ def reply(store: Store, group_id: int, thread_id: int, text: str, *, actor: str)
             )
         before = {person_of(one.actor) for one in thread.comments if one.text is not None}
         _say(session, group, thread_id, text, actor, sorted(before))
-        return _need_thread(session, group_id, thread_id)
+        return _answered(session, group_id, thread_id, keep)
 
 
 def resolve(
-    store: Store, group_id: int, thread_id: int, resolved: bool, *, actor: str
+    store: Store,
+    group_id: int,
+    thread_id: int,
+    resolved: bool,
+    *,
+    actor: str,
+    keep: Keep[StoredThread] = keep_nothing,
 ) -> StoredThread:
     """Settle a thread, or open it again.
 
@@ -138,11 +155,18 @@ def resolve(
             set_resolved(session, thread_id, *((time, actor) if resolved else (None, None)))
             did = "resolved" if resolved else "reopened"
             _log(session, group, actor, time, did=did, thread=thread_id)
-        return _need_thread(session, group_id, thread_id)
+        return _answered(session, group_id, thread_id, keep)
 
 
 def change(
-    store: Store, group_id: int, thread_id: int, comment_id: int, text: str, *, actor: str
+    store: Store,
+    group_id: int,
+    thread_id: int,
+    comment_id: int,
+    text: str,
+    *,
+    actor: str,
+    keep: Keep[StoredThread] = keep_nothing,
 ) -> StoredThread:
     """Give a comment of one's own another text; it is marked as edited.
 
@@ -166,10 +190,18 @@ def change(
             _log(session, group, actor, time, did="edited", thread=thread_id, **said)
             new = [name for name in people if name not in comment.mentions]
             _ring(session, group, thread_id, actor, new, ())
-        return _need_thread(session, group_id, thread_id)
+        return _answered(session, group_id, thread_id, keep)
 
 
-def remove(store: Store, group_id: int, thread_id: int, comment_id: int, *, actor: str) -> None:
+def remove(
+    store: Store,
+    group_id: int,
+    thread_id: int,
+    comment_id: int,
+    *,
+    actor: str,
+    keep: Keep[None] = keep_nothing,
+) -> None:
     """Delete a comment of one's own; a thread in which nothing else is said goes with it.
 
     Raises:
@@ -185,6 +217,7 @@ def remove(store: Store, group_id: int, thread_id: int, comment_id: int, *, acto
         thread = _need_thread(session, group_id, thread_id)
         if all(one.text is None for one in thread.comments):
             delete_thread(session, thread_id)
+        keep(None)(session)
 
 
 def _say(
@@ -266,6 +299,15 @@ def _need_group(session: Session, group_id: int) -> Place:
     if group is None:
         raise NotFoundError(f"there is no group {group_id}")
     return group
+
+
+def _answered(
+    session: Session, group_id: int, thread_id: int, keep: Keep[StoredThread]
+) -> StoredThread:
+    """A thread as it is by now, which is the answer."""
+    thread = _need_thread(session, group_id, thread_id)
+    keep(thread)(session)
+    return thread
 
 
 def _need_thread(session: Session, group_id: int, thread_id: int) -> StoredThread:

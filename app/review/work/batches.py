@@ -259,10 +259,12 @@ def change_batch(
     state: str | None = None,
     gold_every: int | None = None,
     no_gold: bool = False,
+    keep: Keep[Batch] = keep_nothing,
 ) -> Batch:
     """Give a batch on to others, close or open it, or name it otherwise; None leaves as it is.
 
     ``gold_every`` counts from the next group on that somebody begins, ``no_gold``: none is one.
+    ``keep`` keeps the answer in its transaction.
 
     Raises:
         NotFoundError: There is none.
@@ -297,15 +299,22 @@ def change_batch(
         _tell(session, batch, new, actor)
         if known != (*batch.annotators, *batch.reviewers):
             announce_batch(session, batch_id, HANDED_ON, actor=actor, at=now())
+        keep(batch)(session)
         return batch
 
 
-def remove_batch(store: Store, batch_id: int, *, actor: str) -> Batch:
-    """Delete a batch; verdicts and edits of its groups stay. Returns what it was."""
+def remove_batch(
+    store: Store, batch_id: int, *, actor: str, keep: Keep[Batch] = keep_nothing
+) -> Batch:
+    """Delete a batch; verdicts and edits of its groups stay. Returns what it was.
+
+    ``keep`` keeps the answer in its transaction.
+    """
     with store.write() as session:
         batch = read_batch(session, batch_id)
         delete_batch(session, batch_id)
         _note(session, batch, "deleted", actor)
+        keep(batch)(session)
         return batch
 
 

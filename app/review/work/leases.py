@@ -15,6 +15,7 @@ from app.review.takes.hand_back import checked_reason, note_hand_back
 from app.review.takes.handed_back import HandedBack, read_handed_back
 from app.review.work.batches import WORK, Batch, Here, Part, read_batch
 from app.review.work.own import hand_in_own, next_own, own_of, returned_to, takes_part
+from app.store.answers import Keep, keep_nothing
 from app.store.log import Entry, append
 from app.store.session import Session
 from app.store.store import Store
@@ -163,9 +164,18 @@ class Leases:
             return Lease(batch, group, here=_here(session, batch, group, self._now()))
 
     def hand_in(
-        self, batch_id: int, group: int, worker: Worker, *, actor: str, done: bool = True
+        self,
+        batch_id: int,
+        group: int,
+        worker: Worker,
+        *,
+        actor: str,
+        done: bool = True,
+        keep: Keep[Lease] = keep_nothing,
     ) -> Lease:
         """Say that the annotation of a group is done, so that a reviewer gets it; or that it is not.
+
+        ``keep`` keeps the answer in the transaction.
 
         Raises:
             NotFoundError: There is no such batch, or it has no such group.
@@ -176,8 +186,9 @@ class Leases:
             batch = _open_batch(session, batch_id)
             own = own_of(session, batch, group, worker.name)
         if own is not None:
-            hand_in_own(self._store, batch, own, actor=actor, done=done)
-            return Lease(batch, group)
+            lease = Lease(batch, group)
+            hand_in_own(self._store, batch, own, actor=actor, done=done, keep=lambda _: keep(lease))
+            return lease
         with self._store.write() as session:
             batch = _open_batch(session, batch_id)
             row = _group(session, batch, group)
@@ -191,14 +202,21 @@ class Leases:
             did = "handed in" if done else "taken back"
             body = {"batch": batch.id, "dataset": batch.dataset_id, "did": did, "group": group}
             append(session, [Entry(WORK, actor, self._now(), body)])
-            end_lease_of(session, batch_id, group, worker.name)
-            after = read_batch(session, batch_id)
-            return Lease(after, group, here=_here(session, after, group, self._now()))
+            return self._ended(session, batch_id, group, worker, keep)
 
     def hand_back(
-        self, batch_id: int, group: int, worker: Worker, reason: str = "", *, actor: str
+        self,
+        batch_id: int,
+        group: int,
+        worker: Worker,
+        reason: str = "",
+        *,
+        actor: str,
+        keep: Keep[Lease] = keep_nothing,
     ) -> Lease:
         """Give a group that was handed in back to who did, and tell them why; they get it next.
+
+        ``keep`` keeps the answer in the transaction.
 
         Raises:
             NotFoundError: There is no such batch, or it has no such group.
@@ -216,9 +234,17 @@ class Leases:
             person = row.handed_in_by
             hand_in(session, batch_id, group, at=None, by=person, returned=True)
             note_hand_back(session, WORK, group, person, said, actor=actor, batch=batch_id)
-            end_lease_of(session, batch_id, group, worker.name)
-            after = read_batch(session, batch_id)
-            return Lease(after, group, here=_here(session, after, group, self._now()))
+            return self._ended(session, batch_id, group, worker, keep)
+
+    def _ended(
+        self, session: Session, batch_id: int, group: int, worker: Worker, keep: Keep[Lease]
+    ) -> Lease:
+        """The answer once somebody's lease has ended with what they said of the group."""
+        end_lease_of(session, batch_id, group, worker.name)
+        batch = read_batch(session, batch_id)
+        lease = Lease(batch, group, here=_here(session, batch, group, self._now()))
+        keep(lease)(session)
+        return lease
 
     def _kept(self, session: Session, batch: Batch, row: Any, part: Part, worker: Worker) -> Lease:
         at, group = self._clock(), row.group_id

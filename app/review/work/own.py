@@ -9,9 +9,10 @@ from collections.abc import Collection
 from app.errors import ConflictError
 from app.review.takes.adopt import adopt_take
 from app.review.takes.mixing import Terms, begin_next
-from app.review.takes.take import Take, hand_in, read_take, reopen
+from app.review.takes.take import Take, TakeView, hand_in, read_take, reopen
 from app.review.work.batches import Batch, Part
 from app.soccer.actors import person_of
+from app.store.answers import Keep, keep_nothing
 from app.store.clock import now
 from app.store.session import Session
 from app.store.store import Store
@@ -101,16 +102,26 @@ def own_of(session: Session, batch: Batch, group: int, person: str) -> Take | No
     return read_take(session, row.id)
 
 
-def hand_in_own(store: Store, batch: Batch, take: Take, *, actor: str, done: bool) -> None:
+def hand_in_own(
+    store: Store,
+    batch: Batch,
+    take: Take,
+    *,
+    actor: str,
+    done: bool,
+    keep: Keep[TakeView] = keep_nothing,
+) -> None:
     """Hand an own annotation in, or go on with it while nothing was decided about it.
+
+    ``keep`` keeps the answer in the transaction.
 
     Raises:
         ConflictError: It was taken over, or decided about.
     """
     if done:
-        hand_in(store, take.id, actor=actor)
+        hand_in(store, take.id, actor=actor, keep=keep)
         take_over_handed_in(store, batch, take.person)
     elif take.verdict is not None:
         raise ConflictError("you have judged this group", hint="Take your verdict back.")
     else:
-        reopen(store, take.id)
+        reopen(store, take.id, keep=keep)

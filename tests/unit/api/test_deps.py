@@ -78,7 +78,7 @@ class TestRequireIfMatch:
 
 
 class TestDependencies:
-    def test_none_that_every_request_asks_takes_a_thread(self) -> None:
+    def test_those_of_every_request_are_coroutines_and_take_no_thread(self) -> None:
         for given in (get_services, get_store, get_actor, require_if_match, get_asked):
             assert iscoroutinefunction(given), given.__name__
 

@@ -47,7 +47,7 @@ class TestGroup:
 
 
 class TestProblem:
-    def test_is_one(self) -> None:
+    def test_the_example_fits_the_schema_of_problems(self) -> None:
         assert Problem.model_validate_json(PROBLEM).status == 422
 
 

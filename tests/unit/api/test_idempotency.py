@@ -149,7 +149,9 @@ class TestFailure:
 
         monkeypatch.setattr(answers, "keep_answer", full)
         with capture_logs() as logs:
-            assert api.post(f"{API}/practice", json={}, headers=KEY).status_code == 202
+            headers = {"Content-Type": "application/octet-stream", **KEY}
+            sent = api.post(f"{API}/uploads?name=a.json", content=b"{}", headers=headers)
+            assert sent.status_code == 201
         assert [entry["event"] for entry in logs] == [
             "an answer could not be kept",
             "request answered",

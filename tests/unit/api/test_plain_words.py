@@ -64,7 +64,7 @@ def properties(document: Any, schema: Any) -> set[str]:
 
 class TestRefusals:
     @pytest.mark.parametrize("bad", BAD, ids=str)
-    def test_of_bodies(self, api: Any, bad: Any) -> None:
+    def test_every_refusal_of_a_body_is_plain(self, api: Any, bad: Any) -> None:
         document = api.get("/api/v1/openapi.json").json()
         seen = 0
         for method, path, operation in operations(document):
@@ -83,7 +83,7 @@ class TestRefusals:
         assert seen > 40
 
     @pytest.mark.parametrize("bad", ["x'y", "", "-1", "none", "9" * 40])
-    def test_of_parameters(self, api: Any, bad: str) -> None:
+    def test_every_refusal_of_a_parameter_is_plain(self, api: Any, bad: str) -> None:
         document = api.get("/api/v1/openapi.json").json()
         for method, path, operation in operations(document):
             if method != "get" or path.endswith("/events"):
@@ -99,7 +99,7 @@ class TestRefusals:
         "query",
         ["jac<x", "status<accepted", "nobody:1", "id:x'y", "status:None", "sort:nobody", 'a"b'],
     )
-    def test_of_queries(self, api: Any, query: str) -> None:
+    def test_every_refusal_of_a_query_is_plain(self, api: Any, query: str) -> None:
         answer = api.get("/api/v1/groups", params={"dataset": "broadcast", "q": query})
         assert answer.status_code == 400
         # What was sent is told as it was sent.

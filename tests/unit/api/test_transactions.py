@@ -34,5 +34,5 @@ def test_no_route_opens_a_transaction(path: Path) -> None:
     assert transactions(path.read_text()) == []
 
 
-def test_one_that_did_would_be_found() -> None:
+def test_the_search_finds_a_transaction_that_is_opened() -> None:
     assert transactions("with store.read() as session:\n    ...") == [1]

@@ -31,7 +31,7 @@ class TestParameters:
         assert (answer.status_code, "dry_run" in answer.json()["detail"]) == (422, True)
         assert app.state.services.jobs.find() == []
 
-    def test_those_of_what_a_route_depends_on_are_known(self, api) -> None:
+    def test_parameters_that_only_a_dependency_reads_are_known(self, api) -> None:
         assert api.get(f"{API}/events", params={"dataset": "nowhere"}).status_code == 404
 
 

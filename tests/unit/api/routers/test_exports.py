@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 
 from app.api.routers import exports as module
+from app.review.datasets.dataset import dataset_id
 from app.review.editing.recompute import solve_dataset
 from app.review.importing.ingest import ingest
 from app.review.jobs.jobs import Jobs
@@ -27,14 +28,16 @@ ORDER = {"dataset": "broadcast", "format": "cameras", "all": True}
 
 @pytest.fixture
 def busy(app: Any) -> Any:
-    """The worker is held until the event is set."""
+    """The dataset's exports wait for a job of its own until the event is set."""
     started, finish = threading.Event(), threading.Event()
 
     def work(progress: Any) -> None:
         started.set()
         assert finish.wait(SECONDS)
 
-    app.state.services.jobs.submit("bulk", "Work", work, actor="bob")
+    services = app.state.services
+    own = dataset_id(services.store, ORDER["dataset"])
+    services.jobs.submit("bulk", "Work", work, dataset_id=own, actor="bob")
     assert started.wait(SECONDS)
     yield finish
     finish.set()

@@ -76,6 +76,8 @@ class TestSetPitch:
     @pytest.mark.parametrize(
         ("body", "status"), [({"length": 300.0}, 422), ({"match": "nowhere"}, 404)]
     )
-    def test_what_cannot_be_is_refused(self, api, match, body, status) -> None:
+    def test_an_impossible_size_is_422_and_an_unknown_match_404(
+        self, api, match, body, status
+    ) -> None:
         whole = {"match": match, "length": 103.0, "width": 66.0, **body}
         assert patch(api, whole).status_code == status

@@ -96,7 +96,7 @@ def test_lines_that_were_not_proposed_have_no_source(api, group_id: int) -> None
     assert changed["views"][0]["proposed"] == []
 
 
-def test_what_cannot_be_is_said(api, group_id: int) -> None:
+def test_unknown_matches_datasets_groups_and_markings_are_refused(api, group_id: int) -> None:
     assert api.post(PROPOSALS, json={"match": "final"}).status_code == 404
     assert api.post(f"{API}/datasets/none/proposals", json={}).status_code == 404
     assert api.get(f"{API}/groups/{group_id + 90}/proposals").status_code == 404

@@ -63,6 +63,6 @@ class TestRig:
             assert (answer.status_code, "inputs" in answer.json()["detail"]) == (422, True)
         assert services.jobs.find(kinds=["rig"]) == []
 
-    def test_anything_else_is_refused(self, api) -> None:
+    def test_what_can_be_accepted_is_the_cameras_or_sigma_and_nothing_else(self, api) -> None:
         answer = api.post(ADDRESS, json={"accept": "everything"})
         assert (answer.status_code, answer.json()["pointer"]) == (422, "/accept")

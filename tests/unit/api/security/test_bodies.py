@@ -59,7 +59,7 @@ class TestReadJson:
         )
     )
     def test_takes_every_json_value_that_is_flat_enough(self, value: Any) -> None:
-        read_json(json.dumps(value).encode())
+        assert read_json(json.dumps(value).encode()) == value
 
     @pytest.mark.parametrize("word", [b"NaN", b"Infinity", b"-Infinity"])
     def test_constants_of_javascript_are_no_numbers(self, word: bytes) -> None:
@@ -76,7 +76,8 @@ class TestReadJson:
         assert "levels" in refusal(b"[" * (MAX_DEPTH + 1) + b"]" * (MAX_DEPTH + 1))
 
     def test_brackets_inside_of_texts_do_not_count(self) -> None:
-        read_json(json.dumps(["[" * 100, '"' + "{" * 100]).encode())
+        texts = ["[" * 100, '"' + "{" * 100]
+        assert read_json(json.dumps(texts).encode()) == texts
 
     def test_two_million_brackets_are_refused_at_once(self) -> None:
         start = time.process_time()
@@ -118,10 +119,6 @@ class TestReadJson:
 
 
 class TestRequireJsonType:
-    @pytest.mark.parametrize("kind", ["application/json", "Application/JSON; charset=UTF-8"])
-    def test_json_in_utf_8_is_what_it_takes(self, kind: str) -> None:
-        require_json_type([kind])
-
     @pytest.mark.parametrize(
         "kinds",
         [
@@ -187,13 +184,20 @@ class TestJsonBodies:
         done = Exchange([b"a" * 4] * 1000, JSON, "POST").run(10)
         assert (done.status, done.taken) == (413, 3)
 
-    def test_a_length_that_is_no_number_is_refused(self) -> None:
-        for length in (b"-1", b"1e9", "²".encode("latin-1"), b"9" * 30):
-            headers = [*JSON, (b"content-length", length)]
-            assert Exchange([b"1"], headers, "POST").run(10).status in (400, 413)
+    @pytest.mark.parametrize(
+        ("length", "status"), [(b"-1", 400), (b"1e9", 400), (b"\xb2", 400), (b"9" * 30, 413)]
+    )
+    def test_a_length_that_no_body_has_is_refused(self, length: bytes, status: int) -> None:
+        headers = [*JSON, (b"content-length", length)]
+        assert Exchange([b"1"], headers, "POST").run(10).status == status
 
     def test_a_request_without_a_body_needs_no_type(self) -> None:
         assert Exchange([b""], [], "POST").run(10).status == 204
+
+    @pytest.mark.parametrize("kind", [b"application/json", b"Application/JSON; charset=UTF-8"])
+    def test_json_in_utf_8_arrives(self, kind: bytes) -> None:
+        done = Exchange([b'"\xc3\xa4"'], [(b"content-type", kind)], "POST").run(10)
+        assert (done.status, done.reached) == (204, b'"\xc3\xa4"')
 
     def test_a_body_of_another_type_never_arrives(self) -> None:
         done = Exchange([b"a=1"], [(b"content-type", b"text/plain")], "POST").run(10)

@@ -119,7 +119,7 @@ class TestAfterHandIn:
         second = judged(store, state.id, "ben", 40.0)
         assert after_hand_in(store, second.copy_id) == "agreed"
 
-    def test_of_an_ordinary_group_is_nothing(self, store, state) -> None:
+    def test_handing_in_the_copy_of_an_ordinary_group_compares_nothing(self, store, state) -> None:
         assert after_hand_in(store, state.id) is None
 
 

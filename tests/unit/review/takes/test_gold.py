@@ -37,7 +37,7 @@ def terms(store, fill, make_group) -> Terms:
 
 
 class TestMark:
-    def test_only_what_was_judged_as_it_is(self, store, state) -> None:
+    def test_only_a_group_with_a_verdict_is_made_gold(self, store, state) -> None:
         with pytest.raises(ConflictError):
             mark(store, state.id, "bare", actor="lea")
         with pytest.raises(InputError):
@@ -48,7 +48,7 @@ class TestMark:
         with pytest.raises(NotFoundError):
             unmark(store, state.id, actor="lea")
 
-    def test_no_history_tells(self, store, state) -> None:
+    def test_the_history_of_a_group_does_not_tell_that_it_is_gold(self, store, state) -> None:
         judge(store, state.id)
         before = [entry.kind for entry in history(store, state.id)]
         etag = load(store, state.id).etag

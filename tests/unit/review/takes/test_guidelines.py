@@ -1,11 +1,16 @@
 from __future__ import annotations
 
+from collections.abc import Iterator
+from hashlib import sha256
+
 import pytest
 
 from app.errors import ConflictError, ImageError, NotFoundError
 from app.review.editing.submit import load
 from app.review.takes.guidelines import add_picture, read_guidelines, read_picture, write_guidelines
 from app.review.takes.take import begin_take
+from app.store import media
+from app.store.frames import Frames
 from app.store.uploads import UploadWriter
 from tests.integration.conftest import picture
 
@@ -14,6 +19,13 @@ def upload(store, content: bytes) -> str:
     writer = UploadWriter(store.settings, "case.png")
     writer.write(content)
     return writer.finish().id
+
+
+@pytest.fixture
+def frames(store) -> Iterator[Frames]:
+    made = Frames(store.settings)
+    yield made
+    made.close()
 
 
 class TestGuidelines:
@@ -38,11 +50,27 @@ class TestGuidelines:
         copy = load(store, begin_take(store, state.id, person="ann").copy_id)
         assert read_guidelines(store, copy.dataset_id).text == "one"
 
-    def test_pictures_go_by_their_digest(self, store, state) -> None:
-        kept = add_picture(store, state.dataset, upload(store, picture(0, 40, 30)))
-        assert add_picture(store, state.dataset, upload(store, picture(0, 40, 30))) == kept
+    def test_pictures_go_by_their_digest(self, store, state, frames) -> None:
+        kept = add_picture(store, state.dataset, upload(store, picture(0, 40, 30)), frames)
+        again = add_picture(store, state.dataset, upload(store, picture(0, 40, 30)), frames)
+        assert again == kept
+        assert kept.type == "image/png"
+        assert kept.digest == sha256(picture(0, 40, 30)).hexdigest()
         assert read_picture(store, state.dataset, kept.digest).body == kept.body
-        with pytest.raises(ImageError):
-            add_picture(store, state.dataset, upload(store, b"<svg/>"))
         with pytest.raises(NotFoundError):
             read_picture(store, state.dataset, "0" * 64)
+
+    @pytest.mark.parametrize("content", [b"<svg/>", picture(0, 40, 30)[:-40]])
+    def test_what_does_not_decode_is_refused_and_not_kept(
+        self, store, state, frames, content: bytes
+    ) -> None:
+        with pytest.raises(ImageError):
+            add_picture(store, state.dataset, upload(store, content), frames)
+        with pytest.raises(NotFoundError):
+            read_picture(store, state.dataset, sha256(content).hexdigest())
+
+    def test_pictures_are_decoded_in_a_process_of_their_own(
+        self, store, state, frames, monkeypatch
+    ) -> None:
+        monkeypatch.setattr(media, "read_header", lambda *_: pytest.fail("read in this process"))
+        assert add_picture(store, state.dataset, upload(store, picture(1, 40, 30)), frames)

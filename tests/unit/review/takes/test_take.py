@@ -72,7 +72,9 @@ class TestBeginTake:
         assert load(store, two.copy_id).dataset_id == load(store, one.copy_id).dataset_id
         assert load(store, two.copy_id).policy == STRICT
 
-    def test_of_static_cameras_too_which_are_its_own_then(self, store, fill, make_static) -> None:
+    def test_a_copy_has_static_cameras_of_its_own_until_it_is_adopted(
+        self, store, fill, make_static
+    ) -> None:
         first, second = fill(make_static(10), make_static(11))
         one = begin_take(store, first, person="ann")
         camera = load(store, one.copy_id).station_ids["cam1"]
@@ -115,7 +117,9 @@ class TestBeginTake:
         assert len({load(store, take.copy_id).dataset for take in takes}) == 3
         assert faults(store) == []
 
-    def test_blind_it_begins_as_the_batch_did(self, store, state) -> None:
+    def test_a_blind_copy_begins_with_the_group_as_it_was_when_the_batch_began(
+        self, store, state
+    ) -> None:
         since = "2999-01-01"
         view = state.group.views[0].key
         change(store, state.id, SetBall(view, None), actor="eve")
@@ -124,7 +128,9 @@ class TestBeginTake:
         early = begin_take(store, state.id, person="ann", batch_id=2, since="2000-01-01")
         assert load(store, early.copy_id).group == state.group
 
-    def test_not_blind_as_the_one_before_left_it(self, store, state) -> None:
+    def test_a_copy_that_is_not_blind_begins_with_what_the_person_before_left(
+        self, store, state
+    ) -> None:
         view = state.group.views[0].key
         first = begin_take(store, state.id, person="ann", batch_id=1)
         change(store, first.copy_id, SetBall(view, BALL))
@@ -134,7 +140,7 @@ class TestBeginTake:
         seeing = begin_take(store, state.id, person="cleo", batch_id=1, blind=False)
         assert load(store, seeing.copy_id).group.view(view).balls == (BALL,)
 
-    def test_nameless_it_says_nowhere_what_it_is_of(self, store, state) -> None:
+    def test_a_nameless_copy_says_nowhere_which_group_it_is_of(self, store, state) -> None:
         take = begin_take(store, state.id, person="ann", batch_id=3, nameless=True)
         copy = load(store, take.copy_id)
         said = repr(replace(copy.group, views=())) + repr(copy.view_ids) + repr(copy.station_ids)
@@ -156,7 +162,7 @@ class TestHandIn:
         reopen(store, take.id)
         change(store, take.copy_id, SetBall(state.group.views[0].key, BALL))
 
-    def test_nobody_else_does_it(self, store, state) -> None:
+    def test_nobody_hands_in_the_copy_of_somebody_else(self, store, state) -> None:
         take = begin_take(store, state.id, person="ann")
         with pytest.raises(ForbiddenError):
             hand_in(store, take.id, actor="ben")
@@ -202,7 +208,7 @@ class TestAdoptTake:
         after = adopt_take(store, take.id, actor="lea")
         assert [one.key for one in after.group.views if not one.included] == [view]
 
-    def test_nothing_of_a_gold_group_whose_truth_is_known(self, store, state) -> None:
+    def test_a_gold_group_whose_truth_is_known_adopts_no_gold_copy(self, store, state) -> None:
         take = begin_take(store, state.id, person="ann", kind="independent")
         gold = begin_take(store, state.id, person="ben", kind="gold")
         for one in (take, gold):
@@ -211,7 +217,7 @@ class TestAdoptTake:
             adopt_take(store, gold.id, actor="lea")
         assert adopt_take(store, take.id, actor="lea").id == state.id
 
-    def test_only_what_was_handed_in(self, store, state) -> None:
+    def test_only_a_copy_that_was_handed_in_is_adopted(self, store, state) -> None:
         take = begin_take(store, state.id, person="ann")
         with pytest.raises(ConflictError):
             adopt_take(store, take.id, actor="lea")
@@ -221,7 +227,7 @@ class TestAdoptTake:
 
 
 class TestCopies:
-    def test_no_list_has_them(self, store, state) -> None:
+    def test_the_list_of_datasets_has_no_copies(self, store, state) -> None:
         begin_take(store, state.id, person="ann")
         assert [one.name for one in list_datasets(store)] == [state.dataset]
 

@@ -25,10 +25,12 @@ from app.review.work.batches import (
     list_batch_groups,
     list_batches,
     make_batch,
+    read_batch,
     remove_batch,
 )
-from app.review.work.leases import LASTS, Leases, Worker
+from app.review.work.leases import LASTS, Lease, Leases, Worker
 from app.review.work.progress import my_work, team_work
+from app.store.answers import Kept
 from app.store.audit import AuditQuery
 from app.store.bells import read_rings
 from app.store.people import person_by_name
@@ -215,6 +217,20 @@ class TestLeases:
             leases.take(batch, 99, BO)
         leases.hand_in(batch, groups[0], ADA, actor="ada", done=False)
         assert get_batch(store, batch).handed_in == 0
+
+    @pytest.mark.parametrize("done", [True, False])
+    def test_a_hand_in_keeps_its_answer_in_its_transaction(
+        self, store, dataset, groups, leases, done
+    ):
+        new = NewBatch("a", annotators=["ada"])
+        batch = make_batch(store, dataset, new, actor="lead").id
+        kept = []
+
+        def keep(lease: Lease) -> Kept:
+            return lambda session: kept.append((lease, read_batch(session, batch).handed_in))
+
+        lease = leases.hand_in(batch, groups[0], ADA, actor="ada", done=done, keep=keep)
+        assert kept == [(lease, int(done))]
 
     def test_what_is_handed_back_waits_for_its_annotator_first_and_says_why(
         self, store, dataset, groups, leases
