@@ -9,7 +9,9 @@ from __future__ import annotations
 import re
 from contextlib import nullcontext
 from dataclasses import dataclass, field
+from math import inf
 from threading import Event, Thread
+from time import monotonic
 from typing import Annotated
 
 import structlog
@@ -54,7 +56,24 @@ log = structlog.get_logger("touchline.api")
 ACTOR_HEADER = "X-Actor"
 LEFTOVERS_AGAIN_S = 2.0
 MAX_ID = 2**63 - 1
+STOP_SECONDS = 10.0
+"""A server that is told to stop has ended after so long."""
 _STRONG_ETAG = re.compile(r'"[\x21\x23-\x7e]*"')
+
+
+class Stopping(Event):
+    """Set when the server is told to stop; from then on its time is counted."""
+
+    _until = inf
+
+    def set(self) -> None:
+        """Begin to stop."""
+        self._until = min(self._until, monotonic() + STOP_SECONDS)
+        super().set()
+
+    def seconds_left(self) -> float:
+        """Until the server shall have ended."""
+        return max(self._until - monotonic(), 0.0)
 
 
 @dataclass(frozen=True)
@@ -78,7 +97,7 @@ class Services:
     noises: NoiseStore
     upkeep: Upkeep
     webhooks: WebhookSender
-    stopping: Event = field(default_factory=Event)
+    stopping: Stopping = field(default_factory=Stopping)
 
     @property
     def paint(self) -> PaintFollower:
@@ -159,13 +178,19 @@ class Services:
         while not self.stopping.wait(LEFTOVERS_AGAIN_S) and not self._solved_leftovers():
             pass
 
+    def stop(self) -> None:
+        """Tell all work to end after its next step; requests that are open go on."""
+        self.stopping.set()
+        self.events.close()
+        self.webhooks.stop()
+        self.upkeep.stop()
+        self.jobs.stop()
+
     def close(self) -> None:
         """Let the running work end, and close processes and database."""
-        self.events.close()
-        self.webhooks.close()
-        self.upkeep.stop()
-        self.jobs.close()
-        self.upkeep.close()
+        self.stop()
+        for work in (self.webhooks, self.jobs, self.upkeep):
+            work.close(self.stopping.seconds_left())
         self.previews.close()
         self.frames.close()
         self.predictions.close()

@@ -26,6 +26,8 @@ SWITCH_SECONDS = 0.001
 """How long a thread that solves may keep the others waiting: a reader takes its turn a dozen times
 for one answer, and Python's own 5 ms add up."""
 
+ANSWER_SECONDS = 8
+"""So long open requests are answered by a server that stops; it has ended two seconds later."""
 USUAL = (700, 10, 100)
 """New objects before the collector looks at them, and how often it looks at older ones, as Python has it; but
 at all of them a tenth as often: that takes 40 ms when caches are full, and nobody is answered meanwhile."""
@@ -96,7 +98,7 @@ def make_server(app: FastAPI) -> Server:
         # Nobody stands in front of a local server: forwarded addresses would be invented.
         proxy_headers=False,
         timeout_keep_alive=30,
-        timeout_graceful_shutdown=10,
+        timeout_graceful_shutdown=ANSWER_SECONDS,
         backlog=ACCEPTED_AT_ONCE,
     )
     return Server(config, app)
@@ -117,7 +119,6 @@ class Server(uvicorn.Server):
             listening.listen(WAITING)
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
-        """Stop; open event streams and uploads end at once."""
-        self._app.state.services.stopping.set()
-        self._app.state.services.events.close()
+        """Stop; open event streams and uploads end at once, and jobs while requests are answered."""
+        self._app.state.services.stop()
         await super().shutdown(sockets)

@@ -8,6 +8,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
@@ -15,7 +16,11 @@ from urllib.parse import urlsplit
 import httpx
 import pytest
 
+from tests.databases import holding_the_write_lock
+from tests.e2e.service import serving
+from tests.homes import copy_home
 from tests.integration.conftest import COMMAND, environment
+from tests.starting import Process
 from tests.waiting import SECONDS
 
 
@@ -82,7 +87,44 @@ def is_alive(pid: int) -> bool:
         return False
 
 
+def is_listening(address: str) -> bool:
+    try:
+        socket.create_connection((urlsplit(address).hostname, urlsplit(address).port)).close()
+    except ConnectionRefusedError:
+        return False
+    return True
+
+
 class TestStopping:
+    def test_a_change_that_is_under_way_is_answered_and_kept(
+        self, filled: Path, tmp_path_factory: pytest.TempPathFactory
+    ) -> None:
+        home = copy_home(filled, tmp_path_factory)
+        views = "/api/v1/datasets/small/saved-views"
+        server = Process(
+            [sys.executable, "-c", COMMAND, "serve", "--port", "0"],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            text=True,
+            env=environment(home),
+        )
+        assert server.stdout is not None
+        address = server.stdout.readline().split()[-1]
+        # It writes when it starts.
+        assert httpx.get(f"{address}/healthz", timeout=SECONDS).status_code == 200
+        with ThreadPoolExecutor() as executor, holding_the_write_lock(home):
+            body = {"name": "kept", "q": "status:accepted"}
+            change = executor.submit(httpx.post, address + views, json=body, timeout=SECONDS)
+            busy = 'touchline_lane_busy{lane="changes"} 1.0'
+            until(lambda: busy in httpx.get(f"{address}/metrics", timeout=SECONDS).text)
+            server.terminate()
+            until(lambda: not is_listening(address))
+        assert change.result().status_code == 201
+        server.communicate(timeout=SECONDS)
+        with serving(home) as address:
+            found = httpx.get(address + views, timeout=SECONDS).json()["items"]
+            assert [item["name"] for item in found] == ["kept"]
+
     @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGKILL])
     def test_no_process_outlives_the_server(
         self, server: subprocess.Popen[str], address: str, number: int

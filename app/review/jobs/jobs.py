@@ -269,15 +269,19 @@ class Jobs(JobRecords):
         """Whether none waits or runs."""
         return not self._queue.runs
 
-    def close(self) -> None:
-        """Stop after the next step of the jobs that run; their records say where they were.
-
-        A job that takes no step for long is left to itself.
-        """
+    def stop(self) -> None:
+        """Tell the jobs that run to stop after their next step; none begins any more."""
         with self._changed:
             self._closing.set()
             self._changed.notify_all()
-        until = monotonic() + CLOSE_SECONDS
+
+    def close(self, seconds: float = CLOSE_SECONDS) -> None:
+        """Stop, and wait so long for it; the records of the jobs say where they were.
+
+        A job that takes no step for long is left to itself.
+        """
+        self.stop()
+        until = monotonic() + seconds
         for worker in self._workers:
             worker.join(max(until - monotonic(), 0.0))
         if any(worker.is_alive() for worker in self._workers):

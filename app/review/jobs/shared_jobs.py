@@ -102,15 +102,21 @@ class SharedJobs(Jobs):
         self._leader = threading.Thread(target=self._follow, name="leader", daemon=True)
         self._leader.start()
 
-    def close(self) -> None:
-        """See ``Jobs``; another process goes on."""
+    def stop(self) -> None:
+        """See ``Jobs``."""
         self._ended.set()
         self._look.set()
-        if self._leader is not None:
-            self._leader.join(CLOSE_SECONDS)
         if self._lost is not None:
             self._lost.set()
-        super().close()
+        super().stop()
+
+    def close(self, seconds: float = CLOSE_SECONDS) -> None:
+        """See ``Jobs``; another process goes on."""
+        until = time.monotonic() + seconds
+        self.stop()
+        if self._leader is not None:
+            self._leader.join(seconds)
+        super().close(max(until - time.monotonic(), 0.0))
         self._store.sharing.give_back(CLAIM)
 
     def cancel(self, job_id: int) -> Job:

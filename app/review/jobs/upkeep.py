@@ -128,11 +128,11 @@ class Upkeep:
         """Tell it to end after the step that is under way; a look at the whole database ends there."""
         self._closing.set()
 
-    def close(self) -> None:
-        """Stop, and wait for the end of the step that is under way."""
+    def close(self, seconds: float = BUSY_SECONDS) -> None:
+        """Stop, and wait so long for the end of the step that is under way."""
         self.stop()
         if self._thread is not None:
-            self._thread.join(BUSY_SECONDS)
+            self._thread.join(seconds)
 
     def _work(self) -> None:
         wait = FIRST_SECONDS

@@ -105,12 +105,16 @@ class WebhookSender:
         """Look soon."""
         self._wake.set()
 
-    def close(self) -> None:
-        """End; what waits is sent by the next server."""
+    def stop(self) -> None:
+        """Tell it to end; what waits is sent by the next server."""
         self._closing.set()
         self._wake.set()
+
+    def close(self, seconds: float = SECONDS) -> None:
+        """Stop, and wait so long for it."""
+        self.stop()
         if self._thread is not None:
-            self._thread.join(SECONDS)
+            self._thread.join(seconds)
 
     def look(self) -> int:
         """Write down what webhooks have not been told yet; returns how many messages that makes."""

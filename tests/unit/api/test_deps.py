@@ -12,7 +12,14 @@ from threading import Event
 import pytest
 
 from app.api import deps
-from app.api.deps import Services, get_actor, get_services, get_store, require_if_match
+from app.api.deps import (
+    STOP_SECONDS,
+    Services,
+    get_actor,
+    get_services,
+    get_store,
+    require_if_match,
+)
 from app.api.errors import PreconditionRequiredError
 from app.api.reply import get_asked
 from app.config import Settings
@@ -41,6 +48,29 @@ class TestServices:
         assert tidying.wait(20)
         services.close()
         assert told == [True]
+
+    def test_all_work_is_told_to_stop_first_and_has_ten_seconds_together(
+        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        services = Services.open(Settings(home=tmp_path / "home"))
+        told: list[str] = []
+        given: list[float] = []
+
+        def close(seconds: float) -> None:
+            told.append("wait")
+            given.append(seconds)
+            # As if it had taken most of what was left.
+            services.stopping._until -= 0.9 * seconds
+
+        for work in (services.webhooks, services.jobs, services.upkeep):
+            monkeypatch.setattr(work, "stop", lambda: told.append("stop"))
+            monkeypatch.setattr(work, "close", close)
+        services.stop()
+        services.close()
+        assert told == [*["stop"] * 6, *["wait"] * 3]
+        assert sum(0.9 * seconds for seconds in given) <= STOP_SECONDS
+        assert given[0] > STOP_SECONDS / 2
+        assert given[2] < STOP_SECONDS / 10
 
     def test_another_process_can_make_the_work_of_every_kind_of_job_over_matches(
         self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

@@ -448,9 +448,8 @@ class TestRestart:
         first.close()
 
     def test_a_stop_in_good_order_does_not_count_where_the_job_takes_no_step(
-        self, store: Store, monkeypatch: pytest.MonkeyPatch
+        self, store: Store
     ) -> None:
-        monkeypatch.setattr(module, "CLOSE_SECONDS", 0.05)
         started, finish = threading.Event(), threading.Event()
 
         def stuck(progress: JobProgress) -> Json:
@@ -463,7 +462,7 @@ class TestRestart:
         job = submit(jobs, stuck, kind="import")
         assert started.wait(SECONDS)
         with capture_logs() as logs:
-            jobs.close()
+            jobs.close(0.05)
         assert [entry["event"] for entry in logs] == ["a job did not end in time"]
         assert jobs.get(job.id).tries == 0
         finish.set()
