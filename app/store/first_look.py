@@ -11,6 +11,7 @@ from pathlib import Path
 from app.config import Settings
 from app.errors import DamagedError, StorageError
 from app.store.anchor import read_anchor
+from app.store.home import ASIDE
 from app.store.wal import DatabaseHeader, WriteAheadLog, read_header, read_log
 
 
@@ -83,11 +84,14 @@ def signs_of_use(settings: Settings) -> list[str | None]:
     database = settings.database_file
     anchor = read_anchor(database)
     log = log_file(database)
+    aside = next(settings.home.glob(f"{ASIDE}*/{database.name}"), None)
     return [
         None if anchor is None else f"home.json knows {anchor.entries:,} entries of its log",
         f"{log.name} holds changes" if _size(log) else None,
         _filled(settings.uploads, "*/upload.json"),
         _filled(settings.exports, "*.json"),
+        _filled(settings.home / "backups", "*.zip"),
+        None if aside is None else f"{aside.parent.name}/ holds its database",
     ]
 
 

@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from app.config import Settings
-from app.errors import StorageError
+from app.errors import BusyError, StorageError
 from app.store.home import (
     DATABASE_LOCK,
     OPENING_LOCK,
@@ -20,8 +20,36 @@ from app.store.home import (
     refused,
 )
 
-AGAIN_S = 0.1
+AGAIN_S = 0.005
 """Between two looks whether a lock is free."""
+OPENING_SECONDS = 60.0
+"""So long who opens the database waits for another process that does, and may be migrating it."""
+
+
+def lock_within(handle: int, seconds: float) -> bool:
+    """Take the lock of an open file or folder; False where others had it all the while."""
+    until = time.monotonic() + seconds
+    while True:
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            return True
+        except BlockingIOError:
+            if time.monotonic() >= until:
+                return False
+            time.sleep(AGAIN_S)
+
+
+def require_lock(handle: int, held: str, seconds: float) -> None:
+    """Take the lock of an open file or folder; ``held`` says what whoever has it has been doing.
+
+    Raises:
+        BusyError: It was not free in time.
+    """
+    if not lock_within(handle, seconds):
+        raise BusyError(
+            f"another Touchline process {held} for {seconds:.0f} seconds",
+            hint="Wait until it is done. One that was stopped (Ctrl-Z) goes on with fg.",
+        )
 
 
 class DatabaseLock:
@@ -37,11 +65,13 @@ class DatabaseLock:
     def __init__(self, settings: Settings):
         home = make_home(settings)
         self._handle, self._opening = _open(home / DATABASE_LOCK), _open(home / OPENING_LOCK)
-        fcntl.flock(self._opening, fcntl.LOCK_EX)
         try:
-            fcntl.flock(self._handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            self.alone = True
-        except BlockingIOError:
+            require_lock(self._opening, "has been opening the database", OPENING_SECONDS)
+        except BusyError:
+            self.release()
+            raise
+        self.alone = lock_within(self._handle, 0.0)
+        if not self.alone:
             self.share()
 
     def share(self) -> None:
@@ -105,13 +135,8 @@ def practice_lock(settings: Settings, waiting: Callable[[], None]) -> Iterator[N
     """Hold the practice groups while they are made; ``waiting`` is called while others make them."""
     handle = _open(make_home(settings) / PRACTICE_LOCK)
     try:
-        while True:
-            try:
-                fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                break
-            except BlockingIOError:
-                waiting()
-                time.sleep(AGAIN_S)
+        while not lock_within(handle, AGAIN_S):
+            waiting()
         yield
     finally:
         os.close(handle)

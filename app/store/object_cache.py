@@ -7,14 +7,13 @@ digest of what follows: one that is cut off or damaged is thrown away and never 
 from __future__ import annotations
 
 import contextlib
-import fcntl
 import hashlib
 import os
-import time
 from collections.abc import Iterator
 from pathlib import Path
 
 from app.durable import replace_file
+from app.store.locks import lock_within
 
 DIGEST = hashlib.sha256().digest_size
 LOOKS = 50
@@ -96,22 +95,10 @@ class ObjectCache:
         """Whether no other makes room any more: what was written meanwhile counts, too."""
         handle = os.open(self._folder, os.O_RDONLY | os.O_CLOEXEC)
         try:
-            yield _locked(handle, time.monotonic() + PATIENCE_S)
+            yield lock_within(handle, PATIENCE_S)
         finally:
             os.close(handle)
 
     def _place(self, name: str) -> Path:
         digest = hashlib.sha256(name.encode()).hexdigest()
         return self._folder / digest[:2] / digest[2:34]
-
-
-def _locked(handle: int, until: float) -> bool:
-    """Lock an open folder, or say that another held it all the while."""
-    while True:
-        try:
-            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            return True
-        except BlockingIOError:
-            if time.monotonic() > until:
-                return False
-            time.sleep(0.005)

@@ -9,7 +9,6 @@ it gets its name.
 from __future__ import annotations
 
 import errno
-import fcntl
 import hashlib
 import json
 import os
@@ -28,6 +27,7 @@ from app.durable import replace_file, sync
 from app.errors import InputError, NotFoundError, StorageError, TooLargeError
 from app.finite import json_text
 from app.store.clock import now
+from app.store.locks import require_lock
 
 PART = ".part"
 """How the name of a half-sent upload's folder ends."""
@@ -38,6 +38,8 @@ _MAX_NAME = 120
 _RECORD = "upload.json"
 _CONTENT = "content"
 _WRITING = threading.Lock()
+WRITING_SECONDS = 10.0
+"""So long one process waits for another that writes a record."""
 
 
 @dataclass(frozen=True)
@@ -62,13 +64,17 @@ class Upload:
 
 @contextmanager
 def _writing(settings: Settings) -> Iterator[None]:
-    """Held from reading a record until what follows from it is written, among all processes."""
+    """Held from reading a record until what follows from it is written, among all processes.
+
+    Raises:
+        BusyError: Another process writes for too long.
+    """
     with _WRITING:
         with _reported():
             settings.uploads.mkdir(mode=0o700, parents=True, exist_ok=True)
             folder = os.open(settings.uploads, os.O_RDONLY | os.O_CLOEXEC)
         try:
-            fcntl.flock(folder, fcntl.LOCK_EX)
+            require_lock(folder, "has been writing uploads", WRITING_SECONDS)
             yield
         finally:
             os.close(folder)

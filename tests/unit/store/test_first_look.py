@@ -81,7 +81,16 @@ class TestRequireSound:
             settings.database_file.touch()
         refused(settings, "is missing" if missing else "is empty")
 
-    @pytest.mark.parametrize("sign", ["home.json", "uploads/1/upload.json", "exports/1.json"])
+    @pytest.mark.parametrize(
+        "sign",
+        [
+            "home.json",
+            "uploads/1/upload.json",
+            "exports/1.json",
+            "backups/before-schema-0032.zip",
+            "before-restore-2030-01-01/touchline.db",
+        ],
+    )
     def test_a_home_that_was_used_is_no_new_home(
         self, store: Store, tmp_path: Path, sign: str
     ) -> None:

@@ -5,26 +5,23 @@ import fcntl
 import pytest
 
 from app.config import Settings
-from app.errors import StorageError
+from app.errors import BusyError, StorageError
+from app.store import locks
 from app.store.locks import DatabaseLock, database_alone, practice_lock, server_lock
 
 FLOCK = fcntl.flock
-
-
-def flock_at_once(handle: int, operation: int) -> None:
-    """Refuses where the real one would wait."""
-    FLOCK(handle, operation | fcntl.LOCK_NB)
 
 
 class TestDatabaseLock:
     def test_who_opens_first_is_alone_and_the_next_wait_until_it_is_shared(
         self, settings: Settings, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        monkeypatch.setattr(fcntl, "flock", flock_at_once)
+        monkeypatch.setattr(locks, "OPENING_SECONDS", 0.05)
         first = DatabaseLock(settings)
         assert first.alone
-        with pytest.raises(BlockingIOError):
+        with pytest.raises(BusyError, match="has been opening the database") as refused:
             DatabaseLock(settings)
+        assert "Ctrl-Z" in str(refused.value.hint)
         first.share()
         second, third = DatabaseLock(settings), DatabaseLock(settings)
         assert not (first.alone or second.alone or third.alone)
@@ -34,15 +31,16 @@ class TestDatabaseLock:
     def test_nobody_is_alone_while_a_lock_is_changed_to_a_shared_one(
         self, settings: Settings, monkeypatch: pytest.MonkeyPatch
     ) -> None:
+        monkeypatch.setattr(locks, "OPENING_SECONDS", 0.05)
         first, waited = DatabaseLock(settings), []
 
         def with_a_gap(handle: int, operation: int) -> None:
             """Lets go before it shares, as the system may, and somebody opens just then."""
             FLOCK(handle, fcntl.LOCK_UN)
-            monkeypatch.setattr(fcntl, "flock", flock_at_once)
+            monkeypatch.setattr(fcntl, "flock", FLOCK)
             try:
                 DatabaseLock(settings).release()
-            except BlockingIOError:
+            except BusyError:
                 waited.append(True)
             FLOCK(handle, operation)
 

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import errno
+import fcntl
 import json
 import os
 import threading
@@ -11,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from app.config import Settings
-from app.errors import InputError, NotFoundError, StorageError, TooLargeError
+from app.errors import BusyError, InputError, NotFoundError, StorageError, TooLargeError
 from app.store import uploads
 from app.store.uploads import (
     Upload,
@@ -113,6 +114,18 @@ class TestUploadWriter:
         assert len(uploads) == 1
         assert [item.id for item in list_uploads(settings)] == list(uploads)
         assert len(list(settings.uploads.iterdir())) == 1
+
+    def test_who_meets_another_process_that_does_not_go_on_is_told_so(
+        self, settings: Settings, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(uploads, "WRITING_SECONDS", 0.01)
+        settings.uploads.mkdir(parents=True)
+        other = os.open(settings.uploads, os.O_RDONLY)
+        fcntl.flock(other, fcntl.LOCK_EX)
+        with pytest.raises(BusyError, match="another Touchline process has been writing uploads"):
+            send(settings)
+        os.close(other)
+        assert send(settings).name == "a.zip"
 
     def test_a_folder_without_record_makes_way(self, settings: Settings) -> None:
         upload = send(settings)
