@@ -6,7 +6,6 @@ import gc
 import json
 import os
 import re
-import resource
 import runpy
 import socket
 import subprocess
@@ -56,15 +55,20 @@ class TestModule:
         assert capsys.readouterr().out.startswith("touchline ")
 
 
+HEAVY = {"numpy", "scipy", "cv2", "numba", "PIL", "fastapi", "uvicorn", "httpx", "alembic", "yaml"}
+"""What a command that answers at once has no time for."""
+
+
 class TestHelp:
-    def test_comes_within_a_second(self) -> None:
-        # Processor time: a busy machine is no fault of ours.
-        before = resource.getrusage(resource.RUSAGE_CHILDREN)
-        command = "import sys; sys.argv = ['touchline', '--help']; from app.cli import main; main()"
-        done = subprocess.run([sys.executable, "-c", command], capture_output=True, text=True)
-        after = resource.getrusage(resource.RUSAGE_CHILDREN)
-        assert after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime < 1.0
-        assert done.returncode == 0
+    def test_comes_without_loading_what_only_work_needs(self) -> None:
+        program = (
+            "import sys; sys.argv = ['touchline', '--help']\n"
+            "from app.cli import main\n"
+            "try: main()\n"
+            f"finally: print('loaded', *({HEAVY!r} & sys.modules.keys()), file=sys.stderr)"
+        )
+        done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+        assert (done.returncode, done.stderr) == (0, "loaded\n")
         for name in ("serve", "import", "solve", "findings", "export", "calibrate", "score"):
             assert name in done.stdout
 
