@@ -171,7 +171,7 @@ def _settle_all(
                 distances[row, place] = _weigh(
                     spreads[row, place], offset, slope, weighed, information, pull
                 )
-            sound = sound and _invert(information, spans[row])
+            sound = sound and invert_symmetric(information, spans[row])
             if not sound or arrived or turn == STEPS:
                 found[row] = sound
                 break
@@ -205,7 +205,7 @@ def _weigh(spread, offset, slope, weighed, information, pull):
 
 
 @compiled
-def _invert(matrix, inverse):
+def invert_symmetric(matrix, inverse):
     """Writes the inverse of a symmetric matrix of 3 x 3, by Cholesky; False where it has none."""
     largest = max(matrix[0, 0], matrix[1, 1], matrix[2, 2])
     if not (math.isfinite(largest) and largest > 0):

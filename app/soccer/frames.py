@@ -30,10 +30,6 @@ class ImageSize:
         """Pixel of a normalised file coordinate, which scales by (width - 1, height - 1)."""
         return ImagePoint(x * (self.width - 1), y * (self.height - 1))
 
-    def pixel_to_unit(self, point: ImagePoint) -> tuple[float, float]:
-        """Normalised file coordinate of a pixel."""
-        return point.x / (self.width - 1), point.y / (self.height - 1)
-
 
 @dataclass(frozen=True)
 class Box:

@@ -16,6 +16,7 @@ from app.geometry.arrays import BoolArray, FloatArray
 from app.geometry.resection import KAPPA, PARAMETERS, residuals
 from app.soccer.solution import Picture
 from app.solving.observations import Observations
+from app.solving.picture_camera import undo_warp
 from app.solving.resect import MIN_CLICK_SIGMA_PX, ResectionProblem
 
 PRIOR = np.array([0.12, 0.2, 0.2])
@@ -101,7 +102,7 @@ def _find(
         moved = parameters - step[:PARAMETERS]
         if not np.isfinite(moved).all():
             return None
-        parameters = problem.refine(_warped(problem, observations, warp), moved[None]).parameters
+        parameters = problem.refine(undo_warp(problem, observations, warp), moved[None]).parameters
         linear = _linear(problem, parameters, observations, warp)
         variance = max(linear.squares / (spare + 1), floor)
     left = max(linear.squares, floor * spare)
@@ -122,23 +123,13 @@ def _is_large(warp: FloatArray, sigma: FloatArray) -> BoolArray:
     return large
 
 
-def _warped(
-    problem: ResectionProblem, observations: Observations, warp: FloatArray
-) -> Observations:
-    """The points where an unstretched picture with its middle in the middle shows them."""
-    half = problem.size.diagonal / 2
-    pixels = observations.pixels - warp[1:] * half
-    pixels[:, 0] /= np.exp(warp[0])
-    return Observations(observations.curves, pixels, observations.marking)
-
-
 def _linear(
     problem: ResectionProblem, parameters: FloatArray, observations: Observations, warp: FloatArray
 ) -> _Linear:
     """The least-squares problem about a camera and a picture; points beyond an end are left out."""
 
     def at(place: FloatArray) -> tuple[FloatArray, FloatArray]:
-        seen = _warped(problem, observations, place)
+        seen = undo_warp(problem, observations, place)
         return residuals(parameters, seen.curves, seen.sightings(), problem.size.diagonal / 2)
 
     offsets, jacobians = at(warp)

@@ -25,7 +25,7 @@ ASIDE, RESTORING = "before-restore-", f".restore{PARTIAL}"
 SERVER_LOCK, DATABASE_LOCK, OPENING_LOCK = "server.lock", "database.lock", "opening.lock"
 PRACTICE_LOCK = "practice.lock"
 LOCKS = SERVER_LOCK, DATABASE_LOCK, OPENING_LOCK, PRACTICE_LOCK
-FOLDER_MODE, FILE_MODE = 0o700, 0o600
+FOLDER_MODE = 0o700
 
 _MOUNTS = Path("/proc/mounts")
 

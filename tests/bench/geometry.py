@@ -12,6 +12,7 @@ from scipy.optimize import least_squares
 from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
 from app.geometry.damped_solve import solve_damped
+from app.geometry.likely_point import invert_symmetric
 from app.geometry.smallest_singular import smallest_singular_vectors
 from app.geometry.triangulation import triangulate_pairs
 from app.soccer.annotation import make_lines
@@ -33,7 +34,7 @@ TIMES = 1000
 
 def bench_geometry() -> None:
     """Triangulation of many pairs, one refinement of a camera, and the compiled kernels alone."""
-    rows = [*_triangulation(), *_refinement(), *_damped_steps()]
+    rows = [*_triangulation(), *_refinement(), *_damped_steps(), *_inverse()]
     # One pair is what an edit asks for, many are a dataset.
     rows += [*_singular_vectors(1, TIMES), *_singular_vectors(100_000, 1)]
     print_table(
@@ -99,6 +100,17 @@ def _damped_steps() -> list[list[object]]:
     return [
         ["40 damped steps (numpy)", 1e6 * ours / TIMES, 1e6 * theirs / TIMES, "us", theirs / ours]
     ]
+
+
+def _inverse() -> list[list[object]]:
+    """The information about a ball, inverted, as the descent to the likeliest point asks for it."""
+    slopes = np.random.default_rng(4).normal(size=(12, 3))
+    information, found = slopes.T @ slopes, np.empty((3, 3))
+    ours = _best(lambda: _often(lambda: invert_symmetric(information, found)))
+    theirs = _best(lambda: _often(lambda: np.linalg.inv(information)))
+    np.testing.assert_allclose(found, np.linalg.inv(information), rtol=1e-9)
+    name = "inverse of 3 x 3 (numpy)"
+    return [[name, 1e6 * ours / TIMES, 1e6 * theirs / TIMES, "us", theirs / ours]]
 
 
 def _singular_vectors(count: int, times: int) -> list[list[object]]:

@@ -7,7 +7,7 @@ class TestImageSize:
     def test_file_coordinates_scale_by_one_less_than_the_size(self):
         size = ImageSize(960, 540)
         assert size.unit_to_pixel(1.0, 1.0) == ImagePoint(959.0, 539.0)
-        assert size.pixel_to_unit(ImagePoint(479.5, 269.5)) == (0.5, 0.5)
+        assert size.unit_to_pixel(0.5, 0.5) == ImagePoint(479.5, 269.5)
 
     def test_one_per_cent_of_full_hd_is_22_03_px(self):
         assert ImageSize(1920, 1080).diagonal / 100 == pytest.approx(22.03, abs=0.005)
