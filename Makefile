@@ -147,4 +147,4 @@ postgresql: setup
 	@$(BIN)/python -m tests.install_postgresql
 
 clean:
-	rm -rf .venv .venv-release .venv-generators .readers .moto dist static/node_modules tests/generators/node_modules
+	rm -rf .venv .venv-release .venv-generators .readers .moto dist static/node_modules static/built tests/generators/node_modules
