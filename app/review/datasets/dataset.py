@@ -54,6 +54,7 @@ class DatasetHead:
 
     id: int
     name: str
+    created: str
     policy: Policy
 
 
@@ -90,11 +91,17 @@ def list_datasets(store: Store, sight: Sight = EVERYTHING) -> list[Dataset]:
 
 
 def get_dataset(store: Store, dataset: str | int) -> Dataset:
-    """A dataset by its name or its id.
+    """A dataset by its name or its id, and how far it is.
 
     Raises:
         NotFoundError: There is none.
     """
+    with store.read() as session:
+        return _datasets(session, [_need(session, dataset)])[0]
+
+
+def get_head(store: Store, dataset: str | int) -> DatasetHead:
+    """A dataset by its name or its id, uncounted; raises NotFoundError when there is none."""
     with store.read() as session:
         return read_dataset(session, dataset)
 
@@ -107,35 +114,28 @@ def dataset_id(store: Store, dataset: str | int) -> int:
 
 def need_dataset(session: Session, dataset: str | int) -> int:
     """``dataset_id`` within a session."""
-    row = find_dataset(session, dataset)
-    if row is None:
-        raise NotFoundError(f'there is no dataset "{dataset}"')
-    return int(row.id)
+    return int(_need(session, dataset).id)
 
 
-def read_dataset(session: Session, dataset: str | int) -> Dataset:
-    """``get_dataset`` within a session."""
-    row = find_dataset(session, dataset)
-    if row is None:
-        raise NotFoundError(f'there is no dataset "{dataset}"')
-    return _datasets(session, [row])[0]
+def read_dataset(session: Session, dataset: str | int) -> DatasetHead:
+    """A dataset within a session, uncounted; raises NotFoundError when there is none."""
+    row = _need(session, dataset)
+    return DatasetHead(row.id, row.name, row.created, policy_of(row.policy))
 
 
 def require_matches(
     session: Session, dataset: str | int, matches: Collection[str] | None = None
 ) -> DatasetHead:
-    """The head of a dataset that has all of these matches; nothing is counted.
+    """The head of a dataset that has all of these matches.
 
     Raises:
         NotFoundError: There is no such dataset or match.
     """
-    row = find_dataset(session, dataset)
-    if row is None:
-        raise NotFoundError(f'there is no dataset "{dataset}"')
+    found = read_dataset(session, dataset)
     for match in matches or ():
-        if not has_match(session, row.id, match):
-            raise NotFoundError(f'"{row.name}" has no match {match}')
-    return DatasetHead(row.id, row.name, policy_of(row.policy))
+        if not has_match(session, found.id, match):
+            raise NotFoundError(f'"{found.name}" has no match {match}')
+    return found
 
 
 def save_policy(session: Session, dataset_id: int, policy: Policy, actor: str) -> None:
@@ -144,6 +144,13 @@ def save_policy(session: Session, dataset_id: int, policy: Policy, actor: str) -
     body = {"policy": policy_to_json(policy)}
     append(session, [Entry("policy", actor, now(), body, dataset_id=dataset_id)])
     refresh_queue(session, group_ids(session, dataset_id))
+
+
+def _need(session: Session, dataset: str | int) -> Any:
+    row = find_dataset(session, dataset)
+    if row is None:
+        raise NotFoundError(f'there is no dataset "{dataset}"')
+    return row
 
 
 def _datasets(session: Session, rows: Sequence[Any]) -> list[Dataset]:

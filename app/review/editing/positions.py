@@ -16,7 +16,7 @@ import numpy as np
 
 from app.errors import ConflictError, NotFoundError
 from app.progress import Progress
-from app.review.datasets.dataset import Dataset, read_dataset
+from app.review.datasets.dataset import DatasetHead, read_dataset
 from app.review.datasets.fan_out import fan_out
 from app.review.editing.codec import edit_from_json, edit_to_json
 from app.review.editing.edit import Edit, SetPositions
@@ -175,7 +175,7 @@ def share_positions(
 
 def require_sharable(
     store: Store, dataset: str | int, matches: Collection[str] | None = None
-) -> Dataset:
+) -> DatasetHead:
     """The dataset, unless nothing would use what is shared.
 
     Raises:
@@ -305,7 +305,7 @@ def _inputs(item: MatchPositions, policy: CalibrationPolicy) -> str:
 
 
 def _chosen(
-    session: Session, dataset: Dataset, matches: Collection[str] | None
+    session: Session, dataset: DatasetHead, matches: Collection[str] | None
 ) -> list[tuple[MatchPositions, str]]:
     """Matches to share in, each with the key of what it will be shared from."""
     policy = dataset.policy.calibration

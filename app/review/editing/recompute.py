@@ -10,7 +10,7 @@ from concurrent.futures import Executor
 from dataclasses import dataclass, field
 
 from app.progress import Progress
-from app.review.datasets.dataset import Dataset, get_dataset, need_dataset, read_dataset
+from app.review.datasets.dataset import DatasetHead, get_head, need_dataset, read_dataset
 from app.review.datasets.fan_out import fan_out
 from app.review.editing.known import calibration_keys
 from app.review.editing.smaller_tau import retell_task, retell_tasks
@@ -84,7 +84,7 @@ def solve_dataset(
             that was saved before is lost.
         stop: Asked every now and then; once it says so, what is done is saved, and no more.
     """
-    found, ids = get_dataset(store, dataset), stale_groups(store, dataset)
+    found, ids = get_head(store, dataset), stale_groups(store, dataset)
     report = SolveReport(total=len(ids))
 
     def keep(results: Sequence[Result]) -> None:
@@ -141,7 +141,7 @@ def _save(store: Store, results: Sequence[Result], report: SolveReport) -> None:
     report.failed += [(item.group, item.problem) for item in results if item.solution is None]
 
 
-def _task(store: Store, dataset: Dataset, ids: Sequence[int]) -> Task:
+def _task(store: Store, dataset: DatasetHead, ids: Sequence[int]) -> Task:
     with store.read() as session:
         policy = read_dataset(session, dataset.id).policy
         stored = read_groups(session, ids, extras=False).values()
@@ -154,7 +154,7 @@ def _task(store: Store, dataset: Dataset, ids: Sequence[int]) -> Task:
     return Task(groups, policy, known)
 
 
-def _calibrate_shared(store: Store, dataset: Dataset) -> None:
+def _calibrate_shared(store: Store, dataset: DatasetHead) -> None:
     """Calibrate each static camera once, before the chunks that all need it are sent out."""
     policy = dataset.policy
     with store.read() as session:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from app.errors import DamagedError
-from app.review.datasets.dataset import Dataset
+from app.review.datasets.dataset import DatasetHead
 from app.review.editing.solve_encoded import Result
 from app.soccer.policy import Policy
 from app.solving.another_tau import has_smaller_tau, retold, undecided
@@ -31,7 +31,7 @@ class RetellTask:
     policy: Policy
 
 
-def retell_tasks(store: Store, dataset: Dataset, ids: Sequence[int]) -> Iterator[RetellTask]:
+def retell_tasks(store: Store, dataset: DatasetHead, ids: Sequence[int]) -> Iterator[RetellTask]:
     """What can be retold of groups that have no solution under the policy of their dataset."""
     with store.read() as session:
         history = policy_history(session, dataset.id)

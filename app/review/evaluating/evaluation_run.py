@@ -11,7 +11,7 @@ from app.evaluation.evaluate import Inputs, Options, evaluate
 from app.evaluation.frame import BOX_KINDS, Detection
 from app.evaluation.result import Evaluation
 from app.progress import Progress
-from app.review.datasets.dataset import Dataset, read_dataset
+from app.review.datasets.dataset import DatasetHead, read_dataset
 from app.review.evaluating.careful_boxes import careful_boxes
 from app.review.evaluating.evaluation import read_evaluation
 from app.review.evaluating.frames import LIVE_RULES, Truth, live_truth, version_truth
@@ -148,21 +148,21 @@ def check_evaluation(store: Store, dataset: str | int, request: EvaluationReques
             raise InputError(f"groups are {', '.join(LIVE_RULES)}", pointer="/groups")
 
 
-def _truth(session: Session, dataset: Dataset, request: EvaluationRequest) -> Truth:
+def _truth(session: Session, dataset: DatasetHead, request: EvaluationRequest) -> Truth:
     if request.version is None:
         return live_truth(session, dataset, request.groups, request.split)
     version = _own_version(session, dataset, request.version)
     return version_truth(session, version, request.split)
 
 
-def _own_version(session: Session, dataset: Dataset, version_id: int) -> Version:
+def _own_version(session: Session, dataset: DatasetHead, version_id: int) -> Version:
     version = read_version(session, version_id)
     if version.dataset_id != dataset.id:
         raise NotFoundError(f"dataset {dataset.name} has no version {version_id}")
     return version
 
 
-def _own_set(session: Session, dataset: Dataset, set_id: int, pointer: str) -> PredictionSet:
+def _own_set(session: Session, dataset: DatasetHead, set_id: int, pointer: str) -> PredictionSet:
     found = read_set(session, set_id)
     if found.dataset_id != dataset.id:
         raise InputError(
@@ -205,7 +205,7 @@ def _set_counts(sets: Mapping[str, PredictionSet]) -> dict[str, int]:
     return {f"unknown_{name}_frames": item.unknown for name, item in sets.items()}
 
 
-def _no_frames(dataset: Dataset, request: EvaluationRequest) -> InputError:
+def _no_frames(dataset: DatasetHead, request: EvaluationRequest) -> InputError:
     of = f' in the split "{request.split}"' if request.split else ""
     hint = "Groups take part when the policy passes them and nobody rejected them."
     if request.groups == "accepted":

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from app.datasets.manifest import software_version
 from app.errors import ConflictError, InputError
 from app.evaluation.frame import Frame
-from app.review.datasets.dataset import Dataset
+from app.review.datasets.dataset import DatasetHead
 from app.review.editing.state import read_states
 from app.review.versions.membership import RULES, read_candidates, require_solved
 from app.review.versions.version import FrozenGroup, Version, thaw
@@ -66,7 +66,7 @@ def version_truth(session: Session, version: Version, split: str | None) -> Trut
     return Truth(tuple(frames), version.policy, gone, pins)
 
 
-def live_truth(session: Session, dataset: Dataset, rule: str, split: str | None) -> Truth:
+def live_truth(session: Session, dataset: DatasetHead, rule: str, split: str | None) -> Truth:
     """The frames of a dataset as it is now; the pin is a digest of all that they follow from.
 
     Raises:

@@ -8,7 +8,7 @@ from typing import Any, Protocol
 
 from app.datasets.export_record import ExportRecord
 from app.errors import InputError
-from app.review.datasets.dataset import Dataset
+from app.review.datasets.dataset import DatasetHead
 from app.review.editing.state import GroupState, VerdictState, read_states
 from app.review.versions.manifest import policy_settings, version_settings, version_stamp
 from app.review.versions.version import FrozenGroup, Version, thaw
@@ -63,7 +63,7 @@ class LiveSource:
     version = None
     licence = None
 
-    def __init__(self, session: Session, dataset: Dataset, everything: bool):
+    def __init__(self, session: Session, dataset: DatasetHead, everything: bool):
         self._session, self._found, self._everything = session, dataset, everything
         self._ids = exported_groups(session, dataset.id, everything)
         self.dataset, self.count = dataset.name, len(self._ids)
@@ -178,7 +178,7 @@ def verdict_reason(
     return None
 
 
-def _nothing(dataset: Dataset, left_out: Mapping[str, int], everything: bool) -> InputError:
+def _nothing(dataset: DatasetHead, left_out: Mapping[str, int], everything: bool) -> InputError:
     if everything:
         return InputError(
             f'dataset "{dataset.name}" holds no groups, so there is nothing to export'

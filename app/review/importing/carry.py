@@ -17,7 +17,7 @@ from app.datasets.manifest import Manifest, write_manifest
 from app.datasets.store_output import output_anywhere
 from app.finite import json_text
 from app.progress import Progress
-from app.review.datasets.dataset import Dataset, read_dataset
+from app.review.datasets.dataset import DatasetHead, read_dataset
 from app.review.datasets.licence import licence_text
 from app.review.editing.lineage import Lineage, Lineages, station_lineage
 from app.soccer.group import Group
@@ -112,7 +112,7 @@ def _stations(session: Session, dataset_id: int) -> Iterator[Json]:
         }
 
 
-def _groups(session: Session, dataset: Dataset, progress: Progress | None) -> Iterator[Json]:
+def _groups(session: Session, dataset: DatasetHead, progress: Progress | None) -> Iterator[Json]:
     lineages = Lineages(session, dataset.id)
     ids = [group.id for group in known_groups(session, dataset.id)]
     for start in range(0, len(ids), _BATCH):
@@ -161,7 +161,7 @@ def _spare(session: Session, dataset_id: int) -> Iterator[Json]:
         yield {"camera": row.camera, "frame": row.frame, "extras": unpack(row.extras)}
 
 
-def _manifest(session: Session, dataset: Dataset, counts: Mapping[str, int]) -> Manifest:
+def _manifest(session: Session, dataset: DatasetHead, counts: Mapping[str, int]) -> Manifest:
     matches = {group.match for group in known_groups(session, dataset.id)}
     return Manifest(
         dataset=dataset.name,

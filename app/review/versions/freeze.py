@@ -14,7 +14,7 @@ from typing import Any
 from app.datasets.manifest import software_version
 from app.errors import ConflictError, InputError
 from app.progress import Progress
-from app.review.datasets.dataset import Dataset, read_dataset
+from app.review.datasets.dataset import DatasetHead, read_dataset
 from app.review.datasets.licence import licence_text
 from app.review.versions.membership import RULES, Candidate, read_candidates, require_solved
 from app.review.versions.version import Version, calibration_names, read_version
@@ -164,7 +164,7 @@ class _Run:
         self,
         store: Store,
         session: Session,
-        dataset: Dataset,
+        dataset: DatasetHead,
         request: FreezeRequest,
         candidates: Sequence[Candidate],
         progress: Progress | None,
@@ -333,7 +333,7 @@ def _reasons(candidates: Iterable[Candidate]) -> dict[str, int]:
     return dict(sorted(counts.items()))
 
 
-def _require_free(session: Session, dataset: Dataset, name: str) -> None:
+def _require_free(session: Session, dataset: DatasetHead, name: str) -> None:
     if has_version(session, dataset.id, name):
         raise ConflictError(
             f'"{dataset.name}" has a version "{name}" already',
@@ -341,7 +341,7 @@ def _require_free(session: Session, dataset: Dataset, name: str) -> None:
         )
 
 
-def _require_some(dataset: Dataset, candidates: Sequence[Candidate], rule: str) -> None:
+def _require_some(dataset: DatasetHead, candidates: Sequence[Candidate], rule: str) -> None:
     if any(item.why is None for item in candidates):
         return
     reasons = ", ".join(f"{count} {reason}" for reason, count in _reasons(candidates).items())
