@@ -26,6 +26,7 @@ import socket
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 from pathlib import Path
 from typing import Any, ClassVar
@@ -40,6 +41,7 @@ MOST = 2**18
 """Bytes of a request: program, arguments and environment."""
 _SUBREAPER = 36
 """PR_SET_CHILD_SUBREAPER: who is it becomes the parent of its children's orphans."""
+_one_nursery = threading.Lock()
 
 
 class Process(subprocess.Popen[Any]):
@@ -105,10 +107,11 @@ def _bound(environment: Any) -> dict[str, str]:
 
 
 def nursery() -> Nursery:
-    """The process that forks for this one; the first that asks starts it."""
-    if Process.nursery is None:
-        Process.nursery = Nursery()
-    return Process.nursery
+    """The process that forks for this one; the first thread that asks starts it."""
+    with _one_nursery:
+        if Process.nursery is None:
+            Process.nursery = Nursery()
+        return Process.nursery
 
 
 class Nursery:

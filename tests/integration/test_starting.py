@@ -8,6 +8,8 @@ import resource
 import signal
 import subprocess
 import sys
+import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -121,3 +123,22 @@ class TestProcess:
         burn = "import time\nwhile time.process_time() < 0.3: pass"
         assert starting.run([sys.executable, "-c", burn], cwd=ROOT).returncode == 0
         assert used_by_children() > before + 0.2
+
+
+class TestNursery:
+    def test_threads_that_start_their_first_processes_at_once_have_one(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        made: list[object] = []
+
+        def slowly() -> object:
+            made.append(object())
+            time.sleep(0.05)
+            return made[-1]
+
+        monkeypatch.setattr(starting.Process, "nursery", None)
+        monkeypatch.setattr(starting, "Nursery", slowly)
+        with ThreadPoolExecutor(8) as executor:
+            found = [executor.submit(starting.nursery) for _ in range(8)]
+        assert {one.result() for one in found} == {*made}
+        assert len(made) == 1
