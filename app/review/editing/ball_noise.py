@@ -10,14 +10,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-from app.review.editing.codec import edit_to_json
 from app.review.editing.edit import Edit, SetBall, SetBalls, SetNoise, Several, need_view
+from app.review.editing.group_edits import give_edits
 from app.review.editing.undo import GROUP_KINDS
 from app.soccer.group import Group, View
 from app.store.clock import now
 from app.store.datasets import group_ids
-from app.store.group_revisions import next_revision, save_revision
-from app.store.groups import read_groups
+from app.store.groups import StoredGroup
 from app.store.log import Entry, append, read_entries_of
 from app.store.noise import (
     NOISE,
@@ -27,7 +26,6 @@ from app.store.noise import (
     read_factors,
     write_factors,
 )
-from app.store.queue import refresh_queue
 from app.store.session import Session
 
 _BATCH = 100
@@ -54,14 +52,20 @@ def give_factors(session: Session, dataset_id: int, factors: Factors, actor: str
 
     They are stale until they are solved again. No factors: all balls are as noisy as the dataset's.
     """
-    before, at, changed = read_factors(session, dataset_id), now(), 0
+    before = read_factors(session, dataset_id)
     write_factors(session, dataset_id, factors)
     body = {"factors": factors_to_json(factors), "before": factors_to_json(before)}
-    append(session, [Entry(NOISE, actor, at, body, dataset_id)])
+    append(session, [Entry(NOISE, actor, now(), body, dataset_id)])
     ids = group_ids(session, dataset_id)
-    for start in range(0, len(ids), _BATCH):
-        changed += _give(session, dataset_id, ids[start : start + _BATCH], factors, actor, at)
-    return changed
+
+    def edits(some: Mapping[int, StoredGroup]) -> dict[int, SetNoise]:
+        placed = read_placed(session, [*some])
+        return {
+            number: SetNoise(_noise(stored.group, placed.get(number, {}), factors))
+            for number, stored in some.items()
+        }
+
+    return give_edits(session, dataset_id, NOISE, ids, edits, actor=actor)
 
 
 def with_noise(factors: Factors, group: Group, edit: Edit, actor: str) -> Edit:
@@ -83,25 +87,6 @@ def keeping_noise(group: Group, edit: Edit) -> Edit:
     if not isinstance(edit, SetBall | SetBalls):
         return edit
     return replace(edit, noise=need_view(group, edit.view).noise)
-
-
-def _give(
-    session: Session, dataset_id: int, ids: Sequence[int], factors: Factors, actor: str, at: str
-) -> int:
-    placed = read_placed(session, ids)
-    entries, changed = [], []
-    for stored in read_groups(session, ids).values():
-        edit = SetNoise(_noise(stored.group, placed.get(stored.id, {}), factors))
-        group = edit.apply(stored.group)
-        if group == stored.group:
-            continue
-        save_revision(session, stored, next_revision(stored, group, at))
-        done = {"edit": edit_to_json(edit), "inverse": edit_to_json(edit.inverse(stored.group))}
-        entries.append(Entry(NOISE, actor, at, done, dataset_id, stored.id))
-        changed.append(stored.id)
-    append(session, entries)
-    refresh_queue(session, changed)
-    return len(changed)
 
 
 def _noise(group: Group, placed: Mapping[str, str], factors: Factors) -> dict[str, float]:

@@ -41,6 +41,11 @@ from app.store.codecs import (
 )
 
 
+def step_to_json(edit: Edit | StationEdit, inverse: Edit | StationEdit) -> Json:
+    """An edit with the one that takes it back, as entries of the log have them."""
+    return {"edit": edit_to_json(edit), "inverse": edit_to_json(inverse)}
+
+
 def edit_to_json(edit: Edit | StationEdit) -> Json:
     """An edit with its name under ``edit``."""
     match edit:

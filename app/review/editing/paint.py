@@ -23,17 +23,15 @@ from app.review.datasets.paint_reading import (
     outdated_beside_others,
     read_view_paint,
 )
-from app.review.editing.codec import edit_to_json
 from app.review.editing.edit import SetPaint
+from app.review.editing.group_edits import give_edits
 from app.review.editing.known import known_calibrations
 from app.soccer.paint_evidence import NO_FRAME, NO_PAINT, PAINT_DISAGREES, PaintReading
 from app.soccer.policy import CalibrationPolicy
 from app.solving.calibrate import clicks_key
 from app.store.clock import now
 from app.store.datasets import group_ids
-from app.store.group_revisions import next_revision, save_revision
 from app.store.groups import StoredGroup, read_groups
-from app.store.log import Entry, append
 from app.store.paint import (
     PAINT,
     MatchPaint,
@@ -42,7 +40,6 @@ from app.store.paint import (
     match_paint,
     read_readings,
 )
-from app.store.queue import refresh_queue
 from app.store.session import Session
 from app.store.store import Store
 
@@ -252,26 +249,21 @@ def _give(
     body: dict[str, Any],
 ) -> None:
     """One entry for each group that changes; of a take-back for the first in any case."""
-    ids, at = sorted(wanted), now()
-    for start in range(0, len(ids), _BATCH):
-        entries, changed = [], []
-        for stored in read_groups(session, ids[start : start + _BATCH]).values():
-            fitting = outdated_beside_others(stored.group, wanted[stored.id])
-            edit = SetPaint(fitting)
-            group = edit.apply(stored.group)
-            is_told = "takes_back" in body and stored.id == ids[0]
-            if group == stored.group and not is_told:
-                continue
+    ids = sorted(wanted)
+
+    def edits(some: Mapping[int, StoredGroup]) -> dict[int, SetPaint]:
+        fitting = {
+            number: SetPaint(outdated_beside_others(stored.group, wanted[number])).apply(
+                stored.group
+            )
+            for number, stored in some.items()
+        }
+        for group in fitting.values():
             insert_readings(session, dataset_id, group.paint.values())
-            save_revision(session, stored, next_revision(stored, group, at))
-            done = {
-                "edit": edit_to_json(SetPaint(group.paint)),
-                "inverse": edit_to_json(edit.inverse(stored.group)),
-            }
-            entries.append(Entry(PAINT, actor, at, {**body, **done}, dataset_id, stored.id))
-            changed.append(stored.id)
-        append(session, entries)
-        refresh_queue(session, changed)
+        return {number: SetPaint(group.paint) for number, group in fitting.items()}
+
+    told = ids[0] if ids and "takes_back" in body else None
+    give_edits(session, dataset_id, PAINT, ids, edits, actor=actor, body=body, told=told)
 
 
 def _tasks(store: Store, ids: Sequence[int], dataset: DatasetHead) -> dict[int, list[PaintTask]]:

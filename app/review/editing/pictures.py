@@ -16,19 +16,15 @@ from app.errors import GeometryError
 from app.progress import Progress
 from app.review.datasets.dataset import need_dataset, read_dataset, require_matches
 from app.review.datasets.fan_out import fan_out
-from app.review.editing.codec import edit_to_json
 from app.review.editing.edit import SetPicture
+from app.review.editing.group_edits import give_edits
 from app.soccer.group import Group, View
 from app.soccer.picture import PictureGeometry
 from app.soccer.policy import CalibrationPolicy
 from app.solving.match_picture import PictureEstimate, PictureFrame, estimate_match_picture
-from app.store.clock import now
-from app.store.group_revisions import next_revision, save_revision
-from app.store.groups import read_groups
-from app.store.log import Entry, append
+from app.store.groups import StoredGroup, read_groups
 from app.store.pictures import MatchPictures, match_pictures
 from app.store.pitches import groups_of_match, match_pitches
-from app.store.queue import refresh_queue
 from app.store.session import Session
 from app.store.store import Store
 
@@ -169,22 +165,15 @@ def _give(
     picture: PictureGeometry | None,
     actor: str,
 ) -> int:
-    at, count = now(), 0
-    for start in range(0, len(ids), _BATCH):
-        entries, changed = [], []
-        for stored in read_groups(session, ids[start : start + _BATCH]).values():
-            view = _main_view(stored.group)
-            if view is None or view.station.picture == picture:
-                continue
-            edit = SetPicture(view.key, picture)
-            save_revision(session, stored, next_revision(stored, edit.apply(stored.group), at))
-            body = {"edit": edit_to_json(edit), "inverse": edit_to_json(edit.inverse(stored.group))}
-            entries.append(Entry("edit", actor, at, body, dataset_id, stored.id))
-            changed.append(stored.id)
-        append(session, entries)
-        refresh_queue(session, changed)
-        count += len(changed)
-    return count
+    def edits(some: Mapping[int, StoredGroup]) -> dict[int, SetPicture]:
+        views = {number: _main_view(stored.group) for number, stored in some.items()}
+        return {
+            number: SetPicture(view.key, picture)
+            for number, view in views.items()
+            if view is not None
+        }
+
+    return give_edits(session, dataset_id, "edit", ids, edits, actor=actor)
 
 
 def _main_view(group: Group) -> View | None:

@@ -16,18 +16,16 @@ from app.errors import GeometryError, InputError, NotFoundError
 from app.progress import Progress
 from app.review.datasets.dataset import read_dataset
 from app.review.datasets.fan_out import fan_out
-from app.review.editing.codec import edit_from_json, edit_to_json
+from app.review.editing.codec import edit_from_json
 from app.review.editing.edit import SetPitch
+from app.review.editing.group_edits import give_edits
 from app.review.editing.state import require_etag
 from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy, digested_calibration
 from app.soccer.solution import SOLVER_VERSION
 from app.solving.pitch_size import PitchEstimate, PitchFrame, estimate_pitch
-from app.store.clock import now
 from app.store.digest import digest
-from app.store.group_revisions import next_revision, save_revision
-from app.store.groups import read_groups
-from app.store.log import Entry, LogEntry, append
+from app.store.log import LogEntry
 from app.store.pitches import (
     PITCH,
     MatchPitch,
@@ -243,19 +241,8 @@ def give_pitch(
     session: Session, dataset_id: int, ids: Sequence[int], pitch: Pitch, actor: str
 ) -> None:
     """Give groups another pitch, each with an entry of the log; one that has it stays as it is."""
-    edit, at = SetPitch(pitch.length, pitch.width), now()
-    for start in range(0, len(ids), _BATCH):
-        entries, changed = [], []
-        for stored in read_groups(session, ids[start : start + _BATCH]).values():
-            group = edit.apply(stored.group)
-            if group == stored.group:
-                continue
-            save_revision(session, stored, next_revision(stored, group, at))
-            body = {"edit": edit_to_json(edit), "inverse": edit_to_json(edit.inverse(stored.group))}
-            entries.append(Entry(PITCH, actor, at, body, dataset_id, stored.id))
-            changed.append(stored.id)
-        append(session, entries)
-        refresh_queue(session, changed)
+    edit = SetPitch(pitch.length, pitch.width)
+    give_edits(session, dataset_id, PITCH, ids, lambda some: dict.fromkeys(some, edit), actor=actor)
 
 
 _Shown = tuple[PitchEstimate | None, str | None]

@@ -18,8 +18,9 @@ from app.errors import ConflictError, NotFoundError
 from app.progress import Progress
 from app.review.datasets.dataset import DatasetHead, read_dataset
 from app.review.datasets.fan_out import fan_out
-from app.review.editing.codec import edit_from_json, edit_to_json
+from app.review.editing.codec import edit_from_json
 from app.review.editing.edit import Edit, SetPositions
+from app.review.editing.group_edits import give_edits
 from app.soccer.group import Group, SharedPosition, Station
 from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy
@@ -27,11 +28,8 @@ from app.soccer.solution import SOLVER_VERSION, Calibration
 from app.solving.calibrate import calibrate_station, calibration_key
 from app.solving.match_model import Place
 from app.solving.match_position import Places, pan_of, place_of
-from app.store.clock import now
 from app.store.digest import digest
-from app.store.group_revisions import next_revision, save_revision
-from app.store.groups import read_groups
-from app.store.log import Entry, append
+from app.store.groups import StoredGroup, read_groups
 from app.store.positions import (
     POSITION,
     MatchPositions,
@@ -39,7 +37,6 @@ from app.store.positions import (
     match_positions,
     position_inputs,
 )
-from app.store.queue import refresh_queue
 from app.store.session import Session
 from app.store.solutions import read_calibrations
 from app.store.store import Store
@@ -248,24 +245,17 @@ def _give(
 
     A group that has left the match of the body meanwhile is left alone.
     """
-    ids, at = sorted(edits), now()
-    for start in range(0, len(ids), _BATCH):
-        entries, changed = [], []
-        for stored in read_groups(session, ids[start : start + _BATCH]).values():
-            edit = edits[stored.id]
-            group = edit.apply(stored.group)
-            is_same = group == stored.group and stored.id != ids[0]
-            if is_same or group.match != body["match"]:
-                continue
-            save_revision(session, stored, next_revision(stored, group, at))
-            done = {
-                "edit": edit_to_json(edit),
-                "inverse": edit_to_json(edit.inverse(stored.group)),
-            }
-            entries.append(Entry(POSITION, actor, at, {**body, **done}, dataset_id, stored.id))
-            changed.append(stored.id)
-        append(session, entries)
-        refresh_queue(session, changed)
+    ids = sorted(edits)
+
+    def of_match(some: Mapping[int, StoredGroup]) -> dict[int, Edit]:
+        return {
+            number: edits[number]
+            for number, stored in some.items()
+            if stored.group.match == body["match"]
+        }
+
+    where = (session, dataset_id, POSITION, ids, of_match)
+    give_edits(*where, actor=actor, body=body, told=ids[0] if ids else None)
 
 
 def _read(session: Session, dataset: str | int) -> DatasetPositions:

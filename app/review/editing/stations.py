@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import NotRequired, TypedDict, Unpack
 
 from app.errors import ConflictError, NotFoundError
-from app.review.editing.codec import edit_to_json, station_edit_from_json
+from app.review.editing.codec import station_edit_from_json, step_to_json
 from app.review.editing.edit import SetStationLines, StationEdit, with_station
 from app.review.editing.known import known_calibrations
 from app.review.editing.point_limits import require_few_points
@@ -269,7 +269,7 @@ def _plan_edit(edit: StationEdit) -> _Plan:
         station = state.station
         if isinstance(edit, SetStationLines):
             require_few_points(f"camera {station.key}", station.lines, edit.lines)
-        body = {"edit": edit_to_json(edit), "inverse": edit_to_json(edit.inverse(station))}
+        body = step_to_json(edit, edit.inverse(station))
         return _Change("station_edit", body, edit.apply(station))
 
     return plan

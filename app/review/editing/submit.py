@@ -13,7 +13,7 @@ from typing import NotRequired, TypedDict, Unpack
 
 from app.errors import ConflictError, NotFoundError, SharedStationError
 from app.review.editing.ball_noise import keeping_noise, with_noise
-from app.review.editing.codec import edit_from_json, edit_to_json
+from app.review.editing.codec import edit_from_json, step_to_json
 from app.review.editing.copies import require_open
 from app.review.editing.edit import STATION_EDITS, Edit, SetPaint, SetPicture, need_view
 from app.review.editing.etags import read_etags, require_said, require_unchanged
@@ -306,7 +306,7 @@ def _read_beside(outcome: _Outcome) -> Json:
     """Body of the entry that says what was read of the paint with a change."""
     before = outcome.change.group
     edit = SetPaint(outcome.painted.paint)
-    body = {"edit": edit_to_json(edit), "inverse": edit_to_json(edit.inverse(before))}
+    body = step_to_json(edit, edit.inverse(before))
     return {FOLLOWS: outcome.change.kind, **body}
 
 
@@ -316,7 +316,7 @@ def _plan_edit(edit_of: Callable[[StoredGroup], Edit]) -> _Plan:
         edit = with_noise(record.stored.factors, group, edit, actor)
         refuse_shared(record.stored, edit)
         require_few_points_in_all(group, [edit])
-        body = {"edit": edit_to_json(edit), "inverse": edit_to_json(edit.inverse(group))}
+        body = step_to_json(edit, edit.inverse(group))
         return _Change("edit", body, edit.apply(group))
 
     return plan

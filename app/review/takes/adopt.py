@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from app.errors import ConflictError
-from app.review.editing.codec import edit_to_json
+from app.review.editing.codec import step_to_json
 from app.review.editing.edit import (
     Edit,
     IncludeView,
@@ -166,7 +166,7 @@ def _adopt_stations(
         if own.calibration != station.calibration:
             edits.append(SetStationCalibration(own.calibration))
         for edit in edits:
-            body = {"edit": edit_to_json(edit), "inverse": edit_to_json(edit.inverse(station))}
+            body = step_to_json(edit, edit.inverse(station))
             station = edit.apply(station)
             where = {"dataset_id": original.dataset_id, "station_id": held.id}
             append(session, [Entry("station_edit", person, now(), body, **where)])
