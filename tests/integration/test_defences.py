@@ -104,9 +104,12 @@ class TestEveryRoute:
                 answer = client.request(method, path, json=example, headers={"If-Match": tag})
                 assert answer.status_code == 400, (path, tag)
             stale = client.request(method, path, json=example, headers={"If-Match": '"a"'})
-            assert stale.status_code in (409, 412), path
-            if stale.status_code == 412:
-                assert stale.json()["current"]["etag"] == stale.headers["etag"]
+            if "/stations/" in path:
+                # The cameras of the small dataset are not static.
+                assert stale.status_code == 409, path
+                continue
+            assert stale.status_code == 412, path
+            assert stale.json()["current"]["etag"] == stale.headers["etag"]
         assert guarded >= 8
 
 
@@ -142,12 +145,12 @@ class TestPaths:
             f"{API}/groups/{path}",
         ):
             answer = raw("GET", target)
-            assert answer.status in (400, 404, 422), (target, answer.body[:200])
+            assert answer.status == 404, (target, answer.body[:200])
             assert b"root:" not in answer.body
 
     def test_a_target_that_is_no_path_is_refused(self, raw) -> None:
         for target in ("http://evil.example/", "//evil.example/", "*"):
-            assert raw("GET", target).status in (400, 404), target
+            assert raw("GET", target).status == 404, target
 
 
 class TestBodies:
@@ -179,7 +182,7 @@ class TestBodies:
         assert sent < 20 * 1024 * 1024
 
     def test_a_request_line_without_end_is_refused(self, raw) -> None:
-        assert raw("GET", "/" + "a" * 100_000).status in (400, 404, 414, 431)
+        assert raw("GET", "/" + "a" * 100_000).status == 431
 
 
 def size_of(content: bytes) -> tuple[int, int]:
@@ -209,8 +212,8 @@ class TestImages:
         answer = client.get(views[1]["image"], params={"width": 208})
         # By its header: what goes off while it is decoded is ended by its allowance, and says that.
         assert "pixels" in answer.json()["detail"], answer.text
-        assert answer.status_code in (413, 422)
-        assert_guarded(answer.status_code, answer.headers, answer.text)
+        assert answer.status_code == 413
+        assert_guarded(413, answer.headers, answer.text)
 
     @pytest.mark.parametrize("width", ["0", "-5", "1e9", "x", "999999999999"])
     def test_a_width_that_cannot_be_is_refused(self, client, width: str) -> None:

@@ -7,14 +7,29 @@ import shutil
 import subprocess
 import sys
 from collections import Counter
+from contextlib import closing
 from pathlib import Path
 
 import pytest
+from sqlalchemy import text
 
+from app.config import Settings
+from app.store.store import Store
 from tests.cluster import ADVICE, find_programs
-from tests.torture import commands, conditions, crowd, engines, flood, kills, power, upgrades
+from tests.torture import (
+    attacks,
+    commands,
+    conditions,
+    crowd,
+    engines,
+    flood,
+    kills,
+    power,
+    upgrades,
+)
 from tests.torture.counting import processor
 from tests.torture.crowd import Load
+from tests.torture.person import Work
 from tests.torture.power import Acknowledge, Sync, Unlink, Write, cut_power, disk_at, parse
 
 
@@ -125,11 +140,24 @@ class TestParse:
 
 
 class TestCommands:
-    def test_an_import_that_was_killed_ends_the_same_the_second_time(self, tmp_path: Path) -> None:
-        found = commands.torture(
-            tmp_path / "commands", kills=1, groups=2, seed=2, commands=commands.COMMANDS[:1]
-        )
-        assert (found.kills, found.commands, found.faults) == (1, 1, [])
+    def test_each_command_that_was_killed_ends_the_same_the_second_time(
+        self, tmp_path: Path
+    ) -> None:
+        found = commands.torture(tmp_path / "commands", kills=1, groups=2, seed=2)
+        assert (found.kills, found.commands, found.faults) == (5, 5, [])
+
+    def test_a_row_and_a_file_that_differ_are_seen(
+        self, home: Path, prepared: Path, tmp_path: Path
+    ) -> None:
+        calm = Path(shutil.copytree(prepared, tmp_path / "calm"))
+        for one in (calm, home):
+            (one / "out").mkdir()
+            (one / "out" / "a.json").write_text("{}")
+        assert commands.differences(calm, home) == []
+        (home / "out" / "a.json").write_text("{} ")
+        with closing(Store.open(Settings(home=home))) as store, store.write() as session:
+            session.execute(text("UPDATE groups SET inputs_hash = 'another' WHERE id = 1"))
+        assert commands.differences(calm, home) == ["groups differ", "a.json differ"]
 
 
 class TestCrowd:
@@ -138,6 +166,23 @@ class TestCrowd:
         assert found.faults == []
         assert found.changes > 0
         assert found.lines()[0].startswith("4 people, 3 s: ")
+        assert found.clients > 0
+
+    def test_a_change_that_is_lost_a_failure_and_a_state_that_comes_twice_are_seen(self) -> None:
+        sound = Work({"ball": [1.0]}, {200: 3, 412: 1}, [(1, "a"), (1, "b"), (2, "a")])
+        other = Work({"ball": [2.0]}, {200: 1}, [(2, "b")])
+        load = crowd.gathered(2, 1.0, [sound, other], {1: 2, 2: 2})
+        assert (load.faults, load.changes, load.stale) == ([], 4, 1)
+        assert load.milliseconds == {"ball": [1.0, 2.0]}
+        assert crowd.gathered(2, 1.0, [sound, other], {1: 1, 2: 2}).faults == [
+            "group 1: 2 changes accepted, 1 in its history"
+        ]
+        worse = Work({}, {500: 1, 200: 1}, [(2, "a")], ["EOFError: "])
+        assert crowd.gathered(2, 1.0, [sound, worse], {1: 2, 2: 2}).faults == [
+            "EOFError: ",
+            "answers that were neither 200 nor 412: {500: 1}",
+            "group 2: two changes led to one state",
+        ]
 
 
 class TestEngines:
@@ -190,12 +235,14 @@ class TestProcessor:
 
 
 class TestFlood:
-    def test_too_many_clients_are_refused_and_a_reader_is_served(self, home: Path) -> None:
+    def test_too_many_clients_are_refused_and_quiet_people_are_served(self, home: Path) -> None:
         # `make torture` has all attacks; these are the ones that hold on to something.
         hold = ("slow bodies", "streams", "uploads")
         told: list[str] = []
-        assert flood.flood(home, flood.SHORT, times=None, only=hold, tell=told.append) == []
-        assert len(told) == 1 + len(hold)
+        assert flood.flood(home, attacks.SHORT, times=None, only=hold, tell=told.append) == []
+        assert len(told) == 2 + len(hold)
+        # A line of each has what each of the quiet parties waited.
+        assert not [line for line in told if "nan" in line]
 
     def test_a_refusal_that_does_not_say_when_to_come_back_is_seen(self) -> None:
         async def refused(_number: int) -> tuple[int, dict[str, str]]:
@@ -205,25 +252,50 @@ class TestFlood:
             return 503, {"retry-after": "2"}
 
         seen = [
-            flood.run(flood.Attack("uploads", 3, once, frozenset()), flood.Scale(0.05)).faults
+            flood.run(attacks.Attack("uploads", 3, once, frozenset()), attacks.Scale(0.05)).faults
             for once in (refused, told)
         ]
         assert seen == [["uploads: 503 without Retry-After"], []]
 
-    def test_a_failure_a_slow_reader_and_memory_that_grows_are_seen(self) -> None:
-        attack = flood.Attack("edits", 1, flood.nothing, frozenset({412}))
-        quiet = flood.Seen("nobody", [20.0] * 10, 200)
-        fine = flood.Seen("edits", [59.0] * 10, 480, Counter({412: 3, 503: 2}))
+    def test_a_failure_a_flood_without_refusals_slow_answers_and_memory_are_seen(self) -> None:
+        attack = attacks.Attack("uploads", 1, attacks.nothing, frozenset({201}), frozenset({503}))
+        quiet = flood.Seen("nobody", {"reader": [20.0] * 10, "editor": [2.0] * 10}, 200)
+        times = {"reader": [59.0] * 10, "editor": [14.0] * 10}
+        fine = flood.Seen("uploads", times, 480, Counter({201: 3, 503: 2}))
         assert flood.judged(fine, quiet, attack, 3.0) == []
-        bad = flood.Seen("edits", [61.0] * 10, 501, Counter({500: 1}))
+        times = {"reader": [61.0] * 10, "editor": [16.0] * 10}
+        bad = flood.Seen("uploads", times, 501, Counter({201: 3, 500: 1}))
         assert flood.judged(bad, quiet, attack, 3.0) == [
-            "edits: answers {500: 1}",
-            "edits: the server took 501 MB",
-            "edits: the reader waited 61 ms, 20 before",
+            "uploads: answers {500: 1}",
+            "uploads: nobody was answered with 503",
+            "uploads: the server took 501 MB",
+            "uploads: the reader waited 61 ms, 20 before",
+            "uploads: the editor waited 16 ms, 2 before",
         ]
+        assert len(flood.judged(bad, quiet, attack, None)) == 3
 
 
 class TestConditions:
+    def test_frames_that_are_taken_away_cost_the_frames_alone(self, tmp_path: Path) -> None:
+        assert conditions.frames_gone(tmp_path) == []
+
+    @pytest.mark.file_of_sqlite("a page of its file")
+    def test_a_page_that_is_lost_meanwhile_stops_changes_with_a_sentence(self, home: Path) -> None:
+        assert conditions.damaged_meanwhile(home) == []
+
+    def test_a_server_that_starts_falls_over_or_says_something_else_is_seen(self) -> None:
+        condition = conditions.CONDITIONS[0]
+        said = "this home is of a newer version\nof Touchline"
+        assert conditions.judged(condition, 1, said) == []
+        assert conditions.judged(condition, None, said) == ["newer schema: the server started"]
+        assert conditions.judged(condition, 0, said) == [
+            "newer schema: the server ended as if all were well"
+        ]
+        assert conditions.judged(condition, 1, "Traceback") == [
+            "newer schema: the server fell over: Traceback",
+            "newer schema: the server says 'Traceback'",
+        ]
+
     def test_a_clock_that_is_set_back_disturbs_nothing(self, home: Path) -> None:
         assert conditions.clock_set_back(home) == []
 
@@ -239,3 +311,32 @@ class TestUpgrades:
         self, tmp_path: Path
     ) -> None:
         assert upgrades.torture(tmp_path, kills=1, seed=1, revisions=("0004", "0011")) == []
+
+    def test_what_people_said_is_there_after_the_newest_migration(
+        self, home: Path, tmp_path: Path
+    ) -> None:
+        assert upgrades.carry(home, tmp_path) == []
+
+
+VIEWS: upgrades.Rows = {"view": [{"id": 1, "lines": "{}"}, {"id": 2, "lines": "[1]"}]}
+
+
+class TestLost:
+    def test_a_column_that_is_emptied_and_a_row_that_is_gone_are_named(self) -> None:
+        emptied: upgrades.Rows = {"view": [{"id": 1, "lines": ""}, {"id": 2, "lines": ""}]}
+        assert upgrades.lost(VIEWS, emptied) == ["view.lines"]
+        gone: upgrades.Rows = {"view": VIEWS["view"][:1]}
+        assert upgrades.lost(VIEWS, gone) == ["view.id", "view.lines"]
+        assert upgrades.lost(VIEWS, {"view": []}) == ["view"]
+
+    def test_what_a_new_schema_adds_or_has_no_room_for_is_not_lost(self) -> None:
+        grown = [{"id": 1, "ball": None}, {"id": 2, "ball": None}, {"id": 3, "ball": None}]
+        assert upgrades.lost(VIEWS, {"view": grown, "ball": []}) == []
+        assert upgrades.lost(VIEWS, {}) == []
+
+
+class TestDifferences:
+    def test_another_value_and_a_table_that_one_has_alone_are_named(self) -> None:
+        one: upgrades.Rows = {"view": [{"id": 1}], "installation": [{"id": "a"}]}
+        assert upgrades.differences(one, one | {"installation": [{"id": "b"}]}) == []
+        assert upgrades.differences(one, {"view": [{"id": 2}], "ball": []}) == ["ball", "view"]

@@ -21,8 +21,10 @@ import yaml
 
 from app.api.application import create_app
 from app.config import Settings
+from app.datasets.soccernet_v3_writer import write_soccernet_v3
 from app.store.store import Store
 from tests.databases import count_rows
+from tests.scenes import make_scenes
 from tests.security.asking import JSON, Answer, assert_guarded
 from tests.security.conftest import API, FORMULA, Guarded
 from tests.security.table import CORPUS, MISSING, TABLE, Row, lines_of, rows, served
@@ -333,10 +335,12 @@ def _state(home: Path) -> dict[str, int]:
 
 
 class TestFilesOfOthers:
-    def imported(self, guarded: Guarded, form: str, name: str, content: bytes) -> Any:
+    def imported(
+        self, guarded: Guarded, form: str, name: str, content: bytes, dataset: str = "hostile"
+    ) -> Any:
         """The job of an import of an uploaded file."""
         source = {"upload": guarded.upload(name, content)}
-        asked = {"dataset": "hostile", "format": form, "source": source}
+        asked = {"dataset": dataset, "format": form, "source": source}
         return guarded.json("POST", "/imports", asked)
 
     def test_hostile_members_of_a_zip_are_left_out(self, guarded: Guarded, tmp_path: Path) -> None:
@@ -346,9 +350,17 @@ class TestFilesOfOthers:
         }
         # No other run left a file of that name where this one looks.
         escaped = f"escaped-{uuid.uuid4().hex}"
-        content = _archive(escaped)
-        job = self.imported(guarded, "soccernet-v3", "tree.zip", content)
-        assert job["state"] == "failed", job
+        write_soccernet_v3(tmp_path, [make_scenes(groups=1, seed=4, faults=False)[0].group])
+        labels = tmp_path.rglob("Labels-v3.json")
+        sound = {path.relative_to(tmp_path).as_posix(): path.read_bytes() for path in labels}
+        content = _archive(escaped, sound)
+        job = self.imported(guarded, "soccernet-v3", "tree.zip", content, "sound")
+        assert job["state"] == "done", job
+        assert job["result"]["imported"] == 1, job
+        # A zip ends names at NUL; each member has a sentence of its own, and the labels none.
+        names = [entry.filename.partition("\0")[0] for entry, _ in _members(escaped)]
+        assert [skipped["record"] for skipped in job["result"]["skipped"]] == names
+        guarded.ended(job["result"]["solve_job"])
         assert not [secret for secret in ("root:x:", str(guarded.home)) if secret in str(job)]
         body = {"name": "p", "upload": guarded.upload("p.zip", content), "format": "yolo"}
         sent = json.dumps(body).encode()
@@ -417,20 +429,28 @@ def _tables(answer: Answer) -> list[str]:
         return [packed.read(name).decode() for name in names]
 
 
-def _archive(escaped: str) -> bytes:
-    """The zip of the corpus; members that lead out are called so."""
+def _archive(escaped: str, sound: dict[str, bytes]) -> bytes:
+    """The zip of the corpus beside sound members; members that lead out are called so."""
     out = io.BytesIO()
     with warnings.catch_warnings(), zipfile.ZipFile(out, "w", zipfile.ZIP_DEFLATED) as packed:
         warnings.simplefilter("ignore")
-        for member in yaml.safe_load((CORPUS / "archives.yaml").read_text()):
-            entry = zipfile.ZipInfo("x")
-            entry.filename = member["name"].replace("escaped", escaped)
-            entry.compress_type = zipfile.ZIP_DEFLATED
-            entry.external_attr = int(str(member.get("mode", "100644")), 8) << 16
-            content = b"\0" * member.get("zeros", 0) or str(member.get("content", "x")).encode()
-            for _ in range(member.get("times", 1)):
-                packed.writestr(entry, content)
+        for name, labels in sound.items():
+            packed.writestr(name, labels)
+        for entry, content in _members(escaped):
+            packed.writestr(entry, content)
     return out.getvalue()
+
+
+def _members(escaped: str) -> Iterator[tuple[zipfile.ZipInfo, bytes]]:
+    """The hostile members of the corpus."""
+    for member in yaml.safe_load((CORPUS / "archives.yaml").read_text()):
+        entry = zipfile.ZipInfo("x")
+        entry.filename = member["name"].replace("escaped", escaped)
+        entry.compress_type = zipfile.ZIP_DEFLATED
+        entry.external_attr = int(str(member.get("mode", "100644")), 8) << 16
+        content = b"\0" * member.get("zeros", 0) or str(member.get("content", "x")).encode()
+        for _ in range(member.get("times", 1)):
+            yield entry, content
 
 
 class TestAtLast:

@@ -249,7 +249,7 @@ class TestSecondFactor:
         ruled(trusted=frozenset({"high"}))
         assert name_in(door.enter()) == "fay"
 
-    def test_that_everybody_needs_is_made_first_unless_the_provider_vouches(
+    def test_one_that_is_required_is_enrolled_first_unless_the_provider_vouches(
         self, door: Door, ruled: Any
     ) -> None:
         door.join("ned")

@@ -191,8 +191,12 @@ def _people(folder: Path, asked: argparse.Namespace) -> list[str]:
 def _flood(folder: Path, asked: argparse.Namespace) -> list[str]:
     home = folder / "flood"
     kills.prepare(home, folder / "flood-files", clients=1, groups=12)
-    print("A reader of groups, alone and beside clients that ask for too much")
-    return flood.flood(home, tell=print)
+    planted = Path(shutil.copytree(home, folder / "flood-planted"))
+    print("Quiet people, alone and beside somebody who asks for too much")
+    faults = flood.flood(home, tell=print)
+    # Where nobody is refused, the flood must say so, else what it says shows nothing.
+    seen = flood.flood(planted, times=None, only=("uploads",), plant=flood.UNBOUNDED)
+    return faults if seen else [*faults, "flood: the planted fault was not seen"]
 
 
 def _conditions(folder: Path, asked: argparse.Namespace) -> list[str]:
@@ -202,7 +206,12 @@ def _conditions(folder: Path, asked: argparse.Namespace) -> list[str]:
 
 
 def _upgrades(folder: Path, asked: argparse.Namespace) -> list[str]:
-    return upgrades.torture(folder / "upgrades", kills=3, seed=asked.seed, tell=print)
+    home = folder / "upgrades-home"
+    kills.prepare(home, folder / "upgrades-files", clients=1, groups=4)
+    return [
+        *upgrades.torture(folder / "upgrades", kills=3, seed=asked.seed, tell=print),
+        *upgrades.carry(home, folder / "carried"),
+    ]
 
 
 PARTS = {

@@ -18,11 +18,14 @@ from pathlib import Path
 from typing import Any
 
 import httpx
-import pysqlite3.dbapi2 as sqlite
 
+from app.datasets.soccernet_v3_writer import write_soccernet_v3
+from tests.e2e.service import run_touchline
+from tests.integration.conftest import picture
+from tests.scenes import make_scenes
+from tests.torture import damage
 from tests.torture.kills import API, Server
 
-DATABASE = "touchline.db"
 DAY = 24 * 3600
 ROOM = "24m"
 """Of the disk that is filled."""
@@ -64,28 +67,6 @@ class Condition:
     says: tuple[str, ...]
 
 
-def _newer(home: Path) -> None:
-    _change(home, "UPDATE alembic_version SET version_num = '9999'")
-
-
-def _cut(home: Path) -> None:
-    _settle(home)
-    os.truncate(home / DATABASE, (home / DATABASE).stat().st_size // 2 // 4096 * 4096)
-
-
-def _gone(home: Path) -> None:
-    _settle(home)
-    (home / DATABASE).unlink()
-
-
-def _scribbled(home: Path) -> None:
-    """A page in the middle of the schema is not what was written."""
-    _settle(home)
-    with (home / DATABASE).open("r+b") as file:
-        file.seek(40)
-        file.write(b"\xff" * 3000)
-
-
 def _on_a_network(home: Path) -> str:
     mounts = home.with_name("mounts")
     mounts.write_text(f"/dev/vda / ext4 rw 0 0\nserver:/data {home.resolve()} nfs4 rw 0 0\n")
@@ -93,10 +74,11 @@ def _on_a_network(home: Path) -> str:
 
 
 CONDITIONS = (
-    Condition("newer schema", _newer, ("newer version of Touchline",)),
-    Condition("truncated file", _cut, ("is cut short",)),
-    Condition("no database", _gone, ("is missing, but this home has been used",)),
-    Condition("damaged page", _scribbled, ("damaged",)),
+    Condition("newer schema", damage.write_newer_schema, ("newer version of Touchline",)),
+    Condition("truncated file", damage.cut_short, ("is cut short",)),
+    Condition("no database", damage.take_away, ("is missing, but this home has been used",)),
+    Condition("damaged page", damage.spoil_first, ("damaged",)),
+    Condition("damaged page in the middle", damage.spoil_inside, ("touchline.db is damaged",)),
     Condition("network file system", _on_a_network, ("network file system (nfs4)",)),
 )
 
@@ -108,7 +90,8 @@ def torture(home: Path, folder: Path, tell: Callable[[str], None] = lambda _: No
         found = refused(_copy(home, folder / str(number)), condition)
         tell(f"{condition.name}: {'; '.join(found) or 'one sentence'}")
         faults += found
-    faults += frames_gone(_copy(home, folder / "frames"))
+    faults += frames_gone(folder / "frames")
+    faults += damaged_meanwhile(_copy(home, folder / "damaged"))
     if can_mount():
         faults += read_only(_copy(home, folder / "read-only"))
         faults += full_disk(_copy(home, folder / "full"), tell)
@@ -137,21 +120,27 @@ def _copy(home: Path, folder: Path) -> Path:
 
 def refused(home: Path, condition: Condition) -> list[str]:
     """Start a server over a home in that condition; what was not in order."""
-    _no_sentence = f"{condition.name}: the server"
     plant = condition.spoil(home) or ""
     server = Server(home, plant)
     (home / "server.log").unlink(missing_ok=True)
     server.start()
     code = server.ended(60)
-    said = server.log()
-    faults = []
     if code is None:
         server.kill()
-        faults.append(f"{_no_sentence} started")
+    return judged(condition, code, server.log())
+
+
+def judged(condition: Condition, code: int | None, said: str) -> list[str]:
+    """What is wrong with how a server ended, None: it has not, and with what it said."""
+    server, faults = f"{condition.name}: the server", []
+    if code is None:
+        faults.append(f"{server} started")
+    if code == 0:
+        faults.append(f"{server} ended as if all were well")
     if "Traceback" in said:
-        faults.append(f"{_no_sentence} fell over: {said[-300:]}")
+        faults.append(f"{server} fell over: {said[-300:]}")
     if not any(words in " ".join(said.split()) for words in condition.says):
-        faults.append(f"{_no_sentence} says {said[-300:]!r}")
+        faults.append(f"{server} says {said[-300:]!r}")
     return faults
 
 
@@ -159,7 +148,7 @@ def read_only(home: Path) -> list[str]:
     """A home on a disk that cannot be written: a sentence that says so (as root alone)."""
     with _disk(home.with_name("read-only")) as disk:
         shutil.copytree(home, disk / "home")
-        _settle(disk / "home")
+        damage.settle(disk / "home")
         subprocess.run(["mount", "-o", "remount,ro", str(disk)], check=True)
         # Its log must go elsewhere.
         server = Server(disk / "home", log=home.with_name("read-only.log"))
@@ -268,18 +257,61 @@ def _finished(http: httpx.Client, job: dict[str, Any]) -> list[str]:
     return ["clock set back: an export does not end"]
 
 
-def frames_gone(home: Path) -> list[str]:
-    """A home whose frames were taken away: the rest is served, and a picture says what it lacks."""
+def frames_gone(folder: Path) -> list[str]:
+    """Frames that are taken away while they are looked at: the rest is served, and a picture says
+    what it lacks.
+
+    Args:
+        folder: Where a home and its frames go.
+    """
+    home, tree = folder / "home", folder / "tree"
+    _with_frames(home, tree)
+    server = Server(home)
+    server.start()
+    try:
+        server.wait()
+        with httpx.Client(base_url=server.address, timeout=60) as http:
+            person, faults = _Person(http), []
+            # Each width is made for itself: what was looked at may be served on.
+            answers = [http.get(f"{API}/views/{person.view}/image?width=320")]
+            tree.rename(folder / "elsewhere")
+            answers.append(http.get(f"{API}/views/{person.view}/image?width=208"))
+            faults += person.edit(200)
+            if answers[0].status_code != 200:
+                faults.append(f"frames there: {answers[0].status_code} {answers[0].text[:200]}")
+            if answers[1].status_code != 404 or not answers[1].json().get("detail"):
+                faults.append(f"frames gone: {answers[1].status_code} {answers[1].text[:200]}")
+            return faults + person.compare("frames gone")
+    finally:
+        server.kill()
+
+
+def _with_frames(home: Path, tree: Path) -> None:
+    """A home with one group, whose frames are in a tree."""
+    group = make_scenes(groups=1, seed=3, faults=False)[0].group
+    write_soccernet_v3(tree, [group])
+    for view in group.views:
+        path = tree / group.match / view.key
+        path.write_bytes(picture(0, view.size.width, view.size.height))
+    run_touchline(home, "migrate", f"import soccernet-v3 {tree} --dataset client0")
+
+
+def damaged_meanwhile(home: Path) -> list[str]:
+    """A page of the views is lost while a server runs: a sentence for all, and no change is taken."""
+    damage.settle(home)
+    place = damage.interior_page(home)
     server = Server(home)
     server.start()
     try:
         server.wait()
         with httpx.Client(base_url=server.address, timeout=60) as http:
             person = _Person(http)
-            answer = http.get(f"{API}/views/{person.view}/image?width=320")
             faults = person.edit(200)
-            if answer.status_code != 404 or "detail" not in answer.json():
-                faults.append(f"frames gone: {answer.status_code} {answer.text[:200]}")
+            damage.scribble(home, place)
+            answers = [person.send(), person.send(), http.get("/readyz")]
+            for answer in answers:
+                if answer.status_code != 503 or "is damaged" not in answer.json()["detail"]:
+                    faults.append(f"damaged meanwhile: {answer.status_code} {answer.text[:200]}")
             return faults
     finally:
         server.kill()
@@ -325,19 +357,6 @@ class _Person:
 def _sent(answer: httpx.Response) -> dict[str, str]:
     names = ("if-match", "idempotency-key", "content-type")
     return {name: answer.request.headers[name] for name in names}
-
-
-def _change(home: Path, statement: str) -> None:
-    with sqlite.connect(str(home / DATABASE)) as connection:
-        connection.execute(statement)
-    connection.close()
-
-
-def _settle(home: Path) -> None:
-    """Bring the write-ahead log into the database, so that its file alone counts."""
-    connection = sqlite.connect(str(home / DATABASE))
-    connection.execute("PRAGMA wal_checkpoint(TRUNCATE)")
-    connection.close()
 
 
 @contextmanager

@@ -6,22 +6,28 @@ of the server. How long answers take is printed beside the same load of one pers
 
 from __future__ import annotations
 
-import random
-import threading
-import time
+import subprocess
+import sys
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import httpx
+import msgspec
 import numpy as np
 
+from tests.e2e.service import ROOT
 from tests.torture.counting import processor
 from tests.torture.kills import API, Server
+from tests.torture.person import READY, Shift, Work
+from tests.waiting import SECONDS
 
 SHARED_GROUPS = 20
+PROCESSES = 2
+"""Of the people: with more of them, a server on two processors waits for its clients."""
+PEOPLE = "from tests.torture.person import main; main()"
 
 
 @dataclass
@@ -39,6 +45,8 @@ class Load:
     """What each kind of request costs by itself (``counting``), where it was measured."""
     processor: tuple[float, float] = (0.0, 0.0)
     """Seconds of the processor that the server took meanwhile, and others that were named."""
+    clients: float = 0.0
+    """Seconds of the processor that the people took themselves, where it was measured."""
 
     def percentiles(self, kind: str) -> tuple[float, float, float]:
         """p50, p95 and p99 of one kind of request."""
@@ -54,71 +62,9 @@ class Load:
             for kind in sorted(self.milliseconds)
             for p50, p95, p99 in [self.percentiles(kind)]
         ]
-        return [head, *rows]
-
-
-class Person(threading.Thread):
-    """Somebody who opens a group, moves a ball, judges, thinks, and goes on to the next."""
-
-    def __init__(self, address: str, groups: list[int], seed: int, until: float, think: float):
-        super().__init__(daemon=True)
-        self.milliseconds: dict[str, list[float]] = {"group": [], "ball": [], "verdict": []}
-        self.statuses: Counter[int] = Counter()
-        self.accepted: list[tuple[int, str]] = []
-        """Group and new ETag of each change that was answered with 200."""
-        self.fault: str | None = None
-        self._http = httpx.Client(base_url=address, timeout=60)
-        self._groups, self._until, self._think = groups, until, think
-        self._random = random.Random(seed)
-
-    def run(self) -> None:
-        """Come in, not all at the same moment, and work until the time is over."""
-        try:
-            self._pause()
-            while time.monotonic() < self._until:
-                self._work(self._random.choice(self._groups))
-        except Exception as error:
-            self.fault = f"{type(error).__name__}: {error}"
-        finally:
-            self._http.close()
-
-    def _work(self, group_id: int) -> None:
-        group = self._ask("group", "GET", f"/groups/{group_id}").json()
-        self._pause()
-        view = self._random.choice(group["views"])
-        box = [round(self._random.uniform(50, 800), 2), round(self._random.uniform(50, 450), 2)]
-        edit = {"box": [*box, 12.0, 12.5]}
-        after = self._change("ball", "PATCH", f"/views/{view['id']}/ball", edit, group)
-        if after is None:
-            return
-        self._pause()
-        state = "deferred" if after["verdict"]["state"] != "deferred" else "unreviewed"
-        self._change("verdict", "PUT", f"/groups/{group_id}/verdict", {"state": state}, after)
-
-    def _change(
-        self, kind: str, method: str, path: str, body: Any, group: dict[str, Any]
-    ) -> dict[str, Any] | None:
-        answer = self._ask(kind, method, path, body, group["etag"])
-        if answer.status_code != 200:
-            return None
-        after: dict[str, Any] = answer.json()
-        self.accepted.append((group["id"], after["etag"]))
-        return after
-
-    def _ask(
-        self, kind: str, method: str, path: str, body: Any = None, etag: str | None = None
-    ) -> httpx.Response:
-        quoted = None if etag is None else etag if etag.startswith('"') else f'"{etag}"'
-        headers = {} if quoted is None else {"If-Match": quoted}
-        start = time.perf_counter()
-        answer = self._http.request(method, API + path, json=body, headers=headers)
-        self.milliseconds[kind].append(1000 * (time.perf_counter() - start))
-        self.statuses[answer.status_code] += 1
-        return answer
-
-    def _pause(self) -> None:
-        if self._think:
-            time.sleep(self._random.expovariate(1 / self._think))
+        busy = f"  processor: {self.processor[0]:.1f} s of the server, "
+        busy += f"{self.clients:.1f} s of the people"
+        return [head, *rows, *([busy] if self.clients else [])]
 
 
 def crowd(
@@ -149,48 +95,88 @@ def crowd(
         with httpx.Client(base_url=server.address, timeout=60) as http:
             ids = http.get(f"{API}/groups/ids", params={"dataset": "client0"}).json()["ids"]
             before = {group: _history(http, group) for group in ids}
-            until = time.monotonic() + seconds
-            team = [
-                Person(
-                    server.address,
-                    ids[:SHARED_GROUPS] if number % 2 == 0 else ids,
-                    seed + number,
-                    until,
-                    think,
-                )
-                for number in range(people)
-            ]
+            shifts = list(_shifts(server.port, ids, people, seconds, think, seed))
             watched = ((server.pid,), tuple(others))
-            begun = [sum(map(processor, pids)) for pids in watched]
-            for person in team:
-                person.start()
-            for person in team:
-                person.join()
-            ended = [sum(map(processor, pids)) for pids in watched]
-            load = _load(
-                team, seconds, {group: _history(http, group) - before[group] for group in ids}
-            )
+            with _come(shifts) as processes:
+                begun = [sum(map(processor, pids)) for pids in watched]
+                works = list(_works(processes, seconds))
+                ended = [sum(map(processor, pids)) for pids in watched]
+            kept = {group: _history(http, group) - before[group] for group in ids}
+            load = gathered(people, seconds, works, kept)
             load.processor = (ended[0] - begun[0], ended[1] - begun[1])
             return load
     finally:
         server.kill()
 
 
-def _load(team: list[Person], seconds: float, kept: dict[int, int]) -> Load:
-    load = Load(len(team), seconds)
-    load.faults = [person.fault for person in team if person.fault]
-    for person in team:
-        load.statuses += person.statuses
-        for kind, times in person.milliseconds.items():
+def _shifts(
+    port: int, ids: list[int], people: int, seconds: float, think: float, seed: int
+) -> Iterator[Shift]:
+    """What each process of people is to do."""
+    for place in range(PROCESSES):
+        # Pairs of neighbours, of whom one works on the shared groups, stay together.
+        numbers = [number for number in range(people) if number // 2 % PROCESSES == place]
+        groups = [ids[:SHARED_GROUPS] if number % 2 == 0 else ids for number in numbers]
+        seeds = [seed + number for number in numbers]
+        yield Shift(port, groups, seeds, seconds, think)
+
+
+@contextmanager
+def _come(shifts: Sequence[Shift]) -> Iterator[list[subprocess.Popen[bytes]]]:
+    """Processes of people, each of whom waits to be told to go on."""
+    pipe, command = subprocess.PIPE, [sys.executable, "-c", PEOPLE]
+    processes = [subprocess.Popen(command, cwd=ROOT, stdin=pipe, stdout=pipe) for _ in shifts]
+    try:
+        for process, shift in zip(processes, shifts, strict=True):
+            assert process.stdin is not None and process.stdout is not None
+            process.stdin.write(msgspec.json.encode(shift) + b"\n")
+            process.stdin.flush()
+        for process in processes:
+            assert process.stdout is not None
+            if process.stdout.readline() != READY.encode():
+                raise AssertionError("people did not come")
+        yield processes
+    finally:
+        for process in processes:
+            process.kill()
+            process.communicate()
+
+
+def _works(processes: Sequence[subprocess.Popen[bytes]], seconds: float) -> Iterator[Work]:
+    """Tell all to go on, and what each process has done."""
+    for process in processes:
+        assert process.stdin is not None
+        process.stdin.write(b"go on\n")
+        process.stdin.flush()
+    for process in processes:
+        said, _ = process.communicate(timeout=seconds + SECONDS)
+        yield msgspec.json.decode(said, type=Work)
+
+
+def gathered(people: int, seconds: float, works: Sequence[Work], kept: Mapping[int, int]) -> Load:
+    """What all processes of people came to, with what got lost.
+
+    Args:
+        people: How many they were.
+        seconds: For how long.
+        works: What each process has done.
+        kept: How many entries the history of each group has grown by.
+    """
+    load = Load(people, seconds)
+    for work in works:
+        load.faults += work.faults
+        load.clients += work.processor
+        load.statuses.update(work.statuses)
+        for kind, times in work.milliseconds.items():
             load.milliseconds.setdefault(kind, []).extend(times)
-    accepted = Counter(group for person in team for group, _ in person.accepted)
+    places = Counter(place for work in works for place in work.accepted)
+    accepted = Counter(group for group, _ in places.elements())
     load.changes, load.stale = accepted.total(), load.statuses[412]
     wrong = {status: count for status, count in load.statuses.items() if status not in (200, 412)}
     if wrong:
         load.faults.append(f"answers that were neither 200 nor 412: {wrong}")
-    etags = Counter(place for person in team for place in person.accepted)
     load.faults += [
-        f"group {place[0]}: two changes led to one state" for place in etags if etags[place] > 1
+        f"group {place[0]}: two changes led to one state" for place in places if places[place] > 1
     ]
     load.faults += [
         f"group {group}: {accepted[group]} changes accepted, {number} in its history"

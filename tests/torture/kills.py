@@ -29,8 +29,8 @@ from app.store.log import read_log
 from app.store.store import Store
 from tests.e2e.service import ROOT, SERVE, free_port, run_touchline
 from tests.starting import Process
+from tests.torture.connection import API
 
-API = "/api/v1"
 START_SECONDS = 120.0
 ANSWER_SECONDS = 120.0
 """For one request, with all the times that it is sent."""

@@ -35,6 +35,8 @@ from tests.torture import counting
 from tests.torture.crowd import Load
 from tests.torture.kills import API, Server
 
+LEAD = "lead"
+"""Who is in charge of every team."""
 SECRET = "three plain words"
 DRAGS = 5
 """Previews of one drag."""
@@ -240,7 +242,7 @@ def office(home: Path, *, people: int, think: float, seed: int, team: bool) -> I
     """
     names = [f"person{number}" for number in range(people)]
     if team:
-        _invite(home, names)
+        invite_all(home, names)
     server = TeamServer(home)
     with server.running(team=team) as address:
         clients = [httpx.Client(base_url=address, timeout=60) for _ in names]
@@ -248,7 +250,7 @@ def office(home: Path, *, people: int, think: float, seed: int, team: bool) -> I
         try:
             batch = None
             if team:
-                for name, client in zip(("lead", *names), (lead, *clients), strict=True):
+                for name, client in zip((LEAD, *names), (lead, *clients), strict=True):
                     client.headers["Origin"] = address
                     log_in(client, name)
                 asked = {"name": "everything"}
@@ -264,7 +266,7 @@ def office(home: Path, *, people: int, think: float, seed: int, team: bool) -> I
                 client.close()
 
 
-def _invite(home: Path, names: Sequence[str]) -> None:
+def invite_all(home: Path, names: Sequence[str]) -> None:
     """Accounts for a lead and for everybody; their passwords are hashed in no time, for it is not
     the logging in that is measured."""
     quick = PasswordHash((Argon2Hasher(time_cost=1, memory_cost=8, parallelism=1),))
@@ -272,8 +274,8 @@ def _invite(home: Path, names: Sequence[str]) -> None:
         patch.object(passwords, "HASHER", quick),
         closing(Store.open(Settings(home=home))) as store,
     ):
-        for name in ("lead", *names):
-            role = Role.LEAD if name == "lead" else Role.REVIEWER
+        for name in (LEAD, *names):
+            role = Role.LEAD if name == LEAD else Role.REVIEWER
             links.use(store, invite(store, name, role, actor="local")[1].token, SECRET)
 
 

@@ -1,7 +1,7 @@
 """Upgrades: homes of every released schema, with something in every table, killed while they migrate.
 
-A migration that was killed has not happened; done again it keeps every row that the new schema
-has room for.
+A migration that was killed has not happened; done again it ends where one that nobody killed does,
+and keeps every value that the new schema has room for.
 """
 
 from __future__ import annotations
@@ -12,15 +12,16 @@ import signal
 import subprocess
 import sys
 import tempfile
+from collections import Counter
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 from alembic import command
 from alembic.config import Config
 from alembic.operations import Operations
-from sqlalchemy import MetaData, func, select
-from sqlalchemy.exc import IntegrityError
+from sqlalchemy import MetaData, func, select, text
 
 from app.config import Settings
 from app.store.clock import now
@@ -32,7 +33,10 @@ from app.store.migrate import KNOWN_REVISIONS, migrate, migrations_folder, schem
 from app.store.restore import restore
 from app.store.session import Session
 from tests.e2e.service import ROOT
+from tests.torture import populated
 
+Rows = dict[str, list[dict[str, Any]]]
+"""All rows of all tables."""
 MIGRATE = (
     "import sys; from tests.torture.upgrades import migrate_by_steps; migrate_by_steps(sys.argv[1])"
 )
@@ -45,6 +49,10 @@ SAYS = {
     ("view", "balls"): "[]",
 }
 """What a migration reads must be there."""
+RENEWED = {("alembic_version", "version_num"), ("solution", "summary")}
+"""Columns that migrations fill anew."""
+DRAWN = {"installation"}
+"""Tables that a migration fills with what it draws at random."""
 
 
 def make_old(settings: Settings, revision: str) -> None:
@@ -66,7 +74,9 @@ def _fill(connection: Session) -> None:
     schema = MetaData()
     schema.reflect(connection)
     append(connection, [Entry("dataset", "ann", now(), {}, 1)])
-    for table in schema.sorted_tables:
+    # What belongs to a version is filled before that is there, and not later.
+    connection.execute(text("PRAGMA defer_foreign_keys = ON"))
+    for table in sorted(schema.sorted_tables, key=lambda table: table.name != "version_group"):
         if connection.execute(select(func.count()).select_from(table)).scalar():
             continue
         values = {}
@@ -82,23 +92,41 @@ def _fill(connection: Session) -> None:
             }
             known = SAYS.get((table.name, column.name))
             values[column.name] = texts.get(kind, 1) if known is None else known
-        # What belongs to a version is filled while that is being frozen, and not later.
-        with suppress(IntegrityError), connection.begin_nested():
-            connection.execute(table.insert().values(values))
+        connection.execute(table.insert().values(values))
 
 
-def rows(settings: Settings) -> dict[str, int]:
-    """How many rows each table has."""
+def rows(settings: Settings) -> Rows:
+    """All that a database holds, in an order of its own."""
     engine = make_engine(settings)
     with engine.connect() as connection:
         schema = MetaData()
         schema.reflect(connection)
         found = {
-            table.name: connection.execute(select(func.count()).select_from(table)).scalar_one()
+            table.name: sorted(map(dict, connection.execute(select(table)).mappings()), key=repr)
             for table in schema.sorted_tables
         }
     engine.dispose()
     return found
+
+
+def differences(one: Rows, other: Rows) -> list[str]:
+    """Names of tables that one of the two has not, or with other rows."""
+    names = {*one, *other} - DRAWN
+    return sorted(name for name in names if one.get(name) != other.get(name))
+
+
+def lost(before: Rows, after: Rows) -> list[str]:
+    """Columns, of those that are still there, in which a value is gone."""
+    found = []
+    for table in before.keys() & after.keys():
+        columns = {name for row in after[table] for name in row}
+        if before[table] and not after[table]:
+            found.append(table)
+        for name in columns & {name for row in before[table] for name in row}:
+            then, now = (Counter(repr(row[name]) for row in had[table]) for had in (before, after))
+            if then - now and (table, name) not in RENEWED:
+                found.append(f"{table}.{name}")
+    return sorted(found)
 
 
 def revision_of(settings: Settings) -> str | None:
@@ -137,14 +165,14 @@ def _after_each_operation(do: Callable[[], None]) -> Iterator[None]:
         Operations.invoke = execute  # type: ignore[method-assign]
 
 
-def operations(home: Path) -> int:
-    """How many operations it takes to migrate a home; done to a copy of it."""
+def rehearse(home: Path) -> tuple[int, Rows]:
+    """How many operations it takes to migrate a home, and what is there then; done to a copy of it."""
     steps: list[None] = []
     with tempfile.TemporaryDirectory(prefix="touchline-copy-") as name:
-        copy = shutil.copytree(home, Path(name, "home"))
+        copy = Settings(home=shutil.copytree(home, Path(name, "home")))
         with _after_each_operation(lambda: steps.append(None)):
-            migrate(Settings(home=copy))
-    return len(steps)
+            migrate(copy)
+        return len(steps), rows(copy)
 
 
 def torture(
@@ -160,32 +188,60 @@ def torture(
     for revision in revisions:
         settings = Settings(home=folder / revision)
         make_old(settings, revision)
-        before, steps = rows(settings), operations(settings.home)
-        if steps == 0:
-            faults.append(f"schema {revision}: its migration has no operation to be killed at")
-        for _ in range(kills if steps else 0):
-            step = chance.randint(1, steps)
-            fault = _kill_at(settings, step)
-            if (revision_of(settings), rows(settings)) != (revision, before):
-                fault = fault or "something had happened"
-            if fault:
-                faults.append(f"schema {revision}: killed at operation {step} of {steps}: {fault}")
-                break
-        migrated = migrate(settings)
-        after = rows(settings)
-        lost = [name for name, count in before.items() if after.get(name, count) < count]
-        if lost or revision_of(settings) != KNOWN_REVISIONS[-1]:
-            faults.append(f"schema {revision}: migrated, and rows are gone of {', '.join(lost)}")
-        if migrated.copy is None:
-            faults.append(f"schema {revision}: migrated without a backup")
-            continue
-        restore(settings, migrated.copy)
-        if (revision_of(settings), rows(settings)) != (revision, before):
-            faults.append(f"schema {revision}: its backup is not what it was")
-        tell(
-            f"schema {revision}: {len(before)} tables, {kills} kills among {steps} operations, migrated and taken back"
-        )
+        faults += [
+            f"schema {revision}: {fault}" for fault in _upgrade(settings, revision, kills, chance)
+        ]
+        tell(f"schema {revision}: {kills} kills, migrated and taken back")
     return faults
+
+
+def _upgrade(settings: Settings, revision: str, kills: int, chance: random.Random) -> list[str]:
+    """Migrate a home, killed that often before, and take it back."""
+    before = rows(settings)
+    steps, wanted = rehearse(settings.home)
+    if steps == 0:
+        return ["its migration has no operation to be killed at"]
+    for _ in range(kills):
+        step = chance.randint(1, steps)
+        fault = _kill_at(settings, step)
+        if not fault and (revision_of(settings), rows(settings)) != (revision, before):
+            fault = "something had happened"
+        if fault:
+            return [f"killed at operation {step} of {steps}: {fault}"]
+    migrated = migrate(settings)
+    after = rows(settings)
+    faults = [f"killed and migrated again, {name} differs" for name in differences(wanted, after)]
+    faults += [f"values are gone of {name}" for name in lost(before, after)]
+    if revision_of(settings) != KNOWN_REVISIONS[-1]:
+        faults.append(f"it is migrated to {revision_of(settings)}")
+    if migrated.copy is None:
+        return [*faults, "it is migrated without a backup"]
+    restore(settings, migrated.copy)
+    if (revision_of(settings), rows(settings)) != (revision, before):
+        faults.append("its backup is not what it was")
+    return faults
+
+
+def carry(home: Path, folder: Path, revision: str = KNOWN_REVISIONS[-2]) -> list[str]:
+    """Bring what people said into an earlier schema, migrate that, and read it with the product.
+
+    Args:
+        home: A home that ``kills.prepare`` has made; people work in it.
+        folder: Where the home of the earlier schema goes.
+        revision: Its schema; the one before the newest.
+    """
+    settings, old = Settings(home=home), Settings(home=folder / revision)
+    populated.people_work(settings)
+    wanted = populated.said(settings)
+    make_old(old, revision)
+    populated.carry_back(home, old)
+    migrate(old)
+    found = populated.said(old)
+    return [
+        f"carried from schema {revision}: {name} are not what was said"
+        for name in wanted
+        if found[name] != wanted[name]
+    ]
 
 
 def _kill_at(settings: Settings, step: int) -> str:

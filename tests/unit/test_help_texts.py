@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -26,48 +27,47 @@ PLAIN_WORDS = """
     choice give hand handed back lease leases on people work
     take takes gold guidelines mixing copying copies own errors parts guideline datasets
     adjudicate compare differences distance limits other panel rater summary weigh workspace
-    comment comments talk threads mentions bells past deed deeds window before after
+    comment comments talk threads mentions bells past deeds window before after
     tall scroll stalls settling
     cluster serving hosts
     private kept another smaller
-    stored tree trees safe path refusal attempt cookie fit stack
+    stored tree trees safe path refusal attempt cookie fit
     compiler dialect postgresql sqlite statements transfer triggers
     attempts lived processes shared sharing short web
     addresses messages secrets sender
     challenges enrol
     joined turns
     proof provider identities sign
-    access account accounts join link links login logins passwords people person roles team tokens
+    access account join links login logins passwords roles team tokens
     bearer codes me remote rules tries users
     about adopt aliases belonging instead needs rights sight whereabouts
-    actor actors
+    actors
     candidate drawn proposal propose scoring search straight
     3d accept action actions address adjust adjustments advice ahead anchor annotate answers app
-    application archive archives arrays arrival ask axis backup bar bars batches best binned bodies
-    bundle proposal
-    body boxes bulk button buttons cache calibrate canvas caption card cards cell changes chart
-    child chip choice chooser class cli client clock codec codecs colours command comparison completion
+    application archives arrays arrival ask axis backup bar bars batches best binned bodies
+    bundle body boxes bulk button buttons cache calibrate canvas caption card cards cell changes chart
+    child chip chooser class cli client clock codec codecs colours command comparison completion
     conditions config confirm connections contact copy cross csv cursor curve damped delete deps details
-    detect diagram dialog diff doctor document documents drags drawing durable editor empty encode
-    encoded engine environment estimator etags evaluate event events exact examination export
-    exports facets facts failures fan faults fields figure figures files finite first fixes fixture
+    detect diagram dialog diff doctor document documents drags drawing durable editor empty
+    encoded engine estimator etags evaluate event events exact examination export
+    exports facets facts fan faults fields figure figures files finite first fixes fixture
     folder folders follow form format formats frozen gathered gestures glossary grass grid guess guide header
     headers heads health heat help histograms history hit home hooks idempotency identity if image images
     import imports in info init insight items jaccard json judged key keys known konva last latest lazy
-    least leftovers legend lens lesson lessons letter licence limits list listing live locks look loupe
+    least leftovers legend lens lesson lessons letter licence list listing live locks look loupe
     kernels profile trace
-    main map markdown marks match matches matrix meant membership menu merge metrics migrate mini missing
+    main map markdown marks match matches matrix membership menu merge metrics migrate mini missing
     model models modules name names navigation neighbours nested notice nudge numbers object
     observability onnx open openapi opened options order origin orphans output overlap page pages
-    paint palette panel parquet parse parts patch pen pins pitch pitches pixel place places plain png pointer
+    paint palette parquet parse patch pen pins pitch pitches pixel place places plain png pointer
     policies pool popover pose position preview problem progress projection props query rail reader reasons
     recompute record remedies removal render reply report requests resect resource restore result
     revert reviewers rotation router row rows run runs sample save scale scene scene3d scenes score
-    scoreboard sending server service session sets shadows shared sheet singular site smallest solve
+    scoreboard sending server service session sets shadows sheet singular site smallest solve
     solving soundness source sources sphere spill spread squares stage staging standpoints starts
-    state statistics steps storage store stream submit summary surface swap synloc tab table tally tables term
+    state statistics steps storage store stream submit surface swap synloc tab table tally tables term
     terminal text textures threshold ticks tools triangulate truth types undo undrawn unknown upload uploads
-    v3 v3d video viewport viewports virtual wal walk warm what when whiskers words workspace write writer zip
+    v3 v3d video viewport viewports virtual wal walk warm what when whiskers words write writer zip
 """
 PLAIN = frozenset(PLAIN_WORDS.split())
 """Words of file names that are plain English, or that every programmer knows; any other has to be
@@ -89,6 +89,13 @@ def source_files(tree: str) -> list[Path]:
     found = (path for ending in ("py", "js") for path in (ROOT / tree).rglob(f"*.{ending}"))
     others = {"node_modules", "built"}
     return [path.relative_to(ROOT) for path in found if not others & {*path.parts}]
+
+
+def words_of_names(tree: str) -> Iterator[tuple[str, Path]]:
+    """The words of the file names of a part of the product, and the file of each."""
+    for path in source_files(tree):
+        for word in path.stem.strip("_").split("_"):
+            yield word, path
 
 
 class TestPages:
@@ -143,11 +150,16 @@ class TestGlossary:
         heads = {part for word in glossary_words() for part in re.findall(r"[a-z0-9]+", word)}
         unknown = {
             word: str(path)
-            for path in source_files(tree)
-            for word in path.stem.strip("_").split("_")
+            for word, path in words_of_names(tree)
             if not {word, word.rstrip("s"), f"{word}s"} & (heads | PLAIN)
         }
         assert not unknown, "put them into static/help/glossary.json, or name the files otherwise"
+
+    def test_every_plain_word_stands_once_and_in_the_name_of_a_file(self):
+        words = PLAIN_WORDS.split()
+        used = {word for tree in ("app", "static") for word, _ in words_of_names(tree)}
+        assert [word for word in words if words.count(word) > 1] == []
+        assert sorted(PLAIN - used) == []
 
     @pytest.mark.parametrize("word", ["carry", "spare", "lineage", "ledger", "upstream"])
     def test_the_words_of_moving_data_are_explained(self, word: str):

@@ -73,7 +73,7 @@ class TestLicences:
             "",
         ],
     )
-    def test_what_cannot_or_is_no_expression_is_not(self, expression: str) -> None:
+    def test_what_cannot_be_met_and_what_is_no_expression_is_refused(self, expression: str) -> None:
         assert not allowed(expression)
 
     def test_older_metadata_are_understood(self) -> None:

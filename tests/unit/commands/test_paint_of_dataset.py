@@ -58,6 +58,8 @@ class TestPaint:
             (("demo", "--undo", "--show"), 2, "one at a time"),
         ],
     )
-    def test_what_cannot_be_is_said(self, run: Run, words, code: int, sentence: str) -> None:
+    def test_wrong_options_and_what_cannot_be_read_or_undone_are_refused(
+        self, run: Run, words, code: int, sentence: str
+    ) -> None:
         found, _, err = run(*words)
         assert (found, sentence in err) == (code, True)

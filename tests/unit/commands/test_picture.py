@@ -80,7 +80,9 @@ class TestPicture:
             ((), 2, "give either line files or --dataset"),
         ],
     )
-    def test_what_cannot_be_is_said(self, run: Run, words, code: int, sentence: str) -> None:
+    def test_wrong_options_and_unknown_names_are_refused_with_a_sentence(
+        self, run: Run, words, code: int, sentence: str
+    ) -> None:
         found, _, err = run("picture", *words)
         assert (found, sentence in err) == (code, True)
 

@@ -85,6 +85,8 @@ class TestPitch:
             (("demo", "--dataset", "demo"), 2, "give either line files or --dataset"),
         ],
     )
-    def test_what_cannot_be_is_said(self, run: Run, words, code: int, sentence: str) -> None:
+    def test_wrong_options_unknown_names_and_what_is_no_size_are_refused(
+        self, run: Run, words, code: int, sentence: str
+    ) -> None:
         found, _, err = run(*words)
         assert (found, sentence in err) == (code, True)

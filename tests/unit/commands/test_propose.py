@@ -91,7 +91,9 @@ class TestOfDataset:
             (("--undo", "--match", "m"), 2, "all of a dataset"),
         ],
     )
-    def test_what_cannot_be_is_said(self, propose, words, code: int, sentence: str):
+    def test_wrong_options_and_unknown_matches_are_refused_with_a_sentence(
+        self, propose, words, code: int, sentence: str
+    ):
         found, _, err = propose(*words)
         assert (found, sentence in err) == (code, True)
 

@@ -56,7 +56,7 @@ class TestRig:
         assert json.loads(run("--undo", "--json").stdout) == {"taken_back": 4}
         assert known(store) == [False] * 4
 
-    def test_one_thing_at_a_time(self, store: Store) -> None:
+    def test_undo_and_accept_together_are_wrong_usage(self, store: Store) -> None:
         assert run("--undo", "--accept", "cameras").exit_code == 2
 
     def test_lines_of_no_camera_are_refused(self, store: Store, tmp_path: Path) -> None:

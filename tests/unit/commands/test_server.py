@@ -233,7 +233,7 @@ class TestRefusals:
             ("http://127.0.0.1:1", "does not answer"),
         ],
     )
-    def test_an_address_that_cannot_be_one(self, url: str, sentence: str) -> None:
+    def test_what_is_no_address_of_a_server_is_refused(self, url: str, sentence: str) -> None:
         done = CliRunner().invoke(app, ["--server", url, "datasets", "list"])
         assert sentence in str(done.exception)
 

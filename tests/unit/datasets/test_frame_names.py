@@ -11,7 +11,9 @@ Make = Callable[..., Group]
 
 
 class TestMatchFrame:
-    def test_beside_the_labels_of_the_match(self, soccer_group: Make, issia_group: Make) -> None:
+    def test_a_frame_lies_beside_the_labels_of_its_match(
+        self, soccer_group: Make, issia_group: Make
+    ) -> None:
         group, static = soccer_group(match="l/s/m"), issia_group()
         assert match_frame(group, group.views[1], "train", ".jpg") == "l/s/m/Frames-v3/7_1.png"
         name = match_frame(static, static.views[0], "", ".jpg")

@@ -51,7 +51,9 @@ class TestMatchOf:
             ({}, ""),
         ],
     )
-    def test_every_spelling(self, record: dict[str, Any], match: str) -> None:
+    def test_the_match_is_found_in_every_spelling_of_it(
+        self, record: dict[str, Any], match: str
+    ) -> None:
         assert match_of(record) == match
 
 

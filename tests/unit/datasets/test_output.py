@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import os
 import zipfile
 from pathlib import Path
 
@@ -45,6 +46,20 @@ class TestOutputTree:
         for name in ("a.zip", "b.zip"):
             _export(tmp_path / name)
         assert (tmp_path / "a.zip").read_bytes() == (tmp_path / "b.zip").read_bytes()
+
+    @pytest.mark.parametrize("name", ["out", "out.zip"])
+    def test_its_content_is_on_disk_before_its_name_and_then_its_name(
+        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
+    ) -> None:
+        out, synced = tmp_path / name, set()
+
+        def watched(handle: int) -> None:
+            synced.add((os.fstat(handle).st_ino, out.exists()))
+
+        monkeypatch.setattr(os, "fsync", watched)
+        _export(out)
+        content = {(path.stat().st_ino, False) for path in (out, *out.rglob("*"))}
+        assert synced == {*content, (tmp_path.stat().st_ino, True)}
 
     @pytest.mark.parametrize("name", ["out", "out.zip"])
     def test_an_error_leaves_nothing_behind(self, tmp_path: Path, name: str) -> None:

@@ -218,7 +218,7 @@ class TestNamesThatAreNoText:
         assert problem.problem == "has a name that is no text, so it cannot be read"
         assert guess_format(marked) == "sn-calibration"
 
-    def test_nor_inside_a_zip_inside_a_zip(
+    def test_one_of_them_inside_a_nested_zip_condemns_no_other_member(
         self, marked: Path, make_zip: MakeZip, report: Report
     ) -> None:
         path = make_zip({"inner.zip": marked.read_bytes()}, marked.with_name("outer.zip"))
@@ -245,7 +245,7 @@ class TestPipesAndDevices:
         assert report.problems[0].problem == "is not a plain file"
         guess_format(tmp_path / name)
 
-    def test_so_is_a_device(self, report: Report) -> None:
+    def test_a_device_is_refused_at_once(self, report: Report) -> None:
         assert open_tree(Path("/dev/zero"), report) is None
         assert report.problems[0].problem == "is not a plain file"
 

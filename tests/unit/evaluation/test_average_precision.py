@@ -113,7 +113,9 @@ class TestFindHits:
 
 
 class TestCurve:
-    def test_by_hand(self, make_judged) -> None:
+    def test_recall_and_precision_of_three_detections_are_those_computed_by_hand(
+        self, make_judged
+    ) -> None:
         # Right, wrong, right: of two balls.
         judged = [
             make_judged(BALL, (BALL, 0.9), (AWAY, 0.8), identity=1),
@@ -133,7 +135,7 @@ class TestCurve:
         written = curve(find_hits([one, two, two]))
         assert interpolated(twice) == pytest.approx(interpolated(written))
 
-    def test_is_the_evaluators_own(self, random_judged) -> None:
+    def test_its_means_are_those_of_the_public_evaluator(self, random_judged) -> None:
         hits = find_hits(random_judged)
         ap_50, ap = coco_average_precision(random_judged)
         assert interpolated(curve(hits)) == pytest.approx(ap_50, abs=1e-12)

@@ -50,7 +50,7 @@ class TestSlopes:
         by_shift = np.linalg.norm(place(1e-4, 0) - place(-1e-4, 0)) / 2e-4
         assert slopes(camera, box, DIAMETER) == pytest.approx((by_size, by_shift), rel=1e-3)
 
-    def test_by_hand(self, make_frame) -> None:
+    def test_a_ball_fifty_metres_away_has_the_slopes_computed_by_hand(self, make_frame) -> None:
         # 50 m away: one per cent of the size is half a metre; a pixel is 50 m / 2000.
         frame = make_frame(distance=50.0)
         box = frame.boxes["optimized"]

@@ -18,7 +18,7 @@ KERNELS = {
 }
 
 
-def test_all_are_found() -> None:
+def test_kernels_of_several_modules_are_found() -> None:
     assert {"curve_fit.descend", "start_kernels.aim", "point_kernels.keep_farthest"} <= set(KERNELS)
 
 

@@ -59,6 +59,6 @@ class TestReplaySeat:
 
 
 class TestParallax:
-    def test_a_right_angle(self):
+    def test_rays_along_two_axes_meet_at_a_right_angle(self):
         ball = np.array([0.0, 0.0, 0.0])
         assert parallax(np.array([9.0, 0, 0]), np.array([0, 4.0, 0]), ball) == np.pi / 2

@@ -101,11 +101,14 @@ class TestResidualsOf:
         policy = random_policy(seed)
         parts = [group_facts(*random_views(seed)) for seed in seeds]
 
-        def tested(of: Facts) -> Residuals:
+        def residuals_at_ball(of: Facts) -> Residuals:
             verdict = judge(of, policy, MeanSpread(of))
             return residuals_of(of, views_of(of, verdict.valid), verdict.point, policy)
 
-        together, alone = tested(join(parts)), [tested(part) for part in parts]
+        together, alone = (
+            residuals_at_ball(join(parts)),
+            [residuals_at_ball(part) for part in parts],
+        )
         for item in fields(Residuals):
             pieces = np.concatenate([getattr(one, item.name) for one in alone])
             assert np.array_equal(getattr(together, item.name), pieces, equal_nan=True), item.name

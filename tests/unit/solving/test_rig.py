@@ -123,7 +123,7 @@ class TestAdjust:
                 shares.append(squares < 5.99)
         assert np.concatenate(shares).mean() > 0.85
 
-    def test_noisier_balls_are_seen_to_be(self):
+    def test_noisier_balls_get_a_larger_sigma(self):
         noisy = make_rig(cameras(), frames(noise_px=3.0), PITCH, PAPER)[0]
         # The policy's 1 px holds at 1920 x 1080, and this picture is two thirds of it.
         assert adjust(noisy).ball_sigma == pytest.approx(4.5, rel=0.15)

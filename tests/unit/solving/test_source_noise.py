@@ -129,7 +129,7 @@ class TestEstimateSources:
         assert 1.5 < ratios[0] < 3.2
         assert ratios[1] == pytest.approx(3.0, rel=0.15)
 
-    def test_one_alone_is_the_dataset(self) -> None:
+    def test_a_single_person_gets_no_estimate_beside_that_of_the_dataset(self) -> None:
         assert estimated(*drawn(1, {"ann": 1.0})) == {}
         assert estimated() == {}
 

@@ -100,6 +100,14 @@ class TestCheckSize:
         with pytest.raises(TooLargeError, match=f"{width} x {height}"):
             check_size(read_header(png(width, height)), Settings())
 
-    def test_takes_the_largest_that_is_allowed(self) -> None:
-        check_size(read_header(png(10_000, 5_000)), Settings())
-        check_size(read_header(png(16_384, 3_051)), Settings())
+    @pytest.mark.parametrize(
+        ("largest", "larger"), [((10_000, 5_000), (10_000, 5_001)), ((16_384, 3_051), (16_385, 1))]
+    )
+    def test_refuses_no_image_but_what_is_larger_than_the_largest(self, largest, larger) -> None:
+        refused = []
+        for size in (largest, larger):
+            try:
+                check_size(read_header(png(*size)), Settings())
+            except TooLargeError:
+                refused.append(size)
+        assert refused == [larger]

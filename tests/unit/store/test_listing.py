@@ -57,7 +57,7 @@ class TestCounts:
 
 
 class TestReadColumns:
-    def test_some_columns_by_number(self, session: Session) -> None:
+    def test_columns_come_in_the_order_of_the_numbers(self, session: Session) -> None:
         rows = Listing(session, 1, OPEN).columns(("number", "sigma_m"), by_number=True)
         assert [tuple(row) for row in rows] == [(1, None), (2, 0.5), (3, 0.1)]
 
@@ -67,7 +67,7 @@ class TestReadColumns:
 
 
 class TestOrder:
-    def test_ids_all_or_the_first(self, session: Session) -> None:
+    def test_all_ids_or_the_first_few_come_in_the_order(self, session: Session) -> None:
         assert Listing(session, 1).ids(BY_SIGMA) == [2, 4, 3, 1]
         assert Listing(session, 1, OPEN).ids(BY_SIGMA, 2) == [2, 3]
 

@@ -66,7 +66,7 @@ class TestReadPlace:
         assert read_place(f"tcp://{host}:8786", None).keys is None
 
     @pytest.mark.parametrize("host", ["10.0.0.1", "solve.example.org", "0.0.0.0"])
-    def test_another_one_does(self, host: str) -> None:
+    def test_another_machine_needs_encryption_and_certificates(self, host: str) -> None:
         with pytest.raises(InputError, match="not encrypted"):
             read_place(f"tcp://{host}:8786", None)
         with pytest.raises(InputError, match="needs certificates"):

@@ -147,7 +147,7 @@ class TestFollow:
         without = bare.with_view(replace(view, media=None))
         assert paint.follow(without, policy, {}) is without
 
-    def test_what_nobody_asked_for_is_not_read(self, painted, paint, looked):
+    def test_after_its_reading_was_taken_back_an_edit_reads_no_paint(self, painted, paint, looked):
         take_back_paint(painted, "demo", actor="ann")
         change(painted, paint, without_a_line(painted))
         assert looked == []

@@ -167,7 +167,9 @@ class TestReadPaint:
         item = state(painted)
         assert (item.groups, item.views, item.read, item.painted) == (2, 4, 4, 4)
         for number, scene in enumerate(scenes(), start=1):
-            for view, found in zip(scene.group.views, calibrations(painted, number), strict=False):
+            of_views = calibrations(painted, number)
+            assert len(of_views) == 2
+            for view, found in zip(scene.group.views, of_views, strict=False):
                 truth = scene.truth.view(view.key).camera
                 assert (found.source, found.paint.reason) == ("paint", None)
                 assert found.paint.supported > 0.5 and found.paint.error_px < 0.2
@@ -179,12 +181,15 @@ class TestReadPaint:
             group = load(painted, number).group
             for view in group.views:
                 people = [box for box in view.extras.places if box.width * box.height < 2e4]
-                assert people
-                for places in group.paint[view.key].evidence.points.values():
+                believed = group.paint[view.key].evidence.points
+                assert people and believed
+                for places in believed.values():
                     assert not [place for place in places for box in people if inside(box, place)]
 
     def test_the_least_agreement_of_a_groups_views_is_in_the_queue(self, painted):
-        for row in list_groups(painted, 1).items:
+        rows = list_groups(painted, 1).items
+        assert len(rows) == 2
+        for row in rows:
             least = min(item.paint.agreement for item in calibrations(painted, row.id))
             assert row.agreement == least and 0.2 < least <= 1
         page = list_groups(painted, 1, "sort:agreement-desc agreement>0.2")

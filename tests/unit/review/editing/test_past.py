@@ -48,11 +48,11 @@ class TestReadStep:
     def test_a_static_camera_that_was_changed_stands_in_the_past_of_its_groups(
         self, store: Store, fill, make_static
     ) -> None:
-        ids = fill(make_static(10), make_static(11))
-        camera = load_station(store, load(store, ids[0]).station_ids["cam1"])
+        first, second = fill(make_static(10), make_static(11))
+        camera = load_station(store, load(store, first).station_ids["cam1"])
         edit = SetStationLines({"Middle line": HERE})
         submit_station(store, camera.id, edit, if_match=camera.etag, actor="ann")
-        for group in ids:
+        for group in (first, second):
             brought, changed = steps(store, group)
             assert changed.entry.kind == "station_edit"
             assert [view.key for view in changed.views] == ["cam1"]

@@ -76,8 +76,9 @@ class TestFindRemedies:
 
     def test_no_remedy_puts_a_ball_onto_the_ray_that_would_then_confirm_it(self):
         bad = self.with_ball_off(40.0)
-        for remedy in find_remedies(bad, PAPER, solve(bad, PAPER)):
-            assert edit_of_fix(bad, remedy.fix, remedy.point) is None
+        (remedy,) = find_remedies(bad, PAPER, solve(bad, PAPER))
+        assert (remedy.fix.action, remedy.passes) == ("look_ball", True)
+        assert edit_of_fix(bad, remedy.fix, remedy.point) is None
 
     def test_no_ball_is_looked_for_farther_off_than_a_hand_slips(self):
         bad = self.with_ball_off(440.0)

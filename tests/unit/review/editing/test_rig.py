@@ -67,9 +67,13 @@ def known() -> dict[str, ProposedRig]:
 
 @pytest.fixture
 def proposed(store, ids, known) -> ProposedRig:
+    """Something for every camera."""
     if not known:
         known["demo"] = propose(store, "demo")
-    return known["demo"]
+    found = known["demo"]
+    keys = [change.key for change in found.proposal.cameras]
+    assert keys == sorted(found.stations) == sorted(GIVEN) != []
+    return found
 
 
 def stations(store, proposed) -> dict[str, Station]:
@@ -78,7 +82,6 @@ def stations(store, proposed) -> dict[str, Station]:
 
 class TestPropose:
     def test_saves_nothing(self, store, ids, proposed) -> None:
-        assert [change.key for change in proposed.proposal.cameras] == sorted(GIVEN)
         assert all(item.given == GIVEN[key] for key, item in stations(store, proposed).items())
         assert all(load_station(store, s.id).revision == 1 for s in proposed.stations.values())
 
@@ -140,7 +143,9 @@ class TestAccept:
             assert (station.given, station.given_covariance) == (change.after, change.covariance)
         assert set(stale_groups(store, "demo")) == set(ids)
 
-    def test_or_leaves_the_cameras_and_says_how_far_they_may_be_off(self, store, proposed) -> None:
+    def test_accepting_sigma_keeps_the_cameras_and_says_how_far_they_may_be_off(
+        self, store, proposed
+    ) -> None:
         accept(store, proposed, SIGMA, actor="ann")
         for change in proposed.proposal.cameras:
             station = stations(store, proposed)[change.key]
@@ -183,7 +188,9 @@ class TestAccept:
         with pytest.raises(ConflictError, match="adjusted already"):
             propose(store, "demo")
 
-    def test_anything_else_is_refused(self, store, proposed) -> None:
+    def test_what_can_be_accepted_is_the_cameras_or_sigma_and_nothing_else(
+        self, store, proposed
+    ) -> None:
         with pytest.raises(InputError, match='"sigma"'):
             accept(store, proposed, "all", actor="ann")
 

@@ -44,7 +44,7 @@ class TestWideLenses:
         assert not (tmp_path / "out").exists()
 
     @pytest.mark.parametrize("kind", ["issia", "issia-3d"])
-    def test_nor_has_issia_a_place_for_it(
+    def test_issia_has_no_place_for_a_wide_lens_and_names_the_view(
         self, store, fill, make_static, lens, tmp_path, kind
     ) -> None:
         group = make_static(10)

@@ -47,7 +47,7 @@ def test_it_counts_and_solves_nothing(gone: Store) -> None:
     jobs.close()
 
 
-def test_asking_counts_nothing(gone: Store, monkeypatch) -> None:
+def test_a_job_is_asked_for_without_a_count_of_every_match(gone: Store, monkeypatch) -> None:
     def refuse(*_arguments):
         raise AssertionError("every match was counted")
 

@@ -194,8 +194,13 @@ class TestUpkeep:
         with pytest.raises(DamagedError):
             there.require_whole()
 
-    def test_ends_at_once(self, store: Store) -> None:
+    def test_its_thread_has_ended_when_it_is_closed_however_long_it_would_wait(
+        self, store: Store, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(module, "FIRST_SECONDS", 3600.0)
         upkeep = Upkeep(store, Jobs(store))
         upkeep.start()
         upkeep.close()
         upkeep.close()
+        assert upkeep._thread is not None
+        assert not upkeep._thread.is_alive()

@@ -58,7 +58,7 @@ def anna(home, clock) -> Login:
 
 
 class TestText:
-    def test_every_slip_of_the_pen_is_seen(self) -> None:
+    def test_a_token_with_a_wrong_missing_or_swapped_letter_is_not_whole(self) -> None:
         text = new_text()
         assert is_whole(text)
         assert not is_whole(text + "\n")
@@ -70,7 +70,7 @@ class TestText:
         assert not [one for one in swapped if one != text and is_whole(one)]
 
     @pytest.mark.parametrize("text", ["", "tl_", "x" * 57, "tl_" + "é" * 54])
-    def test_what_is_none_is_none(self, text: str) -> None:
+    def test_a_text_of_another_shape_is_no_token(self, text: str) -> None:
         assert not is_whole(text)
 
 
