@@ -72,11 +72,10 @@ class InputError(ReviewError):
 class UnknownMarkingError(InputError):
     """A marking name that is none of the 26 markings of the pitch."""
 
-    def __init__(self, marking: str, *, pointer: str | None = None):
+    def __init__(self, marking: str):
         super().__init__(
             f'"{marking}" is not a pitch marking',
             hint="docs/glossary.md lists the 26 names; trailing spaces do not matter.",
-            pointer=pointer,
         )
         self.marking = marking
 

@@ -120,14 +120,12 @@ class Evidence:
         offsets: From the expected place along the normal, pixels, shape (N,).
         sigmas: Standard deviations of the offsets, pixels, shape (N,).
         strengths: How much brighter than the grass beside it, grey levels, shape (N,).
-        sought: Places on the field at which paint was looked for.
     """
 
     traced: Traced
     offsets: FloatArray
     sigmas: FloatArray
     strengths: FloatArray
-    sought: int
 
     @property
     def share(self) -> float:
@@ -235,7 +233,7 @@ def seek(reading: Reading, traced: Traced, window_px: float | FloatArray) -> Evi
     )
     sigma = np.hypot(sigmas[kept], SIGMA_FLOOR_PX)
     sigma *= 1 + (sigma / UNSURE_PX) ** 2
-    return Evidence(seen, offsets[kept], sigma, strengths[kept], count)
+    return Evidence(seen, offsets[kept], sigma, strengths[kept])
 
 
 def shows_grass_beside(reading: Reading, traced: Traced, window_px: float) -> BoolArray:

@@ -57,12 +57,10 @@ def take_of_copy(session: Session, copy_id: int) -> Any | None:
     return session.execute(_OF_COPY, {"copy": copy_id}).one_or_none()
 
 
-def takes_of_group(session: Session, group_id: int, batch_id: int | None = None) -> Sequence[Any]:
-    """The takes of a group, of one batch where it is named, in the order in which they began."""
-    where = [TakeModel.group_id == group_id]
-    if batch_id is not None:
-        where.append(TakeModel.batch_id == batch_id)
-    return session.execute(_TAKES.where(*where).order_by(TakeModel.id)).all()
+def takes_of_group(session: Session, group_id: int) -> Sequence[Any]:
+    """The takes of a group in the order in which they began."""
+    mine = TakeModel.group_id == group_id
+    return session.execute(_TAKES.where(mine).order_by(TakeModel.id)).all()
 
 
 def takes_of_batch(session: Session, batch_id: int | None, dataset_id: int) -> Sequence[Any]:

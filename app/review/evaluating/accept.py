@@ -34,12 +34,6 @@ SHOWN = 20
 """Views that a dry run shows."""
 TRIES = 3
 """How often a group is taken up again that somebody else changes meanwhile."""
-REASONS = {
-    "below_score": "the surest prediction is below the score",
-    "annotated": "the view has a ball already",
-    "the_same": "the view has this very ball already",
-    "not_a_ball": "the prediction cannot be a ball in this image",
-}
 
 
 @dataclass(frozen=True)
@@ -63,7 +57,7 @@ class AcceptRequest:
 
 @dataclass(frozen=True)
 class Accepted:
-    """One view whose prediction is to be accepted, or why not (one of ``REASONS``)."""
+    """One view whose prediction is to be accepted, or why not."""
 
     view_id: int
     view: str

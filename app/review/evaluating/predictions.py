@@ -54,7 +54,6 @@ def add_predictions(
     files: PredictionFiles,
     *,
     actor: str,
-    source: str | None = None,
     reuse: bool = False,
     read: Read = read_files,
     keep: Keep[PredictionSet] = keep_nothing,
@@ -67,7 +66,6 @@ def add_predictions(
         name: Of the set; unique in its dataset.
         files: What to read.
         actor: Who brings them.
-        source: What people call the file; its own name by default.
         reuse: Answer the set that came of the very same reading, where there is one, and find
             another name where the name is taken.
         read: Reads the files, here or in another process.
@@ -95,7 +93,7 @@ def add_predictions(
         cameras.cameras,
         names=names,
         format=files.format if files.path is not None else "cameras",
-        source=source or first.name,
+        source=first.name,
         report=_report(boxes, cameras),
         unknown=len(boxes.unknown) + len(cameras.unknown),
         actor=actor,
