@@ -121,9 +121,9 @@ export function getSummary(dataset, q, signal) {
 }
 
 /**
- * @param {{dataset: string, q: string, cursor: string | null, limit: number}} options
+ * @param {{dataset: string, q: string, limit: number, from?: number}} options `from`: the place of the first row
  * @param {AbortSignal} [signal]
- * @returns {Promise<GroupPage>}
+ * @returns {Promise<GroupPage>} as the list is at this moment
  */
 export function getGroups(options, signal) {
 	return request(`/groups${queryText(options)}`, { signal });

@@ -3,8 +3,6 @@
 
 import { idempotencyKey, queryText, request } from './client.js';
 
-/** @import {GroupPage} from './types.js' */
-
 /** @typedef {{q: string, state: string, reason: string | null, note: string | null, expected?: number}} BulkRequest   `expected`: how many the person saw */
 /** @typedef {{reason: string, groups: number}} RefusedJson */
 
@@ -45,16 +43,6 @@ import { idempotencyKey, queryText, request } from './client.js';
 /** @returns {Promise<{items: QueryField[], sorts: {name: string, meaning: string}[]}>} */
 export function getQueryFields() {
 	return request('/query-fields');
-}
-
-/**
- * Rows from a place of the list on, as it is at this moment.
- *
- * @param {{dataset: string, q: string, from: number, limit: number}} options @param {AbortSignal} signal
- * @returns {Promise<GroupPage>}
- */
-export function getGroupsFrom(options, signal) {
-	return request(`/groups${queryText(options)}`, { signal });
 }
 
 /** @param {{dataset: string, q: string, from: number, limit: number}} options @returns {Promise<{ids: number[], total: number}>} */

@@ -228,7 +228,7 @@
  * @property {BestBallJson | null} [best_ball]
  * @property {'mean' | 'best'} [point] which 3D ball is exported
  * @property {Ball3DJson | null} [mean_ball] where the most likely point is exported
- * @property {{value: number | null, freedom: number, p_value: number, views: string[]} | null} [chi_square]
+ * @property {{value: number | null, p_value: number, views: string[]} | null} [chi_square]
  * @property {FindingJson[]} findings
  */
 

@@ -38,7 +38,7 @@ export function ontoPaint(point, places, reach) {
 }
 
 /** A goal is no paint on grass. @param {string} marking */
-export function isPainted(marking) {
+function isPainted(marking) {
 	return !marking.startsWith('Goal');
 }
 

@@ -32,6 +32,11 @@ export function pitchMarkings(length, width) {
 	return markings;
 }
 
+/** The data of an SVG path along points of the pitch, seen from above, one unit a metre. @param {readonly (readonly number[])[]} points */
+export function pathFromAbove(points) {
+	return `M${points.map(([x, y]) => `${x.toFixed(2)} ${y.toFixed(2)}`).join('L')}`;
+}
+
 /**
  * @param {Map<string, PitchPoint[]>} markings @param {string} side @param {number} sign
  * @param {number} half half the length of the pitch

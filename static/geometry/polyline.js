@@ -86,7 +86,7 @@ export function lengthOf(polyline) {
  * @param {number} count at least 2
  * @returns {{point: ImagePoint, normal: ImagePoint}[]}
  */
-export function frames(polyline, count) {
+function frames(polyline, count) {
 	const total = lengthOf(polyline);
 	if (total === 0) return [];
 	const result = [];

@@ -120,8 +120,8 @@ function range(size, room) {
 	return size < room ? [(room - size) / 2, (room - size) / 2] : [room - size, 0];
 }
 
-/** @param {number} value @param {number} low @param {number} high */
-function clamp(value, low, high) {
+/** The number of a range that is nearest to a value. @param {number} value @param {number} low @param {number} high */
+export function clamp(value, low, high) {
 	return Math.min(high, Math.max(low, value));
 }
 

@@ -1,7 +1,7 @@
 // @ts-check
 /** The colours of tokens.css for canvases, which cannot read custom properties themselves. */
 
-import { signal } from '@preact/signals';
+import { followed, tokens } from './tokens.js';
 
 const NAMES = /** @type {const} */ ([
 	'ok', 'warn', 'bad', 'muted', 'ink', 'halo', 'point', 'human', 'optimised', 'reprojected', 'predicted',
@@ -13,19 +13,11 @@ const LETTERS = ['a', 'b', 'c', 'd', 'e', 'f'];
 
 /** @returns {Colours} */
 function read() {
-	const style = getComputedStyle(document.documentElement);
-	/** @param {string} name */
-	const get = (name) => style.getPropertyValue(name).trim();
-	const named = Object.fromEntries(NAMES.map((name) => [name, get(`--canvas-${name}`)]));
-	return /** @type {Colours} */ ({ ...named, views: LETTERS.map((letter) => get(`--view-${letter}`)) });
+	return { ...tokens(NAMES, 'canvas-'), views: Object.values(tokens(LETTERS, 'view-')) };
 }
 
 /** The colours as they are now; changes with the scheme. */
-export const colours = signal(read());
-
-for (const query of ['(prefers-color-scheme: dark)', '(prefers-contrast: more)']) {
-	matchMedia(query).addEventListener('change', () => { colours.value = read(); });
-}
+export const colours = followed(read);
 
 /** The colour of a view by its letter. @param {string} letter @returns {string} */
 export function viewColour(letter) {

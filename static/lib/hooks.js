@@ -16,7 +16,8 @@ import { bind } from './keys.js';
 export function useSize() {
 	const ref = useRef(/** @type {T | null} */ (null));
 	const [size, setSize] = useState({ width: 0, height: 0 });
-	useEffect(() => {
+	// Before the next paint: what was laid out for no size would be seen for a moment, and drawn twice.
+	useLayoutEffect(() => {
 		const element = ref.current;
 		if (!element) return undefined;
 		const observer = new ResizeObserver(([entry]) => {

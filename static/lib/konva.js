@@ -10,4 +10,7 @@ import 'konva/konva.min.js';
 /** @type {typeof import('konva/lib/Core.js').default & Pick<typeof import('konva').default, 'Image'>} */
 const Konva = /** @type {any} */ (globalThis).Konva;
 
+// A layer is drawn when `ImageStage` says so, not once more for each value of it that is set.
+Konva.autoDrawEnabled = false;
+
 export default Konva;

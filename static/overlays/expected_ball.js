@@ -36,7 +36,7 @@ export function drawExpected(context, { picture, viewport }) {
  * @param {NonNullable<ViewSolutionJson['expected']>} expected
  * @returns {{x: number, y: number}[]} image pixels; none where the uncertainty is not known
  */
-export function ellipse({ place: [x, y], covariance }) {
+function ellipse({ place: [x, y], covariance }) {
 	const [a, b, , d] = covariance.map((value) => value ?? NaN);
 	// Cholesky: the unit circle becomes the ellipse.
 	const l11 = Math.sqrt(a);

@@ -2,13 +2,14 @@
 /** The canvas of one panel: the frame below, the overlays above, drawn from a Scene. */
 
 import { colours } from '../lib/colours.js';
+import { nextFrame } from '../lib/drawing.js';
 import Konva from '../lib/konva.js';
 import { drawBall } from './ball.js';
 import { drawEpipolars } from './epipolars.js';
 import { drawExpected } from './expected_ball.js';
 import { drawGhosts } from './ghosts.js';
 import { drawMarkings } from './markings.js';
-import { drawMeant } from './meant.js';
+import { drawMendMarks } from './mend_marks.js';
 import { drawPins } from './pins.js';
 import { drawPoints, drawSelectedPoint, drawWhiskers } from './points.js';
 import { drawUndrawn } from './undrawn.js';
@@ -27,6 +28,10 @@ export class ImageStage {
 		this.picture = new Konva.Image({ image: undefined, listening: false });
 		/** @type {Scene | null} */
 		this.scene = null;
+		this.size = { width: 1, height: 1 };
+		/** Layers that do not show what they should. @type {Set<InstanceType<typeof Konva.Layer>>} */
+		this.stale = new Set();
+		this.drawing = nextFrame(() => this.drawStale());
 		this.overlay = new Konva.Shape({
 			listening: false,
 			sceneFunc: (context) => {
@@ -38,10 +43,9 @@ export class ImageStage {
 		this.stage.add(this.below, this.above);
 	}
 
-	/** @param {number} width @param {number} height CSS pixels */
+	/** The size that the next drawing has. @param {number} width @param {number} height CSS pixels */
 	resize(width, height) {
-		if (this.stage.width() === width && this.stage.height() === height) return;
-		this.stage.size({ width, height });
+		this.size = { width, height };
 	}
 
 	/** @param {ImageBitmap | null} image */
@@ -49,7 +53,7 @@ export class ImageStage {
 		this.picture.image(image ?? undefined);
 		// Without a frame the markings stand on grass.
 		this.picture.fill(image ? '' : colours.value.field);
-		this.below.batchDraw();
+		if (this.scene) this.drawSoon(this.below);
 	}
 
 	/** Brightness and contrast of the frame alone. @param {string} filter as CSS writes it */
@@ -72,13 +76,34 @@ export class ImageStage {
 				height: picture.view.height * viewport.scale,
 			});
 			this.below.imageSmoothingEnabled(viewport.scale < UNSMOOTHED_FROM);
-			this.below.batchDraw();
+			this.drawSoon(this.below);
 		}
-		this.above.batchDraw();
+		this.drawSoon(this.above);
+	}
+
+	/** Draw a layer with the next frame: a page that loads changes it many times before. @param {InstanceType<typeof Konva.Layer>} layer */
+	drawSoon(layer) {
+		this.stale.add(layer);
+		this.drawing.ask();
+	}
+
+	/** Draw what is stale, in the size that it has by now. */
+	drawStale() {
+		const { width, height } = this.size;
+		if (this.stage.width() !== width || this.stage.height() !== height) {
+			// Konva draws for the width and once more for the height, unless there is nothing to be seen.
+			this.stage.visible(false);
+			this.stage.size({ width, height });
+			this.stage.visible(true);
+			this.stale.add(this.below).add(this.above);
+		}
+		for (const layer of this.stale) layer.draw();
+		this.stale.clear();
 	}
 
 	/** Free the canvases. */
 	destroy() {
+		this.drawing.cancel();
 		this.stage.destroy();
 	}
 }
@@ -95,7 +120,7 @@ export function drawOverlays(context, scene) {
 	if (scene.boxes) scene.picture.predictions?.draw(context, scene);
 	drawExpected(context, scene);
 	drawBall(context, scene);
-	drawMeant(context, scene);
+	drawMendMarks(context, scene);
 	drawSelectedPoint(context, scene);
 	drawGhosts(context, scene);
 	drawPins(context, scene);

@@ -6,7 +6,7 @@ import { stored } from '../lib/storage.js';
 /** @typedef {{brightness: number, contrast: number}} Adjustment   1 leaves the frame as it is */
 
 /** @type {Adjustment} */
-export const PLAIN = { brightness: 1, contrast: 1 };
+const PLAIN = { brightness: 1, contrast: 1 };
 /** Least, most and step of both. */
 export const RANGE = { min: 0.4, max: 2.6, step: 0.05 };
 

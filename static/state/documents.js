@@ -19,7 +19,7 @@ export function known(id) {
 }
 
 /** @param {GroupDocument} document */
-export function remember(document) {
+function remember(document) {
 	documents.delete(document.id);
 	documents.set(document.id, document);
 	const oldest = documents.keys().next().value;

@@ -206,6 +206,6 @@ function beside(from, step) {
  * @returns {Promise<number | null>} null when nothing matches
  */
 export async function firstGroup(dataset) {
-	const found = await getGroups({ dataset, q: query.value, cursor: null, limit: 1 });
+	const found = await getGroups({ dataset, q: query.value, limit: 1 });
 	return found.items[0]?.id ?? null;
 }

@@ -61,7 +61,7 @@ function press(binding) {
 export async function groupItems(dataset, text, signal) {
 	const q = /^\d+$/.test(text) ? `number:${text}` : text.replaceAll('"', '');
 	try {
-		const found = await getGroups({ dataset: dataset.name, q, cursor: null, limit: MOST }, signal);
+		const found = await getGroups({ dataset: dataset.name, q, limit: MOST }, signal);
 		return found.items.map((row) => ({
 			id: `group-${row.id}`, kind: 'Groups', label: `Group ${row.number}`, hint: row.label,
 			run: () => navigate(reviewAddress(row.id, '')),

@@ -42,3 +42,8 @@ export function rangeOf(q, field) {
 	}
 	return range;
 }
+
+/** What the rows of a query are remembered under. @param {string} dataset @param {string} q */
+export function queueKey(dataset, q) {
+	return `${dataset} ${q.trim()}`;
+}

@@ -3,11 +3,10 @@
 
 import { signal } from '@preact/signals';
 
-import { getSummary } from '../api/client.js';
+import { getGroups, getSummary } from '../api/client.js';
 import { ApiError } from '../api/problem.js';
-import { getGroupsFrom } from '../api/queue.js';
 import { complain } from './notice.js';
-import { withField } from './query.js';
+import { queueKey, withField } from './query.js';
 import { indexOf, PAGE, pagesOf, rowAt, withPage } from './queue_pages.js';
 
 /** @import {Pages} from './queue_pages.js' */
@@ -45,11 +44,6 @@ let countedFor = '';
 /** @param {{id: number}} dataset @param {string} q */
 function countsKey(dataset, q) {
 	return `${dataset.id} ${withField(q, 'sort', [])}`;
-}
-
-/** What the rows of a query are remembered under. @param {string} dataset @param {string} q */
-export function queueKey(dataset, q) {
-	return `${dataset} ${q.trim()}`;
 }
 
 /**
@@ -128,7 +122,7 @@ async function readAnew(dataset, q, abort) {
 
 /** @param {string} dataset @param {string} q @param {number} page @param {AbortSignal} abort */
 function readPage(dataset, q, page, abort) {
-	return getGroupsFrom({ dataset, q, from: page * PAGE, limit: PAGE }, abort);
+	return getGroups({ dataset, q, from: page * PAGE, limit: PAGE }, abort);
 }
 
 /** What is being read, by page. @type {Map<number, AbortController>} */

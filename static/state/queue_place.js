@@ -6,7 +6,8 @@ import { signal } from '@preact/signals';
 import { stored } from '../lib/storage.js';
 import { groupDocument } from './group.js';
 import { neighbours } from './navigation.js';
-import { activeRow, queueKey } from './queue.js';
+import { queueKey } from './query.js';
+import { activeRow } from './queue.js';
 
 /** `top` is the first row in sight, not always a whole one. */
 const place = stored('queue-place', { key: '', active: 0, top: 0 }, 'sessionStorage');

@@ -7,8 +7,8 @@ import { ApiError } from '../api/problem.js';
 import { getGroupIds } from '../api/queue.js';
 import { count } from '../lib/format.js';
 import { announce, complain } from './notice.js';
-import { withField } from './query.js';
-import { activeRow, queue, queueKey } from './queue.js';
+import { queueKey, withField } from './query.js';
+import { activeRow, queue } from './queue.js';
 import { idsBetween, rowAt } from './queue_pages.js';
 
 /** @typedef {{readonly all: boolean, readonly ids: ReadonlySet<number>}} Ticks   `all`: every row that matches but `ids`; else `ids` alone */

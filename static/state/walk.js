@@ -12,7 +12,7 @@ import { stored } from '../lib/storage.js';
 import { groupDocument } from './group.js';
 import { neighbours, query, recount } from './navigation.js';
 import { outbox } from './outbox.js';
-import { withField, wordsOf } from './query.js';
+import { queueKey, withField, wordsOf } from './query.js';
 
 /** @import {Neighbours} from '../api/types.js' */
 
@@ -36,14 +36,9 @@ const walk = stored('walk', NOWHERE, 'sessionStorage');
 /** Groups judged on this walk. */
 const judged = stored('walk-done', /** @type {number[]} */ ([]), 'sessionStorage');
 
-/** @param {string} dataset @param {string} q */
-function keyOf(dataset, q) {
-	return `${dataset} ${q.trim()}`;
-}
-
 /** Go on with the walk, or begin one. @param {string} dataset @param {Neighbours & {id: number, q: string}} at */
 function arrive(dataset, at) {
-	const key = keyOf(dataset, at.q);
+	const key = queueKey(dataset, at.q);
 	const known = walk.peek();
 	// A group that was not there when the walk began belongs to a new one.
 	if (known.key === key && (at.index === null || known.ids.length === 0 || known.ids.includes(at.id))) return;
@@ -117,7 +112,7 @@ function isLeft(q) {
 /** Where the group on screen stands; null until it is known. */
 export const standing = computed(() => {
 	const [at, group] = [neighbours.value, groupDocument.value];
-	return at && group?.id === at.id ? standingOf(at, walk.value, judged.value, keyOf(group.dataset.name, at.q)) : null;
+	return at && group?.id === at.id ? standingOf(at, walk.value, judged.value, queueKey(group.dataset.name, at.q)) : null;
 });
 
 /**

@@ -87,7 +87,7 @@ function largest(n, width, height, least) {
  *
  * @param {number} n @param {number} width @param {number} height CSS pixels
  */
-export function layout(n, width, height) {
+function layout(n, width, height) {
 	const numbered = largest(n, width, height, NUMBERED);
 	return numbered.side >= SMALLEST ? numbered : largest(n, width, height, 0);
 }

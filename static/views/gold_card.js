@@ -22,7 +22,7 @@ const FROM = { verdict: 'what it held when it was marked', sample: 'with what it
 const WIDE = 160, HIGH = 28;
 
 /** A median with its interval; few numbers have none. @param {MiddleJson} one @param {number} digits */
-export function middleText({ count, median, low, high }, digits) {
+function middleText({ count, median, low, high }, digits) {
 	if (median === null) return '–';
 	const of = low === null || high === null ? `${count} only` : `${low.toFixed(digits)} to ${high.toFixed(digits)}`;
 	return `${median.toFixed(digits)} (${of})`;

@@ -24,7 +24,7 @@ function shortened(text, first, last) {
 }
 
 /** @param {{before: string, after: string}} props */
-export function WordChanges({ before, after }) {
+function WordChanges({ before, after }) {
 	const changes = wordChanges(before, after);
 	if (changes.every(({ kind }) => kind === 'same')) return html`<p>The texts are the same.</p>`;
 	return html`<p class="guidelines__changes">${changes.map(({ kind, text }, i) => {

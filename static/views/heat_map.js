@@ -4,25 +4,19 @@
 import { html } from 'htm/preact';
 import { useRef, useState } from 'preact/hooks';
 
-import { pitchMarkings } from '../geometry/pitch.js';
+import { pathFromAbove, pitchMarkings } from '../geometry/pitch.js';
 import { count, fixed, plural } from '../lib/format.js';
 import { queueAddress } from '../state/navigation.js';
 import { withField } from '../state/query.js';
 
 /** @import {StatisticsJson} from '../api/statistics.js' */
-/** @import {PitchPoint} from '../geometry/camera.js' */
 
 const LENGTH = 105;
 const WIDTH = 68;
 
 /** @typedef {{left: number, right: number, top: number, bottom: number, n: number}} Cell */
 
-/** @param {PitchPoint[]} points */
-function path(points) {
-	return `M${points.map(([x, y]) => `${x.toFixed(2)} ${y.toFixed(2)}`).join('L')}`;
-}
-
-const LINES = [...pitchMarkings(LENGTH, WIDTH)].filter(([name]) => !name.startsWith('Goal')).map(([, points]) => path(points));
+const LINES = [...pitchMarkings(LENGTH, WIDTH)].filter(([name]) => !name.startsWith('Goal')).map(([, points]) => pathFromAbove(points));
 
 /** Cells with balls, row by row. @param {StatisticsJson['positions']} positions @returns {Cell[]} */
 function cellsOf({ x_edges: xs, y_edges: ys, counts }) {

@@ -1,12 +1,18 @@
 // @ts-check
-/** What cards with a row for each match share: they follow changes, and send theirs. */
+/** What cards with a row for each match share: their frame; they follow changes, and send theirs. */
 
+import { html } from 'htm/preact';
 import { useEffect, useRef } from 'preact/hooks';
 
 import { listenToGroups } from '../api/events.js';
 import { latest } from '../lib/latest.js';
 import { useResource } from '../lib/resource.js';
+import { JobButton } from './job_button.js';
+import { JobProgress } from './job_progress.js';
 import { useSavePolicy } from './save_policy.js';
+
+/** @import {ComponentChildren, Ref} from 'preact' */
+/** @import {JobJson} from '../api/jobs.js' */
 
 /** What somebody else changed is shown after this many milliseconds at the latest. */
 const PAUSE = 3000;
@@ -32,4 +38,40 @@ export function useMatchCard(get, dataset, concerned) {
 		reload();
 	});
 	return { value, error, reload, card, saving };
+}
+
+/** The first cell of a match's row. @param {{name: string, aside: string}} props as `matchName` has them */
+export function MatchHead({ name, aside }) {
+	return html`<th scope="row">${name}${aside ? html`<small>${aside}</small>` : null}</th>`;
+}
+
+/**
+ * A button in a match's row.
+ *
+ * @param {{name: string, busy: boolean, act: () => void, title: string, kind?: string, children: ComponentChildren}} props
+ *   name: of the match, for whoever hears the button alone
+ */
+export function MatchButton({ name, kind = '', children, ...rest }) {
+	return html`<${JobButton} ...${rest} kind=${`button--small ${kind}`}>${children}<span class="hidden-text"> for ${name}</span><//>`;
+}
+
+/**
+ * @param {{
+ *   id: string, title: ComponentChildren, columns: string[], rows: ComponentChildren, note?: ComponentChildren,
+ *   card: Ref<HTMLElement>, job: JobJson | null, refused: string
+ * }} props columns: those between the match and what can be done; job: what is under way; refused: why not
+ */
+export function MatchCard({ id, title, columns, rows, note = null, card, job, refused }) {
+	return html`
+		<section class="card card--flush statistics__matches" aria-labelledby=${`${id}-title`} ref=${card}>
+			<h2 id=${`${id}-title`} tabindex="-1">${title}</h2>
+			<table class="table">
+				<thead><tr><th>match</th>${columns.map((name) => html`<th key=${name}>${name}</th>`)}<th><span class="hidden-text">actions</span></th></tr></thead>
+				<tbody>${rows}</tbody>
+			</table>
+			${note}
+			${job ? html`<${JobProgress} job=${job} />` : null}
+			${refused ? html`<p class="form__error" role="alert">${refused}</p>` : null}
+		</section>
+	`;
 }

@@ -13,7 +13,7 @@ import { FormError } from './form_error.js';
 /** @import {MemberJson, Role} from '../api/people.js' */
 
 /** Roles that are of a dataset. */
-export const ROLES_HERE = /** @type {const} */ (['none', 'viewer', 'annotator', 'reviewer', 'lead']);
+const ROLES_HERE = /** @type {const} */ (['none', 'viewer', 'annotator', 'reviewer', 'lead']);
 
 /** @param {{one: MemberJson, give: (role: Role | null) => void}} props */
 function MemberRow({ one, give }) {

@@ -5,7 +5,7 @@ import { html } from 'htm/preact';
 
 import { cameraFromJson, rayThrough } from '../geometry/camera.js';
 import { ballName, ballTold } from '../geometry/estimator.js';
-import { pitchMarkings } from '../geometry/pitch.js';
+import { pathFromAbove, pitchMarkings } from '../geometry/pitch.js';
 import { ballCenter, ballOf } from '../geometry/preview.js';
 import { clipSegment, spreadApart, within as inBox } from '../geometry/spread.js';
 import { fixed } from '../lib/format.js';
@@ -91,7 +91,7 @@ const drawn = new Map();
 /** The lines of a pitch as paths, made once for each size. @param {number} length @param {number} width */
 function linesOf(length, width) {
 	const key = `${length} ${width}`;
-	const lines = drawn.get(key) ?? [...pitchMarkings(length, width).values()].map(path);
+	const lines = drawn.get(key) ?? [...pitchMarkings(length, width).values()].map(pathFromAbove);
 	drawn.set(key, lines);
 	return lines;
 }
@@ -99,11 +99,6 @@ function linesOf(length, width) {
 /** @param {ReturnType<typeof frameOf>} frame @param {PitchPoint} point */
 function within({ left, top, width, height }, [x, y]) {
 	return x > left && x < left + width && y > top && y < top + height;
-}
-
-/** @param {PitchPoint[]} points */
-function path(points) {
-	return `M${points.map(([x, y]) => `${x.toFixed(2)} ${y.toFixed(2)}`).join('L')}`;
 }
 
 /** @param {{group: GroupDocument, solution: SolutionJson}} props */
@@ -127,7 +122,7 @@ function Drawing({ group, solution }) {
 				${linesOf(l, w).map((line) => html`<path class="mini-pitch__line" d=${line} stroke-width=${pixel} />`)}
 				${cameras.map((stand) => {
 					const ray = rayOf(stand, group, frame);
-					return ray ? html`<path class="mini-pitch__ray" data-letter=${stand.letter} d=${path(ray)} stroke-width=${1.3 * pixel} />` : null;
+					return ray ? html`<path class="mini-pitch__ray" data-letter=${stand.letter} d=${pathFromAbove(ray)} stroke-width=${1.3 * pixel} />` : null;
 				})}
 				${solution.pairs.filter(({ point }) => within(frame, point)).map(({ point, valid }) => html`
 					<circle class="mini-pitch__pair" data-valid=${valid} cx=${point[0]} cy=${point[1]} r=${2.4 * pixel} stroke-width=${1.2 * pixel} />`)}
@@ -135,7 +130,7 @@ function Drawing({ group, solution }) {
 					const [{ x, y }, at] = [marks[i], inBox(stand, room)];
 					return Math.hypot(x - at.x, y - at.y) < MOVED * pixel ? null : html`
 						<g class="mini-pitch__leader" data-letter=${letter} stroke-width=${pixel}>
-							<path d=${path([[at.x, at.y, 0], [x, y, 0]])} />
+							<path d=${pathFromAbove([[at.x, at.y, 0], [x, y, 0]])} />
 							<circle cx=${at.x} cy=${at.y} r=${1.8 * pixel} />
 						</g>`;
 				})}

@@ -31,7 +31,7 @@ export function isNews({ values, is_new }) {
  *
  * @param {FactorJson[]} factors @returns {string}
  */
-export function unlike(factors) {
+function unlike(factors) {
 	const own = factors.filter(({ camera, person, ratio }) => ratio !== 1 && (camera === null || person === null));
 	const names = own.map(({ camera, person, ratio }) => `${camera === null ? person : `camera ${camera}`} (${ratio.toFixed(2)} times)`);
 	if (names.length) return names.join(', ');

@@ -10,8 +10,9 @@ import { capital, count, plural } from '../lib/format.js';
 import { matchName } from '../lib/match_name.js';
 import { isOver } from '../state/jobs.js';
 import { pageAddress } from './dataset_menu.js';
+import { JobButton } from './job_button.js';
 import { JobProgress } from './job_progress.js';
-import { useMatchCard } from './match_card.js';
+import { MatchHead, useMatchCard } from './match_card.js';
 import { Trouble } from './page_frame.js';
 import { Term } from './term.js';
 
@@ -43,11 +44,11 @@ function MatchPaint({ one, used, busy, onRead }) {
 	const { name, aside } = matchName(one.match);
 	return html`
 		<tr>
-			<th scope="row">${name || 'no match'}${aside ? html`<small>${aside}</small>` : null}</th>
+			<${MatchHead} name=${name || 'no match'} aside=${aside} />
 			<td>${capital(one.sentence)}</td>
 			<td><span class="table__actions">
 				${used && leftToRead(one) > 0 ? html`
-					<button data-needs="lead" class="button button--small" type="button" aria-disabled=${busy} title=${busy ? 'Under way' : 'Read the pictures of this match'} onClick=${() => { if (!busy) onRead(); }}>Read<span class="hidden-text"> ${name}</span></button>` : null}
+					<${JobButton} busy=${busy} act=${onRead} kind="button--small" title="Read the pictures of this match">Read<span class="hidden-text"> ${name}</span><//>` : null}
 			</span></td>
 		</tr>`;
 }
@@ -73,17 +74,17 @@ export function PaintCard({ dataset }) {
 	const isRead = items.some(({ read }) => read > 0);
 	// Under another policy what was read once is still there, and can be seen.
 	const isTold = value.used || isRead;
-	/** @param {string} text @param {string} title @param {() => void} act @param {string} [kind] */
-	const button = (text, title, act, kind = '') => html`
-		<button data-needs="lead" class=${`button ${kind}`} type="button" aria-disabled=${busy} title=${busy ? 'Under way' : title} onClick=${() => { if (!busy) act(); }}>${text}</button>`;
 	return html`
 		<section class="card card--flush statistics__matches paint-card" aria-labelledby="paint-title" ref=${card}>
 			<h2 id="paint-title" tabindex="-1"><${Term} word="reading of paint">Paint of the pictures<//></h2>
 			${isTold ? html`<${Numbers} items=${items} />` : null}
 			${value.used ? html`
 				<p class="buttons paint-card__actions">
-					${button(isRead ? 'Read again' : 'Read the pictures', left ? `${count(left)} pictures to read; those that fit are only compared` : 'Every picture is compared with what was read of it', () => send(() => readDatasetPaint(dataset.id, null)), left ? 'button--primary' : '')}
-					${isRead ? button('Take the last reading back', 'All groups get what they had before', () => send(() => takeDatasetPaintBack(dataset.id))) : null}
+					<${JobButton}
+						busy=${busy} act=${() => send(() => readDatasetPaint(dataset.id, null))} kind=${left ? 'button--primary' : ''}
+						title=${left ? `${count(left)} pictures to read; those that fit are only compared` : 'Every picture is compared with what was read of it'}
+					>${isRead ? 'Read again' : 'Read the pictures'}<//>
+					${isRead ? html`<${JobButton} busy=${busy} act=${() => send(() => takeDatasetPaintBack(dataset.id))} title="All groups get what they had before">Take the last reading back<//>` : null}
 				</p>` : html`
 				<p class="paint-card__actions">The policy finds cameras from the lines alone; the paint of ${plural(pictures, 'picture')} could place them more exactly. <a class="link" href=${pageAddress(dataset.name, 'policy')}>Choose the policy <em>touchline</em></a>, then read the pictures here.</p>`}
 			${job ? html`<div class="paint-card__actions"><${JobProgress} job=${job} /></div>` : null}

@@ -7,8 +7,8 @@ import { useState } from 'preact/hooks';
 import { estimateMatchPictures, getMatchPictures, setMatchPicture } from '../api/pictures.js';
 import { fixed, plural } from '../lib/format.js';
 import { matchName } from '../lib/match_name.js';
-import { JobProgress } from './job_progress.js';
-import { useMatchCard } from './match_card.js';
+import { JobButton } from './job_button.js';
+import { MatchButton, MatchCard, MatchHead, useMatchCard } from './match_card.js';
 import { Trouble } from './page_frame.js';
 
 /** @import {MatchPictureJson, PictureEstimateJson} from '../api/pictures.js' */
@@ -20,7 +20,7 @@ const CONCERNED = ['import', 'edit', 'undo', 'redo'];
 const [LEAST_PERCENT, LEAST_SHIFT] = [0.05, 0.0005];
 
 /** What was done to a picture, for people. @param {PictureJson | null} picture @returns {string} */
-export function pictureWords(picture) {
+function pictureWords(picture) {
 	if (!picture) return 'as taken';
 	const wide = 100 * (picture.aspect - 1), [right, down] = picture.shift;
 	const said = [];
@@ -32,19 +32,21 @@ export function pictureWords(picture) {
 /** @param {{one: MatchPictureJson, shown: PictureEstimateJson | undefined, busy: boolean, onSet: (picture: PictureJson | null) => void}} props */
 function MatchPicture({ one, shown, busy, onSet }) {
 	const { name, aside } = matchName(one.match);
-	/** @param {string} text @param {string} title @param {PictureJson | null} picture @param {string} kind */
-	const button = (text, title, picture, kind) => html`
-		<button data-needs="lead" class=${`button button--small ${kind}`} type="button" aria-disabled=${busy} title=${busy ? 'Under way' : title} onClick=${() => { if (!busy) onSet(picture); }}>${text}<span class="hidden-text"> for ${name}</span></button>`;
 	const proposed = shown?.proposed ?? null;
 	const isNew = proposed !== null && JSON.stringify(proposed) !== JSON.stringify(one.picture);
 	return html`
 		<tr>
-			<th scope="row">${name}${aside ? html`<small>${aside}</small>` : null}</th>
+			<${MatchHead} name=${name} aside=${aside} />
 			<td>${one.mixed ? 'several kinds' : pictureWords(one.picture)}</td>
 			<td>${shown ? shown.sentence : '–'}${shown?.estimate && !proposed ? html`<small>nothing that is certain</small>` : null}</td>
 			<td><span class="table__actions">
-				${isNew ? button('Use it', `Solve the ${plural(one.frames, 'picture')} of this main camera with ${pictureWords(proposed)}`, proposed, 'button--primary') : null}
-				${one.picture || one.mixed ? button('As taken', 'Take the pictures to be as they were taken', null, '') : null}
+				${isNew ? html`
+					<${MatchButton}
+						name=${name} busy=${busy} act=${() => onSet(proposed)} kind="button--primary"
+						title=${`Solve the ${plural(one.frames, 'picture')} of this main camera with ${pictureWords(proposed)}`}
+					>Use it<//>` : null}
+				${one.picture || one.mixed ? html`
+					<${MatchButton} name=${name} busy=${busy} act=${() => onSet(null)} title="Take the pictures to be as they were taken">As taken<//>` : null}
 			</span></td>
 		</tr>`;
 }
@@ -59,24 +61,19 @@ export function Pictures({ dataset }) {
 	const shown = job?.kind === 'pictures' && job.state === 'done' ? job.result.items : found;
 	/** @param {() => Promise<import('../api/jobs.js').JobJson>} put */
 	const ask = (put) => { if (!busy) { setFound(shown); send(put); } };
+	const title = html`Stretched and cropped pictures
+		<span class="card__aside"><${JobButton} busy=${busy} act=${() => ask(() => estimateMatchPictures(dataset))} kind="button--small" title="Look at up to thirty frames of each match together">Estimate<//></span>`;
 	return html`
-		<section class="card card--flush statistics__matches" aria-labelledby="pictures-title" ref=${card}>
-			<h2 id="pictures-title" tabindex="-1">Stretched and cropped pictures
-				<span class="card__aside"><button data-needs="lead" class="button button--small" type="button" aria-disabled=${busy} title=${busy ? 'Under way' : 'Look at up to thirty frames of each match together'} onClick=${() => ask(() => estimateMatchPictures(dataset))}>Estimate</button></span>
-			</h2>
-			<table class="table">
-				<thead><tr><th>match</th><th>in use</th><th>lines show</th><th><span class="hidden-text">actions</span></th></tr></thead>
-				<tbody>${value.items.map((one) => html`
-					<${MatchPicture}
-						key=${one.match} one=${one} busy=${busy}
-						shown=${shown.find((/** @type {PictureEstimateJson} */ { match }) => match === one.match)}
-						onSet=${(/** @type {PictureJson | null} */ picture) => ask(() => setMatchPicture(dataset, one.match, picture))}
-					/>`)}
-				</tbody>
-			</table>
-			<p class="note">Of the main cameras; a replay has the finding “picture geometry” where its own lines show it. Accept a proposal where you know that pictures were scaled or cropped: lens and pitch can look alike.</p>
-			${job && !(job.kind === 'pictures' && job.state === 'done') ? html`<${JobProgress} job=${job} />` : null}
-			${refused ? html`<p class="form__error" role="alert">${refused}</p>` : null}
-		</section>
+		<${MatchCard}
+			id="pictures" title=${title} columns=${['in use', 'lines show']} card=${card} refused=${refused}
+			job=${job?.kind === 'pictures' && job.state === 'done' ? null : job}
+			rows=${value.items.map((one) => html`
+				<${MatchPicture}
+					key=${one.match} one=${one} busy=${busy}
+					shown=${shown.find((/** @type {PictureEstimateJson} */ { match }) => match === one.match)}
+					onSet=${(/** @type {PictureJson | null} */ picture) => ask(() => setMatchPicture(dataset, one.match, picture))}
+				/>`)}
+			note=${html`<p class="note">Of the main cameras; a replay has the finding “picture geometry” where its own lines show it. Accept a proposal where you know that pictures were scaled or cropped: lens and pitch can look alike.</p>`}
+		/>
 	`;
 }

@@ -7,8 +7,7 @@ import { getPitches, setPitch } from '../api/pitches.js';
 import { count } from '../lib/format.js';
 import { matchName } from '../lib/match_name.js';
 import { pitchSize, shownSize } from '../lib/pitch_size.js';
-import { JobProgress } from './job_progress.js';
-import { useMatchCard } from './match_card.js';
+import { MatchButton, MatchCard, MatchHead, useMatchCard } from './match_card.js';
 import { Trouble } from './page_frame.js';
 
 /** @import {MatchPitchJson, PitchSizeJson} from '../api/pitches.js' */
@@ -21,18 +20,21 @@ const CONCERNED = ['pitch', 'import', 'solved'];
  */
 function MatchPitch({ one, busy, onSet }) {
 	const { name, aside } = one.match ? matchName(one.match) : { name: 'groups without a match', aside: '' };
-	/** @param {string} text @param {string} title @param {PitchSizeJson} size @param {string} kind */
-	const button = (text, title, size, kind) => html`
-		<button data-needs="lead" class=${`button button--small ${kind}`} type="button" aria-disabled=${busy} title=${busy ? 'Under way' : title} onClick=${() => { if (!busy) onSet(size); }}>${text}<span class="hidden-text"> for ${name}</span></button>`;
-	const changed = one.previous !== null && (one.previous.length !== one.length || one.previous.width !== one.width);
+	const { proposed, previous } = one;
+	const changed = previous !== null && (previous.length !== one.length || previous.width !== one.width);
 	return html`
 		<tr>
-			<th scope="row">${name}${aside ? html`<small>${aside}</small>` : null}</th>
+			<${MatchHead} name=${name} aside=${aside} />
 			<td>${one.mixed ? 'several sizes' : pitchSize(one)}</td>
 			<td>${one.problem ?? shownSize(one.estimate)}</td>
 			<td><span class="table__actions">
-				${one.proposed ? button(`Use ${pitchSize(one.proposed)}`, `Solve the ${count(one.groups)} ${one.match ? 'groups of this match' : 'groups without a match'} on this pitch`, one.proposed, 'button--primary') : null}
-				${one.previous && changed ? button('Take back', `Back to ${pitchSize(one.previous)}`, one.previous, '') : null}
+				${proposed ? html`
+					<${MatchButton}
+						name=${name} busy=${busy} act=${() => onSet(proposed)} kind="button--primary"
+						title=${`Solve the ${count(one.groups)} ${one.match ? 'groups of this match' : 'groups without a match'} on this pitch`}
+					>Use ${pitchSize(proposed)}<//>` : null}
+				${previous && changed ? html`
+					<${MatchButton} name=${name} busy=${busy} act=${() => onSet(previous)} title=${`Back to ${pitchSize(previous)}`}>Take back<//>` : null}
 			</span></td>
 		</tr>`;
 }
@@ -45,16 +47,11 @@ export function Pitches({ dataset }) {
 	if (!value?.items.length) return null;
 	const proposals = value.items.filter(({ proposed }) => proposed).length;
 	return html`
-		<section class="card card--flush statistics__matches" aria-labelledby="pitches-title" ref=${card}>
-			<h2 id="pitches-title" tabindex="-1">Pitch sizes${proposals ? html` · ${count(proposals)} proposed` : null}</h2>
-			<table class="table">
-				<thead><tr><th>match</th><th>in use</th><th>lines show</th><th><span class="hidden-text">actions</span></th></tr></thead>
-				<tbody>${value.items.map((one) => html`
-					<${MatchPitch} key=${one.match} one=${one} busy=${busy} onSet=${(/** @type {PitchSizeJson} */ size) => send(() => setPitch(dataset, one.match, size, value.etag))} />`)}
-				</tbody>
-			</table>
-			${job ? html`<${JobProgress} job=${job} />` : null}
-			${refused ? html`<p class="form__error" role="alert">${refused}</p>` : null}
-		</section>
+		<${MatchCard}
+			id="pitches" title=${html`Pitch sizes${proposals ? html` · ${count(proposals)} proposed` : null}`}
+			columns=${['in use', 'lines show']} card=${card} job=${job} refused=${refused}
+			rows=${value.items.map((one) => html`
+				<${MatchPitch} key=${one.match} one=${one} busy=${busy} onSet=${(/** @type {PitchSizeJson} */ size) => send(() => setPitch(dataset, one.match, size, value.etag))} />`)}
+		/>
 	`;
 }

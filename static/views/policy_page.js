@@ -11,6 +11,7 @@ import { useResource } from '../lib/resource.js';
 import { loadDatasets } from '../state/datasets.js';
 import { pageAddress } from './dataset_menu.js';
 import { DatasetFrame } from './dataset_frame.js';
+import { JobButton } from './job_button.js';
 import { JobProgress } from './job_progress.js';
 import { changesOf, isNews, NoiseCard } from './noise_card.js';
 import { Loading, Trouble } from './page_frame.js';
@@ -71,7 +72,7 @@ function Shipped({ one, policy, etag, shipped, busy, send }) {
 						<th scope="row">${name}</th>
 						<td><span class="table__actions">
 							${hash === policy.hash ? html`<span class="note">in force</span>` : html`
-								<button data-needs="lead" class="button button--small" type="button" aria-disabled=${busy} title=${busy ? 'Under way' : ''} onClick=${() => { if (!busy) send(() => putPolicy(one.id, name, null, etag)); }}>Use ${name}</button>`}
+								<${JobButton} busy=${busy} act=${() => send(() => putPolicy(one.id, name, null, etag))} kind="button--small">Use ${name}<//>`}
 						</span></td>
 					</tr>`)}
 				</tbody>
@@ -87,20 +88,16 @@ function NoiseOf({ one, policy, busy, send }) {
 	if (!busy || !version.current) version.current = `${policy.hash} ${policy.version} ${sent.current}`;
 	/** @param {() => Promise<JobJson>} put */
 	function act(put) {
-		if (busy) return;
 		sent.current += 1;
 		send(put);
 	}
-	/** @param {string} text @param {() => Promise<JobJson>} put */
-	const button = (text, put) => html`
-		<button data-needs="lead" class="button" type="button" aria-disabled=${busy} title=${busy ? 'Under way' : ''} onClick=${() => act(put)}>${text}</button>`;
 	return html`
 		<${NoiseCard} dataset=${one.id} version=${version.current}>
 			${(/** @type {NoiseJson} */ noise) => (!isNews(noise) && !noise.used?.length ? null : html`
 				${changesOf(noise) ? html`<p class="note">The button sets ${changesOf(noise)}.</p>` : null}
 				<p class="buttons">
-					${isNews(noise) ? button('Use the estimates and solve', () => acceptNoise(one.id)) : null}
-					${noise.used?.length ? button('Take all balls to be alike', () => takeNoiseBack(one.id)) : null}
+					${isNews(noise) ? html`<${JobButton} busy=${busy} act=${() => act(() => acceptNoise(one.id))}>Use the estimates and solve<//>` : null}
+					${noise.used?.length ? html`<${JobButton} busy=${busy} act=${() => act(() => takeNoiseBack(one.id))}>Take all balls to be alike<//>` : null}
 				</p>`)}
 		<//>
 	`;

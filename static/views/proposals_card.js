@@ -11,7 +11,7 @@ import { matchName } from '../lib/match_name.js';
 import { queueAddress } from '../state/navigation.js';
 import { announce } from '../state/notice.js';
 import { JobProgress } from './job_progress.js';
-import { useMatchCard } from './match_card.js';
+import { MatchHead, useMatchCard } from './match_card.js';
 import { Trouble } from './page_frame.js';
 import { Term } from './term.js';
 
@@ -27,7 +27,7 @@ function MatchProposals({ one, dataset }) {
 	const { name, aside } = matchName(one.match);
 	return html`
 		<tr data-match=${one.match}>
-			<th scope="row">${name || 'no match'}${aside ? html`<small>${aside}</small>` : null}</th>
+			<${MatchHead} name=${name || 'no match'} aside=${aside} />
 			<td data-numeric="true">${count(one.views)}</td>
 			${OUTCOMES.map((outcome) => html`
 				<td key=${outcome} data-numeric="true" data-number=${outcome}>${one[outcome] ? html`

@@ -33,7 +33,7 @@ function asked(group, solution, name) {
  * @param {GroupDocument} group @param {SolutionJson | null} solution @param {Mend | null} offered
  * @returns {Headline}
  */
-export function headline(group, solution, offered) {
+function headline(group, solution, offered) {
 	if (!solution && offered?.title) return { tone: 'unseen', over: 'Not solved', title: offered.title, text: offered.sentence };
 	if (!solution) {
 		return { tone: 'unseen', over: 'Not solved', title: 'No numbers yet', text: 'Solve the dataset, or edit this group: it is solved with every edit.' };

@@ -37,6 +37,17 @@ GREEN_PIXELS = """canvas => {
 }"""
 
 
+COUNT_PICTURES = """() => {
+  const { prototype } = CanvasRenderingContext2D;
+  const { drawImage } = prototype;
+  window.pictures = new Map();
+  prototype.drawImage = function (...what) {
+    window.pictures.set(this.canvas, 1 + (window.pictures.get(this.canvas) ?? 0));
+    drawImage.apply(this, what);
+  };
+}"""
+
+
 class TestQueue:
     def test_lists_every_group_and_opens_one_by_keyboard(self, open_page: OpenPage) -> None:
         page = open_page("/groups")
@@ -226,6 +237,17 @@ class TestEditing:
 
 
 class TestLooking:
+    def test_a_page_that_loads_draws_each_picture_a_few_times(self, open_page: OpenPage) -> None:
+        page = open_page(None)
+        page.add_init_script(f"({COUNT_PICTURES})()")
+        page.goto(f"/review/{passing(page, 0)}")
+        Screen(page).ready()
+        strips = page.locator(".line-row__strip")
+        expect(strips.first).to_be_visible()
+        pictures = page.locator(".image-panel__stage, .crop__canvas").count() + strips.count()
+        until(page, lambda: page.evaluate("window.pictures.size") >= pictures)
+        assert page.evaluate("Math.max(...window.pictures.values())") <= 3
+
     def test_t_shows_the_other_3d_ball_and_says_which(self, review: Callable[..., Screen]) -> None:
         screen = review(0)
         solution = screen.document()["solution"]

@@ -1,7 +1,7 @@
 import assert from 'node:assert/strict';
 import { describe, it } from 'node:test';
 
-import { pitchMarkings } from '../../static/geometry/pitch.js';
+import { pathFromAbove, pitchMarkings } from '../../static/geometry/pitch.js';
 import { twinMarking } from '../../static/state/edits.js';
 import { close } from './scene.mjs';
 
@@ -28,5 +28,11 @@ describe('pitchMarkings', () => {
 			const plain = (rows) => rows.map((row) => row.replaceAll('-0.000000', '0.000000')).sort();
 			assert.deepEqual(new Set(plain(turned)), new Set(plain(twin)), name);
 		}
+	});
+});
+
+describe('pathFromAbove', () => {
+	it('leads along the points, whatever their height, to the centimetre', () => {
+		assert.equal(pathFromAbove([[-52.5, 3.661, -2.44], [0, 10, 0]]), 'M-52.50 3.66L0.00 10.00');
 	});
 });

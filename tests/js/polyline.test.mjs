@@ -1,7 +1,7 @@
 import assert from 'node:assert/strict';
 import { describe, it } from 'node:test';
 
-import { frames, framesOf, lengthOf, nearestOfPieces, nearestOn, piecesOf } from '../../static/geometry/polyline.js';
+import { framesOf, lengthOf, nearestOfPieces, nearestOn, piecesOf } from '../../static/geometry/polyline.js';
 import { DASHES, gradeOfJac, gradeOfResidual, residualsOf } from '../../static/geometry/residual.js';
 import { close } from './scene.mjs';
 
@@ -28,9 +28,9 @@ describe('nearestOn', () => {
 	});
 });
 
-describe('frames', () => {
+describe('framesOf', () => {
 	it('stand at even distances with normals to the right of travel', () => {
-		const found = frames(corner, 5);
+		const found = framesOf([corner], 5);
 		assert.deepEqual(found.map(({ point }) => [point.x, point.y]), [[0, 0], [5, 0], [10, 0], [10, 5], [10, 10]]);
 		close(Object.values(found[0].normal), [0, 1]);
 		close(Object.values(found[4].normal), [-1, 0]);
@@ -38,7 +38,7 @@ describe('frames', () => {
 
 	it('end at the end', () => {
 		close([lengthOf(corner)], [20]);
-		assert.deepEqual(frames([{ x: 1, y: 1 }, { x: 1, y: 1 }], 4), []);
+		assert.deepEqual(framesOf([[{ x: 1, y: 1 }, { x: 1, y: 1 }]], 4), []);
 	});
 });
 

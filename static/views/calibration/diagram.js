@@ -4,7 +4,7 @@
 import { html } from 'htm/preact';
 import { useMemo, useRef } from 'preact/hooks';
 
-import { pitchMarkings } from '../../geometry/pitch.js';
+import { pathFromAbove, pitchMarkings } from '../../geometry/pitch.js';
 import { GLYPHS } from '../../geometry/residual.js';
 import { choice, hovered, lines, mode } from '../../state/calibration.js';
 import { focusImage, pickMarking } from './actions.js';
@@ -24,7 +24,7 @@ function shapeOf(name, polyline, half) {
 		const side = Math.sign(x);
 		return [side * (half + 1.2 - z * GOAL_SCALE), y * GOAL_SCALE];
 	});
-	return `M${flat.map(([x, y]) => `${x.toFixed(2)} ${y.toFixed(2)}`).join('L')}`;
+	return pathFromAbove(flat);
 }
 
 /** @param {number} length @param {number} width @returns {Shape[]} */

@@ -18,7 +18,7 @@ const LINE_REACH = 7;
  * @param {LinesJson} lines @param {Viewport} viewport @param {ScreenPoint} at @param {string | null} preferred
  * @returns {{marking: string, index: number} | null}
  */
-export function pointAt(lines, viewport, at, preferred) {
+function pointAt(lines, viewport, at, preferred) {
 	let best = { found: /** @type {{marking: string, index: number} | null} */ (null), distance: POINT_REACH };
 	for (const [marking, points] of Object.entries(lines)) {
 		points.forEach((point, index) => {

@@ -25,7 +25,7 @@ import { CompareWorkspace } from './workspace.js';
 /** @import {Binding} from '../../lib/keys.js' */
 
 /** @param {string} dataset */
-export const agreementAddress = (dataset) => address(`/datasets/${encodeURIComponent(dataset)}/agreement`, {});
+const agreementAddress = (dataset) => address(`/datasets/${encodeURIComponent(dataset)}/agreement`, {});
 
 /** The next group that waits, or the list. @param {string} dataset @param {number} after */
 async function goOn(dataset, after) {

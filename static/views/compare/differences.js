@@ -11,7 +11,7 @@ import { Letter } from '../letter.js';
 /** @import {GroupDocument} from '../../api/types.js' */
 
 /** The two by the numbers that people see. @param {string} sentence @param {[string, string]} names */
-export function withNames(sentence, [a, b]) {
+function withNames(sentence, [a, b]) {
 	return sentence.replace(/\ba\b/g, a).replace(/\bb\b/g, b);
 }
 

@@ -39,7 +39,7 @@ const KEYS = [
 ];
 
 /** Views, the worst first. */
-export function ViewTabs() {
+function ViewTabs() {
 	return html`
 		<nav class="compare__views" aria-label="Views, the worst first">
 			${orderedViews.value.map(({ key, letter, label }) => {

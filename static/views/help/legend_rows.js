@@ -10,7 +10,7 @@ import { drawExpected } from '../../overlays/expected_ball.js';
 import { drawGhosts } from '../../overlays/ghosts.js';
 import { drawStrip } from '../../overlays/line_strip.js';
 import { drawMarkings } from '../../overlays/markings.js';
-import { drawMeant } from '../../overlays/meant.js';
+import { drawMendMarks } from '../../overlays/mend_marks.js';
 import { drawPins } from '../../overlays/pins.js';
 import { drawPixelGrid } from '../../overlays/pixel_grid.js';
 import { drawPoints, drawSelectedPoint, drawWhiskers } from '../../overlays/points.js';
@@ -89,7 +89,7 @@ const BALLS = {
 		{ name: 'Outline and cross', meaning: 'Where the 3D ball lies in this picture. Green; where a person marked the ball it must lie on it.', tokens: 'canvas-reprojected', draw: onGrass(sceneOf({ ball: fit, outline: circle(66, 26, 12) }, { boxes: false }), drawBall) },
 		{ name: 'Expected ball', meaning: 'Nobody has drawn the ball here; the other views see it at the green cross, and in 95 of 100 cases within the dashed ring.', tokens: 'canvas-reprojected', draw: onGrass(sceneOf({ solved: expecting, outline: circle(66, 26, 9) }), drawExpected) },
 		{ name: 'Placed ball', meaning: 'It was put where the other views see it (Y). It is exported and confirms nothing until somebody moves it. Green dots.', tokens: 'canvas-reprojected', draw: onGrass(sceneOf({}, {}, [ballAt({ inferred: true })]), drawBall) },
-		{ name: 'What the card speaks about', meaning: 'The point, line or view that Enter would mend. Yellow.', tokens: 'canvas-selected', draw: onGrass(sceneOf({ markings: [lineOf('bad', 12, { marking: 'Side' })] }, { meant: /** @type {any} */ ({ action: 'drop_point', marking: 'Side', index: 0 }) }), drawMarkings, drawPoints, drawMeant) },
+		{ name: 'What the card speaks about', meaning: 'The point, line or view that Enter would mend. Yellow.', tokens: 'canvas-selected', draw: onGrass(sceneOf({ markings: [lineOf('bad', 12, { marking: 'Side' })] }, { meant: /** @type {any} */ ({ action: 'drop_point', marking: 'Side', index: 0 }) }), drawMarkings, drawPoints, drawMendMarks) },
 		{ name: 'Selected ball', meaning: 'Yellow with corners: drag it, or its corners; arrows move it.', tokens: 'canvas-selected', draw: onGrass(sceneOf({}, { selected: { kind: 'ball', view: KEY } }, [ballAt()]), drawBall) },
 		{ name: 'Several balls', meaning: 'More than one is marked: choose the one in play.', tokens: 'canvas-human', draw: onGrass(sceneOf({}, {}, [ballAt({ box: [10, 28, 14, 14] }), ballAt({ box: [70, 28, 14, 14] })]), drawBall) },
 		{ name: 'Ray of another view', meaning: 'The ball of that view lies somewhere on this line. Dotted, in the colour of the view, with its letter.', tokens: 'view-b', draw: onGrass(sceneOf({ epipolars: [{ letter: 'B', points: [{ x: 130, y: 2 }, { x: 4, y: 48 }] }] }), drawEpipolars) },

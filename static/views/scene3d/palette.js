@@ -1,25 +1,22 @@
 // @ts-check
 /** The colours of tokens.css that the 3D view needs. */
 
+import { tokens } from '../../lib/tokens.js';
+
 const NAMES = /** @type {const} */ ([
 	'sky', 'ground', 'grass', 'grass-stripe', 'line', 'goal', 'shadow', 'ball', 'best', 'ellipsoid', 'stem', 'valid', 'invalid',
 ]);
 
-/** @typedef {Record<typeof NAMES[number], string> & {views: Record<string, string>}} Palette */
+const LETTERS = /** @type {const} */ (['a', 'b', 'c', 'd', 'e', 'f']);
+
+/** @typedef {Record<typeof NAMES[number], string> & {views: Record<string, string>}} Palette   `views`: by small letter */
 
 /** @returns {Palette} */
 export function readPalette() {
-	const style = getComputedStyle(document.documentElement);
-	/** @param {string} name */
-	const get = (name) => style.getPropertyValue(name).trim();
-	const named = Object.fromEntries(NAMES.map((name) => [name, get(`--scene-${name}`)]));
-	const views = Object.fromEntries(['a', 'b', 'c', 'd', 'e', 'f'].map((letter) => (
-		[letter.toUpperCase(), get(`--scene-view-${letter}`)]
-	)));
-	return /** @type {Palette} */ ({ ...named, views });
+	return { ...tokens(NAMES, 'scene-'), views: tokens(LETTERS, 'scene-view-') };
 }
 
 /** @param {Palette} palette @param {string} letter */
-export function colourOf(palette, letter) {
-	return palette.views[letter] ?? palette.views.A;
+export function colourOf({ views }, letter) {
+	return views[letter.toLowerCase()] ?? views.a;
 }

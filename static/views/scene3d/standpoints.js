@@ -6,7 +6,7 @@
  * the near side line (y of the pitch frame). This file is the one place where the two meet.
  */
 
-import { fit } from '../../geometry/viewport.js';
+import { clamp, fit } from '../../geometry/viewport.js';
 
 /** @import {Camera} from '../../geometry/camera.js' */
 /** @import {Size} from '../../geometry/viewport.js' */
@@ -79,11 +79,6 @@ export function shifted(orbit, right, down) {
 			z + right * span * Math.sin(azimuth) - ahead * Math.cos(azimuth),
 		],
 	};
-}
-
-/** @param {number} value @param {number} low @param {number} high */
-function clamp(value, low, high) {
-	return Math.min(high, Math.max(low, value));
 }
 
 /**

@@ -14,7 +14,7 @@ const RING = 11;
 const ROOMY = 330;
 
 /** @param {CanvasRenderingContext2D} context @param {Scene} scene */
-export function drawMeant(context, scene) {
+export function drawMendMarks(context, scene) {
 	const { meant } = scene;
 	if (!meant) return;
 	if (meant.action === 'swap_sides') plate(context, 'Left and right swapped?');
