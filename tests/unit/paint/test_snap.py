@@ -86,7 +86,7 @@ class TestCircle:
             )
             none = np.zeros((len(marking), 2))
             traced = Traced(none, none, none, none[:, 0], marking, none, len(marking))
-            seen = Evidence(traced, none[:, 0], none[:, 0], none[:, 0], len(marking))
+            seen = Evidence(traced, none[:, 0], none[:, 0], none[:, 0])
             return _suffices(seen, CURVED, spacing)
 
         assert suffices(places) and not suffices(places - 1)
