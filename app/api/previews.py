@@ -18,6 +18,7 @@ from app.api.edits import preview_edits
 from app.api.pool_answer import while_wanted
 from app.api.schemas.preview import PreviewDocument, PreviewRequest
 from app.api.schemas.solution import SolutionDocument
+from app.api.security.lanes import is_large
 from app.child import Allowance, ChildEnded
 from app.child_figures import FIGURES
 from app.child_pool import ChildPool
@@ -60,6 +61,8 @@ class Previews:
     async def answer(self, request: Request, group_id: int, changes: PreviewRequest) -> bytes:
         """The document of a what-if; empty where nobody waits for it any more.
 
+        A large one is solved here, for the process has one at a time.
+
         Raises:
             NotFoundError: There is no such group.
             InputError: It has no such view, or the changes are too many.
@@ -67,7 +70,7 @@ class Previews:
             OverloadedError: The process ended.
         """
         self._begin()
-        if self._pool is not None and self.is_ready:
+        if self._pool is not None and self.is_ready and not is_large(request.scope):
             given = (self._settings, group_id, changes)
             task = self._pool.submit(solve_apart, *given, explain=_ended)
             found: bytes | None = await while_wanted(request, task)

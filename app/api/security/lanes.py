@@ -102,6 +102,10 @@ LANES = (
     LOGINS,
     SIGN_ONS,
 )
+LARGE_BYTES = 8 * 1024
+"""A body beyond these draws hundreds of points, and is solved for as long as dozens of others."""
+AMONG_LARGE = {EDITS: CHANGES, PREVIEWS: QUESTIONS}
+"""Where requests with large bodies wait instead, so that they keep nobody waiting who drags a point."""
 AWAY = 8
 """So many of a lane may have left it before they were done."""
 THREADS = sum(max(lane.width, lane.served or 0) for lane in LANES) + 2 * AWAY + 6
@@ -146,6 +150,13 @@ def lane_of(method: str, path: str) -> Lane | None:
     if method == "POST" and _UPLOAD.search(path):
         return UPLOADS
     return EDITS if _EDIT.search(path) else CHANGES
+
+
+def is_large(scope: Scope) -> bool:
+    """Whether a request brings far more than a person draws; one that does not say how much may."""
+    headers = Headers(scope=scope)
+    size = headers.get("content-length", "")
+    return int(size) > LARGE_BYTES if size.isdecimal() else "transfer-encoding" in headers
 
 
 class Door:
@@ -205,6 +216,8 @@ class Doors:
         if scope["type"] != "http":
             return None
         lane = lane_of(scope["method"], scope["path"])
+        if lane in AMONG_LARGE and is_large(scope):
+            lane = AMONG_LARGE[lane]
         return None if lane is None else self._of[lane]
 
 

@@ -1,3 +1,4 @@
+import json
 import multiprocessing
 import os
 import time
@@ -9,6 +10,7 @@ import pytest
 from fastapi import FastAPI
 
 from app.api.previews import Previews
+from app.api.security.lanes import LARGE_BYTES
 from app.errors import DamagedError
 from tests.waiting import SECONDS
 
@@ -86,6 +88,20 @@ class TestApart:
             headers={"If-Match": group["etag"]},
         ).raise_for_status()
         assert preview(api).json()["solution"]["pairs"] != before["pairs"]
+
+    def test_a_large_one_is_left_to_the_server_so_that_drags_need_not_wait_for_it(
+        self, ready, api, monkeypatch
+    ) -> None:
+        monkeypatch.setattr("app.api.previews.solve_apart", see_damage)
+        group = api.get(f"{API}/groups/1").json()
+        points = [{"x": 5.0 + number / 7, "y": 40.0 + number / 3} for number in range(90)]
+        lines = dict.fromkeys(
+            ("Middle line", "Side line top", "Circle central", "Big rect. left main"), points
+        )
+        body = {"views": {group["views"][0]["key"]: {"lines": lines}}}
+        assert len(json.dumps(body)) > LARGE_BYTES
+        assert api.post(f"{API}/groups/1/preview", json=body).status_code == 200
+        assert preview(api).status_code == 503
 
     def test_damage_that_the_process_sees_stops_changes_here(
         self, app, ready, api, monkeypatch

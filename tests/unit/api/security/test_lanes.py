@@ -32,6 +32,7 @@ from app.api.security.lanes import (
     ZIPS,
     Door,
     Doors,
+    Lane,
     Lanes,
     lane_of,
 )
@@ -90,6 +91,36 @@ class TestLaneOf:
     @pytest.mark.parametrize("path", ["/", "/review/3", "/nowhere", "/healthz/x"])
     def test_pages_wait_for_each_other_alone(self, path: str) -> None:
         assert lane_of("GET", path) == PAGES
+
+    @pytest.mark.parametrize(
+        ("method", "path", "usual", "large"),
+        [
+            ("PATCH", "/views/1/lines", EDITS, CHANGES),
+            ("POST", "/groups/1/preview", PREVIEWS, QUESTIONS),
+            ("PATCH", "/stations/1/lines", CHANGES, CHANGES),
+        ],
+    )
+    @pytest.mark.parametrize(
+        ("headers", "is_large"),
+        [
+            ({}, False),
+            ({b"content-length": b"8192"}, False),
+            ({b"content-length": b"8193"}, True),
+            ({b"transfer-encoding": b"chunked"}, True),
+        ],
+    )
+    def test_what_draws_hundreds_of_points_keeps_nobody_waiting_who_drags_one(
+        self, method: str, path: str, usual: Lane, large: Lane, headers: Any, is_large: bool
+    ) -> None:
+        scope = {
+            "type": "http",
+            "method": method,
+            "path": PREFIX + path,
+            "headers": [*headers.items()],
+        }
+        door = Doors().of(scope)
+        assert door is not None
+        assert door.lane == (large if is_large else usual)
 
     def test_every_route_that_changes_something_has_one(self, api: TestClient) -> None:
         document = api.get(f"{PREFIX}/openapi.json").json()["paths"]
@@ -213,7 +244,9 @@ class TestLanes:
                 await asyncio.sleep(0.01)
             # Time enough for one more, if it were let in.
             await asyncio.sleep(0.1)
-            door = service.doors.of({"type": "http", "method": "PATCH", "path": EDIT})
+            door = service.doors.of(
+                {"type": "http", "method": "PATCH", "path": EDIT, "headers": []}
+            )
             assert door is not None
             # One more is at work, has asked to leave, and had to stay.
             assert len(service.work.begun) == EDITS.width + AWAY
@@ -225,7 +258,7 @@ class TestLanes:
         run(test)
 
     def test_more_edits_are_let_in_where_a_server_of_databases_is_waited_for(self) -> None:
-        edit = {"type": "http", "method": "PATCH", "path": EDIT}
+        edit = {"type": "http", "method": "PATCH", "path": EDIT, "headers": []}
         here, there = (Doors(served).of(edit) for served in (False, True))
         assert here is not None and there is not None
 
