@@ -74,13 +74,15 @@ CHANGES = Lane("changes", 3, 100)
 """All others; they may take their time."""
 PREVIEWS = Lane("previews", 1, 100)
 """What a drag asks: some milliseconds of solving."""
+LARGE = Lane("large", 1, 50)
+"""Edits and previews of hundreds of points, each of which is solved for as long as dozens of others."""
 QUESTIONS = Lane("questions", 2, 100)
 """What is answered by solving many times, or many groups; it takes up to seconds."""
 STREAMS = Lane("streams", 1, 200)
 """Those that begin: who listens takes nobody's place. All windows of a team come back at the same
 moment when a server starts again, and what each asks first would keep readers waiting."""
 IMAGES = Lane("images", 6, 200)
-UPLOADS = Lane("uploads", 8, 8, pause=2.0)
+UPLOADS = Lane("uploads", 8, 8, pause=4.0)
 ZIPS = Lane("zips", 16, 100)
 """Those of exports, which a request may find still being written."""
 LOGINS = Lane("logins", 4, 50)
@@ -94,6 +96,7 @@ LANES = (
     EDITS,
     CHANGES,
     PREVIEWS,
+    LARGE,
     QUESTIONS,
     STREAMS,
     IMAGES,
@@ -103,9 +106,7 @@ LANES = (
     SIGN_ONS,
 )
 LARGE_BYTES = 8 * 1024
-"""A body beyond these draws hundreds of points, and is solved for as long as dozens of others."""
-AMONG_LARGE = {EDITS: CHANGES, PREVIEWS: QUESTIONS}
-"""Where requests with large bodies wait instead, so that they keep nobody waiting who drags a point."""
+"""A body beyond these draws hundreds of points."""
 AWAY = 8
 """So many of a lane may have left it before they were done."""
 THREADS = sum(max(lane.width, lane.served or 0) for lane in LANES) + 2 * AWAY + 6
@@ -216,8 +217,8 @@ class Doors:
         if scope["type"] != "http":
             return None
         lane = lane_of(scope["method"], scope["path"])
-        if lane in AMONG_LARGE and is_large(scope):
-            lane = AMONG_LARGE[lane]
+        if lane in (EDITS, PREVIEWS) and is_large(scope):
+            lane = LARGE
         return None if lane is None else self._of[lane]
 
 

@@ -22,6 +22,7 @@ from app.api.security.lanes import (
     EDITS,
     IMAGES,
     LANES,
+    LARGE,
     LOOKS,
     PAGES,
     PREVIEWS,
@@ -95,8 +96,8 @@ class TestLaneOf:
     @pytest.mark.parametrize(
         ("method", "path", "usual", "large"),
         [
-            ("PATCH", "/views/1/lines", EDITS, CHANGES),
-            ("POST", "/groups/1/preview", PREVIEWS, QUESTIONS),
+            ("PATCH", "/views/1/lines", EDITS, LARGE),
+            ("POST", "/groups/1/preview", PREVIEWS, LARGE),
             ("PATCH", "/stations/1/lines", CHANGES, CHANGES),
         ],
     )
