@@ -68,6 +68,11 @@ def load_document(store: Store, group_id: int) -> GroupDocument:
     return GroupDocument.of(submit.load_solved(store, group_id))
 
 
+def load_document_of_view(store: Store, view_id: int) -> GroupDocument:
+    """The document of the group of a view as it is now."""
+    return GroupDocument.of(submit.load_solved_of_view(store, view_id))
+
+
 def change_group(
     asked: Asked | None,
     present: Callable[[], GroupDocument],

@@ -11,7 +11,7 @@ from app.api.deps import Actor, AppServices, AppStore, DatasetPath, DryRun, Id, 
 from app.api.jobs import ACCEPTED, job_answer
 from app.api.problem import responses
 from app.api.reply import AskedUnder, Reply, document, nothing
-from app.api.routers.groups import CHANGED, CONFLICTS, change_group, load_document
+from app.api.routers.groups import CHANGED, CONFLICTS, change_group, load_document_of_view
 from app.api.schemas.group import GroupDocument
 from app.api.schemas.job import JobDocument
 from app.api.schemas.prediction import (
@@ -193,9 +193,7 @@ def accept_prediction(
     change = partial(
         accept_box, store, view, prediction, if_match=if_match, actor=actor, replace=replace
     )
-    return change_group(
-        asked, lambda: load_document(store, find_view(store, view).group_id), change
-    )
+    return change_group(asked, lambda: load_document_of_view(store, view), change)
 
 
 def _files(settings: Settings, request: PredictionRequest) -> PredictionFiles:

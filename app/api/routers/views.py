@@ -22,7 +22,7 @@ from app.api.deps import (
 from app.api.pool_answer import while_wanted
 from app.api.problem import Responses, responses
 from app.api.reply import Asked, AskedUnder
-from app.api.routers.groups import CHANGED, CONFLICTS, change_group, load_document
+from app.api.routers.groups import CHANGED, CONFLICTS, change_group, load_document_of_view
 from app.api.schemas.annotation import BallEdit, LinesEdit
 from app.api.schemas.group import GroupDocument
 from app.api.schemas.view import NeighbourList, ViewEdit, frames_away
@@ -144,9 +144,7 @@ def _submit(
     change = partial(
         submit_view, store, view, edit_of, if_match=if_match, actor=actor, paint=services.paint
     )
-    return change_group(
-        asked, lambda: load_document(store, find_view(store, view).group_id), change
-    )
+    return change_group(asked, lambda: load_document_of_view(store, view), change)
 
 
 @router.get(

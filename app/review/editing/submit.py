@@ -195,6 +195,13 @@ def load_solved(store: Store, group_id: int) -> GroupState:
     return replace(state, solution=solution)
 
 
+def load_solved_of_view(store: Store, view_id: int) -> GroupState:
+    """``load_solved`` for the group of a view."""
+    with store.read() as session:
+        group_id = group_of_view(session, view_id)
+    return load_solved(store, group_id)
+
+
 def solved(store: Store, group_id: int) -> GroupState:
     """A group as it is now, its solution computed and kept if that was still to do."""
     record, solution = read_solved(store, group_id)
