@@ -64,7 +64,12 @@ def _served(program: str) -> Iterator[tuple[str, int]]:
         home = Path(folder) / "home"
         home.mkdir()
         tree = Path(folder) / "tree"
-        run_touchline(home, f"sample {tree} --groups 3", f"import {tree} --dataset bench", "solve")
+        run_touchline(
+            home,
+            f"sample --workers 1 --groups 3 {tree}",
+            f"import soccernet-v3 {tree} --dataset bench",
+            "solve --dataset bench --workers 1",
+        )
         service.SERVE = program
         try:
             with serving(home) as address:
