@@ -98,7 +98,7 @@ export function NoiseCard({ dataset, version = '', children }) {
 			<h2 id="noise-title">Noise of the clicks${noise ? html` <span class="card__aside">from ${count(noise.groups)} of ${count(noise.solved)} solved groups</span>` : null}</h2>
 			${found.error ? html`<${Trouble} title="The noise cannot be shown" error=${found.error} retry=${found.reload} />` : null}
 			${noise ? html`
-				<table class="table">
+				<table class="table noise">
 					<thead><tr><th>noise</th><th data-numeric="true">estimate</th><th data-numeric="true">interval</th><th data-numeric="true">policy</th></tr></thead>
 					<tbody>
 						${noise.advice.map((item) => html`<${Row} key=${item.name} item=${item} />`)}
