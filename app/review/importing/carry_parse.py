@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import IO, Any
 
-from app.datasets.file_tree import FileTree
+from app.datasets.file_tree import BROKEN, FileTree
 from app.datasets.json_text import read_json
 from app.datasets.report import Report
 from app.errors import DatasetFormatError, InputError, ReviewError
@@ -103,10 +103,18 @@ def read_lines(tree: FileTree, name: str, report: Report) -> Iterator[tuple[str,
 
 
 def _lines(file: IO[bytes], shown: str) -> Iterator[bytes]:
-    while line := file.readline(MAX_LINE + 1):
+    while line := _line(file, shown):
         if len(line) > MAX_LINE:
             raise DatasetFormatError(shown, None, None, f"has a line above {MAX_LINE:,} bytes")
         yield line
+
+
+def _line(file: IO[bytes], shown: str) -> bytes:
+    try:
+        return file.readline(MAX_LINE + 1)
+    except BROKEN as error:
+        problem = "is damaged, here or in its zip file"
+        raise DatasetFormatError(shown, None, None, problem) from error
 
 
 def parse_station(value: Json) -> CarriedStation:
