@@ -237,7 +237,8 @@ def _people(file: _File, group: Group, view: View, camera: Camera | None) -> lis
 
 def _who(box: Mapping[str, Any], group: Group, view: View, index: int) -> Hashable:
     """Whose box it is: a shirt number is the same all match long, another tag in its group."""
-    name, tag = box.get("class"), box.get("ID")
+    # A class that is no text is kept as it came, like all that datasets bring.
+    name, tag = str(box.get("class")), box.get("ID")
     if tag is None:
         return (group.key, view.key, index)
     text = str(tag)
