@@ -40,7 +40,7 @@ def solve(
     json_: Json = False,
 ) -> None:
     """Compute what is missing or out of date; Ctrl+C keeps what is done, and the next run goes on."""
-    from app.review.datasets.dataset import get_head
+    from app.review.datasets.dataset import get_dataset_head
     from app.review.editing.pitches import estimate_pitches
     from app.review.editing.recompute import solve_dataset
     from app.review.policies.policy import change_policy
@@ -64,7 +64,7 @@ def solve(
         estimate_pitches(store, dataset, executor)
         if report.solved > AT_ONCE:
             # So that the first look at the yield finds it counted.
-            YieldStore(store).keep_up(get_head(store, dataset).id)
+            YieldStore(store).keep_up(get_dataset_head(store, dataset).id)
     print_values(vars(report), json_)
 
 

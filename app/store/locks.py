@@ -22,6 +22,8 @@ from app.store.home import (
 
 AGAIN_S = 0.005
 """Between two looks whether a lock is free."""
+TOLD_S = 0.1
+"""Between two words that somebody still waits."""
 OPENING_SECONDS = 60.0
 """So long who opens the database waits for another process that does, and may be migrating it."""
 
@@ -60,6 +62,9 @@ class DatabaseLock:
 
     Attributes:
         alone: Whether nobody else has; others wait until ``share`` before they open it.
+
+    Raises:
+        BusyError: Another process has been opening it for too long.
     """
 
     def __init__(self, settings: Settings):
@@ -135,7 +140,7 @@ def practice_lock(settings: Settings, waiting: Callable[[], None]) -> Iterator[N
     """Hold the practice groups while they are made; ``waiting`` is called while others make them."""
     handle = _open(make_home(settings) / PRACTICE_LOCK)
     try:
-        while not lock_within(handle, AGAIN_S):
+        while not lock_within(handle, TOLD_S):
             waiting()
         yield
     finally:

@@ -44,7 +44,7 @@ def get_dataset(dataset: DatasetPath, store: AppStore) -> review.Dataset:
 @router.get("/{dataset}/summary", operation_id="getSummary", responses=responses(404))
 def get_summary(dataset: DatasetPath, store: AppStore, query: QueryText = "") -> SummaryDocument:
     """Progress and histograms over the groups that a query matches."""
-    found = review.get_head(store, dataset)
+    found = review.get_dataset_head(store, dataset)
     counted = summary(store, found.id, query)
     return SummaryDocument(progress=counted, histograms=counted.histograms)
 

@@ -100,10 +100,10 @@ def get_dataset(store: Store, dataset: str | int) -> Dataset:
         return _datasets(session, [_need(session, dataset)])[0]
 
 
-def get_head(store: Store, dataset: str | int) -> DatasetHead:
+def get_dataset_head(store: Store, dataset: str | int) -> DatasetHead:
     """A dataset by its name or its id, uncounted; raises NotFoundError when there is none."""
     with store.read() as session:
-        return read_dataset(session, dataset)
+        return read_dataset_head(session, dataset)
 
 
 def dataset_id(store: Store, dataset: str | int) -> int:
@@ -117,7 +117,7 @@ def need_dataset(session: Session, dataset: str | int) -> int:
     return int(_need(session, dataset).id)
 
 
-def read_dataset(session: Session, dataset: str | int) -> DatasetHead:
+def read_dataset_head(session: Session, dataset: str | int) -> DatasetHead:
     """A dataset within a session, uncounted; raises NotFoundError when there is none."""
     row = _need(session, dataset)
     return DatasetHead(row.id, row.name, row.created, policy_of(row.policy))
@@ -131,7 +131,7 @@ def require_matches(
     Raises:
         NotFoundError: There is no such dataset or match.
     """
-    found = read_dataset(session, dataset)
+    found = read_dataset_head(session, dataset)
     for match in matches or ():
         if not has_match(session, found.id, match):
             raise NotFoundError(f'"{found.name}" has no match {match}')

@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from app.errors import ConflictError
-from app.review.datasets.dataset import dataset_id, insert_dataset, read_dataset
+from app.review.datasets.dataset import dataset_id, insert_dataset, read_dataset_head
 from app.review.datasets.spare_calibrations import delete_spare_calibrations
 from app.soccer.policy import Policy
 from app.store import removal
@@ -40,7 +40,7 @@ def read_contents(store: Store, dataset: str | int) -> DatasetContents:
         NotFoundError: There is no such dataset.
     """
     with store.read() as session:
-        return _contents(session, read_dataset(session, dataset).id)
+        return _contents(session, read_dataset_head(session, dataset).id)
 
 
 def delete_dataset(
@@ -98,7 +98,7 @@ def delete_dataset(
 
 
 def _contents(session: Session, identity: int) -> DatasetContents:
-    name = read_dataset(session, identity).name
+    name = read_dataset_head(session, identity).name
     return DatasetContents(identity, name, removal.count_contents(session, identity))
 
 

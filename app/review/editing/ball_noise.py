@@ -28,8 +28,6 @@ from app.store.noise import (
 )
 from app.store.session import Session
 
-_BATCH = 100
-
 
 def read_placed(session: Session, groups: Sequence[int]) -> dict[int, dict[str, str]]:
     """Who placed the ball of each view last, by id of the group and key of the view.

@@ -45,17 +45,18 @@ def give_edits(
     """
     at, count = now(), 0
     for start in range(0, len(ids), _BATCH):
-        entries: list[Entry] = []
+        entries, changed = list[Entry](), list[int]()
         some = read_groups(session, ids[start : start + _BATCH])
         for number, edit in edits_of(some).items():
             stored = some[number]
             group = edit.apply(stored.group)
-            if group == stored.group and stored.id != told:
+            if group == stored.group and number != told:
                 continue
             save_revision(session, stored, next_revision(stored, group, at))
             step = step_to_json(edit, edit.inverse(stored.group))
-            entries.append(Entry(kind, actor, at, {**(body or {}), **step}, dataset_id, stored.id))
+            entries.append(Entry(kind, actor, at, {**(body or {}), **step}, dataset_id, number))
+            changed.append(number)
         append(session, entries)
-        refresh_queue(session, [entry.group_id for entry in entries if entry.group_id is not None])
-        count += len(entries)
+        refresh_queue(session, changed)
+        count += len(changed)
     return count

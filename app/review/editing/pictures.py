@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 from app.errors import GeometryError
 from app.progress import Progress
-from app.review.datasets.dataset import need_dataset, read_dataset, require_matches
+from app.review.datasets.dataset import need_dataset, read_dataset_head, require_matches
 from app.review.datasets.fan_out import fan_out
 from app.review.editing.edit import SetPicture
 from app.review.editing.group_edits import give_edits
@@ -106,7 +106,7 @@ def estimate_pictures(
         NotFoundError: There is no such dataset.
     """
     with store.read() as session:
-        found = read_dataset(session, dataset)
+        found = read_dataset_head(session, dataset)
         names = (item.match for item in match_pitches(session, found.id) if item.match)
         matches = [match for match in names if only is None or match in only]
     tasks = (_task(store, found.id, match, found.policy.calibration) for match in matches)

@@ -14,7 +14,7 @@ from typing import Any
 
 from app.errors import GeometryError, InputError, NotFoundError
 from app.progress import Progress
-from app.review.datasets.dataset import read_dataset
+from app.review.datasets.dataset import read_dataset_head
 from app.review.datasets.fan_out import fan_out
 from app.review.editing.codec import edit_from_json
 from app.review.editing.edit import SetPitch
@@ -41,8 +41,6 @@ from app.store.pitches import (
 from app.store.queue import refresh_queue
 from app.store.session import Session
 from app.store.store import Store
-
-_BATCH = 100
 
 
 @dataclass(frozen=True)
@@ -140,7 +138,7 @@ def estimate_pitches(
         progress: Called with matches done and in all; an error that it raises ends the run.
     """
     with store.read() as session:
-        found = read_dataset(session, dataset)
+        found = read_dataset_head(session, dataset)
         policy = found.policy.calibration
         stale = _stale(session, found.id, policy)
     tasks = (_task(store, found.id, match, inputs, policy) for match, inputs in stale)
@@ -157,7 +155,7 @@ def estimate_pitches(
 def stale_matches(store: Store, dataset: str | int) -> list[str]:
     """The matches that ``estimate_pitches`` would estimate."""
     with store.read() as session:
-        found = read_dataset(session, dataset)
+        found = read_dataset_head(session, dataset)
         return [match for match, _ in _stale(session, found.id, found.policy.calibration)]
 
 
@@ -252,7 +250,7 @@ _Shown = tuple[PitchEstimate | None, str | None]
 def _read(
     session: Session, dataset: str | int, shown: Mapping[str, _Shown] | None = None
 ) -> DatasetPitches:
-    found = read_dataset(session, dataset)
+    found = read_dataset_head(session, dataset)
     if shown is None:
         shown = _shown(session, found.id, found.policy.calibration)
     changes = last_changes(session, found.id)

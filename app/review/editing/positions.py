@@ -16,7 +16,7 @@ import numpy as np
 
 from app.errors import ConflictError, NotFoundError
 from app.progress import Progress
-from app.review.datasets.dataset import DatasetHead, read_dataset
+from app.review.datasets.dataset import DatasetHead, read_dataset_head
 from app.review.datasets.fan_out import fan_out
 from app.review.editing.codec import edit_from_json
 from app.review.editing.edit import Edit, SetPositions
@@ -180,7 +180,7 @@ def require_sharable(
         NotFoundError: There is no such dataset or match.
     """
     with store.read() as session:
-        found = read_dataset(session, dataset)
+        found = read_dataset_head(session, dataset)
         _chosen(session, found, matches)
     if not found.policy.calibration.share_position:
         raise ConflictError(
@@ -220,7 +220,7 @@ def apply_take_back(
         stopped: When shares that were stopped for it had begun; None: never. One that came to the
             match is taken back, and where none did no earlier one is.
     """
-    found = read_dataset(session, dataset)
+    found = read_dataset_head(session, dataset)
     _chosen(session, found, [match])
     entries = last_share(session, found.id, match)
     if stopped and not any(begun and entries and begun <= entries[0].at for begun in stopped):
@@ -259,7 +259,7 @@ def _give(
 
 
 def _read(session: Session, dataset: str | int) -> DatasetPositions:
-    found = read_dataset(session, dataset)
+    found = read_dataset_head(session, dataset)
     policy, then = found.policy.calibration, position_inputs(session, found.id)
     items = tuple(
         _state(item, then.get(item.match), policy)

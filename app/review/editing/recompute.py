@@ -10,7 +10,12 @@ from concurrent.futures import Executor
 from dataclasses import dataclass, field
 
 from app.progress import Progress
-from app.review.datasets.dataset import DatasetHead, get_head, need_dataset, read_dataset
+from app.review.datasets.dataset import (
+    DatasetHead,
+    get_dataset_head,
+    need_dataset,
+    read_dataset_head,
+)
 from app.review.datasets.fan_out import fan_out
 from app.review.editing.known import calibration_keys
 from app.review.editing.smaller_tau import retell_task, retell_tasks
@@ -84,7 +89,7 @@ def solve_dataset(
             that was saved before is lost.
         stop: Asked every now and then; once it says so, what is done is saved, and no more.
     """
-    found, ids = get_head(store, dataset), stale_groups(store, dataset)
+    found, ids = get_dataset_head(store, dataset), stale_groups(store, dataset)
     report = SolveReport(total=len(ids))
 
     def keep(results: Sequence[Result]) -> None:
@@ -143,7 +148,7 @@ def _save(store: Store, results: Sequence[Result], report: SolveReport) -> None:
 
 def _task(store: Store, dataset: DatasetHead, ids: Sequence[int]) -> Task:
     with store.read() as session:
-        policy = read_dataset(session, dataset.id).policy
+        policy = read_dataset_head(session, dataset.id).policy
         stored = read_groups(session, ids, extras=False).values()
         keys = calibration_keys((item.group for item in stored), policy)
         known = read_calibration_bodies(session, keys)

@@ -11,7 +11,7 @@ from typing import Any
 from app.datasets.report import Report
 from app.datasets.sn_calibration_reader import read_line_files
 from app.errors import ConflictError, InputError
-from app.review.datasets.dataset import need_dataset, read_dataset
+from app.review.datasets.dataset import need_dataset, read_dataset_head
 from app.review.editing.edit import SetStationCamera
 from app.review.editing.stations import (
     StationState,
@@ -121,7 +121,7 @@ def adjustable(store: Store, dataset: str | int) -> tuple[list[StationState], Pi
         ConflictError: They were adjusted already.
     """
     with store.read() as session:
-        found = read_dataset(session, need_dataset(session, dataset))
+        found = read_dataset_head(session, need_dataset(session, dataset))
         stations = [item.id for item in shared_stations(session, found.id)]
         pitches = {pitch for _, pitch in station_pitches(session, found.id)}
     states = [load_station(store, station) for station in stations]

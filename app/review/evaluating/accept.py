@@ -14,7 +14,7 @@ from functools import partial
 from app.errors import ConflictError, InputError, NotFoundError, StaleRevisionError
 from app.evaluation.prediction_run import box_problem
 from app.progress import Progress
-from app.review.datasets.dataset import read_dataset
+from app.review.datasets.dataset import read_dataset_head
 from app.review.editing.edit import SetBall, need_view
 from app.review.editing.etags import require_unchanged, said_of
 from app.review.editing.state import GroupState
@@ -103,7 +103,7 @@ def plan_accept(store: Store, dataset: str | int, request: AcceptRequest) -> Acc
         InputError: The query cannot be understood.
     """
     with store.read() as session:
-        found = read_dataset(session, dataset)
+        found = read_dataset_head(session, dataset)
         predictions = read_set(session, request.set_id)
         if predictions.dataset_id != found.id:
             raise NotFoundError(f"dataset {found.name} has no set of predictions {request.set_id}")

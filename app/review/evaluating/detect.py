@@ -12,7 +12,7 @@ from app.config import Settings
 from app.errors import ImageError, InputError, NotFoundError, StorageError, TooLargeError
 from app.evaluation.frame import Detection
 from app.progress import Progress
-from app.review.datasets.dataset import read_dataset
+from app.review.datasets.dataset import read_dataset_head
 from app.review.evaluating.onnx_model import OnnxModel
 from app.review.evaluating.predictions import (
     LISTED,
@@ -71,7 +71,7 @@ def detect(
     """
     check_name(request.name)
     with store.read() as session:
-        found = read_dataset(session, dataset)
+        found = read_dataset_head(session, dataset)
         require_free(session, found.id, request.name)
         rows = _views(session, found.id, request)
     detections: dict[int, list[Detection]] = {}

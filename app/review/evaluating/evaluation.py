@@ -17,7 +17,7 @@ from app.evaluation.comparison import (
 from app.evaluation.figure import Figure
 from app.evaluation.result import NUMBERS, FrameResult
 from app.evaluation.table import Table
-from app.review.datasets.dataset import read_dataset
+from app.review.datasets.dataset import read_dataset_head
 from app.review.people.deeds import note_deed
 from app.store import evaluation_frames as frame_rows
 from app.store.answers import Keep, keep_nothing
@@ -85,7 +85,7 @@ class Comparison:
 def list_evaluations(store: Store, dataset: str | int) -> list[StoredEvaluation]:
     """The runs of a dataset, the newest first."""
     with store.read() as session:
-        found = read_dataset(session, dataset)
+        found = read_dataset_head(session, dataset)
         return dataset_evaluations(session, found.id)
 
 

@@ -11,7 +11,7 @@ from app.evaluation.evaluate import Inputs, Options, evaluate
 from app.evaluation.frame import BOX_KINDS, Detection
 from app.evaluation.result import Evaluation
 from app.progress import Progress
-from app.review.datasets.dataset import DatasetHead, read_dataset
+from app.review.datasets.dataset import DatasetHead, read_dataset_head
 from app.review.evaluating.careful_boxes import careful_boxes
 from app.review.evaluating.evaluation import read_evaluation
 from app.review.evaluating.frames import LIVE_RULES, Truth, live_truth, version_truth
@@ -91,7 +91,7 @@ def run_evaluation(
     """
     request.check()
     with store.read() as session:
-        found = read_dataset(session, dataset)
+        found = read_dataset_head(session, dataset)
         if progress is not None:
             progress(0, None, "Reading frames.")
         truth = _truth(session, found, request)
@@ -136,7 +136,7 @@ def check_evaluation(store: Store, dataset: str | int, request: EvaluationReques
     """Refuse at once what ``run_evaluation`` would refuse for its sets or its version."""
     request.check()
     with store.read() as session:
-        found = read_dataset(session, dataset)
+        found = read_dataset_head(session, dataset)
         for name in ("predictions", "careful"):
             if (identity := getattr(request, name)) is not None:
                 own = _own_set(session, found, identity, name)

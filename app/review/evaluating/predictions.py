@@ -20,7 +20,7 @@ from app.evaluation.frame_names import FrameNames, NamedFrame
 from app.evaluation.prediction_files import ReadPredictedCameras
 from app.evaluation.prediction_run import ReadPredictions, listed
 from app.geometry.camera import Camera
-from app.review.datasets.dataset import read_dataset
+from app.review.datasets.dataset import read_dataset_head
 from app.review.evaluating.prediction_reader import PredictionFiles, Read, read_files
 from app.review.people.deeds import note_deed
 from app.soccer.frames import ImageSize
@@ -142,7 +142,7 @@ def save_predictions(
         "report": report,
     }
     with store.write() as session:
-        found = read_dataset(session, dataset)
+        found = read_dataset_head(session, dataset)
         if reuse:
             own = dataset_prediction_sets(session, found.id)
             known = next((item for item in own if _same_reading(item, values)), None)
@@ -166,7 +166,7 @@ def save_predictions(
 def frame_names(store: Store, dataset: str | int) -> FrameNames:
     """The frames of a dataset by every name that a file may give them."""
     with store.read() as session:
-        rows = dataset_views(session, read_dataset(session, dataset).id)
+        rows = dataset_views(session, read_dataset_head(session, dataset).id)
     return FrameNames.of(
         NamedFrame(
             id=row.id,
@@ -183,7 +183,7 @@ def frame_names(store: Store, dataset: str | int) -> FrameNames:
 def list_predictions(store: Store, dataset: str | int) -> list[PredictionSet]:
     """The sets of a dataset, the newest first."""
     with store.read() as session:
-        found = read_dataset(session, dataset)
+        found = read_dataset_head(session, dataset)
         return dataset_prediction_sets(session, found.id)
 
 

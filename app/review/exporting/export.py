@@ -20,7 +20,7 @@ from app.errors import InputError
 from app.object_store.address import is_address
 from app.object_store.path import StoredPath
 from app.progress import Progress
-from app.review.datasets.dataset import read_dataset
+from app.review.datasets.dataset import read_dataset_head
 from app.review.datasets.licence import licence_of
 from app.review.exporting.formats import (
     CONTENT,
@@ -261,7 +261,7 @@ def _here(store: Store) -> ReadPicture:
 def _source(
     session: Session, store: Store, dataset: str | int, everything: bool, version: str | None
 ) -> LiveSource | VersionSource:
-    found = read_dataset(session, dataset)
+    found = read_dataset_head(session, dataset)
     if version is not None:
         frozen = find_version(store, found.id, version)
         return VersionSource(session, frozen)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import PurePosixPath
 
 from app.geometry.camera import Camera
-from app.review.datasets.dataset import get_head
+from app.review.datasets.dataset import get_dataset_head
 from app.review.importing.ingest import IngestReport, attempt
 from app.store.clock import now
 from app.store.codecs import camera_to_json
@@ -59,7 +59,7 @@ def ingest_cameras(
     Raises:
         NotFoundError: There is no such dataset.
     """
-    report, found = IngestReport(), get_head(store, dataset)
+    report, found = IngestReport(), get_dataset_head(store, dataset)
     with store.read() as session:
         places = _places(session, found.id)
     known = []

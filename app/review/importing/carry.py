@@ -17,7 +17,7 @@ from app.datasets.manifest import Manifest, write_manifest
 from app.datasets.store_output import output_anywhere
 from app.finite import json_text
 from app.progress import Progress
-from app.review.datasets.dataset import DatasetHead, read_dataset
+from app.review.datasets.dataset import DatasetHead, read_dataset_head
 from app.review.datasets.licence import licence_text
 from app.review.editing.lineage import Lineage, Lineages, station_lineage
 from app.soccer.group import Group
@@ -60,7 +60,7 @@ def carry_out(
         progress: Called as groups are written.
     """
     with store.read() as session, output_anywhere(out, store.settings.exports) as root:
-        found = read_dataset(session, dataset)
+        found = read_dataset_head(session, dataset)
         counts = {
             "stations": _write_lines(root / STATIONS, _stations(session, found.id)),
             "groups": _write_lines(root / GROUPS, _groups(session, found, progress)),

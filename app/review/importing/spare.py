@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from itertools import islice
 
 from app.datasets.issia import FramePersons
-from app.review.datasets.dataset import read_dataset
+from app.review.datasets.dataset import read_dataset_head
 from app.review.importing.ingest import IngestReport, ensure_dataset
 from app.soccer.annotation import Extras
 from app.store.clock import now
@@ -56,7 +56,7 @@ def spare_frames(session: Session, dataset_id: int) -> Iterator[SpareFrame]:
 
 def spare_persons(session: Session, dataset: str | int) -> Iterator[FramePersons]:
     """People of the spare frames of a dataset of ISSIA, for its original shape."""
-    for item in spare_frames(session, read_dataset(session, dataset).id):
+    for item in spare_frames(session, read_dataset_head(session, dataset).id):
         if _NUMBER.fullmatch(item.frame) and _CAMERA.fullmatch(item.camera):
             yield FramePersons(int(item.frame), item.camera, item.extras.boxes)
 

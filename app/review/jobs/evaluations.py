@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import asdict
 from typing import Any
 
-from app.review.datasets.dataset import get_head
+from app.review.datasets.dataset import get_dataset_head
 from app.review.evaluating.accept import AcceptReport, AcceptRequest, accept, plan_accept
 from app.review.evaluating.evaluation import list_evaluations
 from app.review.evaluating.evaluation_run import EvaluationRequest, check_evaluation, run_evaluation
@@ -36,7 +36,7 @@ def request_evaluation(
     Raises:
         InputError, NotFoundError: As ``run_evaluation`` does.
     """
-    found = get_head(store, dataset)
+    found = get_dataset_head(store, dataset)
     check_evaluation(store, found.id, request)
     return jobs.submit(
         EVALUATE,
@@ -63,7 +63,7 @@ def request_accept(
     Raises:
         InputError, NotFoundError: As ``plan_accept`` does.
     """
-    found = get_head(store, dataset)
+    found = get_dataset_head(store, dataset)
     plan = plan_accept(store, found.id, request)
     return jobs.submit(
         ACCEPT,

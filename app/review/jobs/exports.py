@@ -10,7 +10,7 @@ from app.datasets.store_output import require_absent
 from app.errors import InputError, NotFoundError
 from app.object_store.address import SCHEME
 from app.object_store.path import StoredPath, target_path
-from app.review.datasets.dataset import get_head
+from app.review.datasets.dataset import get_dataset_head
 from app.review.exporting.export import export, require_possible
 from app.review.exporting.folder import ExportFolder
 from app.review.jobs.job_run import JobProgress, Work, counting
@@ -50,7 +50,7 @@ def request_export(
         InputError: There is nothing to export, or it cannot be written as it is asked for.
         OverloadedError: Too many jobs wait.
     """
-    found = get_head(store, request["dataset"])
+    found = get_dataset_head(store, request["dataset"])
     version = request.get("version")
     if request.get("to") is not None:
         require_absent(_target(store, request["to"]))

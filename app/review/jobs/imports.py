@@ -10,7 +10,7 @@ from app.config import Settings
 from app.datasets.file_tree import Root
 from app.errors import InputError
 from app.progress import Progress
-from app.review.datasets.dataset import get_head, require_name
+from app.review.datasets.dataset import get_dataset_head, require_name
 from app.review.editing.paint import has_pictures
 from app.review.importing.folders import resolve_folder
 from app.review.importing.import_child import Outcome, import_apart
@@ -158,7 +158,7 @@ def _following(jobs: Jobs, store: Store, dataset: str, actor: str) -> dict[str, 
     The clicks are solved first, for that takes seconds; reading the pictures is asked for next, and
     solves once more what it changes.
     """
-    found = get_head(store, dataset)
+    found = get_dataset_head(store, dataset)
     solve, paint = request_solve(jobs, store, found.id, actor=actor), None
     if found.policy.calibration.source == "paint" and has_pictures(store, found.id):
         paint = PAINT.request(jobs, store, found.id, None, actor=actor).id

@@ -54,7 +54,7 @@ CAPACITY = 32
 """Jobs that may wait; one more is told to come back."""
 CLOSE_SECONDS = 10.0
 """How long a server that stops waits for the running job's next step."""
-THEIRS = 4
+LEFT_TO_OTHERS = 4
 """One person leaves this part of the waiting places (one of so many) to others."""
 BESIDE = frozenset({"export"})
 """Kinds that only read and that somebody waits for; a long import or solve does not keep them waiting."""
@@ -306,7 +306,7 @@ class Jobs(JobRecords):
             raise OverloadedError(
                 f"{len(waiting)} jobs wait already", hint="Send it again in a while."
             )
-        if own >= self._capacity - self._capacity // THEIRS:
+        if own >= self._capacity - self._capacity // LEFT_TO_OTHERS:
             raise OverloadedError(
                 f"{own} jobs that you asked for wait already",
                 hint="Send it again when some of them are done.",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from app.errors import ConflictError
-from app.review.datasets.dataset import get_head
+from app.review.datasets.dataset import get_dataset_head
 from app.review.editing.rig import accept, adjustable, proposal_values, propose, take_back
 from app.review.jobs.job_run import JobProgress, Work
 from app.review.jobs.jobs import Jobs
@@ -40,7 +40,7 @@ def request_rig(
     Raises:
         InputError, ConflictError: As ``editing.rig.adjustable`` does.
     """
-    found = get_head(store, dataset)
+    found = get_dataset_head(store, dataset)
     adjustable(store, found.id)
     return jobs.submit(
         KIND,
@@ -71,7 +71,7 @@ def take_rig_back(
     Raises:
         ConflictError: There is nothing to take back.
     """
-    found = get_head(store, dataset)
+    found = get_dataset_head(store, dataset)
     count = take_back(store, found.id, actor=actor, keep=keep)
     request_solve(jobs, store, found.id, actor=actor)
     return count

@@ -7,7 +7,7 @@ from contextlib import nullcontext
 from dataclasses import dataclass
 from typing import TypeVar
 
-from app.review.datasets.dataset import get_head, list_datasets
+from app.review.datasets.dataset import get_dataset_head, list_datasets
 from app.review.editing.pitches import (
     DatasetPitches,
     apply_pitches,
@@ -166,7 +166,7 @@ def solve_work(store: Store, dataset_id: int, pool: Pool = nullcontext) -> Work:
     """The work itself: what to do is found in the data when it starts."""
 
     def work(progress: JobProgress) -> Json:
-        found = get_head(store, dataset_id)
+        found = get_dataset_head(store, dataset_id)
         progress(0, None, f"Solving {found.name}.")
         large = (
             len(stale_groups(store, dataset_id)) >= WORTH_A_POOL

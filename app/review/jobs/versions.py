@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from app.errors import NotFoundError
-from app.review.datasets.dataset import get_head
+from app.review.datasets.dataset import get_dataset_head
 from app.review.jobs.job_run import JobProgress, Work
 from app.review.jobs.jobs import Jobs
 from app.review.versions.freeze import FreezeRequest, freeze, plan_freeze
@@ -34,7 +34,7 @@ def request_freeze(
     Raises:
         InputError, ConflictError: As ``freeze`` does.
     """
-    found = get_head(store, dataset)
+    found = get_dataset_head(store, dataset)
     plan_freeze(store, found.id, request, strict=True)
     return jobs.submit(
         FREEZE,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from app.review.datasets.dataset import read_dataset, save_policy
+from app.review.datasets.dataset import read_dataset_head, save_policy
 from app.review.editing.state import require_etag
 from app.soccer.policy import Policy
 from app.store.digest import digest
@@ -80,5 +80,5 @@ def apply_policy(
 
 
 def _read(session: Session, dataset: str | int) -> PolicyState:
-    found = read_dataset(session, dataset)
+    found = read_dataset_head(session, dataset)
     return PolicyState(found.id, found.name, found.policy, policy_history(session, found.id))

@@ -14,7 +14,7 @@ from typing import Any
 from app.datasets.manifest import software_version
 from app.errors import ConflictError, InputError
 from app.progress import Progress
-from app.review.datasets.dataset import DatasetHead, read_dataset
+from app.review.datasets.dataset import DatasetHead, read_dataset_head
 from app.review.datasets.licence import licence_text
 from app.review.versions.membership import RULES, Candidate, read_candidates, require_solved
 from app.review.versions.version import Version, calibration_names, read_version
@@ -107,7 +107,7 @@ def plan_freeze(
     """
     request.check()
     with store.read() as session:
-        found = read_dataset(session, dataset)
+        found = read_dataset_head(session, dataset)
         _require_free(session, found, request.name)
         candidates = read_candidates(session, found.id, request.groups)
     if strict:
@@ -144,7 +144,7 @@ def freeze(
     """
     request.check()
     with store.read() as session:
-        found = read_dataset(session, dataset)
+        found = read_dataset_head(session, dataset)
         _require_free(session, found, request.name)
         candidates = read_candidates(session, found.id, request.groups)
         require_solved(candidates)

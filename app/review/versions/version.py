@@ -9,7 +9,7 @@ from typing import Any
 
 from app.errors import InputError, NotFoundError, StorageError
 from app.finite import quoted
-from app.review.datasets.dataset import read_dataset
+from app.review.datasets.dataset import read_dataset_head
 from app.soccer.group import Group
 from app.soccer.policy import Policy
 from app.soccer.solution import Solution
@@ -70,7 +70,7 @@ class FrozenGroup:
 def list_versions(store: Store, dataset: str | int) -> list[Version]:
     """The versions of a dataset, newest first."""
     with store.read() as session:
-        found = read_dataset(session, dataset)
+        found = read_dataset_head(session, dataset)
         return _versions(session, dataset_versions(session, found.id))
 
 

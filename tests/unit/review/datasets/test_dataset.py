@@ -3,7 +3,7 @@ from __future__ import annotations
 import pytest
 
 from app.errors import InputError, NotFoundError
-from app.review.datasets.dataset import get_dataset, get_head, list_datasets
+from app.review.datasets.dataset import get_dataset, get_dataset_head, list_datasets
 from app.review.editing.recompute import solve_dataset, stale_groups
 from app.review.editing.submit import load
 from app.review.importing.ingest import ensure_dataset
@@ -33,7 +33,7 @@ class TestGetHead:
     def test_counts_no_group(self, store, counted) -> None:
         made = ensure_dataset(store, "spring 2030", "ann")
         with counted(store) as cost:
-            found = get_head(store, "spring 2030")
+            found = get_dataset_head(store, "spring 2030")
         assert cost.statements == 1
         whole = get_dataset(store, made)
         assert (found.id, found.name, found.created, found.policy) == (

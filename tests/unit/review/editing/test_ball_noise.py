@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from app.review.editing import ball_noise
+from app.review.editing import group_edits
 from app.review.editing.ball_noise import give_factors, read_placed, with_noise
 from app.review.editing.edit import SetBall, SetBalls, Several
 from app.review.editing.past import history
@@ -112,7 +112,7 @@ class TestGiveFactors:
     def test_all_groups_get_theirs_and_those_that_have_it_are_left_alone(
         self, store: Store, fill, make_static, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        monkeypatch.setattr(ball_noise, "_BATCH", 1)
+        monkeypatch.setattr(group_edits, "_BATCH", 1)
         groups = fill(*(make_static(frame) for frame in (10, 11)))
         for group in groups:
             etag = load(store, group).etag
