@@ -10,8 +10,29 @@ from typing import Any
 
 import pytest
 
+from app.review.jobs.job_run import JobProgress
 from app.review.jobs.jobs import Jobs
+from app.store.codecs import Json
+from app.store.jobs import Job
 from tests.waiting import SECONDS
+
+
+class Gate:
+    """Work that says when it runs, and goes on when it is told to."""
+
+    def __init__(self, result: Json = None):
+        self.started, self.finish, self.result = threading.Event(), threading.Event(), result
+
+    def __call__(self, progress: JobProgress) -> Json:
+        self.started.set()
+        while not self.finish.wait(0.005):
+            progress(1, 2, "Half of it.")
+        return self.result
+
+
+def submit(jobs: Jobs, work: Callable[[JobProgress], Json], **options: Any) -> Job:
+    kind = options.pop("kind", "bulk")
+    return jobs.submit(kind, "Some work", work, actor="ann", **options)
 
 
 class Held:
