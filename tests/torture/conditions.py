@@ -308,6 +308,7 @@ def damaged_meanwhile(home: Path) -> list[str]:
             person = _Person(http)
             faults = person.edit(200)
             damage.scribble(home, place)
+            damage.write_beside(home)
             answers = [person.send(), person.send(), http.get("/readyz")]
             for answer in answers:
                 if answer.status_code != 503 or "is damaged" not in answer.json()["detail"]:

@@ -71,5 +71,12 @@ def settle(home: Path) -> None:
         connection.execute("PRAGMA wal_checkpoint(TRUNCATE)")
 
 
+def write_beside(home: Path) -> None:
+    """Count one up, as each write of ours does: a server then believes none of the pages it keeps."""
+    with closing(_connected(home)) as connection:
+        (count,) = connection.execute("PRAGMA user_version").fetchone()
+        connection.execute(f"PRAGMA user_version = {count + 1}")
+
+
 def _connected(home: Path) -> sqlite.Connection:
     return sqlite.connect(str(home / DATABASE))
