@@ -14,6 +14,7 @@ KINDS = (
     "readers",
     "fetchers",
     "previews",
+    "large",
     "predictions",
     "imports",
     "paint",

@@ -268,6 +268,11 @@ class Settings(BaseSettings):
         return Path(self.database.partition("///")[2].partition("?")[0])
 
     @property
+    def solves_apart(self) -> bool:
+        """Whether processes of its own solve what people ask: a team's, in one process that answers."""
+        return self.team and self.web_workers == 1
+
+    @property
     def database_name(self) -> str:
         """What the database is called in a sentence: its file, or its name on its server."""
         if self.database.startswith("sqlite"):

@@ -19,6 +19,7 @@ from fastapi import Depends, Header, Path, Query, Request
 
 from app.api.errors import PreconditionRequiredError
 from app.api.events import Events
+from app.api.large_edits import LargeEdits
 from app.api.previews import Previews
 from app.api.security.access import login_of, sight_of
 from app.config import Settings
@@ -87,6 +88,7 @@ class Services:
     settings: Settings
     store: Store
     frames: Frames
+    large: LargeEdits
     previews: Previews
     predictions: PredictionReader
     exports: ExportFolder
@@ -110,11 +112,13 @@ class Services:
         store = Store.open(settings)
         jobs = SharedJobs(store, pool=pool) if store.sharing.is_shared else Jobs(store, pool=pool)
         exports, frames = ExportFolder(settings.exports), Frames(settings)
+        large = LargeEdits(settings)
         return Services(
             settings,
             store,
             frames,
-            Previews(settings, store, PaintFollower(frames)),
+            large,
+            Previews(settings, store, PaintFollower(frames), large),
             PredictionReader(settings),
             exports,
             jobs,
@@ -192,6 +196,7 @@ class Services:
         for work in (self.webhooks, self.jobs, self.upkeep):
             work.close(self.stopping.seconds_left())
         self.previews.close()
+        self.large.close()
         self.frames.close()
         self.predictions.close()
         self.store.close()

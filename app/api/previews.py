@@ -8,33 +8,32 @@ until it is ready they are solved here, as on a server that somebody runs alone.
 from __future__ import annotations
 
 import gc
-from concurrent.futures import Future
+from collections.abc import Sequence
+from functools import partial
 
-import structlog
 from fastapi import Request
 from starlette.concurrency import run_in_threadpool
 
 from app.api.edits import preview_edits
+from app.api.large_edits import LargeEdits
 from app.api.pool_answer import while_wanted
 from app.api.schemas.preview import PreviewDocument, PreviewRequest
 from app.api.schemas.solution import SolutionDocument
 from app.api.security.lanes import is_large
+from app.api.warm_child import WarmChild
 from app.child import Allowance, ChildEnded
-from app.child_figures import FIGURES
-from app.child_pool import ChildPool
 from app.config import Settings
 from app.errors import OverloadedError
+from app.review.editing.edit import Edit
 from app.review.editing.follow_paint import PaintFollower, WithoutPictures
-from app.review.editing.submit import preview
+from app.review.editing.submit import Solver, preview
+from app.soccer.group import Group
+from app.solving.solve import solve
 from app.solving.warm import warm_up
 from app.store.store import Store
 
-log = structlog.get_logger("touchline.previews")
-
 ALLOWANCE = Allowance(memory=2 * 2**30, processor=60.0, silence=120.0)
 """For one preview; the first one of a process may have to wait for kernels to be compiled."""
-WAITING = 100
-"""Previews that may wait for the process; before they do, they wait in their lane."""
 
 _stores: dict[str, Store] = {}
 """In the process of previews: the database, once it was opened."""
@@ -47,21 +46,18 @@ class Previews:
         settings: Whether there is a process for them.
         store: Has the groups.
         paint: Reads the paint of edited lines again, which the process cannot.
+        large: Solves large ones, for the process does one at a time.
     """
 
-    def __init__(self, settings: Settings, store: Store, paint: PaintFollower):
-        self._settings, self._store, self._paint = settings, store, paint
-        apart = settings.team and settings.web_workers == 1
-        figures = FIGURES["previews"]
-        self._pool = ChildPool(ALLOWANCE, 1, WAITING, "previews", figures) if apart else None
-        self._begun = False
-        self.is_ready = False
-        """Whether the process is there."""
+    def __init__(self, settings: Settings, store: Store, paint: PaintFollower, large: LargeEdits):
+        self._settings, self._store, self._paint, self._large = settings, store, paint, large
+        made = settings.solves_apart
+        self.child = (
+            WarmChild("previews", ALLOWANCE, _ended, make_ready, settings) if made else None
+        )
 
     async def answer(self, request: Request, group_id: int, changes: PreviewRequest) -> bytes:
         """The document of a what-if; empty where nobody waits for it any more.
-
-        A large one is solved here, for the process has one at a time.
 
         Raises:
             NotFoundError: There is no such group.
@@ -69,10 +65,13 @@ class Previews:
             SharedStationError: See ``submit.preview``.
             OverloadedError: The process ended.
         """
-        self._begin()
-        if self._pool is not None and self.is_ready and not is_large(request.scope):
-            given = (self._settings, group_id, changes)
-            task = self._pool.submit(solve_apart, *given, explain=_ended)
+        if is_large(request.scope):
+            apart = partial(self._large.run, solve)
+            return await run_in_threadpool(
+                _solve, self._store, group_id, changes, self._paint, apart
+            )
+        if self.child is not None and self.child.begin():
+            task = self.child.submit(solve_apart, self._settings, group_id, changes)
             found: bytes | None = await while_wanted(request, task)
             if found is not None:
                 return found
@@ -82,23 +81,8 @@ class Previews:
 
     def close(self) -> None:
         """End the process."""
-        if self._pool is not None:
-            self._pool.close()
-
-    def _begin(self) -> None:
-        """Start the process, when it is wanted first."""
-        if self._pool is not None and not self._begun:
-            self._begun = True
-            begun = self._pool.submit(make_ready, self._settings, explain=_ended, bounded=False)
-            begun.future.add_done_callback(self._note)
-
-    def _note(self, begun: Future[None]) -> None:
-        if begun.cancelled():
-            return
-        error = begun.exception()
-        self.is_ready = error is None
-        if error is not None:
-            log.warning("there is no process for previews", error=str(error))
+        if self.child is not None:
+            self.child.close()
 
 
 def make_ready(settings: Settings) -> None:
@@ -123,8 +107,17 @@ def _opened(settings: Settings) -> Store:
     return _stores[key]
 
 
-def _solve(store: Store, group_id: int, changes: PreviewRequest, paint: PaintFollower) -> bytes:
-    edited, solution = preview(store, group_id, lambda found: preview_edits(found, changes), paint)
+def _solve(
+    store: Store,
+    group_id: int,
+    changes: PreviewRequest,
+    paint: PaintFollower,
+    solve: Solver = solve,
+) -> bytes:
+    def edits(found: Group) -> Sequence[Edit]:
+        return preview_edits(found, changes)
+
+    edited, solution = preview(store, group_id, edits, paint, solve)
     document = PreviewDocument(solution=SolutionDocument.of(solution, edited))
     return document.model_dump_json().encode()
 

@@ -26,6 +26,7 @@ from app.api.routers.groups import CHANGED, CONFLICTS, change_group, load_docume
 from app.api.schemas.annotation import BallEdit, LinesEdit
 from app.api.schemas.group import GroupDocument
 from app.api.schemas.view import NeighbourList, ViewEdit, frames_away
+from app.api.security.lanes import is_large
 from app.child import ChildEnded
 from app.errors import ImageError, NotFoundError, StorageError, TooLargeError
 from app.review.editing.edit import (
@@ -37,6 +38,7 @@ from app.review.editing.edit import (
     SetPicture,
 )
 from app.review.editing.places import FoundView, find_view
+from app.review.editing.solve_encoded import Solve, solve_encoded
 from app.review.editing.submit import submit_view
 from app.review.editing.view_paint import NO_FRAME_HINT
 from app.soccer.media import Media
@@ -78,12 +80,17 @@ def patch_lines(
     actor: Actor,
     if_match: IfMatch,
     asked: AskedUnder,
+    request: Request,
 ) -> Response:
     """Draw, move or delete markings; 409 names the station when the camera is static."""
     points, proposed = lines.points(), tuple(lines.proposed)
-    return _submit(
-        services, view, lambda key: SetLines(key, points, proposed), if_match, actor, asked
-    )
+
+    def edit(key: str) -> Edit:
+        return SetLines(key, points, proposed)
+
+    apart = partial(services.large.run, solve_encoded)
+    solve = apart if is_large(request.scope) else solve_encoded
+    return _submit(services, view, edit, if_match, actor, asked, solve)
 
 
 @router.patch(
@@ -139,11 +146,11 @@ def _submit(
     if_match: str,
     actor: str,
     asked: Asked | None,
+    solve: Solve = solve_encoded,
 ) -> Response:
     store = services.store
-    change = partial(
-        submit_view, store, view, edit_of, if_match=if_match, actor=actor, paint=services.paint
-    )
+    change = partial(submit_view, store, view, edit_of, if_match=if_match, actor=actor)
+    change = partial(change, paint=services.paint, solve=solve)
     return change_group(asked, lambda: load_document_of_view(store, view), change)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from app.soccer.group import Group
@@ -11,6 +11,9 @@ from app.soccer.solution import Calibration, Solution
 from app.solving.facts_codec import facts_to_bytes
 from app.solving.solve import solve_with_facts
 from app.store.solutions import EncodedSolution, SolutionKey, encode_solution
+
+Solve = Callable[[Group, Policy, Mapping[str, Calibration]], tuple[Solution, EncodedSolution]]
+"""``solve_encoded``, or who has another process do it."""
 
 
 @dataclass(frozen=True)

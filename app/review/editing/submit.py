@@ -20,10 +20,11 @@ from app.review.editing.etags import read_etags, require_said, require_unchanged
 from app.review.editing.follow_paint import PaintFollower
 from app.review.editing.known import known_calibrations
 from app.review.editing.point_limits import require_few_points_in_all
-from app.review.editing.solve_encoded import solve_encoded
+from app.review.editing.solve_encoded import Solve, solve_encoded
 from app.review.editing.state import GroupState, Record, read_record, read_state
 from app.review.editing.undo import next_step
 from app.soccer.group import Group
+from app.soccer.policy import Policy
 from app.soccer.solution import Calibration, Solution
 from app.solving.solve import solve
 from app.store.answers import Keep, keep_nothing
@@ -68,14 +69,17 @@ class _How(TypedDict):
         actor: Who says so.
         keep: Keeps the answer with the step.
         paint: Reads the paint of edited lines again, as part of it; None: it stays as it is.
+        solve: Solves the group that comes of it.
     """
 
     if_match: str
     actor: str
     keep: NotRequired[Keep[GroupState]]
     paint: NotRequired[PaintFollower | None]
+    solve: NotRequired[Solve]
 
 
+Solver = Callable[[Group, Policy, Mapping[str, Calibration]], Solution]
 _Find = Callable[[Session], int]
 _Plan = Callable[[Session, Record, str], _Change]
 
@@ -115,8 +119,7 @@ def submit(
         store: The database.
         group_id: The group.
         edit: What to change.
-        how: ETag of the state that the edit builds on (``if_match``), who says so (``actor``), what
-            keeps the answer with it (``keep``), and what reads the paint of its lines (``paint``).
+        how: See ``_How``.
 
     Raises:
         StaleRevisionError: Somebody else was faster.
@@ -159,6 +162,7 @@ def preview(
     group_id: int,
     edits_of: Callable[[Group], Sequence[Edit]],
     paint: PaintFollower | None = None,
+    solve: Solver = solve,
 ) -> tuple[Group, Solution]:
     """The group and its solution as they would be after the edits that ``edits_of`` makes for it.
 
@@ -255,6 +259,7 @@ def _change(
     actor: str,
     keep: Keep[GroupState] = keep_nothing,
     paint: PaintFollower | None = None,
+    solve: Solve = solve_encoded,
 ) -> GroupState:
     while True:
         with store.read() as session:
@@ -269,7 +274,7 @@ def _change(
         painted = change.group
         if paint is not None:
             painted = paint.follow(painted, before.stored.policy.calibration, known)
-        outcome = _outcome(before, change, painted, known)
+        outcome = _outcome(before, change, painted, solve(painted, before.stored.policy, known))
         state = outcome.after.state(outcome.solution)
         kept = keep(state)
         with store.write() as session:
@@ -283,15 +288,14 @@ def _change(
 
 
 def _outcome(
-    before: Record, change: _Change, painted: Group, known: Mapping[str, Calibration]
+    before: Record, change: _Change, painted: Group, result: tuple[Solution, EncodedSolution]
 ) -> _Outcome:
     at = now()
     stored = next_revision(before.stored, change.group, at)
     if painted is not change.group:
         stored = next_revision(stored, painted, at)
     after = replace(before, stored=stored, stacks=before.stacks.then(change.kind))
-    solution, encoded = solve_encoded(painted, stored.policy, known)
-    return _Outcome(change, painted, before, after, solution, encoded)
+    return _Outcome(change, painted, before, after, *result)
 
 
 def _save(session: Session, outcome: _Outcome, actor: str) -> None:

@@ -21,6 +21,7 @@ from starlette.testclient import TestClient
 
 from app.api import metrics
 from app.api.deps import Services
+from app.api.large_edits import LargeEdits
 from app.api.previews import Previews
 from app.api.security.lanes import EDITS, LANES
 from app.child import ChildEnded
@@ -149,7 +150,9 @@ def previews(app: FastAPI) -> Iterator[Previews]:
     """What a server of a team has."""
     services = app.state.services
     settings = services.settings.model_copy(update={"team": True})
-    with closing(Previews(settings, services.store, services.paint)) as made:
+    large = LargeEdits(settings)
+    given = settings, services.store, services.paint, large
+    with closing(large), closing(Previews(*given)) as made:
         yield made
 
 
@@ -158,7 +161,8 @@ POOLS: dict[str, Callable[[Services, Previews], Any]] = {
     "readers": lambda services, _: services.frames._readers,
     "fetchers": lambda services, _: services.frames._fetchers,
     "predictions": lambda services, _: services.predictions._pool,
-    "previews": lambda _, previews: previews._pool,
+    "previews": lambda _, previews: previews.child._pool,
+    "large": lambda _, previews: previews._large.child._pool,
 }
 
 

@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 from fastapi import FastAPI
 
+from app.api.large_edits import LargeEdits
 from app.api.previews import Previews
 from app.api.security.lanes import LARGE_BYTES
 from app.errors import DamagedError
@@ -42,7 +43,7 @@ def apart(app: FastAPI) -> Iterator[Previews]:
     """What a server of a team has."""
     services = app.state.services
     settings = services.settings.model_copy(update={"team": True})
-    made = Previews(settings, services.store, services.paint)
+    made = Previews(settings, services.store, services.paint, LargeEdits(settings))
     app.state.services = replace(services, previews=made)
     yield made
     made.close()
@@ -53,7 +54,7 @@ def ready(apart: Previews, api) -> Previews:
     """It, once its process answers."""
     assert preview(api).status_code == 200
     end = time.monotonic() + SECONDS
-    while not apart.is_ready:
+    while not apart.child.begin():
         assert time.monotonic() < end, "there is no process for previews"
         time.sleep(0.02)
     return apart
@@ -64,18 +65,18 @@ class TestAlone:
         before = multiprocessing.active_children()
         assert preview(api).status_code == 200
         assert multiprocessing.active_children() == before
-        assert not app.state.services.previews.is_ready
+        assert app.state.services.previews.child is None
 
 
 class TestApart:
     def test_who_begins_is_answered_before_the_process_is_there(self, apart, api) -> None:
         answer = preview(api)
-        assert (answer.status_code, apart.is_ready) == (200, False)
+        assert (answer.status_code, apart.child.is_ready) == (200, False)
 
     def test_the_process_answers_as_the_server_does(self, app, ready, api, monkeypatch) -> None:
         asked = ({}, {"group": 99}, {"view": "no such view"})
         apart = [alike(preview(api, **one)) for one in asked]
-        monkeypatch.setattr(ready, "is_ready", False)
+        monkeypatch.setattr(ready.child, "is_ready", False)
         assert apart == [alike(preview(api, **one)) for one in asked]
         assert [status for status, *_ in apart] == [200, 404, 400]
 
@@ -89,7 +90,7 @@ class TestApart:
         ).raise_for_status()
         assert preview(api).json()["solution"]["pairs"] != before["pairs"]
 
-    def test_a_large_one_is_left_to_the_server_so_that_drags_need_not_wait_for_it(
+    def test_a_large_one_is_solved_elsewhere_so_that_drags_need_not_wait_for_it(
         self, ready, api, monkeypatch
     ) -> None:
         monkeypatch.setattr("app.api.previews.solve_apart", see_damage)

@@ -1,0 +1,82 @@
+"""Large edits: solves edits and previews of hundreds of points where they keep nobody waiting.
+
+One of them takes as long as dozens of others, and one interpreter computes one thing at a time. A
+server of a team has a process for them, which gives way to the server where both want a processor
+(decision 0062).
+"""
+
+from __future__ import annotations
+
+import gc
+import os
+from collections.abc import Callable, Mapping
+from concurrent.futures import CancelledError
+from typing import TypeVar
+
+from app.api.warm_child import WarmChild
+from app.child import Allowance, ChildEnded
+from app.config import Settings
+from app.errors import OverloadedError
+from app.soccer.group import Group
+from app.soccer.policy import Policy
+from app.soccer.solution import Calibration
+from app.solving.warm import warm_up
+
+Solved = TypeVar("Solved")
+
+ALLOWANCE = Allowance(memory=2 * 2**30, processor=60.0, silence=120.0)
+"""For one; the first one of a process may have to wait for kernels to be compiled."""
+NICENESS = 5
+
+
+class LargeEdits:
+    """Has large groups solved.
+
+    Args:
+        settings: Whether there is a process for them.
+    """
+
+    def __init__(self, settings: Settings):
+        self.child = (
+            WarmChild("large", ALLOWANCE, _ended, make_ready) if settings.solves_apart else None
+        )
+
+    def run(
+        self,
+        work: Callable[[Group, Policy, Mapping[str, Calibration]], Solved],
+        group: Group,
+        policy: Policy,
+        known: Mapping[str, Calibration],
+    ) -> Solved:
+        """What a function of a module that solves a group makes of it; waits for the process.
+
+        Raises:
+            OverloadedError: The process ended.
+        """
+        if self.child is None or not self.child.begin():
+            return work(group, policy, known)
+        task = self.child.submit(work, group, policy, known)
+        try:
+            found: Solved = task.future.result()
+        except CancelledError as error:
+            raise OverloadedError(
+                "the server stops", hint="Nothing was saved. Try it again in a moment."
+            ) from error
+        return found
+
+    def close(self) -> None:
+        """End the process."""
+        if self.child is not None:
+            self.child.close()
+
+
+def make_ready() -> None:
+    """In the process: give way to others, and load the solver's kernels."""
+    os.nice(NICENESS)
+    warm_up()
+    gc.collect()
+    gc.freeze()
+
+
+def _ended(error: ChildEnded) -> OverloadedError:
+    return OverloadedError(f"solving this {error}", hint="Nothing was saved. Try it again.")
