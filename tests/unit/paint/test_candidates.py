@@ -11,7 +11,11 @@ from tests.unit.paint.lawns import PITCH, SMALL, TRUE
 
 FOCAL = TRUE.focal_length[0]
 EXACT = Library(
-    "exact", TRUE.position[None], (FOCAL / SMALL.width, FOCAL / SMALL.width), np.ones(3)
+    "exact",
+    # A copy, as the product's: for an array that is only read all would be compiled once more.
+    np.array([TRUE.position]),
+    (FOCAL / SMALL.width, FOCAL / SMALL.width),
+    np.ones(3),
 )
 
 
