@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from multiprocessing import Process
+
 import numpy as np
 
 from app.paint.view_paint import paint_of
 from app.paint.view_proposal import proposal_of
 from app.sample.render import render
+from app.sample.scene import Scene
 from app.soccer.policy import PAPER
 from app.solving.solve import solve
 from app.solving.warm import warm_up
@@ -14,14 +17,25 @@ from tests.scenes import make_scenes
 
 
 def compile_all() -> None:
-    """Solve a group, draw one of its pictures and read it; what was compiled before is loaded."""
-    warm_up()
+    """Solve a group, draw one of its pictures and read it; what was compiled before is loaded.
+
+    Another process solves meanwhile: it is not the half of it, and reading comes to it last.
+    """
     scene = make_scenes(groups=1, seed=3, faults=False)[0]
-    first = solve(scene.group, PAPER).views[0].calibration
+    solving = Process(target=_solve, args=(scene,))
+    solving.start()
     view, pitch, policy = scene.group.views[0], scene.group.pitch, PAPER.calibration
     image = np.ascontiguousarray(render(scene, view.key)[:, :, ::-1])
-    assert paint_of(image, view.size, first, pitch, policy).outcome == "snapped"
     assert proposal_of(image, view.size, (), pitch, policy).lines
+    solving.join()
+    assert solving.exitcode == 0
+    first = solve(scene.group, PAPER).views[0].calibration
+    assert paint_of(image, view.size, first, pitch, policy).outcome == "snapped"
+
+
+def _solve(scene: Scene) -> None:
+    warm_up()
+    assert solve(scene.group, PAPER).views[0].calibration
 
 
 if __name__ == "__main__":
