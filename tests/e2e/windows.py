@@ -180,11 +180,10 @@ class _Window:
             with suppress(KeyError):
                 tab.remove_listener(*self.heard.pop())
         with suppress(Error):
-            # The page is gone before its requests can reach the server again.
-            tab.goto("about:blank", timeout=EMPTYING_MS)
-            tab.unroute_all()
-            # What a tab keeps for itself is forgotten where it was kept, once the page is gone.
+            # The page is gone before its requests can reach the server again, and before what a
+            # tab keeps for itself is forgotten, which only a page of the same server can do.
             tab.goto("/healthz", timeout=EMPTYING_MS)
+            tab.unroute_all()
             tab.evaluate("() => sessionStorage.clear()")
             tab.goto("about:blank", timeout=EMPTYING_MS)
             # What is still held is let go where nothing happens.
