@@ -62,6 +62,8 @@ def ask_until(port: int, enough: int, but: set[int]) -> set[int]:
     until = time.monotonic() + SECONDS
     while len(found) < enough and time.monotonic() < until:
         found |= {ask(port)} - but - {0}
+        # Who is there already would be asked all the time while another starts.
+        time.sleep(0.01)
     return found
 
 
