@@ -22,7 +22,7 @@ GROUPS = 14
 
 
 def solutions(home: Path) -> int:
-    return count_rows(home)["solution"]
+    return count_rows(home, "solution")["solution"]
 
 
 def test_a_scheduler_that_goes_and_comes_back_costs_no_group(tmp_path: Path) -> None:

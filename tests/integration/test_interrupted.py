@@ -18,7 +18,7 @@ GROUPS = 60
 
 
 def solved(home: Path) -> int:
-    return count_rows(home)["solution"]
+    return count_rows(home, "solution")["solution"]
 
 
 def test_solve_keeps_what_is_done_and_goes_on_from_there(tmp_path: Path) -> None:
