@@ -21,7 +21,10 @@ CONVERGED = "converged"
 OUT_OF_STEPS = "out of steps"
 STUCK = "no step lowers the cost"
 
-_DAMPING_RANGE = (1e-9, 1e9)
+TOLERANCE = 1e-6
+"""A start has converged when a kept step lowers its cost by less than this share."""
+_FIRST_DAMPING, _DAMPING_RANGE = 1e-3, (1e-9, 1e9)
+"""Relative to the diagonal of J^T W J."""
 
 
 @dataclass(frozen=True)
@@ -45,14 +48,7 @@ class Fit:
     reasons: tuple[str, ...]
 
 
-def levenberg_marquardt(
-    normal_equations: NormalEquations,
-    start: FloatArray,
-    steps: int,
-    *,
-    tolerance: float = 1e-6,
-    damping: float = 1e-3,
-) -> Fit:
+def levenberg_marquardt(normal_equations: NormalEquations, start: FloatArray, steps: int) -> Fit:
     """Minimise a sum of squares from each row of ``start``.
 
     Each round damps the normal equations, proposes a step for every start that still moves,
@@ -63,19 +59,16 @@ def levenberg_marquardt(
         normal_equations: The problem; called with all starts that still move.
         start: Shape (B, n).
         steps: Most rounds.
-        tolerance: A start has converged when a kept step lowers its cost by less than this
-            share.
-        damping: First damping, relative to the diagonal of J^T W J.
     """
     parameters = np.array(start, dtype=np.float64)
     count = len(parameters)
     cost, gradient, information = (np.array(part) for part in normal_equations(parameters))
-    damping_now = np.full(count, damping)
+    damping = np.full(count, _FIRST_DAMPING)
     accepted, rejected = np.zeros(count), np.zeros(count)
     reasons = np.full(count, OUT_OF_STEPS, dtype=object)
     moving = np.arange(count)
     for _ in range(steps):
-        step = _damped_step(gradient[moving], information[moving], damping_now[moving])
+        step = _damped_step(gradient[moving], information[moving], damping[moving])
         trial = parameters[moving] + step
         trial_cost, trial_gradient, trial_information = normal_equations(trial)
         better = trial_cost < cost[moving]
@@ -85,10 +78,10 @@ def levenberg_marquardt(
         gradient[kept], information[kept] = trial_gradient[better], trial_information[better]
         accepted[kept] += 1
         rejected[refused] += 1
-        damping_now[kept] = np.maximum(damping_now[kept] / 5, _DAMPING_RANGE[0])
-        damping_now[refused] *= 4
-        reasons[kept[gain < tolerance]] = CONVERGED
-        reasons[refused[damping_now[refused] > _DAMPING_RANGE[1]]] = STUCK
+        damping[kept] = np.maximum(damping[kept] / 5, _DAMPING_RANGE[0])
+        damping[refused] *= 4
+        reasons[kept[gain < TOLERANCE]] = CONVERGED
+        reasons[refused[damping[refused] > _DAMPING_RANGE[1]]] = STUCK
         moving = np.flatnonzero(reasons == OUT_OF_STEPS)
         if len(moving) == 0:
             break

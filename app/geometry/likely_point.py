@@ -121,18 +121,6 @@ def likely_points(
     return made
 
 
-def look(cameras: CameraTable, number: int, point: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Pixel of a point in one of the cameras, NaN where it does not show it, and its derivative.
-
-    Returns:
-        Shapes (2,) and (2, 3), pixels and pixels per metre.
-    """
-    pixel, slope = np.empty(2), np.empty((2, 3))
-    if not _look(*cameras.columns, number, point, pixel, slope):
-        pixel[:] = np.nan
-    return pixel, slope
-
-
 def _kind(camera: Camera) -> int:
     return _WIDE if camera.is_wide else _BENT if camera.distorts else _STRAIGHT
 

@@ -80,7 +80,6 @@ def snap(
     start: Camera,
     pitch: Pitch | None = None,
     *,
-    windows: Sequence[float] = WINDOWS,
     hidden: Sequence[Box] = (),
     policy: CalibrationPolicy | None = None,
     start_covariance: FloatArray | None = None,
@@ -92,14 +91,13 @@ def snap(
         field: The field of play (``grass.field_of_play``), shape (H, W).
         start: A camera of the picture that is right to about the first window.
         pitch: The pitch.
-        windows: How far to either side paint is sought, round by round, pixels at 960 x 540.
         hidden: Boxes in which nothing is believed, pixels.
         policy: Prior of the distortion.
         start_covariance: How well the start is known, where it is known, shape (8, 8).
     """
     reading = read_picture(image, field, hidden)
     return snap_reading(
-        reading, start, pitch or Pitch(), windows, policy or CalibrationPolicy(), start_covariance
+        reading, start, pitch or Pitch(), WINDOWS, policy or CalibrationPolicy(), start_covariance
     )
 
 
@@ -115,6 +113,7 @@ def snap_reading(
     """As ``snap``, for a picture that is prepared already.
 
     Args:
+        windows: How far to either side paint is sought, round by round, pixels at 960 x 540.
         circles_count_twice: A circle of which much is seen stands for two markings, as it tells
             as much as two lines: with the middle line it determines a camera.
     """

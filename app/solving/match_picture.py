@@ -102,14 +102,14 @@ def estimate_match_picture(
     return PictureEstimate(picture_of(warp, (aspect, right, down)), len(seen))
 
 
-def choose_frames(frames: Sequence[PictureFrame], most: int = MAX_FRAMES) -> list[int]:
-    """Indices of the frames with the most independent measurements, at most so many."""
+def choose_frames(frames: Sequence[PictureFrame]) -> list[int]:
+    """Indices of the frames with the most independent measurements, ``MAX_FRAMES`` at most."""
     rich = []
     for index, frame in enumerate(frames):
         count = measurement_count(observe(frame.lines, frame.pitch, frame.size))
         if count >= MIN_MEASUREMENTS:
             rich.append((-count, index))
-    return sorted(index for _, index in sorted(rich)[:most])
+    return sorted(index for _, index in sorted(rich)[:MAX_FRAMES])
 
 
 @dataclass(frozen=True)

@@ -110,7 +110,6 @@ class PitchEstimate:
 def estimate_pitch(
     frames: Sequence[PitchFrame],
     policy: CalibrationPolicy,
-    start: Pitch | None = None,
     *,
     one_match: bool = True,
 ) -> PitchEstimate:
@@ -119,14 +118,13 @@ def estimate_pitch(
     Args:
         frames: Of one match.
         policy: How frames are calibrated.
-        start: Where to begin, 105 x 68 m by default; the answer does not depend on it.
         one_match: Whether the frames are known to be of one match.
 
     Raises:
         DegenerateGeometryError: Too few frames show enough markings, or frames that nobody says
             are of one match show pitches of several sizes.
     """
-    pitch = start or Pitch()
+    pitch = Pitch()
     seen = [_Seen.of(frames[index], pitch, policy) for index in choose_frames(frames)]
     if len(seen) < MIN_FRAMES:
         raise DegenerateGeometryError(
@@ -156,8 +154,8 @@ def estimate_pitch(
     )
 
 
-def choose_frames(frames: Sequence[PitchFrame], most: int = MAX_FRAMES) -> list[int]:
-    """Indices of the frames that say most of length and width, half of them for each.
+def choose_frames(frames: Sequence[PitchFrame]) -> list[int]:
+    """Indices of the ``MAX_FRAMES`` frames that say most of length and width, half of them for each.
 
     A frame tells the length when it shows something of the middle and something of an end, and
     the width when it shows a touchline and something whose width is fixed.
@@ -170,9 +168,10 @@ def choose_frames(frames: Sequence[PitchFrame], most: int = MAX_FRAMES) -> list[
     order = [index for _, index in sorted(rich)]
     length = [index for index in order if _tells_length(frames[index].lines)]
     width = [index for index in order if _tells_width(frames[index].lines)]
-    best = [*length[: most // 2], *width[: most // 2]]
+    half = MAX_FRAMES // 2
+    best = [*length[:half], *width[:half]]
     chosen = dict.fromkeys([*best, *length, *width, *order])
-    return sorted(list(chosen)[:most])
+    return sorted(list(chosen)[:MAX_FRAMES])
 
 
 def _tells_length(lines: Lines) -> bool:

@@ -31,9 +31,9 @@ def _names(pattern: list[str], parts: tuple[str, ...]) -> bool:
     return len(parts) >= len(pattern) and all(map(fnmatchcase, parts, pattern))
 
 
-def leftovers(settings: Settings, seconds: float = DAY) -> Iterator[Path]:
-    """Files and folders that something killed was writing: nothing in them changed for some time."""
-    oldest = time.time() - seconds
+def leftovers(settings: Settings) -> Iterator[Path]:
+    """Files and folders that something killed was writing: nothing in them changed for a day."""
+    oldest = time.time() - DAY
     for pattern in _HALF_WRITTEN:
         # Unlike that of pathlib, it passes over a folder that is deleted meanwhile.
         for name in iglob(pattern, root_dir=settings.home):  # noqa: PTH207
@@ -43,9 +43,9 @@ def leftovers(settings: Settings, seconds: float = DAY) -> Iterator[Path]:
                 yield path
 
 
-def delete_leftovers(settings: Settings, seconds: float = DAY) -> int:
+def delete_leftovers(settings: Settings) -> int:
     """Delete them; returns how many there were."""
-    found = list(leftovers(settings, seconds))
+    found = list(leftovers(settings))
     for path in found:
         clear(path)
     return len(found)

@@ -172,14 +172,13 @@ class Cluster(Executor):
 
     Args:
         place: Where the scheduler is.
-        patience: Seconds that it, or a worker, is waited for when all have gone.
 
     Raises:
         ClusterError: No scheduler answers, it has no worker, or one of another version.
     """
 
-    def __init__(self, place: Place, patience: float = PATIENCE_S):
-        self._place, self._patience, self._build = place, patience, build()
+    def __init__(self, place: Place):
+        self._place, self._build = place, build()
         self._under_way: dict[Future[Any], _Task] = {}
         self._lock = threading.Lock()
         self._ended, self._lost = threading.Event(), threading.Event()
@@ -275,12 +274,12 @@ class Cluster(Executor):
             looked = time.monotonic()
             if _workers_of(self._client) or not self._under_way:
                 seen = looked
-            elif looked - seen > self._patience:
+            elif looked - seen > PATIENCE_S:
                 self._give_up(_no_worker(self._place))
 
     def _send_again(self) -> None:
         """Join the scheduler anew, and send it all that is under way."""
-        deadline = time.monotonic() + self._patience
+        deadline = time.monotonic() + PATIENCE_S
         _leave(self._client)
         while not self._ended.is_set():
             try:

@@ -142,10 +142,10 @@ class SharedJobs(Jobs):
         """See ``Jobs``."""
         self.cancel_each(ids)
 
-    def cancel_all(self, dataset_id: int, seconds: float = CLOSE_SECONDS) -> None:
+    def cancel_all(self, dataset_id: int) -> None:
         """See ``Jobs``."""
         self.cancel_kind(dataset_id)
-        until = time.monotonic() + seconds
+        until = time.monotonic() + CLOSE_SECONDS
         while left := self._running_of(dataset_id):
             if time.monotonic() > until:
                 raise ConflictError(f"job {left[0]} of this dataset is still running")

@@ -15,8 +15,6 @@ from datetime import UTC, datetime, timedelta
 from hmac import compare_digest
 from typing import Any
 
-import structlog
-
 from app.errors import ConflictError, InputError, NotLoggedInError
 from app.finite import json_text
 from app.review.people.challenges import waiting
@@ -35,8 +33,6 @@ from app.store.people import insert_person, person_by_id, person_by_name
 from app.store.second_factors import has_second_factor
 from app.store.session import Session
 from app.store.store import Store
-
-log = structlog.get_logger("touchline.access")
 
 LASTS = timedelta(minutes=10)
 """So long somebody may take to log in at the provider."""

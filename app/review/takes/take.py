@@ -93,11 +93,6 @@ def begin_take(
     group_id: int,
     *,
     person: str,
-    batch_id: int | None = None,
-    kind: str = INDEPENDENT,
-    since: str | None = None,
-    blind: bool = True,
-    nameless: bool = False,
     keep: Keep[TakeView] = keep_nothing,
 ) -> Take:
     """Let a person begin their own annotation of a group; the one that they have already, if so.
@@ -106,11 +101,6 @@ def begin_take(
         store: The database.
         group_id: The original.
         person: Whose it is; also of a token, the person's.
-        batch_id: For which batch; None: for none.
-        kind: ``independent`` or ``gold``.
-        since: When the batch began: edits of the original from then on are not seen.
-        blind: Begin with the group as it was then, else as the last take of it left it.
-        nameless: The copy does not say which group it is of.
         keep: Keeps the answer in the transaction.
 
     Raises:
@@ -118,16 +108,7 @@ def begin_take(
         ConflictError: It is a copy itself.
     """
     with store.write() as session:
-        take = begin(
-            session,
-            group_id,
-            person=person_of(person),
-            batch_id=batch_id,
-            kind=kind,
-            since=since,
-            blind=blind,
-            nameless=nameless,
-        )
+        take = begin(session, group_id, person=person_of(person))
         keep(show(session, take))(session)
     solved(store, take.copy_id)
     return take
@@ -138,13 +119,24 @@ def begin(
     group_id: int,
     *,
     person: str,
-    batch_id: int | None,
-    kind: str,
-    since: str | None,
-    blind: bool,
-    nameless: bool,
+    batch_id: int | None = None,
+    kind: str = INDEPENDENT,
+    since: str | None = None,
+    blind: bool = True,
+    nameless: bool = False,
 ) -> Take:
-    """``begin_take`` within a write session; the copy is solved by the caller."""
+    """``begin_take`` within a write session; the copy is solved by the caller.
+
+    Args:
+        session: Writes.
+        group_id: The original.
+        person: Whose it is.
+        batch_id: For which batch; None: for none.
+        kind: ``independent`` or ``gold``.
+        since: When the batch began: edits of the original from then on are not seen.
+        blind: Begin with the group as it was then, else as the last take of it left it.
+        nameless: The copy does not say which group it is of.
+    """
     stored = need_group(session, group_id)
     others = [one for one in takes_of_group(session, group_id) if one.batch_id == batch_id]
     for one in others:

@@ -78,7 +78,6 @@ class WebhookSender:
     Args:
         store: Where webhooks are and what they are told of.
         clock: Says what time it is, in UTC.
-        again: How long to wait after each try that failed.
         leads: Whether it is this process that sends; asked at every look.
     """
 
@@ -86,11 +85,10 @@ class WebhookSender:
         self,
         store: Store,
         clock: Callable[[], datetime] = lambda: datetime.now(UTC),
-        again: Sequence[timedelta] = AGAIN,
         leads: Callable[[], bool] = lambda: True,
     ):
         self._leads = leads
-        self._store, self._clock, self._again = store, clock, again
+        self._store, self._clock = store, clock
         self._wake, self._closing = threading.Event(), threading.Event()
         self._thread: threading.Thread | None = None
         self._stalls_at: datetime | None = None
@@ -233,8 +231,8 @@ class WebhookSender:
         values: dict[str, Any] = {**tried, "problem": answer.problem, "next_at": None}
         if answer.problem is None:
             values["state"] = DELIVERED
-        elif row.attempts < len(self._again) and answer.status != GONE:
-            values["next_at"] = _text(now + self._again[row.attempts])
+        elif row.attempts < len(AGAIN) and answer.status != GONE:
+            values["next_at"] = _text(now + AGAIN[row.attempts])
         else:
             values["state"] = FAILED
         update_delivery(session, row.id, values)

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.geometry.likely_point import CameraTable, LikelyPoints, likely_points, look
+from app.geometry.likely_point import CameraTable, LikelyPoints, _look, likely_points
 from tests.cameras import EVERY_COEFFICIENT, WIDE_LENSES, looking, wide
 
 MIDDLE = (10.0, 0.0, 0.0)
@@ -26,6 +26,14 @@ def found_from(cameras, views, start=(10.0, 0.0, -1.0), off=0.0) -> LikelyPoints
     spreads = np.tile(ONE_PIXEL, (1, len(views), 1, 1))
     table = CameraTable.of(cameras)
     return likely_points(table, pixels, np.array([views]), np.array([start]), spreads)
+
+
+def look(cameras: CameraTable, number, point):
+    """Pixel of a point in one of the cameras, NaN where it does not show it, and its derivative."""
+    pixel, slope = np.empty(2), np.empty((2, 3))
+    if not _look(*cameras.columns, number, point, pixel, slope):
+        pixel[:] = np.nan
+    return pixel, slope
 
 
 class TestLook:

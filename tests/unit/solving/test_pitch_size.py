@@ -52,11 +52,6 @@ class TestEstimatePitch:
         # Ten frames, none of which is believed to know a size better than 0.25 m.
         assert 0.05 < small.length_sigma_m < 0.3
 
-    def test_it_does_not_depend_on_where_it_starts(self, small):
-        other = estimate_pitch(frames(SMALL), POLICY, Pitch(108.0, 71.0))
-        assert other.length == pytest.approx(small.length, abs=0.05)
-        assert other.width == pytest.approx(small.width, abs=0.05)
-
     def test_a_frame_with_a_wrong_label_is_left_out(self, small):
         spoilt = frames(SMALL)
         lines = dict(spoilt[1].lines)
@@ -118,9 +113,10 @@ class TestProposal:
 
 
 class TestChooseFrames:
-    def test_frames_that_show_length_and_width_come_first(self):
+    def test_frames_that_show_length_and_width_come_first(self, monkeypatch):
+        monkeypatch.setattr("app.solving.pitch_size.MAX_FRAMES", 4)
         narrow = looking((2.0, 62.0, -16.0), (40.0, 0.0, 0.0), 2600.0)
         telling = frames(Pitch(), 4, noise_px=0.0)
         many = [PitchFrame(click(narrow), SIZE)] * 6 + telling
-        chosen = choose_frames(many, most=4)
+        chosen = choose_frames(many)
         assert np.isin(chosen, [6, 7, 8, 9]).sum() >= 3

@@ -59,7 +59,9 @@ class TestLeftovers:
                 keep_upload(settings, upload.id)
         before = [path for path in settings.home.rglob("*") if is_half_written(path, settings.home)]
         assert len(before) == 4, "a record, and a folder with a folder with a file"
-        assert delete_leftovers(settings, seconds=-60.0) == 2
+        for path in before:
+            age(path)
+        assert delete_leftovers(settings) == 2
         assert not any(path.exists() for path in before)
         assert get_upload(settings, upload.id) == upload
 

@@ -32,7 +32,9 @@ from app.soccer.frames import Box, ImagePoint
 from app.soccer.media import Media
 from app.solving.jaccard import project_markings
 from app.store.store import Store
+from app.store.takes import GOLD
 from tests.scenes import make_scenes
+from tests.unit.review.takes.begun import begin_for_batch
 
 SAMPLE = GoldChoice(Source.SAMPLE, start="bare")
 
@@ -99,7 +101,7 @@ class TestSample:
 
     def test_balls_that_are_aside_are_off_by_that_much(self, store, scenes) -> None:
         mark_known(store, "demo", replace(SAMPLE, query="", size=1), actor="lea")
-        take = begin_take(store, 1, person="ann", kind="gold", nameless=True)
+        take = begin_for_batch(store, 1, "ann", kind=GOLD, nameless=True)
         drawn_as_it_is(store, take.copy_id, scenes[0], 6.0)
         judge(store, take.copy_id, "ann")
         ((result,),) = [person.results for person in read_report(store, "demo").people]
@@ -137,7 +139,7 @@ class TestVersion:
         submit(store, 2, SetBall(key, ball), if_match=frozen.etag, actor="cy")
         choice = GoldChoice(Source.VERSION, version="v1")
         assert mark_known(store, "demo", choice, actor="lea").groups == (2,)
-        take = begin_take(store, 2, person="dee", kind="gold", nameless=True)
+        take = begin_for_batch(store, 2, "dee", kind=GOLD, nameless=True)
         judge(store, take.copy_id, "dee")
         ((result,),) = [person.results for person in read_report(store, "demo").people]
         assert (result.right, result.error.ball_px, result.error.line_px) == (True, 0, 0)

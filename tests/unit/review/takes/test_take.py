@@ -32,6 +32,8 @@ from app.soccer.frames import Box, ImagePoint
 from app.soccer.policy import STRICT
 from app.store.log import newest_entry, verify_chain
 from app.store.sight import COPIES, Sight
+from app.store.takes import GOLD
+from tests.unit.review.takes.begun import begin_for_batch
 
 BALL = BallAnnotation(box=Box(500.0, 300.0, 14.0, 14.0))
 HERE = (ImagePoint(1.5, 2.5), ImagePoint(3.0, 4.0))
@@ -123,25 +125,25 @@ class TestBeginTake:
         since = "2999-01-01"
         view = state.group.views[0].key
         change(store, state.id, SetBall(view, None), actor="eve")
-        late = begin_take(store, state.id, person="ann", batch_id=1, since=since)
+        late = begin_for_batch(store, state.id, "ann", batch_id=1, since=since)
         assert load(store, late.copy_id).group.view(view).balls == ()
-        early = begin_take(store, state.id, person="ann", batch_id=2, since="2000-01-01")
+        early = begin_for_batch(store, state.id, "ann", batch_id=2, since="2000-01-01")
         assert load(store, early.copy_id).group == state.group
 
     def test_a_copy_that_is_not_blind_begins_with_what_the_person_before_left(
         self, store, state
     ) -> None:
         view = state.group.views[0].key
-        first = begin_take(store, state.id, person="ann", batch_id=1)
+        first = begin_for_batch(store, state.id, "ann", batch_id=1)
         change(store, first.copy_id, SetBall(view, BALL))
         hand_in(store, first.id, actor="ann")
-        blind = begin_take(store, state.id, person="ben", batch_id=1)
+        blind = begin_for_batch(store, state.id, "ben", batch_id=1)
         assert load(store, blind.copy_id).group == state.group
-        seeing = begin_take(store, state.id, person="cleo", batch_id=1, blind=False)
+        seeing = begin_for_batch(store, state.id, "cleo", batch_id=1, blind=False)
         assert load(store, seeing.copy_id).group.view(view).balls == (BALL,)
 
     def test_a_nameless_copy_says_nowhere_which_group_it_is_of(self, store, state) -> None:
-        take = begin_take(store, state.id, person="ann", batch_id=3, nameless=True)
+        take = begin_for_batch(store, state.id, "ann", batch_id=3, nameless=True)
         copy = load(store, take.copy_id)
         said = repr(replace(copy.group, views=())) + repr(copy.view_ids) + repr(copy.station_ids)
         assert copy.group.label == "Group 1" and copy.group.match == ""
@@ -209,8 +211,8 @@ class TestAdoptTake:
         assert [one.key for one in after.group.views if not one.included] == [view]
 
     def test_a_gold_group_whose_truth_is_known_adopts_no_gold_copy(self, store, state) -> None:
-        take = begin_take(store, state.id, person="ann", kind="independent")
-        gold = begin_take(store, state.id, person="ben", kind="gold")
+        take = begin_take(store, state.id, person="ann")
+        gold = begin_for_batch(store, state.id, "ben", kind=GOLD)
         for one in (take, gold):
             hand_in(store, one.id, actor=one.person)
         with pytest.raises(ConflictError, match="gold"):

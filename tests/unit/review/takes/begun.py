@@ -1,0 +1,17 @@
+"""A take as a batch begins it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from app.review.editing.submit import solved
+from app.review.takes.take import Take, begin
+from app.store.store import Store
+
+
+def begin_for_batch(store: Store, group_id: int, person: str, **terms: Any) -> Take:
+    """Let a person begin a group on a batch's terms, and solve their copy."""
+    with store.write() as session:
+        take = begin(session, group_id, person=person, **terms)
+    solved(store, take.copy_id)
+    return take
