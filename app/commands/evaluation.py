@@ -3,23 +3,23 @@
 from __future__ import annotations
 
 from enum import StrEnum
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from app.commands.opened import opened_store
-from app.commands.options import Dataset, Json, acting, parse_size
+from app.commands.options import BallBox, Dataset, Json, acting, parse_size
 from app.commands.predictions import print_set
 from app.commands.server import Server, connected, given_server
 from app.commands.terminal import print_json, say, show_progress
+from app.progress import Progress
 from app.soccer.frames import ImageSize
 
 if TYPE_CHECKING:
     from app.evaluation.table import Cell, Table
-    from app.review.evaluating.prediction_source import PredictionSource
-    from app.store.evaluations import StoredEvaluation
-    from app.store.predictions import PredictionSet
+    from app.review.evaluating.prediction_source import SourcesRequest
 
 commands = typer.Typer()
 
@@ -31,14 +31,6 @@ class PredictionFormat(StrEnum):
     COCO = "coco"
     YOLO = "yolo"
     CSV = "csv"
-
-
-class TruthBoxes(StrEnum):
-    """Which box of the dataset is the truth."""
-
-    OPTIMIZED = "optimized"
-    ANNOTATED = "annotated"
-    EXACT = "exact"
 
 
 class LiveGroups(StrEnum):
@@ -137,7 +129,7 @@ SplitName = Annotated[
     str | None, typer.Option("--split", rich_help_panel=TRUTH, help="Frames of this split alone.")
 ]
 Boxes = Annotated[
-    TruthBoxes, typer.Option(rich_help_panel=TRUTH, help="Which box of the dataset is the truth.")
+    BallBox, typer.Option(rich_help_panel=TRUTH, help="Which box of the dataset is the truth.")
 ]
 Name = Annotated[str, typer.Option(rich_help_panel=RESULT, help="Name of the evaluation.")]
 Out = Annotated[
@@ -164,7 +156,7 @@ def evaluate(
     version: Version = None,
     groups: Groups = LiveGroups.PASSING,
     split: SplitName = None,
-    boxes: Boxes = TruthBoxes.OPTIMIZED,
+    boxes: Boxes = BallBox.OPTIMIZED,
     name: Name = "",
     out: Out = None,
     json_: Json = False,
@@ -176,86 +168,70 @@ def evaluate(
     if predictions is None and careful is None and cameras is None:
         raise typer.BadParameter("name predictions, --cameras or --careful")
     from app.review.evaluating.evaluation_run import EvaluationRequest
-    from app.review.evaluating.folder import evaluation_values, write_evaluation
-    from app.review.evaluating.prediction_source import PredictionSource, evaluate_sources
+    from app.review.evaluating.prediction_source import PredictionSource, SourcesRequest
 
-    found = PredictionSource(
-        predictions, format_.value, images, category, size, cameras, cameras_size
-    )
-    drawn = PredictionSource(
-        careful, careful_format.value, category=careful_category, size=careful_size
-    )
-    request = EvaluationRequest(
-        name=name, groups=groups.value, split=split, boxes=boxes.value, min_score=min_score
+    request = SourcesRequest(
+        EvaluationRequest(
+            name=name, groups=groups.value, split=split, boxes=boxes.value, min_score=min_score
+        ),
+        PredictionSource(predictions, format_.value, images, category, size, cameras, cameras_size),
+        PredictionSource(careful, careful_format.value, None, careful_category, careful_size),
+        version,
     )
     server = given_server()
-    if server is not None:
-        asked = {
-            "name": name,
-            "groups": groups.value,
-            "split": split,
-            "boxes": boxes.value,
-            "min_score": min_score,
-            "version": version,
-        }
-        _evaluate_at(server, dataset, asked, found, drawn, out, json_)
+    run = _evaluate if server is None else partial(_evaluate_at, server)
+    with show_progress("Evaluating") as progress:
+        values, sets = run(dataset, request, out, progress)
+    if json_:
+        print_json({**values, "sets": [_set_values(item) for item in sets]})
         return
-    with opened_store() as store, show_progress("Evaluating") as progress:
-        done = evaluate_sources(
-            store, dataset, request, predictions=found, careful=drawn,
-            version=version, actor=acting(), progress=progress,
-        )  # fmt: skip
+    for item in sets:
+        print_set(item)
+    _print_evaluation(values)
+
+
+_Values = dict[str, Any]
+
+
+def _evaluate(
+    dataset: str, request: SourcesRequest, out: Path | None, progress: Progress
+) -> tuple[_Values, list[_Values]]:
+    """The evaluation and the sets that were made or found for it, as plain values."""
+    from app.review.evaluating.folder import evaluation_values, write_evaluation
+    from app.review.evaluating.prediction_source import evaluate_sources
+
+    with opened_store() as store:
+        done = evaluate_sources(store, dataset, request, actor=acting(), progress=progress)
         if out is not None:
             write_evaluation(store, done.evaluation, out)
-    if json_:
-        sets = [_set_values(item) for item in done.sets]
-        print_json({**evaluation_values(done.evaluation), "sets": sets})
-        return
-    for item in done.sets:
-        print_set(item)
-    _print_evaluation(done.evaluation)
+    return evaluation_values(done.evaluation), [vars(item) for item in done.sets]
 
 
 def _evaluate_at(
-    server: Server,
-    dataset: str,
-    asked: dict[str, Any],
-    predictions: PredictionSource,
-    careful: PredictionSource,
-    out: Path | None,
-    json_: bool,
-) -> None:
-    from types import SimpleNamespace
-
+    server: Server, dataset: str, request: SourcesRequest, out: Path | None, progress: Progress
+) -> tuple[_Values, list[_Values]]:
+    """As ``_evaluate``, by a server."""
     from app.commands import remote
 
-    with connected(server) as client, show_progress("Evaluating") as progress:
-        values, sets = remote.evaluate(
-            client, dataset, asked, predictions=predictions, careful=careful, progress=progress
-        )
+    with connected(server) as client:
+        values, sets = remote.evaluate(client, dataset, request, progress)
         if out is not None:
             remote.write_evaluation(client, values, out)
-    found: list[Any] = [SimpleNamespace(**item) for item in sets]
-    if json_:
-        print_json({**values, "sets": [_set_values(item) for item in found]})
-        return
-    for item in found:
-        print_set(item)
-    shown: Any = SimpleNamespace(**values)
-    _print_evaluation(shown)
+    return values, sets
 
 
-def _print_evaluation(found: StoredEvaluation) -> None:
-    from app.review.evaluating.evaluation import tables_of
+def _print_evaluation(values: _Values) -> None:
+    from app.review.evaluating.evaluation import read_tables
 
-    for table in tables_of(found):
+    for table in read_tables(values["tables"]):
         say("")
         _print_table(table)
-    version = found.pins["version_name"] or f"the dataset as it is ({found.pins['state'][:12]})"
+    pins = values["pins"]
+    version = pins["version_name"] or f"the dataset as it is ({pins['state'][:12]})"
     say("")
     say(
-        f"evaluation {found.id}: {version}, policy {found.pins['policy_hash']}, "
-        f"solver {found.pins['solver_version']}, software {found.pins['software_version']}"
+        f"evaluation {values['id']}: {version}, policy {pins['policy_hash']}, "
+        f"solver {pins['solver_version']}, software {pins['software_version']}"
     )
 
 
@@ -279,6 +255,11 @@ def _number(cell: Cell) -> str:
     return f"{cell.value:.3g}{spread} (n {counts})"
 
 
-def _set_values(found: PredictionSet) -> dict[str, Any]:
-    """A set as plain values, with what could not be read of it."""
-    return {"id": found.id, "name": found.name, "unknown": found.unknown, **found.report}
+def _set_values(found: _Values) -> _Values:
+    """What is printed of a set, with what could not be read of it."""
+    return {
+        "id": found["id"],
+        "name": found["name"],
+        "unknown": found["unknown"],
+        **found["report"],
+    }

@@ -10,6 +10,7 @@ import typer
 
 from app.commands.opened import opened_store
 from app.commands.options import (
+    BallBox,
     Dataset,
     Json,
     acting,
@@ -36,14 +37,6 @@ class Calibration(StrEnum):
 
     GIVEN = "given"
     LINES = "lines"
-
-
-class Boxes(StrEnum):
-    """Which ball box an export writes."""
-
-    OPTIMIZED = "optimized"
-    ANNOTATED = "annotated"
-    EXACT = "exact"
 
 
 class Views(StrEnum):
@@ -170,7 +163,7 @@ def export(
     everything: Annotated[
         bool, typer.Option("--all", help="Every group, failed and rejected too.")
     ] = False,
-    boxes: Annotated[Boxes, typer.Option(help="Which ball box is written.")] = Boxes.OPTIMIZED,
+    boxes: Annotated[BallBox, typer.Option(help="Which ball box is written.")] = BallBox.OPTIMIZED,
     images: Annotated[Images, typer.Option(help="What happens to frames.")] = Images.NONE,
     views: Annotated[
         Views, typer.Option(help="coco and yolo: balls that no other view confirms, too?")
@@ -181,50 +174,31 @@ def export(
     json_: Json = False,
 ) -> None:
     """Write accepted groups, all of them, or a frozen version, with a manifest."""
+    asked: dict[str, Any] = {
+        "boxes": boxes.value,
+        "images": images.value,
+        "views": views.value,
+        "version": version,
+    }
     server = given_server()
     if server is not None:
         from app.commands import remote
 
         if images is Images.LINK:
             raise typer.BadParameter("a server copies frames, or leaves them out")
-        request = {
-            "dataset": dataset,
-            "format": format_,
-            "all": everything,
-            "boxes": boxes.value,
-            "images": images.value,
-            "views": views.value,
-            "version": version,
-        }
+        request = {"dataset": dataset, "format": format_, "all": everything, **asked}
         with connected(server) as client, show_progress("Exporting") as progress:
-            target = out if is_address(out) else Path(out)
-            values = remote.export_values(client, target, request, progress)
+            sent_to = out if is_address(out) else Path(out)
+            values = remote.export_values(client, sent_to, request, progress)
         print_export(values, json_)
         return
     from app.review.exporting.export import export as run_export
     from app.review.exporting.export import require_possible
 
     with opened_store() as store, show_progress("Exporting") as progress:
-        require_possible(
-            store,
-            dataset,
-            format_,
-            everything=everything,
-            boxes=boxes.value,
-            images=images.value,
-            views=views.value,
-            version=version,
-        )
+        require_possible(store, dataset, format_, everything=everything, **asked)
+        target = target_path(store.settings, out) if is_address(out) else Path(out)
         report = run_export(
-            store,
-            dataset,
-            format_,
-            target_path(store.settings, out) if is_address(out) else Path(out),
-            everything=everything,
-            boxes=boxes.value,
-            images=images.value,
-            views=views.value,
-            version=version,
-            progress=progress,
+            store, dataset, format_, target, everything=everything, **asked, progress=progress
         )
     print_export({**vars(report), "out": str(report.out)}, json_)

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 
 from app.commands.options import read_settings
 from app.commands.server import require_home
+from app.commands.terminal import show_progress
+from app.progress import Progress
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
@@ -24,6 +26,20 @@ def opened_store(settings: Settings | None = None) -> Iterator[Store]:
 
     with closing(Store.open(settings or read_settings())) as store:
         yield store
+
+
+@contextmanager
+def opened_to_solve(
+    what: str, workers: int | None, cluster: str | None = None
+) -> Iterator[tuple[Store, Executor | None, Progress]]:
+    """The database, where its datasets are solved, and a bar that says what is done."""
+    settings = read_settings(cluster=cluster)
+    with (
+        opened_store(settings) as store,
+        executor_of(settings, workers) as executor,
+        show_progress(what) as progress,
+    ):
+        yield store, executor, progress
 
 
 @contextmanager

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from contextvars import ContextVar
+from enum import StrEnum
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -15,6 +16,14 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from app.config import Settings
+
+
+class BallBox(StrEnum):
+    """Which of a ball's boxes counts."""
+
+    OPTIMIZED = "optimized"
+    ANNOTATED = "annotated"
+    EXACT = "exact"
 
 
 def parse_size(text: str) -> ImageSize:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
+from app.commands.matches import of_match, print_sentences
 from app.commands.opened import opened_store
 from app.commands.options import Json, Workers, acting, read_settings
 from app.commands.terminal import print_json, say, show_progress
@@ -57,12 +57,7 @@ def paint(
                     children=workers,
                     progress=progress,
                 )
-    items = [item for item in found.items if match in (None, item.match)]
-    if json_:
-        print_json([{**asdict(item), "sentence": item.sentence} for item in items])
-        return
-    for item in items:
-        say(f"{item.match}: {item.sentence}" if item.match else item.sentence)
+    print_sentences(of_match(found.items, match), json_)
 
 
 @commands.command()

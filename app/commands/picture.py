@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from app.commands.opened import executor_of, opened_store
-from app.commands.options import Json, Size, Workers, acting, read_settings
-from app.commands.terminal import print_json, print_values, say, show_progress
-from app.errors import InputError
+from app.commands.matches import need_match
+from app.commands.opened import opened_to_solve
+from app.commands.options import Json, Size, Workers, acting
+from app.commands.terminal import print_json, print_values, say
 
 if TYPE_CHECKING:
     from app.review.editing.pictures import PictureState
@@ -74,16 +74,9 @@ def _of_dataset(
 ) -> None:
     from app.review.editing.pictures import change_pictures, estimate_pictures
 
-    settings = read_settings()
-    with (
-        opened_store(settings) as store,
-        executor_of(settings, workers) as executor,
-        show_progress("Estimating") as progress,
-    ):
+    with opened_to_solve("Estimating", workers) as (store, executor, progress):
         found = estimate_pictures(store, dataset, executor, progress)
-        chosen = [item for item in found if match in (None, item.match)]
-        if match is not None and not chosen:
-            raise InputError(f'"{dataset}" has no match {match}')
+        chosen = need_match(found, match, dataset)
         wanted: dict[str, PictureGeometry | None] = {
             item.match: item.proposed for item in chosen if accept and item.proposed
         }

@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from app.commands.opened import executor_of, opened_store
-from app.commands.options import Json, Size, Workers, acting, read_settings
-from app.commands.terminal import print_json, print_values, say, show_progress
+from app.commands.matches import need_match, of_match
+from app.commands.opened import opened_to_solve
+from app.commands.options import Json, Size, Workers, acting
+from app.commands.terminal import print_json, print_values, say
 from app.errors import InputError
 
 if TYPE_CHECKING:
@@ -70,16 +71,9 @@ def _of_dataset(
 ) -> DatasetPitches:
     from app.review.editing.pitches import change_pitches, estimate_pitches
 
-    settings = read_settings()
-    with (
-        opened_store(settings) as store,
-        executor_of(settings, workers) as executor,
-        show_progress("Estimating") as progress,
-    ):
+    with opened_to_solve("Estimating", workers) as (store, executor, progress):
         found = estimate_pitches(store, dataset, executor, progress)
-        chosen = [item for item in found.items if match in (None, item.match)]
-        if match is not None and not chosen:
-            raise InputError(f'"{dataset}" has no match {match}')
+        chosen = need_match(found.items, match, dataset)
         wanted = {item.match: item.proposed for item in chosen if accept and item.proposed}
         if size is not None:
             wanted = {chosen[0].match: _size(chosen[0], size)}
@@ -101,7 +95,7 @@ def _size(state: PitchState, text: str) -> Any:
 
 
 def _print(found: DatasetPitches, match: str | None, json_: bool) -> None:
-    items = [item for item in found.items if match in (None, item.match)]
+    items = of_match(found.items, match)
     if json_:
         print_json([pitch_values(item) for item in items])
         return

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
 from typing import Annotated
 
 import typer
 
-from app.commands.opened import executor_of, opened_store
-from app.commands.options import Dataset, Json, Workers, acting, read_settings
-from app.commands.terminal import print_rows, show_progress
+from app.commands.matches import of_match, print_sentences
+from app.commands.opened import opened_store, opened_to_solve
+from app.commands.options import Dataset, Json, Workers, acting
 
 commands = typer.Typer()
 
@@ -40,25 +39,17 @@ def positions(
         raise typer.BadParameter("share positions or take them back, one at a time")
     if undo and match is None:
         raise typer.BadParameter("--undo needs --match")
-    settings = read_settings()
-    with opened_store(settings) as store:
-        if undo:
-            found = take_back_positions(store, dataset, match or "", actor=acting())
-        elif share:
-            with (
-                executor_of(settings, workers) as executor,
-                show_progress("Estimating") as progress,
-            ):
-                chosen = None if match is None else [match]
-                found = share_positions(
-                    store, dataset, chosen, actor=acting(), executor=executor, progress=progress
-                )
-        else:
-            found = get_positions(store, dataset)
-    items = [item for item in found.items if match in (None, item.match)]
-    print_rows(
-        items,
-        json_,
-        lambda item: {**asdict(item), "sentence": item.sentence},
-        lambda item: f"{item.match}: {item.sentence}",
-    )
+    if share:
+        chosen = None if match is None else [match]
+        with opened_to_solve("Estimating", workers) as (store, executor, progress):
+            found = share_positions(
+                store, dataset, chosen, actor=acting(), executor=executor, progress=progress
+            )
+    else:
+        with opened_store() as store:
+            found = (
+                take_back_positions(store, dataset, match or "", actor=acting())
+                if undo
+                else get_positions(store, dataset)
+            )
+    print_sentences(of_match(found.items, match), json_)

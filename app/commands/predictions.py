@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated, Any
 
 import typer
 
 from app.commands.opened import opened_store
 from app.commands.options import Dataset, Json, Workers, acting, read_settings
 from app.commands.terminal import complain, print_json, print_rows, print_values, say, show_progress
-
-if TYPE_CHECKING:
-    from app.store.predictions import PredictionSet
 
 commands = typer.Typer()
 
@@ -115,30 +113,32 @@ def detect(
         print_json(vars(found))
         return
     say(f"{found.boxes} boxes in {found.frames} of {found.report['looked_at']} frames")
-    _print_problems(found)
+    _print_problems(found.report)
     say(
         f"They stay predictions; touchline accept --dataset {dataset} {found.name} takes them over."
     )
 
 
-def print_set(found: PredictionSet) -> None:
+def print_set(found: Mapping[str, Any]) -> None:
     """What was read into a set, and what could not be read."""
     say(
-        f"{found.source}: {found.boxes} boxes in {found.frames} frames, {found.cameras} cameras, "
-        f"{found.unknown} unknown frames (predictions {found.name})"
+        f"{found['source']}: {found['boxes']} boxes in {found['frames']} frames, "
+        f"{found['cameras']} cameras, {found['unknown']} unknown frames "
+        f"(predictions {found['name']})"
     )
-    if found.report.get("without_score"):
-        say(f"  {found.report['without_score']} boxes have no score and count as sure")
-    for item in found.report.get("unknown_frames", [])[:5]:
+    report = found["report"]
+    if report.get("without_score"):
+        say(f"  {report['without_score']} boxes have no score and count as sure")
+    for item in report.get("unknown_frames", [])[:5]:
         complain(f"  {item['frame']} {item['problem']}")
-    _print_problems(found)
+    _print_problems(report)
 
 
-def _print_problems(found: PredictionSet) -> None:
-    problems = found.report["problems"]
+def _print_problems(report: Mapping[str, Any]) -> None:
+    problems = report["problems"]
     for item in problems[:5]:
         place = ", ".join(str(item[part]) for part in ("file", "record", "field") if item[part])
         complain(f"  {place}: {item['problem']}")
-    rest = len(problems) - 5 + found.report["more_problems"]
+    rest = len(problems) - 5 + report["more_problems"]
     if rest > 0:
         complain(f"  and {rest} more problems")

@@ -18,7 +18,7 @@ from app.object_store.address import is_address
 from app.progress import Progress
 
 if TYPE_CHECKING:
-    from app.review.evaluating.prediction_source import PredictionSource
+    from app.review.evaluating.prediction_source import PredictionSource, SourcesRequest
     from touchline.client import Client
 
 PACKED = frozenset({".jpg", ".jpeg", ".png", ".webp", ".mp4", ".zip", ".parquet"})
@@ -199,10 +199,7 @@ def _batch(item: Mapping[str, Any]) -> dict[str, Any]:
 def evaluate(
     client: Client,
     dataset: str,
-    request: dict[str, Any],
-    *,
-    predictions: PredictionSource,
-    careful: PredictionSource,
+    asked: SourcesRequest,
     progress: Progress,
 ) -> tuple[dict[str, Any], list[dict[str, Any]]]:
     """Send predictions, and let the server measure them.
@@ -210,11 +207,12 @@ def evaluate(
     Returns:
         The evaluation, and the sets that were made or found for it.
     """
-    named = {"predictions": predictions, "careful": careful}
+    named = {"predictions": asked.predictions, "careful": asked.careful}
     sets = {
         name: _set(client, dataset, source) for name, source in named.items() if not source.is_empty
     }
-    body = {**request, **{name: found["id"] for name, found in sets.items()}}
+    found_sets = {name: found["id"] for name, found in sets.items()}
+    body = {**vars(asked.request), **found_sets, "version": asked.version}
     place = f"datasets/{_part(dataset)}/evaluations"
     job = client.wait(client.post(place, body), progress=_told(progress))
     found = client.get(f"evaluations/{job['result']['evaluation']}")

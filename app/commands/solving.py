@@ -6,8 +6,8 @@ from typing import Annotated
 
 import typer
 
-from app.commands.opened import executor_of, opened_store
-from app.commands.options import Cluster, Dataset, Json, Workers, acting, read_settings
+from app.commands.opened import opened_store, opened_to_solve
+from app.commands.options import Cluster, Dataset, Json, Workers, acting
 from app.commands.policy import read_policy_option
 from app.commands.server import connected, given_server
 from app.commands.terminal import (
@@ -16,7 +16,6 @@ from app.commands.terminal import (
     print_json,
     print_values,
     say,
-    show_progress,
 )
 
 commands = typer.Typer()
@@ -47,12 +46,7 @@ def solve(
     from app.review.yields.store import AT_ONCE, YieldStore
 
     chosen = None if policy is None else read_policy_option(policy)
-    settings = read_settings(cluster=cluster)
-    with (
-        opened_store(settings) as store,
-        executor_of(settings, workers) as executor,
-        show_progress("Solving") as progress,
-    ):
+    with opened_to_solve("Solving", workers, cluster) as (store, executor, progress):
         if chosen is not None:
             change_policy(store, dataset, chosen, if_match=None, actor=acting())
         with held_interrupts() as interrupted:

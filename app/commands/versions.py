@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from app.commands.opened import executor_of, opened_store
+from app.commands.opened import opened_store, opened_to_solve
 from app.commands.options import (
     Cluster,
     Dataset,
@@ -16,7 +16,6 @@ from app.commands.options import (
     Workers,
     acting,
     parse_cameras,
-    read_settings,
     read_text,
 )
 from app.commands.server import connected, given_server
@@ -182,12 +181,7 @@ def verify(
     from app.review.versions.verify import verify_and_keep
     from app.review.versions.version import find_version, newest_version
 
-    settings = read_settings(cluster=cluster)
-    with (
-        opened_store() as store,
-        executor_of(settings, workers) as executor,
-        show_progress("Verifying") as progress,
-    ):
+    with opened_to_solve("Verifying", workers, cluster) as (store, executor, progress):
         if version is None:
             chosen = newest_version(store, dataset)
         else:

@@ -56,6 +56,23 @@ class PredictionSource:
 
 
 @dataclass(frozen=True)
+class SourcesRequest:
+    """What to evaluate, its sets still to be read or found.
+
+    Attributes:
+        request: Without sets and version; they are filled in.
+        predictions: Predicted boxes and cameras, or empty.
+        careful: Boxes drawn with care, by which the truth itself is measured; or empty.
+        version: Name, id or hash of a frozen version; None: the dataset as it is now.
+    """
+
+    request: EvaluationRequest
+    predictions: PredictionSource
+    careful: PredictionSource
+    version: str | None = None
+
+
+@dataclass(frozen=True)
 class EvaluatedSources:
     """An evaluation, and the sets that were made or found for it."""
 
@@ -66,11 +83,8 @@ class EvaluatedSources:
 def evaluate_sources(
     store: Store,
     dataset: str | int,
-    request: EvaluationRequest,
+    asked: SourcesRequest,
     *,
-    predictions: PredictionSource,
-    careful: PredictionSource,
-    version: str | None,
     actor: str,
     progress: Progress | None = None,
 ) -> EvaluatedSources:
@@ -79,10 +93,7 @@ def evaluate_sources(
     Args:
         store: The database.
         dataset: Name or id.
-        request: What to evaluate; its sets and its version are filled in.
-        predictions: Predicted boxes and cameras, or empty.
-        careful: Boxes drawn with care, by which the truth itself is measured; or empty.
-        version: Name, id or hash of a frozen version; None: the dataset as it is now.
+        asked: What to evaluate.
         actor: Who asks.
         progress: Called as the evaluation goes on.
 
@@ -90,13 +101,13 @@ def evaluate_sources(
         NotFoundError: There is no such dataset, version, file or set.
         InputError: A file cannot be used, or nothing is left to evaluate.
     """
-    pinned = None if version is None else find_version(store, dataset, version).id
+    pinned = None if asked.version is None else find_version(store, dataset, asked.version).id
     found, drawn = (
         None if source.is_empty else prediction_set(store, dataset, source, actor=actor)
-        for source in (predictions, careful)
+        for source in (asked.predictions, asked.careful)
     )
     request = replace(
-        request,
+        asked.request,
         predictions=None if found is None else found.id,
         careful=None if drawn is None else drawn.id,
         version=pinned,
