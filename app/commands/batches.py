@@ -151,12 +151,12 @@ def gold(
         with connected(server) as client:
             print_values(choose_gold(client, dataset, asked), json_)
         return
-    from app.review.takes.gold import Source
+    from app.review.takes.gold import TruthSource
     from app.review.takes.known_truth import GoldChoice, mark_known
 
-    if source not in (Source.SAMPLE, Source.VERSION):
+    if source not in (TruthSource.SAMPLE, TruthSource.VERSION):
         raise typer.BadParameter("say sample or version", param_hint="--from")
-    choice = GoldChoice(Source(source), version, query, size, start)
+    choice = GoldChoice(TruthSource(source), version, query, size, start)
     with opened_store() as store:
         found = mark_known(store, dataset, choice, actor=acting())
     print_values({"groups": [*found.groups], "left_out": found.left_out}, json_)

@@ -56,7 +56,7 @@ def _plain(value: float) -> float:
     return int(value) if isinstance(value, int) else float(value)
 
 
-class Table:
+class CsvTable:
     """A CSV file with pandas' unnamed index column, written row by row."""
 
     def __init__(self, file: IO[str], columns: Iterable[str]):

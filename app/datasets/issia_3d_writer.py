@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from app.datasets.camera_json import camera_to_json
-from app.datasets.csv_text import Table, Value, cell, plain_list
+from app.datasets.csv_text import CsvTable, Value, cell, plain_list
 from app.datasets.export_record import ExportRecord
 from app.datasets.issia import CALIBRATION, TABLE_3D, frame_number, view_camera
 from app.datasets.spill import Spill, open_spill
@@ -65,7 +65,7 @@ def write_issia_3d(
 
 def _write_table(path: Path, spill: Spill, everything: bool) -> None:
     with path.open("w", encoding="utf-8", newline="") as file:
-        table = Table(file, (*COLUMNS, *(("verdict",) if everything else ())))
+        table = CsvTable(file, (*COLUMNS, *(("verdict",) if everything else ())))
         for _, cells in spill.items():
             table.add_cells(json.loads(cells))
 

@@ -27,7 +27,7 @@ TEXT, NUMBER, WHOLE, FLAG, LIST = "string", "double", "int32", "bool", "list"
 
 
 @dataclass(frozen=True)
-class Row:
+class ViewRow:
     """A view on its way out, and what its columns are made from."""
 
     record: ExportRecord
@@ -58,7 +58,7 @@ class Row:
         return self.record.ball_fit(self.view, self.everything)
 
 
-Getter = Callable[[Row], Any]
+Getter = Callable[[ViewRow], Any]
 
 
 def write_parquet(
@@ -92,7 +92,7 @@ def write_parquet(
         for record in records:
             counts["groups"] += 1
             for position, view in enumerate(record.group.views):
-                row = Row(record, view, position, boxes, everything, provenance or {})
+                row = ViewRow(record, view, position, boxes, everything, provenance or {})
                 waiting.append(finite({name: get(row) for name, _, get in COLUMNS}))
                 counts["views"] += 1
                 counts["boxes"] += _chosen(row) is not None
@@ -128,7 +128,7 @@ def _solved(get: Callable[[ViewSolution], Any]) -> Getter:
 
 
 def _axis(number: int) -> Getter:
-    def get(row: Row) -> float | None:
+    def get(row: ViewRow) -> float | None:
         point = row.record.point
         return None if point is None or row.fit is None else float(point[number])
 
@@ -136,7 +136,7 @@ def _axis(number: int) -> Getter:
 
 
 def _ball(name: str) -> Getter:
-    def get(row: Row) -> Any:
+    def get(row: ViewRow) -> Any:
         ball = row.record.solution.ball if row.record.solution else None
         return None if ball is None or row.fit is None else getattr(ball, name)
 
@@ -146,7 +146,7 @@ def _ball(name: str) -> Getter:
 def _of_ball(get: Callable[[Solution], Any]) -> Getter:
     """Of the solution, in rows that have a 3D ball."""
 
-    def value(row: Row) -> Any:
+    def value(row: ViewRow) -> Any:
         solution = row.record.solution
         return None if solution is None or _ball("point")(row) is None else get(solution)
 
@@ -161,24 +161,24 @@ def _p_value(solution: Solution) -> float | None:
     return None if solution.chi_square is None else solution.chi_square.p_value
 
 
-def _box(which: Callable[[Row], Box | None], name: str) -> Getter:
-    def get(row: Row) -> float | None:
+def _box(which: Callable[[ViewRow], Box | None], name: str) -> Getter:
+    def get(row: ViewRow) -> float | None:
         box = which(row)
         return None if box is None else float(getattr(box, name))
 
     return get
 
 
-def _annotated(row: Row) -> Box | None:
+def _annotated(row: ViewRow) -> Box | None:
     return row.view.ball.box if row.view.ball else None
 
 
-def _chosen(row: Row) -> Box | None:
+def _chosen(row: ViewRow) -> Box | None:
     return chosen_box(row.record, row.view, row.boxes) if row.view.ball else None
 
 
 def _center(axis: int) -> Getter:
-    def get(row: Row) -> float | None:
+    def get(row: ViewRow) -> float | None:
         center = row.view.ball.center if row.view.ball else None
         return None if center is None else float(center[axis])
 
@@ -186,19 +186,19 @@ def _center(axis: int) -> Getter:
 
 
 def _jac(index: int) -> Getter:
-    def get(row: Row) -> float | None:
+    def get(row: ViewRow) -> float | None:
         jac = row.solved.calibration.jac if row.solved else None
         return None if jac is None else float(jac[index])
 
     return get
 
 
-def _failing(row: Row) -> str | None:
+def _failing(row: ViewRow) -> str | None:
     gate = row.record.solution.first_failing if row.record.solution else None
     return None if gate is None else gate.name
 
 
-def _fits_pixels(row: Row) -> Any:
+def _fits_pixels(row: ViewRow) -> Any:
     point = row.fit.reprojected if row.fit else None
     return None if point is None else [float(point.x), float(point.y)]
 
@@ -310,5 +310,5 @@ def _listed(values: tuple[float, ...] | None) -> list[float] | None:
     return None if values is None else [*map(float, values)]
 
 
-def _solver(row: Row) -> str | None:
+def _solver(row: ViewRow) -> str | None:
     return row.record.solution.solver_version if row.record.solution else None

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, TextIO
 
 from app.datasets.camera_json import camera_to_json
-from app.datasets.csv_text import Table, Value, plain_list
+from app.datasets.csv_text import CsvTable, Value, plain_list
 from app.datasets.export_record import ExportRecord, chosen_box
 from app.datasets.soccernet_record import GAME, IMAGE
 from app.datasets.soccernet_v3 import image_numbers
@@ -79,7 +79,7 @@ def write_soccernet_v3d(
             for split, name in SPLIT_FILES.items()
         }
         file = stack.enter_context((root / TABLE).open("w", encoding="utf-8", newline=""))
-        table = Table(file, (*COLUMNS, *(("verdict",) if everything else ())))
+        table = CsvTable(file, (*COLUMNS, *(("verdict",) if everything else ())))
         for match, run in groupby(records, key=lambda record: split_key(record.group)):
             members = list(run)
             for record in members:
@@ -90,7 +90,7 @@ def write_soccernet_v3d(
 
 
 def _add_rows(
-    table: Table,
+    table: CsvTable,
     lists: Mapping[str, TextIO],
     record: ExportRecord,
     everything: bool,

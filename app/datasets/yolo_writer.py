@@ -8,7 +8,7 @@ from contextlib import ExitStack
 from pathlib import Path, PurePosixPath
 from typing import Any
 
-from app.datasets.csv_text import Table
+from app.datasets.csv_text import CsvTable
 from app.datasets.export_record import ExportRecord, chosen_box
 from app.datasets.frame_names import flat_frame, likely_suffix, split_folder
 from app.datasets.view_files import PutText, put_on_disk
@@ -59,7 +59,7 @@ def write_yolo(
     with ExitStack() as stack:
         lists = stack.enter_context(ImageLists(root))
         file = stack.enter_context((root / TABLE).open("w", encoding="utf-8", newline=""))
-        table = Table(file, _COLUMNS)
+        table = CsvTable(file, _COLUMNS)
         for record in records:
             counts["groups"] += 1
             for view in record.group.views:
@@ -74,7 +74,7 @@ def _add(
     put: PutText,
     record: ExportRecord,
     view: View,
-    table: Table,
+    table: CsvTable,
     boxes: str,
     counts: dict[str, int],
 ) -> str:

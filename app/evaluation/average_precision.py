@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from app.evaluation.frame import Judged
+from app.evaluation.frame import JudgedFrame
 from app.evaluation.overlap import iou
 from app.geometry.arrays import FloatArray
 
@@ -49,7 +49,7 @@ class Curve:
     score: FloatArray
 
 
-def find_hits(judged: Sequence[Judged]) -> Hits:
+def find_hits(judged: Sequence[JudgedFrame]) -> Hits:
     """Match detections to balls as COCO does: the surest that overlaps enough gets the ball."""
     scores, frames, found = [], [], []
     for index, item in enumerate(judged):
@@ -70,7 +70,7 @@ def find_hits(judged: Sequence[Judged]) -> Hits:
     )
 
 
-def coco_average_precision(judged: Sequence[Judged]) -> tuple[float | None, float | None]:
+def coco_average_precision(judged: Sequence[JudgedFrame]) -> tuple[float | None, float | None]:
     """AP at IoU 0.5, and its mean over 0.5 to 0.95, by faster-coco-eval; None without a ball."""
     if not any(item.truth is not None for item in judged):
         return None, None
@@ -146,7 +146,7 @@ def _envelope(precision: FloatArray) -> FloatArray:
     return best
 
 
-def _coco_truth(judged: Sequence[Judged]) -> dict[str, object]:
+def _coco_truth(judged: Sequence[JudgedFrame]) -> dict[str, object]:
     balls = [(image, item.truth) for image, item in enumerate(judged, 1) if item.truth is not None]
     return {
         "images": [
@@ -169,7 +169,7 @@ def _coco_truth(judged: Sequence[Judged]) -> dict[str, object]:
     }
 
 
-def _coco_results(judged: Sequence[Judged]) -> list[dict[str, object]]:
+def _coco_results(judged: Sequence[JudgedFrame]) -> list[dict[str, object]]:
     return [
         {
             "image_id": image,

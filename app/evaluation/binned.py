@@ -10,9 +10,9 @@ import numpy as np
 
 from app.evaluation.average_precision import coco_average_precision
 from app.evaluation.figure import Axis, Figure, Panel, Series
-from app.evaluation.frame import Judged
+from app.evaluation.frame import JudgedFrame
 from app.evaluation.result import FrameResult
-from app.evaluation.table import Cell, Column, Frames, Row, Table
+from app.evaluation.table import Cell, Column, FrameRange, Row, Table
 
 
 @dataclass(frozen=True)
@@ -79,7 +79,7 @@ def error_figure(frames: Sequence[FrameResult], bins: Bins) -> Figure:
         low=tuple(quarters[:, 0].tolist()),
         high=tuple(quarters[:, 2].tolist()),
         count=tuple(len(inside[place]) for place in places),
-        frames=tuple(Frames(bins.field, *bins.bounds(place)) for place in places),
+        frames=tuple(FrameRange(bins.field, *bins.bounds(place)) for place in places),
     )
     panel = Panel(
         bins.title,
@@ -91,7 +91,9 @@ def error_figure(frames: Sequence[FrameResult], bins: Bins) -> Figure:
     return Figure(bins.figure, bins.title, (panel,), note)
 
 
-def detection_table(judged: Sequence[Judged], frames: Sequence[FrameResult], bins: Bins) -> Table:
+def detection_table(
+    judged: Sequence[JudgedFrame], frames: Sequence[FrameResult], bins: Bins
+) -> Table:
     """AP over the frames of each bin, with how many of their balls were found.
 
     Args:
@@ -115,7 +117,7 @@ def detection_table(judged: Sequence[Judged], frames: Sequence[FrameResult], bin
             Cell(hits / count, count=count, of=count),
         )
         low, high = bins.bounds(place)
-        rows.append(Row(f"{low:g}", bins.name(place), cells, Frames(bins.field, low, high)))
+        rows.append(Row(f"{low:g}", bins.name(place), cells, FrameRange(bins.field, low, high)))
     columns = (
         Column("ap_50", "AP@0.5", "", "higher"),
         Column("ap", "AP@[.5:.95]", "", "higher"),
@@ -142,5 +144,5 @@ def _points(frames: Sequence[FrameResult], field: str) -> Series:
     series = Series("frames", "Frames", (), (), "points")
     x, y = zip(*pairs[::step], strict=True) if pairs else ((), ())
     # No number lies between a value and the next one: a point opens its own frame.
-    only = tuple(Frames(field, value, math.nextafter(value, math.inf)) for value in x)
+    only = tuple(FrameRange(field, value, math.nextafter(value, math.inf)) for value in x)
     return replace(series, x=tuple(x), y=tuple(y), frames=only)

@@ -10,7 +10,7 @@ import numpy as np
 from app.evaluation.bootstrap import Resamples
 from app.evaluation.figure import Axis, Figure, Mark, Panel, Series
 from app.evaluation.frame import Frame
-from app.evaluation.table import Cell, Column, Frames, Row, Table
+from app.evaluation.table import Cell, Column, FrameRange, Row, Table
 from app.geometry.camera import Camera
 from app.progress import Progress
 from app.soccer.solution import GAMMAS_PERCENT
@@ -111,7 +111,7 @@ def _row(
         Cell(total.error_median_px, count=total.calibrated, of=count),
         Cell(total.error_p95_px, count=total.calibrated, of=count),
     )
-    return Row(name, label, cells, Frames("predicted_jac"))
+    return Row(name, label, cells, FrameRange("predicted_jac"))
 
 
 def _panel(name: str, label: str, scores: Scores, min_jac: float) -> Panel:
@@ -141,7 +141,7 @@ def _panel(name: str, label: str, scores: Scores, min_jac: float) -> Panel:
     )
 
 
-def _above() -> tuple[Frames, ...]:
+def _above() -> tuple[FrameRange, ...]:
     """The frames above each threshold itself, which a lower bound alone would take in."""
     bounds = (math.nextafter(threshold, math.inf) for threshold in JAC_LIMITS.tolist())
-    return tuple(Frames("predicted_jac", low=bound) for bound in bounds)
+    return tuple(FrameRange("predicted_jac", low=bound) for bound in bounds)

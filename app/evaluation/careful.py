@@ -9,7 +9,7 @@ from app.evaluation.bootstrap import Resamples
 from app.evaluation.figure import Axis, Figure, Panel, Series
 from app.evaluation.frame import Detection, Frame
 from app.evaluation.overlap import iou, size_error_percent
-from app.evaluation.table import Column, Frames, Row, Table
+from app.evaluation.table import Column, FrameRange, Row, Table
 from app.soccer.frames import Box
 
 COLUMNS = (
@@ -46,7 +46,7 @@ def boxes_table(
     compared = _compared(frames, careful)
     rows = [
         _row(kind, label, [(frame, frame.boxes[kind], box) for frame, box in compared], resamples,
-             len(careful), Frames("box_iou") if kind == truth else None)
+             len(careful), FrameRange("box_iou") if kind == truth else None)
         for kind, label in ROWS
     ]  # fmt: skip
     if detections:
@@ -108,7 +108,7 @@ def _points(
         places,
         tuple(measure(frame.boxes[kind], box) for _, _, frame, box in compared),
         kind="points",
-        frames=tuple(Frames("distance_m", at, math.nextafter(at, math.inf)) for at in places),
+        frames=tuple(FrameRange("distance_m", at, math.nextafter(at, math.inf)) for at in places),
     )
 
 
@@ -129,7 +129,7 @@ def _row(
     compared: Sequence[tuple[Frame, Box, Box]],
     resamples: Resamples,
     whole: int,
-    behind: Frames | None = None,
+    behind: FrameRange | None = None,
 ) -> Row:
     matches = [frame.match for frame, _, _ in compared]
     overlaps = [iou(box, careful) for _, box, careful in compared]

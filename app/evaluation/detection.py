@@ -17,8 +17,8 @@ from app.evaluation.average_precision import (
 )
 from app.evaluation.bootstrap import Resamples
 from app.evaluation.figure import Axis, Figure, Panel, Series
-from app.evaluation.frame import Judged
-from app.evaluation.table import Cell, Column, Frames, Row, Table
+from app.evaluation.frame import JudgedFrame
+from app.evaluation.table import Cell, Column, FrameRange, Row, Table
 from app.geometry.arrays import FloatArray
 
 MAX_PLACES = 400
@@ -33,7 +33,7 @@ COLUMNS = (
 )
 
 
-def detection_summary(judged: Sequence[Judged], resamples: Resamples) -> Table:
+def detection_summary(judged: Sequence[JudgedFrame], resamples: Resamples) -> Table:
     """AP with intervals by match."""
     hits = find_hits(judged)
     place = resamples.places([item.frame.match for item in judged])
@@ -58,11 +58,11 @@ def detection_summary(judged: Sequence[Judged], resamples: Resamples) -> Table:
         f"{len(judged)} frames: {balls} with a ball, {len(judged) - balls} without; "
         f"{len(hits.scores)} detections."
     )
-    row = Row("all", "All frames", cells, Frames("detections"))
+    row = Row("all", "All frames", cells, FrameRange("detections"))
     return Table("detection", "Detection", COLUMNS, (row,), note)
 
 
-def precision_recall(judged: Sequence[Judged]) -> Figure:
+def precision_recall(judged: Sequence[JudgedFrame]) -> Figure:
     """Precision against recall at IoU 0.5 and 0.75."""
     hits = find_hits(judged)
     balls = int(hits.balls.sum())
@@ -88,7 +88,7 @@ def _series(hits: Hits, index: int, words: str) -> Series:
         tuple(found.recall[chosen].tolist()),
         tuple(found.precision[chosen].tolist()),
         count=tuple((chosen + 1).tolist()),
-        frames=tuple(Frames("score", low=score) for score in hits.scores[chosen].tolist()),
+        frames=tuple(FrameRange("score", low=score) for score in hits.scores[chosen].tolist()),
     )
 
 

@@ -12,7 +12,7 @@ from app.evaluation.cameras import Scores, cameras_table, jac_figure, score_came
 from app.evaluation.careful import boxes_figure, boxes_table, comparable
 from app.evaluation.detection import detection_summary, precision_recall
 from app.evaluation.figure import Figure
-from app.evaluation.frame import Detection, Frame, Judged, judge
+from app.evaluation.frame import Detection, Frame, JudgedFrame, judge
 from app.evaluation.localization import localization_table, precision_distance
 from app.evaluation.overlap import iou
 from app.evaluation.place import measure_frame
@@ -122,7 +122,7 @@ def _score(frames: Sequence[Frame], inputs: Inputs, say: Progress) -> tuple[Scor
 
 
 def _measure(
-    judged: Sequence[Judged],
+    judged: Sequence[JudgedFrame],
     inputs: Inputs,
     scores: tuple[Scores, Scores] | None,
     options: Options,
@@ -154,7 +154,10 @@ def _jac(scores: Scores, frame: int) -> float | None:
 
 
 def _detection_tables(
-    judged: Sequence[Judged], results: Sequence[FrameResult], inputs: Inputs, resamples: Resamples
+    judged: Sequence[JudgedFrame],
+    results: Sequence[FrameResult],
+    inputs: Inputs,
+    resamples: Resamples,
 ) -> Iterator[Table]:
     yield detection_summary(judged, resamples)
     yield localization_table(results, resamples, predicted=inputs.cameras is not None)
@@ -163,7 +166,7 @@ def _detection_tables(
 
 
 def _detection_figures(
-    judged: Sequence[Judged], results: Sequence[FrameResult], inputs: Inputs
+    judged: Sequence[JudgedFrame], results: Sequence[FrameResult], inputs: Inputs
 ) -> Iterator[Figure]:
     yield precision_recall(judged)
     yield precision_distance(results, predicted=inputs.cameras is not None)
@@ -178,7 +181,9 @@ def _sensitivity(frames: Sequence[Frame], options: Options) -> tuple[Table, Figu
     return sensitivity.sensitivity_table(samples, able), sensitivity.sensitivity_figure(samples)
 
 
-def _counts(frames: Sequence[Frame], judged: Sequence[Judged], inputs: Inputs) -> dict[str, int]:
+def _counts(
+    frames: Sequence[Frame], judged: Sequence[JudgedFrame], inputs: Inputs
+) -> dict[str, int]:
     """Every denominator, by name."""
     detections = inputs.detections or {}
     inside = {item.frame.id for item in judged}

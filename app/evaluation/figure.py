@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from app.evaluation.table import Frames
+from app.evaluation.table import FrameRange
 
 FIGURES = (
     "precision_recall",
@@ -52,7 +52,7 @@ class Series:
     count: tuple[int, ...] = ()
     color: float | None = None
     group_id: int | None = None
-    frames: tuple[Frames, ...] = ()
+    frames: tuple[FrameRange, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -57,7 +57,7 @@ class Detection:
 
 
 @dataclass(frozen=True)
-class Judged:
+class JudgedFrame:
     """A frame whose truth about the ball is known, with its detections, the surest first.
 
     ``truth`` is None where the ball is out of view.
@@ -70,7 +70,7 @@ class Judged:
 
 def judge(
     frames: Sequence[Frame], detections: Mapping[int, Sequence[Detection]], boxes: str
-) -> list[Judged]:
+) -> list[JudgedFrame]:
     """The frames that have the box to compare with, or no ball at all.
 
     Detections of other frames cannot be judged and take no part.
@@ -87,5 +87,5 @@ def judge(
             continue
         # The sort is stable: of equal scores, the one that stands first in the file comes first.
         found = sorted(detections.get(frame.id, ()), key=lambda item: -item.score)
-        judged.append(Judged(frame, None if frame.absent else truth, tuple(found)))
+        judged.append(JudgedFrame(frame, None if frame.absent else truth, tuple(found)))
     return judged

@@ -10,7 +10,7 @@ import numpy as np
 from app.evaluation.bootstrap import Resamples
 from app.evaluation.figure import Axis, Figure, Mark, Panel, Series
 from app.evaluation.result import FrameResult
-from app.evaluation.table import Cell, Column, Frames, Row, Table
+from app.evaluation.table import Cell, Column, FrameRange, Row, Table
 
 NEAR_M = 2.0
 """The paper's threshold of P_2m."""
@@ -104,7 +104,7 @@ def _overlapping(
         resamples.mean(near, matches, len(balls)),
         _median(values, len(balls)),
     )
-    return Row(name, f"{label}, IoU > 0", cells, Frames(error))
+    return Row(name, f"{label}, IoU > 0", cells, FrameRange(error))
 
 
 def _everywhere(
@@ -124,7 +124,7 @@ def _everywhere(
         resamples.mean(near, [frame.match for frame in balls]),
         _median(values, len(balls)),
     )
-    return Row(f"{name}_all", f"{label}, all frames", cells, Frames("distance_m"))
+    return Row(f"{name}_all", f"{label}, all frames", cells, FrameRange("distance_m"))
 
 
 def _near(error: float | None) -> bool:
@@ -152,5 +152,5 @@ def _within(
         tuple(places.tolist()),
         tuple(share.tolist()),
         count=tuple(below.tolist()),
-        frames=tuple(Frames(field, high=place) for place in places.tolist()),
+        frames=tuple(FrameRange(field, high=place) for place in places.tolist()),
     )

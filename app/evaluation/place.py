@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from app.errors import DegenerateGeometryError
-from app.evaluation.frame import Detection, Frame, Judged
+from app.evaluation.frame import Detection, Frame, JudgedFrame
 from app.evaluation.overlap import iou
 from app.evaluation.result import FrameResult
 from app.geometry.camera import Camera
@@ -13,7 +13,7 @@ from app.geometry.sphere import position_from_diameter
 
 
 def measure_frame(
-    item: Judged, diameter_m: float, predicted: Camera | None = None, min_score: float = 0.0
+    item: JudgedFrame, diameter_m: float, predicted: Camera | None = None, min_score: float = 0.0
 ) -> FrameResult:
     """Everything that is known about one frame.
 

@@ -45,7 +45,7 @@ class Column:
 
 
 @dataclass(frozen=True)
-class Frames:
+class FrameRange:
     """The frames behind a row: those whose ``field`` lies in [low, high), a missing bound open.
 
     Fields are those of ``result.FrameResult``.
@@ -63,7 +63,7 @@ class Row:
     name: str
     label: str
     cells: tuple[Cell, ...]
-    frames: Frames | None = None
+    frames: FrameRange | None = None
 
 
 @dataclass(frozen=True)

@@ -30,7 +30,7 @@ REFERENCE_WIDTH = 960
 
 
 @dataclass(frozen=True)
-class Agreement:
+class PaintAgreement:
     """How well a camera and the paint agree.
 
     Attributes:
@@ -54,7 +54,7 @@ def agreement(
     field: BoolArray,
     paint: npt.NDArray[np.bool_] | npt.NDArray[np.uint8],
     pitch: Pitch | None = None,
-) -> Agreement:
+) -> PaintAgreement:
     """Agreement of a camera with a picture.
 
     Args:
@@ -72,7 +72,7 @@ def agreement(
     model = np.zeros((height, width), np.uint8)
     model[rows, columns] = 1
     explained = _widened(model, near + SPACING_PX / 2)[lines.astype(np.bool_)] > 0
-    return Agreement(
+    return PaintAgreement(
         supported=float(supported.mean()) if len(supported) else 0.0,
         explained=float(explained.mean()) if len(explained) else 0.0,
         points=len(supported),

@@ -22,12 +22,12 @@ import numpy.typing as npt
 from app.geometry.arrays import BoolArray, FloatArray
 from app.geometry.camera import Camera
 from app.geometry.resection import X, Z
-from app.paint.agreement import Agreement, agreement
+from app.paint.agreement import PaintAgreement, agreement
 from app.paint.candidates import KNOWN, MAIN, WIDE, Library, known_library
 from app.paint.evidence import Reading, read_picture, shows_grass_beside, trace
 from app.paint.grass import field_of_play, why_no_field
 from app.paint.ridges import line_like
-from app.paint.scoring import Picture
+from app.paint.scoring import ScoredPicture
 from app.paint.search import KAPPA_MEAN, SCOUTED, SEARCHED, Shown, search, shown_by, shows_the_same
 from app.paint.snap import Snapped, snap_reading
 from app.paint.straight import straight_pieces
@@ -72,7 +72,7 @@ LAST_WINDOWS = (5.0, 3.0, 3.0)
 
 
 @dataclass(frozen=True)
-class Proposal:
+class FrameProposal:
     """What is proposed for a frame.
 
     Attributes:
@@ -88,21 +88,21 @@ class Proposal:
     outcome: Outcome
     reason: str | None
     camera: Camera | None = None
-    agreement: Agreement | None = None
+    agreement: PaintAgreement | None = None
     snapped: Snapped | None = None
     runner_up: float | None = None
     weakest: float | None = None
 
 
 @dataclass(frozen=True)
-class Frame:
+class SearchedFrame:
     """A frame in the width in which it is searched."""
 
     image: Image
     field: BoolArray
     paint: BoolArray
     pieces: FloatArray
-    picture: Picture
+    picture: ScoredPicture
     reading: Reading
 
 
@@ -116,7 +116,7 @@ class Ranked:
     """
 
     snapped: Snapped
-    agreement: Agreement
+    agreement: PaintAgreement
     weakest: float
     policy: CalibrationPolicy = field(default_factory=CalibrationPolicy)
 
@@ -144,7 +144,7 @@ def propose(
     pitch: Pitch | None = None,
     known: Sequence[Camera] = (),
     policy: CalibrationPolicy | None = None,
-) -> Proposal:
+) -> FrameProposal:
     """A camera for a frame.
 
     Args:
@@ -157,7 +157,7 @@ def propose(
     pitch, policy = pitch or Pitch(), policy or CalibrationPolicy()
     frame = read_frame(image)
     if isinstance(frame, str):
-        return Proposal("nothing", frame)
+        return FrameProposal("nothing", frame)
     ranked: list[Ranked] = []
     for library in [*([known_library(known)] if known else []), MAIN, WIDE]:
         ranked = merged(frame, ranked, rank(frame, library, pitch, policy))
@@ -166,7 +166,7 @@ def propose(
     return _answer(image, frame, ranked, pitch)
 
 
-def read_frame(image: Image) -> Frame | str:
+def read_frame(image: Image) -> SearchedFrame | str:
     """A frame ready to be searched, or why there is nothing to search for."""
     height, width = image.shape[:2]
     if min(height, width) < LEAST_SIDE:
@@ -185,11 +185,13 @@ def read_frame(image: Image) -> Frame | str:
     if not len(pieces):
         return "no straight line is seen on the grass"
     center = principal_point(ImageSize(image.shape[1], image.shape[0]))
-    picture = Picture.of(paint, field, center)
-    return Frame(image, field, paint, pieces, picture, read_picture(image, field))
+    picture = ScoredPicture.of(paint, field, center)
+    return SearchedFrame(image, field, paint, pieces, picture, read_picture(image, field))
 
 
-def rank(frame: Frame, library: Library, pitch: Pitch, policy: CalibrationPolicy) -> list[Ranked]:
+def rank(
+    frame: SearchedFrame, library: Library, pitch: Pitch, policy: CalibrationPolicy
+) -> list[Ranked]:
     """The cameras of a library that lie on the paint of a frame, best first."""
     amount = (SNAPPED, SCOUTED, SEARCHED)
     if library.name == KNOWN:
@@ -218,7 +220,7 @@ def rank(frame: Frame, library: Library, pitch: Pitch, policy: CalibrationPolicy
 
 
 def _drawn(
-    frame: Frame, start: Camera, library: Library, pitch: Pitch, policy: CalibrationPolicy
+    frame: SearchedFrame, start: Camera, library: Library, pitch: Pitch, policy: CalibrationPolicy
 ) -> Snapped:
     """A camera drawn onto the paint; where the paint leaves a number open or would move it far,
     once more with what is known of cameras."""
@@ -247,7 +249,7 @@ def weakest_marking(reading: Reading, snapped: Snapped, pitch: Pitch) -> float:
     return float((seen[long] / shown[long]).min()) if long.any() else 1.0
 
 
-def merged(frame: Frame, one: Sequence[Ranked], other: Sequence[Ranked]) -> list[Ranked]:
+def merged(frame: SearchedFrame, one: Sequence[Ranked], other: Sequence[Ranked]) -> list[Ranked]:
     """Both lists in one, best first, each camera once."""
     kept: list[Ranked] = []
     shown: list[Shown] = []
@@ -287,15 +289,17 @@ def why_unsure(ranked: Sequence[Ranked]) -> str | None:
     return None
 
 
-def _answer(image: Image, frame: Frame, ranked: list[Ranked], pitch: Pitch) -> Proposal:
+def _answer(
+    image: Image, frame: SearchedFrame, ranked: list[Ranked], pitch: Pitch
+) -> FrameProposal:
     reason = why_unsure(ranked)
     if not ranked:
-        return Proposal("unsure", reason)
+        return FrameProposal("unsure", reason)
     best, lead = ranked[0], runner_up(ranked)
     snapped = best.snapped
     if image.shape[:2] != frame.field.shape:
         snapped = _at_full_size(image, frame, best, pitch)
-    return Proposal(
+    return FrameProposal(
         "unsure" if reason else "proposed",
         reason,
         snapped.camera,
@@ -306,7 +310,7 @@ def _answer(image: Image, frame: Frame, ranked: list[Ranked], pitch: Pitch) -> P
     )
 
 
-def _at_full_size(image: Image, frame: Frame, best: Ranked, pitch: Pitch) -> Snapped:
+def _at_full_size(image: Image, frame: SearchedFrame, best: Ranked, pitch: Pitch) -> Snapped:
     """A camera drawn once more onto the paint of the picture as it is; where that says otherwise,
     as it was found in the small one."""
     height, width = image.shape[:2]

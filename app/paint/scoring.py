@@ -89,7 +89,7 @@ def _with_tangents(points: FloatArray) -> FloatArray:
 
 
 @dataclass(frozen=True)
-class Picture:
+class ScoredPicture:
     """What scoring reads of one frame.
 
     Attributes:
@@ -119,14 +119,14 @@ class Picture:
         return float(np.hypot(*self.field.shape)) / 2
 
     @staticmethod
-    def of(line_like: BoolArray, field: BoolArray, center: tuple[float, float]) -> Picture:
+    def of(line_like: BoolArray, field: BoolArray, center: tuple[float, float]) -> ScoredPicture:
         """The picture of a frame's line-like paint."""
         missing = np.logical_not(line_like).astype(np.uint8)
         distance = np.asarray(cv2.distanceTransform(missing, cv2.DIST_L2, 3), np.float32)
         rows, columns = np.nonzero(line_like)
         pixels = np.column_stack([columns - center[0], rows - center[1]]).astype(np.float64)
         spread = _spread(pixels, POINTS)
-        return Picture(
+        return ScoredPicture(
             spread[:POINTS], spread[:SOME], spread[:FEW], distance, field, np.array(center)
         )
 
@@ -141,7 +141,7 @@ def _spread(pixels: FloatArray, count: int) -> FloatArray:
 
 
 def first_look(
-    parameters: FloatArray, picture: Picture, pitch: Pitch, reach: float, executor: Executor
+    parameters: FloatArray, picture: ScoredPicture, pitch: Pitch, reach: float, executor: Executor
 ) -> FloatArray:
     """Mean truncated distance of some of the paint to the markings, 0 to 1, shape (B,)."""
     return _unexplained(parameters, picture.few, picture, pitch, reach, executor)
@@ -150,7 +150,7 @@ def first_look(
 def _unexplained(
     parameters: FloatArray,
     points: FloatArray,
-    picture: Picture,
+    picture: ScoredPicture,
     pitch: Pitch,
     reach: float,
     executor: Executor,
@@ -169,7 +169,7 @@ def _unexplained(
 
 
 def second_look(
-    parameters: FloatArray, picture: Picture, pitch: Pitch, reach: float, executor: Executor
+    parameters: FloatArray, picture: ScoredPicture, pitch: Pitch, reach: float, executor: Executor
 ) -> FloatArray:
     """Unexplained paint, unsupported markings (0 to 1), length on and off the field, pixels.
 
@@ -193,7 +193,7 @@ def refine(
     parameters: FloatArray,
     mean: FloatArray,
     sigma: FloatArray,
-    picture: Picture,
+    picture: ScoredPicture,
     points: FloatArray,
     pitch: Pitch,
     scales: Sequence[float],

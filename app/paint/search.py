@@ -17,7 +17,7 @@ from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
 from app.geometry.resection import KAPPA, PARAMETERS, ROLL, X, Z, camera_from_parameters
 from app.paint.candidates import Library, candidates
-from app.paint.scoring import Picture, first_look, refine, second_look
+from app.paint.scoring import ScoredPicture, first_look, refine, second_look
 from app.soccer.pitch import Pitch
 
 FIRST_REACH_PX, SECOND_REACH_PX = 20.0, 8.0
@@ -46,7 +46,7 @@ class Found:
 
 
 def search(
-    picture: Picture,
+    picture: ScoredPicture,
     pieces: FloatArray,
     library: Library,
     pitch: Pitch,
@@ -95,7 +95,7 @@ def _sigma(library: Library) -> FloatArray:
     return sigma
 
 
-def _score(looked: FloatArray, picture: Picture) -> FloatArray:
+def _score(looked: FloatArray, picture: ScoredPicture) -> FloatArray:
     """Explained times supported; markings drawn where no grass is count half."""
     unexplained, unsupported, on, off = looked.T
     score = (1 - unexplained) * (1 - unsupported) * (1 - 0.5 * off / (on + off + 1))
@@ -107,7 +107,9 @@ def _smallest(cost: FloatArray, count: int) -> npt.NDArray[np.int64]:
     return np.asarray(np.argsort(cost, kind="stable")[:count], np.int64)
 
 
-def _distinct(rows: FloatArray, score: FloatArray, picture: Picture, most: int) -> list[Found]:
+def _distinct(
+    rows: FloatArray, score: FloatArray, picture: ScoredPicture, most: int
+) -> list[Found]:
     found: list[Found] = []
     shown: list[Shown] = []
     x0, y0 = picture.center
@@ -134,7 +136,7 @@ class Shown:
     pixels: FloatArray
 
 
-def shown_by(camera: Camera, picture: Picture) -> Shown:
+def shown_by(camera: Camera, picture: ScoredPicture) -> Shown:
     """Where a camera sees some of the paint; what it sees above the horizon is left out."""
     pixels = picture.few[:COMPARED] + picture.center
     rays = camera.rays(pixels)
@@ -143,7 +145,7 @@ def shown_by(camera: Camera, picture: Picture) -> Shown:
     return Shown(camera.position - camera.position[2] / rays[:, 2:] * rays, pixels)
 
 
-def shows_the_same(shown: Shown, other: Camera, picture: Picture) -> bool:
+def shows_the_same(shown: Shown, other: Camera, picture: ScoredPicture) -> bool:
     """Whether another camera sees the same places, or those of the pitch turned by half a turn."""
     if len(shown.pixels) < len(picture.few[:COMPARED]) / 2:
         return False

@@ -48,7 +48,7 @@ REPLAY_SHARE = (0.18, 0.24, 0.15, 0.15, 0.16, 0.12)
 
 
 @dataclass(frozen=True)
-class Rig:
+class CameraStands:
     """Where the cameras of one match stand.
 
     Attributes:
@@ -60,7 +60,7 @@ class Rig:
     seats: dict[str, tuple[FloatArray, ...]]
 
 
-def make_rig(rng: np.random.Generator) -> Rig:
+def make_rig(rng: np.random.Generator) -> CameraStands:
     """Cameras as broadcasters place them."""
     y = rng.uniform(46.0, 90.0)
     height = np.clip(9.5 + 0.24 * (y - 41.0) + rng.normal(0, 2.0), 9.3, 24.7)
@@ -87,10 +87,12 @@ def make_rig(rng: np.random.Generator) -> Rig:
             for end in ends
         ),
     }  # fmt: skip
-    return Rig(main, seats)
+    return CameraStands(main, seats)
 
 
-def replay_seat(rng: np.random.Generator, rig: Rig, ball: FloatArray) -> tuple[str, FloatArray]:
+def replay_seat(
+    rng: np.random.Generator, rig: CameraStands, ball: FloatArray
+) -> tuple[str, FloatArray]:
     """A replay camera, most often one at the ball's end; where it stands, metres, shape (3,)."""
     kind = str(rng.choice(REPLAYS, p=REPLAY_SHARE))
     seats = rig.seats[kind]

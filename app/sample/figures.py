@@ -42,7 +42,7 @@ _TURNS = np.radians(np.arange(-90, 91, 15.0))
 
 
 @dataclass(frozen=True)
-class Person:
+class DrawnPerson:
     """One person as seen in one view: joints in pixels and how large a metre is there."""
 
     index: int
@@ -57,7 +57,7 @@ class Person:
     height: float
 
 
-def people_in_view(camera: Camera, instant: Instant, pose: Pose, image: Image) -> list[Person]:
+def people_in_view(camera: Camera, instant: Instant, pose: Pose, image: Image) -> list[DrawnPerson]:
     """Everybody who is at least partly in the frame."""
     count, joints = pose.joints.shape[:2]
     flat = pose.joints.reshape(-1, 3)
@@ -76,7 +76,9 @@ def people_in_view(camera: Camera, instant: Instant, pose: Pose, image: Image) -
         toward = camera.position[:2] - instant.feet[index]
         turn = float(instant.heading[index] - np.arctan2(toward[1], toward[0]))
         people.append(
-            Person(index, pixels[index], depths[index], scale, turn, float(instant.height[index]))
+            DrawnPerson(
+                index, pixels[index], depths[index], scale, turn, float(instant.height[index])
+            )
         )
     return people
 
@@ -91,7 +93,7 @@ def kit_of(look: Look, index: int) -> Kit:
 
 
 def draw_person(
-    image: Image, person: Person, look: Look, number: int, gain: Colour, lit_from: float
+    image: Image, person: DrawnPerson, look: Look, number: int, gain: Colour, lit_from: float
 ) -> None:
     """Draw one person.
 
@@ -118,7 +120,7 @@ def draw_person(
 @dataclass
 class _Painter:
     patch: Patch
-    person: Person
+    person: DrawnPerson
     kit: Kit
     skin: Colour
     hair: Colour

@@ -12,7 +12,7 @@ from app.datasets.soccernet_record import IMAGE
 from app.errors import NotFoundError
 from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
-from app.sample.figures import Person, draw_person, people_in_view
+from app.sample.figures import DrawnPerson, draw_person, people_in_view
 from app.sample.instant import HALF_LENGTH, HALF_WIDTH, Instant
 from app.sample.look import Colour, Look
 from app.sample.pose import pose_people
@@ -128,7 +128,7 @@ def _draw_play(image: Image, camera: Camera, instant: Instant, look: Look, lit_f
     """People and the ball, far ones first."""
     people = people_in_view(camera, instant, pose_people(instant), image)
     ball_depth = float(camera.pitch_to_camera(instant.ball[None])[0, 2])
-    order: list[tuple[float, Person | None]] = [(ball_depth, None)]
+    order: list[tuple[float, DrawnPerson | None]] = [(ball_depth, None)]
     order += [(float(person.depths.mean()), person) for person in people]
     for depth, person in sorted(order, key=lambda item: -item[0]):
         if depth < 0.5:

@@ -15,7 +15,7 @@ from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
 from app.geometry.sphere import tight_box
 from app.sample.annotate import click_lines, loose_box, person_boxes, person_tags
-from app.sample.cameras import MIN_PARALLAX, Rig, aim, make_rig, parallax, replay_seat
+from app.sample.cameras import MIN_PARALLAX, CameraStands, aim, make_rig, parallax, replay_seat
 from app.sample.faults import (
     FaultPlan,
     another_instant,
@@ -56,7 +56,7 @@ class Stage:
     """What all groups of a match share."""
 
     fixture: Fixture
-    rig: Rig
+    rig: CameraStands
     numbers: tuple[int, ...]
     seed: int
     groups: int

@@ -21,7 +21,7 @@ from app.geometry.arrays import BoolArray, FloatArray
 from app.soccer.policy import Policy
 from app.soccer.solution import Ball3D
 from app.solving.spread import CLICK_DIAGONAL, calibration_spread
-from app.solving.triangulate import Sight
+from app.solving.triangulate import Sighting
 
 MIN_NUMBERS = 20
 """Fewer say too little."""
@@ -113,7 +113,7 @@ class BallNoise:
     share_interval: tuple[float, float] | None = None
 
 
-def misses_of(ball: Ball3D, sights: Sequence[Sight]) -> tuple[Miss, ...]:
+def misses_of(ball: Ball3D, sights: Sequence[Sighting]) -> tuple[Miss, ...]:
     """What the rays to the ball of one group leave unexplained: 2 V - 3 numbers of V views.
 
     Given cameras with a covariance are left aside: those of one rig err together, and a

@@ -13,7 +13,7 @@ from app.geometry.likely_point import CameraTable, likely_points
 from app.soccer.policy import Policy
 from app.soccer.solution import BestBall, Pair
 from app.solving.spread import sight_spreads
-from app.solving.triangulate import Sight
+from app.solving.triangulate import Sighting
 
 MAX_MAHALANOBIS = 13.8
 """Squared, of two coordinates: one honest view in a thousand lies beyond."""
@@ -34,7 +34,7 @@ class _Estimate:
         return bool((self.distances <= MAX_MAHALANOBIS).all())
 
 
-def best_ball(pairs: Sequence[Pair], usable: Sequence[Sight], policy: Policy) -> BestBall | None:
+def best_ball(pairs: Sequence[Pair], usable: Sequence[Sighting], policy: Policy) -> BestBall | None:
     """The point that explains the most views best; None where no two views see the ball.
 
     All views count, weighted by the uncertainty of click and calibration. Where they contradict
@@ -112,7 +112,7 @@ def _influence(views: _Views, estimate: _Estimate) -> tuple[tuple[str, float], .
 class _Views:
     """The views of a group, and the most likely point of any of their subsets."""
 
-    def __init__(self, sights: Sequence[Sight], policy: Policy):
+    def __init__(self, sights: Sequence[Sighting], policy: Policy):
         self.sights = tuple(sights)
         self._policy = policy
         self._centers = np.array([sight.center for sight in sights])
@@ -148,7 +148,7 @@ class _Views:
         return sight_spreads(sights, places, self._policy).reshape(*chosen.shape, 2, 2)
 
 
-def _is_behind(pair: Pair, sights: Sequence[Sight]) -> bool:
+def _is_behind(pair: Pair, sights: Sequence[Sighting]) -> bool:
     point = np.array([pair.point])
     return any(
         sight.camera.pitch_to_camera(point)[0, 2] <= 0

@@ -13,7 +13,7 @@ from app.soccer.policy import Policy
 from app.soccer.solution import ChiSquare
 from app.solving.chi_square import residuals_of, residuals_without, untestable
 from app.solving.facts import Facts
-from app.solving.triangulate import Sight
+from app.solving.triangulate import Sighting
 from app.solving.verdict import Verdict, views_of
 
 LOW_P_VALUE = 0.002
@@ -86,7 +86,7 @@ def contradiction(
     keys: Sequence[str],
     facts: Facts,
     verdict: Verdict,
-    sights: Sequence[Sight],
+    sights: Sequence[Sighting],
     policy: Policy,
 ) -> Contradiction | None:
     """Where the views of the ball contradict each other; None where they do not.
@@ -133,7 +133,9 @@ def _blamed(
     return keys[places[best]] if agree else None, confidence, left.point[best]
 
 
-def _apart(a: Sight, b: Sight, point: FloatArray, policy: Policy) -> tuple[float, float | None]:
+def _apart(
+    a: Sighting, b: Sighting, point: FloatArray, policy: Policy
+) -> tuple[float, float | None]:
     """How far two rays miss each other, and their balls if both lie on the grass, metres."""
     gap = _rays_apart(a, b)
     grass = -policy.ball_diameter_m / 2
@@ -143,7 +145,7 @@ def _apart(a: Sight, b: Sight, point: FloatArray, policy: Policy) -> tuple[float
     return gap, float(np.linalg.norm(ends[0] - ends[1]))
 
 
-def _to_level(sight: Sight, z: float) -> FloatArray | None:
+def _to_level(sight: Sighting, z: float) -> FloatArray | None:
     """Where a ray meets a level of the pitch frame, shape (3,); None where it is nearly level."""
     direction, position = _direction(sight), sight.camera.position
     if direction[2] < STEEP or z < position[2]:
@@ -152,7 +154,7 @@ def _to_level(sight: Sight, z: float) -> FloatArray | None:
     return place
 
 
-def _rays_apart(a: Sight, b: Sight) -> float:
+def _rays_apart(a: Sighting, b: Sighting) -> float:
     """Smallest distance of the rays of two sights, metres."""
     across = np.cross(_direction(a), _direction(b))
     length = float(np.linalg.norm(across))
@@ -162,12 +164,12 @@ def _rays_apart(a: Sight, b: Sight) -> float:
     return abs(float(between @ across)) / length
 
 
-def _off_ray(sight: Sight, point: FloatArray) -> float:
+def _off_ray(sight: Sighting, point: FloatArray) -> float:
     """Distance of a point from the ray of a sight, metres."""
     return float(np.linalg.norm(np.cross(point - sight.camera.position, _direction(sight))))
 
 
-def _direction(sight: Sight) -> FloatArray:
+def _direction(sight: Sighting) -> FloatArray:
     ray = sight.camera.rays(np.array([sight.center]))[0]
     direction: FloatArray = ray / np.linalg.norm(ray)
     return direction

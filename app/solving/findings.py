@@ -15,7 +15,7 @@ from app.solving.gates import chance
 from app.solving.paint_findings import paint_findings
 from app.solving.plausible import implausible
 from app.solving.sides import Swap, find_swaps
-from app.solving.triangulate import Sight
+from app.solving.triangulate import Sighting
 
 MAX_SIZE_RATIO = 2.0
 """A ball box may be so many times larger or smaller than the 3D point implies."""
@@ -47,7 +47,7 @@ _BY_WEIGHT = (
 def find(
     group: Group,
     views: Sequence[ViewSolution],
-    sights: Sequence[Sight],
+    sights: Sequence[Sighting],
     pairs: Sequence[Pair],
     ball: Ball3D | None,
     policy: Policy,
@@ -83,7 +83,7 @@ def find(
 
 
 def _swaps(
-    group: Group, views: Sequence[ViewSolution], sights: Sequence[Sight], policy: Policy
+    group: Group, views: Sequence[ViewSolution], sights: Sequence[Sighting], policy: Policy
 ) -> tuple[Swap, ...]:
     left = {solved.view for solved in views if solved.failed is None}
     first = next((sight for sight in sights if sight.view == group.views[0].key), None)

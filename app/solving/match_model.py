@@ -31,7 +31,7 @@ _ROUNDS = 6
 
 
 @dataclass(frozen=True)
-class Place:
+class FramePlace:
     """Where one frame alone puts its camera.
 
     Attributes:
@@ -71,7 +71,7 @@ class MatchModel:
 class PlaceEquations:
     """Normal equations of each of some places, to fit one model to many choices of them."""
 
-    def __init__(self, places: Sequence[Place], wander_m: FloatArray):
+    def __init__(self, places: Sequence[FramePlace], wander_m: FloatArray):
         """``wander_m``: what a place differs from the model by itself, each axis, shape (3,)."""
         positions = np.array([place.position for place in places]).reshape(-1, 3)
         spreads = np.array([place.covariance for place in places]).reshape(-1, 3, 3)

@@ -22,7 +22,7 @@ from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy
 from app.soccer.solution import Calibration
 from app.solving.calibrate import calibrate_near
-from app.solving.match_model import MatchModel, Place, PlaceEquations
+from app.solving.match_model import FramePlace, MatchModel, PlaceEquations
 from app.solving.resect import PositionPrior, is_main_position, match_prior
 
 WANDER_M = np.array([0.15, 0.15, 0.1])
@@ -35,7 +35,7 @@ SCATTER, GIVE_UP = 3.0, 12.0
 frames are not of one match."""
 
 
-def place_of(calibration: Calibration, size: ImageSize) -> Place | None:
+def place_of(calibration: Calibration, size: ImageSize) -> FramePlace | None:
     """The place of a main camera; None for other cameras, and where the lines leave it open."""
     if calibration.camera is None or calibration.covariance is None:
         return None
@@ -45,7 +45,7 @@ def place_of(calibration: Calibration, size: ImageSize) -> Place | None:
     spread = spread[X : Z + 1, X : Z + 1]
     if not is_main_position(position) or not np.trace(spread) <= MAX_SIGMA_M**2:
         return None
-    return Place(position, spread, float(parameters[PAN]))
+    return FramePlace(position, spread, float(parameters[PAN]))
 
 
 def pan_of(calibration: Calibration) -> float | None:
@@ -59,7 +59,7 @@ def pan_of(calibration: Calibration) -> float | None:
 class Places:
     """Places of some frames, side by side, to take one out and look at the others."""
 
-    def __init__(self, places: Sequence[Place]):
+    def __init__(self, places: Sequence[FramePlace]):
         self._equations = PlaceEquations(places, WANDER_M)
         self._left_out: int | None = None
 

@@ -12,13 +12,13 @@ from heapq import heappop, heappush
 
 import numpy as np
 
-from app.solving.match_model import Place, PlaceEquations
+from app.solving.match_model import FramePlace, PlaceEquations
 
 WANDER_M = np.array([0.3, 0.3, 0.18])
 """What frames of one match are allowed to differ by, each axis, beyond their own sigmas."""
 
 
-def guess_matches(places: Sequence[Place | None]) -> list[int]:
+def guess_matches(places: Sequence[FramePlace | None]) -> list[int]:
     """A match for each frame, from 0, where nobody names them: runs whose places agree.
 
     Args:
@@ -35,7 +35,7 @@ def guess_matches(places: Sequence[Place | None]) -> list[int]:
 class _Runs:
     """Runs of places side by side, each known by its first place."""
 
-    def __init__(self, places: Sequence[Place]):
+    def __init__(self, places: Sequence[FramePlace]):
         self._equations = PlaceEquations(places, WANDER_M)
         self._end = {at: at + 1 for at in range(len(places))}
         self._begin = {at + 1: at for at in range(len(places))}

@@ -19,7 +19,7 @@ from app.soccer.pitch import Pitch
 from app.soccer.policy import Policy
 from app.solving.plausible import is_plausible
 from app.solving.spread import pixel_spread
-from app.solving.triangulate import Meeting, Sight, meet
+from app.solving.triangulate import Meeting, Sighting, meet
 
 _HALF_TURN = np.diag([-1.0, -1.0, 1.0])
 LOOSE, SIZE_SIGMA = 0.15, 0.35
@@ -61,11 +61,11 @@ def turned_camera(camera: Camera) -> Camera:
 
 
 def find_swaps(
-    first: Sight | None,
-    usable: Sequence[Sight],
+    first: Sighting | None,
+    usable: Sequence[Sighting],
     pitch: Pitch,
     policy: Policy,
-    doubtful: Sequence[Sight] = (),
+    doubtful: Sequence[Sighting] = (),
 ) -> tuple[Swap, ...]:
     """Views whose ball meets that of the others only after a half turn.
 
@@ -94,16 +94,20 @@ def find_swaps(
     return tuple(swap for swap in swaps if swap is not None)
 
 
-def _from_lines(sight: Sight) -> bool:
+def _from_lines(sight: Sighting) -> bool:
     return sight.calibration.source != "given"
 
 
-def _others(sight: Sight, sights: Sequence[Sight]) -> list[Sight]:
+def _others(sight: Sighting, sights: Sequence[Sighting]) -> list[Sighting]:
     return [other for other in sights if other is not sight]
 
 
 def _swap(
-    sight: Sight, others: Sequence[Sight], first: Sight | None, pitch: Pitch, policy: Policy
+    sight: Sighting,
+    others: Sequence[Sighting],
+    first: Sighting | None,
+    pitch: Pitch,
+    policy: Policy,
 ) -> Swap | None:
     turned = _meetings(_turn(sight), others, policy)
     after = _best_error(turned, pitch, policy)
@@ -125,12 +129,12 @@ def _swap(
     )
 
 
-def _turn(sight: Sight) -> Sight:
+def _turn(sight: Sighting) -> Sighting:
     calibration = replace(sight.calibration, camera=turned_camera(sight.camera), covariance=None)
     return replace(sight, calibration=calibration)
 
 
-def _meetings(sight: Sight, others: Sequence[Sight], policy: Policy) -> list[Meeting]:
+def _meetings(sight: Sighting, others: Sequence[Sighting], policy: Policy) -> list[Meeting]:
     """Where the sight meets the others, except from beside it."""
     return [
         item
@@ -149,7 +153,7 @@ def _best_error(meetings: Sequence[Meeting], pitch: Pitch, policy: Policy) -> fl
     return min(errors, default=np.inf)
 
 
-def _weighed(costs: Sequence[float], meetings: Sequence[Meeting], first: Sight | None) -> float:
+def _weighed(costs: Sequence[float], meetings: Sequence[Meeting], first: Sighting | None) -> float:
     """Sum of costs; the main camera counts more than a replay, which may be turned itself."""
     return sum(
         cost * (MAIN_WEIGHT if item.b is first else 1.0)
@@ -158,7 +162,7 @@ def _weighed(costs: Sequence[float], meetings: Sequence[Meeting], first: Sight |
 
 
 def _costs(
-    sight: Sight, meetings: Sequence[Meeting], turned: bool, pitch: Pitch, policy: Policy
+    sight: Sighting, meetings: Sequence[Meeting], turned: bool, pitch: Pitch, policy: Policy
 ) -> list[float]:
     """How badly a view fits each of the others: minus twice the logarithm of the likelihood, robustly.
 
@@ -182,7 +186,7 @@ def _costs(
     return costs
 
 
-def _misfit(sight: Sight, point: FloatArray, policy: Policy) -> float:
+def _misfit(sight: Sighting, point: FloatArray, policy: Policy) -> float:
     """Squared residuals of a ball's place and size in a view, each in units of its sigma."""
     offset = np.array(sight.center) - sight.camera.project(point[None])[0]
     if np.isnan(offset).any():

@@ -29,7 +29,7 @@ DECIMALS = 2
 _ROUNDS, _LONGEST, _SETTLED = 30, 0.5, 1e-4
 
 
-class Source(NamedTuple):
+class BallSource(NamedTuple):
     """Where a ball comes from: a static camera by its key, or a person by their name."""
 
     kind: Literal["camera", "person"]
@@ -74,7 +74,7 @@ class SourceFactors:
     """
 
     sigma_px: float
-    sources: tuple[Source, ...]
+    sources: tuple[BallSource, ...]
     logs: FloatArray
     covariance: FloatArray
     numbers: FloatArray
@@ -92,7 +92,7 @@ class SourceFactors:
                 found.append(SourceNoise(source.name, middle, low, high, math.exp(log), numbers))
         return tuple(sorted(found, key=lambda item: -item.sigma_px))
 
-    def factor(self, sources: Sequence[Source]) -> float:
+    def factor(self, sources: Sequence[BallSource]) -> float:
         """How noisy a ball of these sources is beside the dataset's; one where it may be alike.
 
         What is asked is whether all of them together differ: of a camera whose balls one person
@@ -156,7 +156,7 @@ class _Parts:
 
 
 def estimate_sources(
-    misses: Sequence[tuple[Miss, Mapping[str, Sequence[Source]]]],
+    misses: Sequence[tuple[Miss, Mapping[str, Sequence[BallSource]]]],
     click: float,
     share: float,
     given: float,
@@ -184,15 +184,15 @@ def estimate_sources(
     )
 
 
-def _told_apart(seen: Sequence[Sequence[Source]]) -> list[Source]:
+def _told_apart(seen: Sequence[Sequence[BallSource]]) -> list[BallSource]:
     """The sources, without those that all views have: one alone is the dataset."""
     every = sorted({source for sources in seen for source in sources})
     return [one for one in every if not all(one in sources for sources in seen)]
 
 
 def _parts(
-    misses: Sequence[tuple[Miss, Mapping[str, Sequence[Source]]]],
-    sources: Sequence[Source],
+    misses: Sequence[tuple[Miss, Mapping[str, Sequence[BallSource]]]],
+    sources: Sequence[BallSource],
     squared: FloatArray,
 ) -> _Parts:
     place = {source: at for at, source in enumerate(sources)}

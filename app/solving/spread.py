@@ -15,7 +15,7 @@ from app.soccer.picture import camera_aspect, taken_camera
 from app.soccer.policy import Policy
 from app.soccer.solution import Calibration
 from app.solving.facts import STEP_PX, Facts
-from app.solving.triangulate import Sight
+from app.solving.triangulate import Sighting
 
 CLICK_DIAGONAL = float(np.hypot(1920, 1080))
 """The policy's click sigma holds for 1920 x 1080 and grows with the diagonal."""
@@ -201,7 +201,7 @@ def _picture_spread(
     return spread
 
 
-def pixel_spread(sight: Sight, point: FloatArray, policy: Policy) -> FloatArray:
+def pixel_spread(sight: Sighting, point: FloatArray, policy: Policy) -> FloatArray:
     """Covariance of the ball's pixel in a view, square pixels, shape (2, 2).
 
     The noise of the click, that of a given camera, and, where the camera comes from lines, the covariance of its
@@ -211,7 +211,7 @@ def pixel_spread(sight: Sight, point: FloatArray, policy: Policy) -> FloatArray:
     return spread
 
 
-def sight_spreads(sights: Sequence[Sight], points: FloatArray, policy: Policy) -> FloatArray:
+def sight_spreads(sights: Sequence[Sighting], points: FloatArray, policy: Policy) -> FloatArray:
     """``pixel_spread`` of several sights at a point each, square pixels, shape (N, 2, 2).
 
     Args:

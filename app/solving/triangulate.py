@@ -19,7 +19,7 @@ from app.soccer.solution import Calibration
 
 
 @dataclass(frozen=True)
-class Sight:
+class Sighting:
     """The ball in one calibrated view.
 
     Attributes:
@@ -102,8 +102,8 @@ class Meeting:
         parallax_degrees: Between the rays.
     """
 
-    a: Sight
-    b: Sight
+    a: Sighting
+    b: Sighting
     point: FloatArray
     errors_px: tuple[float, float]
     in_front: bool
@@ -117,7 +117,7 @@ class Meeting:
         return x, y, z
 
 
-def sights_of(views: Sequence[View], calibrations: Sequence[Calibration]) -> list[Sight]:
+def sights_of(views: Sequence[View], calibrations: Sequence[Calibration]) -> list[Sighting]:
     """The views that take part: included, calibrated, and with one ball.
 
     A ball that was put where the others see it is no sight: it would confirm itself. Nor is one
@@ -128,7 +128,7 @@ def sights_of(views: Sequence[View], calibrations: Sequence[Calibration]) -> lis
         calibrations: Of each view.
     """
     sights = [
-        Sight(
+        Sighting(
             view.key,
             calibration,
             center,
@@ -144,7 +144,7 @@ def sights_of(views: Sequence[View], calibrations: Sequence[Calibration]) -> lis
     return [sight for sight in sights if np.isfinite(sight.ideal_center).all()]
 
 
-def meet(couples: Iterable[tuple[Sight, Sight]]) -> list[Meeting]:
+def meet(couples: Iterable[tuple[Sighting, Sighting]]) -> list[Meeting]:
     """Where the rays of each couple meet; one camera twice, and parallel rays, meet nowhere.
 
     Source: SoccerNet-v3D (arXiv 2504.10106), triangulation of ball annotations.
@@ -161,7 +161,7 @@ def meet(couples: Iterable[tuple[Sight, Sight]]) -> list[Meeting]:
 
 
 def lines_of_sight(
-    a: Sequence[Sight], b: Sequence[Sight]
+    a: Sequence[Sighting], b: Sequence[Sighting]
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """Couples of sights as ``triangulate_pairs`` takes them."""
     return (
@@ -172,7 +172,7 @@ def lines_of_sight(
     )
 
 
-def _meeting(a: Sight, b: Sight, point: FloatArray) -> Meeting:
+def _meeting(a: Sighting, b: Sighting, point: FloatArray) -> Meeting:
     positions = a.camera.position, b.camera.position
     angle = parallax_angle(positions[0][None], positions[1][None], point[None])[0]
     return Meeting(
@@ -188,7 +188,7 @@ def _meeting(a: Sight, b: Sight, point: FloatArray) -> Meeting:
     )
 
 
-def _reprojection_error(sight: Sight, point: FloatArray) -> float:
+def _reprojection_error(sight: Sighting, point: FloatArray) -> float:
     """Distance of the annotated centre from the image of a point, pixels.
 
     A point behind the camera has no image; it is measured by the pinhole's formula, so that

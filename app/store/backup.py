@@ -45,7 +45,7 @@ _QUICK = 1
 
 
 @dataclass(frozen=True)
-class Manifest:
+class BackupManifest:
     """What a backup holds.
 
     Attributes:
@@ -74,7 +74,7 @@ class Manifest:
     version: int = FORMAT_VERSION
 
 
-def back_up(settings: Settings, out: Path, folders: Sequence[str] = ()) -> Manifest:
+def back_up(settings: Settings, out: Path, folders: Sequence[str] = ()) -> BackupManifest:
     """``write_backup`` of a home whose files belong together, beside whoever works in it.
 
     Raises:
@@ -104,7 +104,7 @@ def require_file(settings: Settings, done: str, command: str) -> None:
 
 def write_backup(
     settings: Settings, out: Path, folders: Sequence[str] = (), *, replace: bool = False
-) -> Manifest:
+) -> BackupManifest:
     """Write a backup and read it once more; it is at its place when it is good, or not at all.
 
     The caller holds a lock of the database, and has looked at its files.
@@ -135,7 +135,7 @@ def write_backup(
     return manifest
 
 
-def read_manifest(backup: zipfile.ZipFile) -> Manifest:
+def read_manifest(backup: zipfile.ZipFile) -> BackupManifest:
     """What a backup says that it holds.
 
     Raises:
@@ -147,14 +147,14 @@ def read_manifest(backup: zipfile.ZipFile) -> Manifest:
             raise ValueError(values["format"])
         if values["version"] != FORMAT_VERSION:
             raise InputError("the backup was made by a newer version of Touchline")
-        return Manifest(**values)
+        return BackupManifest(**values)
     except (KeyError, ValueError, TypeError) as error:
         raise InputError(
             f"{backup.filename} is no backup of Touchline: its manifest.json is missing or unknown"
         ) from error
 
 
-def verify_backup(path: Path) -> Manifest:
+def verify_backup(path: Path) -> BackupManifest:
     """Read every byte of a backup and compare it with its manifest.
 
     Raises:
@@ -227,7 +227,9 @@ def _copy_database(settings: Settings, copy: Path) -> None:
         engine.dispose()
 
 
-def _write_zip(settings: Settings, copy: Path, partial: Path, folders: Sequence[str]) -> Manifest:
+def _write_zip(
+    settings: Settings, copy: Path, partial: Path, folders: Sequence[str]
+) -> BackupManifest:
     anchor, rows = examine_database(settings, copy, settings.database_file)
     with closing(pysqlite3.dbapi2.connect(str(copy))) as connection:
         connection.execute("PRAGMA journal_mode=DELETE")
@@ -242,7 +244,7 @@ def _write_zip(settings: Settings, copy: Path, partial: Path, folders: Sequence[
                 # Uploads expire, and exports are deleted, meanwhile.
                 with suppress(FileNotFoundError):
                     files[name] = _add(backup, name, path, zipfile.ZIP_STORED)
-            manifest = Manifest(
+            manifest = BackupManifest(
                 made=now(),
                 home=str(settings.home.resolve()),
                 schema=anchor.schema,

@@ -35,7 +35,7 @@ from app.store.models import (
 )
 from app.store.session import Session
 from app.store.solutions import is_current, read_summary
-from app.store.summary import Summary
+from app.store.summary import SolutionSummary
 from app.store.verdicts import StoredVerdict
 
 _BATCH = 1000
@@ -59,7 +59,9 @@ _NOTICED = union_all(
     .where(_VIEW.c.group_id.in_(_IDS)),
 ).order_by("shared", "id")
 """A group's own come before those of its static cameras."""
-_NUMBERS = [item.name for item in fields(Summary) if item.name not in ("passes", "findings")]
+_NUMBERS = [
+    item.name for item in fields(SolutionSummary) if item.name not in ("passes", "findings")
+]
 
 
 def refresh_queue(session: Session, group_ids: Sequence[int]) -> None:
@@ -94,7 +96,7 @@ def update_row(
     stored: StoredGroup,
     verdict: StoredVerdict | None,
     noticed: Sequence[str],
-    summary: Summary,
+    summary: SolutionSummary,
 ) -> None:
     """Bring a group's row in step whose edit and solution are at hand: nothing is read.
 
@@ -136,7 +138,7 @@ def _refresh(session: Session, ids: Sequence[int]) -> None:
         session.execute(_REPLACE, rows)
 
 
-def _heads(session: Session, ids: Sequence[int]) -> list[tuple[Any, Summary | None]]:
+def _heads(session: Session, ids: Sequence[int]) -> list[tuple[Any, SolutionSummary | None]]:
     """Groups with the summary of the solution that fits their present state, if there is one."""
     statement = (
         select(*GroupModel.__table__.columns, SolutionModel.summary)
@@ -245,7 +247,7 @@ def _judged(
     }
 
 
-def _computed(summary: Summary | None, noticed: Sequence[str]) -> dict[str, Any]:
+def _computed(summary: SolutionSummary | None, noticed: Sequence[str]) -> dict[str, Any]:
     if summary is None:
         nothing: dict[str, Any] = dict.fromkeys(_NUMBERS)
         return {**nothing, "solved": False, "passes": None, "findings": _list(noticed)}

@@ -19,7 +19,7 @@ from app.store.codecs import as_written, inflate, parse
 from app.store.dialect.statements import insert
 from app.store.models import CalibrationModel, DatasetModel, GroupModel, SolutionModel
 from app.store.session import Session
-from app.store.summary import Summary, summarize
+from app.store.summary import SolutionSummary, summarize
 
 _ELSEWHERE = Calibration(source="", camera=None)
 """Stands in a stored solution for the calibration that is kept under its key."""
@@ -71,7 +71,7 @@ class EncodedSolution:
     calibrations: Mapping[str, bytes]
     """Calibrations by key, those that the encoder was not told to be known."""
     calibration_keys: tuple[str, ...]
-    summary: Summary
+    summary: SolutionSummary
     body: bytes
     facts: bytes | None
 
@@ -235,9 +235,9 @@ def read_calibration_bodies(session: Session, keys: Iterable[str]) -> dict[str, 
     return {row.key: row.body for row in session.execute(_CALIBRATIONS, {"keys": list(keys)})}
 
 
-def read_summary(text: str) -> Summary:
+def read_summary(text: str) -> SolutionSummary:
     """A stored summary."""
-    return value_codec.from_json(Summary, parse(text))
+    return value_codec.from_json(SolutionSummary, parse(text))
 
 
 def undetermined(session: Session, keys: Collection[str]) -> set[str]:

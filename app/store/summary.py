@@ -12,7 +12,7 @@ from app.soccer.solution import BallFit, Gate, Pair, Solution, ViewSolution
 
 
 @dataclass(frozen=True)
-class Summary:
+class SolutionSummary:
     """What a list shows of a solution; None where there is no such number.
 
     Attributes:
@@ -53,11 +53,11 @@ class Summary:
     agreement: float | None = None
 
 
-def summarize(group: Group, solution: Solution) -> Summary:
+def summarize(group: Group, solution: Solution) -> SolutionSummary:
     """The summary of a group's solution."""
     ball = solution.ball
     error_px, error_percent = _error(group, solution)
-    return Summary(
+    return SolutionSummary(
         **_decided(solution),
         min_jac=_min_jac(solution),
         error_px=error_px,
@@ -75,7 +75,7 @@ def summarize(group: Group, solution: Solution) -> Summary:
     )
 
 
-def summarize_gates(before: Summary, solution: Solution) -> Summary:
+def summarize_gates(before: SolutionSummary, solution: Solution) -> SolutionSummary:
     """The summary of a solution that is that of ``before`` but for what its gates say."""
     return replace(before, **_decided(solution))
 

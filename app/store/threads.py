@@ -50,7 +50,7 @@ class StoredThread:
 
 
 @dataclass(frozen=True)
-class Place:
+class ThreadGroup:
     """The group that a thread is about, and what people call it."""
 
     dataset_id: int
@@ -60,7 +60,7 @@ class Place:
     views: frozenset[str] = field(default_factory=frozenset)
 
 
-def find_group(session: Session, group_id: int) -> Place | None:
+def find_group(session: Session, group_id: int) -> ThreadGroup | None:
     """The group of an id, with the keys of its views; None where there is none."""
     statement = (
         select(GroupModel.dataset_id, DatasetModel.name, GroupModel.label, GroupModel.key)
@@ -71,7 +71,7 @@ def find_group(session: Session, group_id: int) -> Place | None:
     if row is None:
         return None
     views = session.scalars(select(ViewModel.key).where(ViewModel.group_id == group_id))
-    return Place(row.dataset_id, row.name, group_id, row.label or row.key, frozenset(views))
+    return ThreadGroup(row.dataset_id, row.name, group_id, row.label or row.key, frozenset(views))
 
 
 def read_threads(
@@ -118,7 +118,11 @@ def _comments(session: Session, threads: Sequence[int]) -> dict[int, list[Stored
 
 
 def insert_thread(
-    session: Session, group: Place, view: str | None, at: tuple[float, float] | None, time: str
+    session: Session,
+    group: ThreadGroup,
+    view: str | None,
+    at: tuple[float, float] | None,
+    time: str,
 ) -> int:
     """Insert an open thread without a comment; returns its id."""
     identity = next_id(session, ThreadModel)

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from app.soccer.policy import Policy
-from app.solving.source_noise import Source, SourceFactors, estimate_sources
+from app.solving.source_noise import BallSource, SourceFactors, estimate_sources
 from tests.bench.cases import Case, Made, make_case
 from tests.bench.table import print_table
 from tests.bench.truth import GROUPS, SEED, judge, misses_in, with_noise
@@ -67,7 +67,7 @@ def _factors(placed: Placed, policy: Policy) -> SourceFactors:
         (
             miss,
             {
-                v.key: [Source("person", of)]
+                v.key: [BallSource("person", of)]
                 for v, of in zip(made.group.views, people, strict=False)
             },
         )
@@ -79,7 +79,7 @@ def _factors(placed: Placed, policy: Policy) -> SourceFactors:
 
 def _with_own(made: Made, people: tuple[str, ...], factors: SourceFactors) -> Made:
     views = tuple(
-        replace(view, noise=factors.factor([Source("person", of)]))
+        replace(view, noise=factors.factor([BallSource("person", of)]))
         for view, of in zip(made.group.views, people, strict=False)
     )
     return replace(made, group=replace(made.group, views=views))

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from app.commands.opened import process_pool
 from app.config import Settings
-from app.review.datasets.cluster import Cluster, Place
+from app.review.datasets.cluster import Cluster, SchedulerPlace
 from app.review.editing.recompute import solve_dataset
 from app.store.store import Store
 from tests.bench.table import print_table
@@ -40,7 +40,7 @@ def bench_cluster() -> None:
             for count in (1, 2):
                 with members(fresh, folder, workers=count) as cluster:
                     cluster.wait_for_workers()
-                    pool = partial(Cluster, Place(cluster.address))
+                    pool = partial(Cluster, SchedulerPlace(cluster.address))
                     what = f"{count} worker{'s' * (count > 1)} of a cluster"
                     taken = _seconds(fresh, folder / "home", pool)
                     seconds.setdefault(what, []).append(taken)

@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from app.geometry.camera import Camera
 from app.geometry.polyline import distance_to_polyline
-from app.paint.propose import Proposal, propose
+from app.paint.propose import FrameProposal, propose
 from app.sample.render import render
 from app.soccer.annotation import Lines, make_lines
 from app.soccer.frames import ImageSize
@@ -40,7 +40,7 @@ class Tried:
     """One frame: its kind, what was proposed, whether it is right, processor and wall time."""
 
     kind: str
-    found: Proposal
+    found: FrameProposal
     right: bool | None
     processor_ms: float
     wall_ms: float
@@ -101,7 +101,7 @@ def _rows(name: str, tried: list[Tried]) -> list[list[object]]:
     return rows
 
 
-def _try(kind: str, image: Image, known: list[Camera]) -> tuple[Proposal, float, float]:
+def _try(kind: str, image: Image, known: list[Camera]) -> tuple[FrameProposal, float, float]:
     began, busy = time.perf_counter(), time.process_time()
     found = propose(image, known=known)
     return found, 1000 * (time.process_time() - busy), 1000 * (time.perf_counter() - began)
@@ -140,7 +140,7 @@ def _known() -> Iterator[Tried]:
         first.setdefault(match, true)
 
 
-def _agrees(found: Proposal, true: Camera, image: Image) -> bool | None:
+def _agrees(found: FrameProposal, true: Camera, image: Image) -> bool | None:
     if found.outcome != "proposed" or found.camera is None:
         return None
     size = ImageSize(image.shape[1], image.shape[0])
@@ -177,7 +177,7 @@ def _picture(path: Path, number: int) -> Image:
     return np.ascontiguousarray(picture[:, :, ::-1])
 
 
-def _near_clicks(found: Proposal, lines: Path, image: Image) -> bool | None:
+def _near_clicks(found: FrameProposal, lines: Path, image: Image) -> bool | None:
     if found.outcome != "proposed" or found.camera is None:
         return None
     size = ImageSize(image.shape[1], image.shape[0])

@@ -24,7 +24,7 @@ from app.solving.ball_noise import Miss, estimate_ball_noise, misses_of
 from app.solving.rig import RigCamera, RigFrame
 from app.solving.rig_proposal import propose_rig
 from app.solving.solve import solve
-from app.solving.source_noise import Source, SourceFactors, estimate_sources
+from app.solving.source_noise import BallSource, SourceFactors, estimate_sources
 from app.solving.triangulate import sights_of
 from tests.bench.table import print_table
 
@@ -100,7 +100,7 @@ def with_cameras(group: Group, cameras: Mapping[str, tuple[Camera, tuple[float, 
 def with_factors(group: Group, factors: SourceFactors) -> Group:
     """The group with each camera's own noise."""
     views = tuple(
-        replace(view, noise=factors.factor([Source("camera", view.station.key)]))
+        replace(view, noise=factors.factor([BallSource("camera", view.station.key)]))
         for view in group.views
     )
     return replace(group, views=views)
@@ -144,8 +144,8 @@ def _row(name: str, groups: Sequence[Group], policy: Policy) -> list[object]:
     return [name, len(seen), sigma, mean_square, percentile, percentile / EXPECTED, contradict]
 
 
-def _cameras(group: Group) -> dict[str, list[Source]]:
-    return {view.key: [Source("camera", view.station.key)] for view in group.views}
+def _cameras(group: Group) -> dict[str, list[BallSource]]:
+    return {view.key: [BallSource("camera", view.station.key)] for view in group.views}
 
 
 def _misses(group: Group) -> tuple[Miss, ...]:

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from app.errors import ClusterError
-from app.review.datasets.cluster import Cluster, Place
+from app.review.datasets.cluster import Cluster, SchedulerPlace
 from tests.certificates import write_keys
 from tests.databases import count_rows
 from tests.e2e.service import run_touchline
@@ -38,12 +38,12 @@ def test_a_scheduler_that_goes_and_comes_back_costs_no_group(tmp_path: Path) -> 
     # Keys and checks are those of an installation with Docker.
     secrets, services = make_secrets(tmp_path / "secrets"), together()["services"]
     with members(shared, tmp_path, workers=1, keys=secrets / "cluster") as cluster:
-        port = Place(cluster.address).port
+        port = SchedulerPlace(cluster.address).port
         cluster.wait_for_workers()
         assert is_healthy(services["scheduler"], secrets, port)
         assert is_healthy(services["worker"], secrets, port)
         assert not is_healthy(services["scheduler"], make_secrets(tmp_path / "strange"), port)
-        stranger = Place(cluster.address, write_keys(tmp_path / "others", "stranger"))
+        stranger = SchedulerPlace(cluster.address, write_keys(tmp_path / "others", "stranger"))
         with pytest.raises(ClusterError, match="no scheduler answers"):
             Cluster(stranger)
         cluster.start("solve")

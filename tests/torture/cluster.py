@@ -16,7 +16,7 @@ from pathlib import Path
 import psutil
 from distributed import Client
 
-from app.review.datasets.cluster import Place
+from app.review.datasets.cluster import SchedulerPlace
 from tests.e2e.service import ROOT, SERVE, run_touchline
 from tests.starting import Process
 from tests.torture.commands import Report, differences
@@ -82,7 +82,7 @@ class Members:
 
     def wait_for_workers(self) -> None:
         """Wait until all workers are at the scheduler."""
-        security = Place(self.address, self._keys).security()
+        security = SchedulerPlace(self.address, self._keys).security()
         with Client(
             self.address, security=security, timeout=SECONDS, set_as_default=False
         ) as client:

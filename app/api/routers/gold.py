@@ -46,7 +46,7 @@ def choose(
 ) -> Response:
     """Make gold groups of those whose truth is known, also while batches are under way."""
     values = choice.model_dump(exclude={"q", "source"})
-    wanted = GoldChoice(gold.Source(choice.source), query=choice.q, **values)
+    wanted = GoldChoice(gold.TruthSource(choice.source), query=choice.q, **values)
     reply = Reply[GoldChosen](
         asked, lambda chosen: document(GoldChosenDocument.model_validate(chosen))
     )

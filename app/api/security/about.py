@@ -18,7 +18,7 @@ from app.api.security.bodies import VALUE
 from app.errors import ForbiddenError
 from app.review.people.logins import Login
 from app.review.people.roles import Action, DatasetRoles, Role, Sight, require
-from app.review.people.whereabouts import MAX_ID, Kind, Named, Place, find_place, role_at
+from app.review.people.whereabouts import MAX_ID, Kind, Named, Whereabouts, find_place, role_at
 from app.review.queue.fields import BLIND
 from app.store.store import Store
 
@@ -160,7 +160,7 @@ class Finding:
     """Where something is that a request mentions; ``place`` None: nowhere that the reader sees."""
 
     mention: Mention
-    place: Place | None
+    place: Whereabouts | None
 
 
 def kind_of_path(route: str) -> tuple[str, Kind] | None:
@@ -235,7 +235,7 @@ def _names_what_is_nobodys(asked: Asked) -> bool:
     return any(_field(asked.body, field) is not None for field in fields)
 
 
-def _require_new(place: Place | None, roles: DatasetRoles, action: Action) -> None:
+def _require_new(place: Whereabouts | None, roles: DatasetRoles, action: Action) -> None:
     """What is made where it is not there; whoever cannot know that it is, is not told."""
     role = roles.everywhere if place is None else roles.role_in(place.dataset)
     if role is not Role.NONE or place is None:
@@ -247,10 +247,12 @@ def _require_new(place: Place | None, roles: DatasetRoles, action: Action) -> No
     )
 
 
-def _place(store: Store, named: Named, login: Login, sight: Sight) -> Place | None:
+def _place(store: Store, named: Named, login: Login, sight: Sight) -> Whereabouts | None:
     roles: DatasetRoles = login.roles
     if not _is_looked_for(named, roles):
-        return None if roles.everywhere is Role.NONE else Place(None, frozenset({login.owner}))
+        return (
+            None if roles.everywhere is Role.NONE else Whereabouts(None, frozenset({login.owner}))
+        )
     found = find_place(store, named, sight)
     if found is None or named.kind is Kind.NEW_DATASET:
         return found

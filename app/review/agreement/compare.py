@@ -15,7 +15,7 @@ from app.store.store import Store
 
 
 @dataclass(frozen=True)
-class Pair:
+class AnnotationPair:
     """Two of several annotations, by their places in the list, from 0.
 
     Attributes:
@@ -41,7 +41,7 @@ class Comparison:
     """
 
     states: tuple[GroupState, ...]
-    pairs: tuple[Pair, ...]
+    pairs: tuple[AnnotationPair, ...]
     limits: Limits
     worst_views: tuple[str, ...]
 
@@ -73,7 +73,7 @@ def compare_states(states: Sequence[GroupState], limits: Limits) -> Comparison:
                 pointer="/with",
             )
         verdicts = (_judged(first), _judged(second))
-        pairs.append(Pair(a, b, distance, disagreements(distance, verdicts, limits)))
+        pairs.append(AnnotationPair(a, b, distance, disagreements(distance, verdicts, limits)))
     pairs.sort(key=lambda pair: (-_weight(pair.disagreements), -len(pair.disagreements)))
     return Comparison(tuple(states), tuple(pairs), limits, _worst_views(states, pairs))
 
@@ -87,7 +87,7 @@ def _weight(found: Sequence[Disagreement]) -> float:
     return max((item.weight for item in found), default=0.0)
 
 
-def _worst_views(states: Sequence[GroupState], pairs: Sequence[Pair]) -> tuple[str, ...]:
+def _worst_views(states: Sequence[GroupState], pairs: Sequence[AnnotationPair]) -> tuple[str, ...]:
     """Views by the weight of what is said of them, then by the largest distance in them."""
     order: dict[str, tuple[float, float]] = {view.key: (0, 0) for view in states[0].group.views}
     for pair in pairs:

@@ -20,7 +20,7 @@ from app.durable import replace_file
 from app.errors import InputError
 from app.finite import json_text
 from app.progress import Progress
-from app.review.datasets.matches import Share, read_matches, shares_of
+from app.review.datasets.matches import MatchShare, read_matches, shares_of
 from app.review.datasets.pictures import as_taken, picture_for
 from app.soccer.finding import Finding
 from app.soccer.frames import ImageSize
@@ -31,7 +31,7 @@ from app.soccer.solution import Calibration
 from app.solving.calibrate import calibrate
 from app.solving.calibration_findings import calibration_findings
 from app.solving.leave_one_out import leave_one_out
-from app.solving.match_model import Place
+from app.solving.match_model import FramePlace
 from app.solving.match_position import Places, place_of, share_position
 from app.solving.warm import warm_up
 
@@ -53,7 +53,7 @@ class CalibratedFrame:
     left_out: tuple[tuple[str, float | None], ...]
     milliseconds: float
     alone: Calibration
-    place: Place | None
+    place: FramePlace | None
 
 
 def calibrate_files(
@@ -154,7 +154,7 @@ def calibrate_chunk(
 def share_chunk(
     files: Sequence[LineFile],
     frames: Sequence[CalibratedFrame],
-    shares: Sequence[Share],
+    shares: Sequence[MatchShare],
     size: ImageSize,
     policy: CalibrationPolicy,
     with_leave_one_out: bool,

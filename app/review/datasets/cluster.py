@@ -49,7 +49,7 @@ _NUMBERS = ("numba", "numpy", "opencv-python-headless", "scipy")
 
 
 @dataclass(frozen=True)
-class Place:
+class SchedulerPlace:
     """Where a scheduler is.
 
     Attributes:
@@ -85,7 +85,7 @@ class Place:
         return Security(require_encryption=True, tls_ca_file=ca, **roles)
 
 
-def read_place(address: str, keys: Path | None) -> Place:
+def read_place(address: str, keys: Path | None) -> SchedulerPlace:
     """Where a scheduler is, as it was typed.
 
     Args:
@@ -120,14 +120,14 @@ def read_place(address: str, keys: Path | None) -> Place:
                 f"{address} is not encrypted: whoever reaches it could run programs on every worker",
                 hint="Write tls://HOST:PORT, and name a folder with certificates (TOUCHLINE_CLUSTER_KEYS).",
             )
-        return Place(f"tcp://{parts.netloc}")
+        return SchedulerPlace(f"tcp://{parts.netloc}")
     if keys is None:
         raise InputError(
             "tls:// needs certificates",
             hint=f"Name a folder with {', '.join(_KEYS)} (TOUCHLINE_CLUSTER_KEYS).",
         )
     _require_keys(keys)
-    return Place(f"tls://{parts.netloc}", keys)
+    return SchedulerPlace(f"tls://{parts.netloc}", keys)
 
 
 def build() -> dict[str, str]:
@@ -177,7 +177,7 @@ class Cluster(Executor):
         ClusterError: No scheduler answers, it has no worker, or one of another version.
     """
 
-    def __init__(self, place: Place):
+    def __init__(self, place: SchedulerPlace):
         self._place, self._build = place, build()
         self._under_way: dict[Future[Any], _Task] = {}
         self._lock = threading.Lock()
@@ -336,7 +336,7 @@ class _Task:
     sent: Any = None
 
 
-def _no_worker(place: Place) -> ClusterError:
+def _no_worker(place: SchedulerPlace) -> ClusterError:
     return ClusterError(
         f"no worker is at {place.address}", hint=f"Start one: touchline worker {place.address}"
     )
@@ -349,7 +349,7 @@ def _workers_of(client: Any) -> int:
     return 0
 
 
-def _connect(place: Place) -> Any:
+def _connect(place: SchedulerPlace) -> Any:
     from distributed import Client
 
     hush()

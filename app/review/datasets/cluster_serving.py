@@ -11,7 +11,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from app.errors import ClusterError
-from app.review.datasets.cluster import Place, hush
+from app.review.datasets.cluster import SchedulerPlace, hush
 
 AGAIN_S = 2.0
 """Seconds until a worker whose scheduler has gone looks for it again."""
@@ -29,7 +29,7 @@ _NOWHERE = "127.0.0.1:0"
 Say = Callable[[str], None]
 
 
-def run_scheduler(place: Place, say: Say) -> None:
+def run_scheduler(place: SchedulerPlace, say: Say) -> None:
     """Carry tasks between servers and workers until the process is told to end.
 
     Raises:
@@ -38,7 +38,7 @@ def run_scheduler(place: Place, say: Say) -> None:
     _run(_schedule(place, say))
 
 
-def run_workers(place: Place, count: int, memory: int | None, say: Say) -> None:
+def run_workers(place: SchedulerPlace, count: int, memory: int | None, say: Say) -> None:
     """Solve for a scheduler until the process is told to end; one that ends is started again.
 
     Args:
@@ -60,7 +60,7 @@ def _run(program: Coroutine[Any, Any, None]) -> None:
         asyncio.run(program)
 
 
-async def _schedule(place: Place, say: Say) -> None:
+async def _schedule(place: SchedulerPlace, say: Say) -> None:
     from distributed import Scheduler
 
     end = _told_to_end()
@@ -80,7 +80,9 @@ async def _schedule(place: Place, say: Say) -> None:
         await end.wait()
 
 
-async def _work(place: Place, count: int, memory: int | None, folder: str, say: Say) -> None:
+async def _work(
+    place: SchedulerPlace, count: int, memory: int | None, folder: str, say: Say
+) -> None:
     end = _told_to_end()
     say(f"{count} workers look for the scheduler at {place.address}")
     limit = 0.9 / count if memory is None else memory
@@ -91,7 +93,7 @@ async def _work(place: Place, count: int, memory: int | None, folder: str, say: 
     await asyncio.gather(*keepers, return_exceptions=True)
 
 
-async def _keep(place: Place, limit: float, folder: str) -> None:
+async def _keep(place: SchedulerPlace, limit: float, folder: str) -> None:
     """A worker, and another one whenever it has ended."""
     from distributed import Nanny
 

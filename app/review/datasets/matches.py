@@ -12,13 +12,13 @@ from app.datasets.file_tree import Limits
 from app.datasets.json_text import read_json
 from app.datasets.sn_calibration import LineFile
 from app.errors import DatasetFormatError
-from app.solving.match_model import Place
+from app.solving.match_model import FramePlace
 from app.solving.match_position import NO_PLACES, Places
 from app.solving.match_runs import guess_matches
 
 
 @dataclass(frozen=True)
-class Share:
+class MatchShare:
     """What a frame gets from the others of its match: their places. ``match`` is its name."""
 
     match: str
@@ -44,8 +44,8 @@ def read_matches(path: Path) -> dict[str, str]:
 
 
 def shares_of(
-    files: Sequence[LineFile], places: Sequence[Place | None], named: Mapping[str, str] | None
-) -> list[Share]:
+    files: Sequence[LineFile], places: Sequence[FramePlace | None], named: Mapping[str, str] | None
+) -> list[MatchShare]:
     """What each frame gets from the others of its match.
 
     Args:
@@ -62,7 +62,7 @@ def shares_of(
     members = defaultdict(list)
     for index, file in enumerate(files):
         members[match[file.stem]].append(index)
-    shares = [Share(match[file.stem], NO_PLACES) for file in files]
+    shares = [MatchShare(match[file.stem], NO_PLACES) for file in files]
     for name, indices in members.items():
         if not name:
             continue
@@ -71,5 +71,5 @@ def shares_of(
         row = {index: at for at, index in enumerate(known)}
         for index in indices:
             others = all_.without(row[index]) if index in row else all_
-            shares[index] = Share(name, others)
+            shares[index] = MatchShare(name, others)
     return shares

@@ -34,7 +34,7 @@ from app.paint.propose import LEAST_SIDE
 from app.paint.ridges import line_like
 from app.paint.snap import Snapped, snap
 from app.progress import Progress
-from app.review.datasets.picture_files import FrameNames, PictureFile, picture_stems, read_pictures
+from app.review.datasets.picture_files import PictureFile, UniqueNames, picture_stems, read_pictures
 from app.soccer.frames import ImageSize
 from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy
@@ -132,7 +132,7 @@ class _Match:
 
     def pictures(self, report: Report) -> Iterator[tuple[PictureFile, str, str]]:
         """Each picture that has a file, with the name of its frame and the key of its file."""
-        names = FrameNames()
+        names = UniqueNames()
         for picture in read_pictures(self._images, self._settings, report):
             key = self._key(picture.stem)
             if key is not None:

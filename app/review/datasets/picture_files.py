@@ -21,7 +21,7 @@ from app.store.frames import ALLOWANCE
 from app.store.media import decode_picture
 
 
-class FrameNames:
+class UniqueNames:
     """Names of frames, none given twice: ``a.jpg`` and ``a.png`` are ``a`` and ``a_2``."""
 
     def __init__(self) -> None:

@@ -19,9 +19,9 @@ from app.durable import replace_file
 from app.errors import GeometryError, InputError
 from app.finite import json_text
 from app.geometry.camera import Camera
-from app.paint.propose import Proposal, propose
+from app.paint.propose import FrameProposal, propose
 from app.progress import Progress
-from app.review.datasets.picture_files import FrameNames, PictureFile, read_pictures
+from app.review.datasets.picture_files import PictureFile, UniqueNames, read_pictures
 from app.soccer.frames import ImageSize
 
 RESULT = "propose.json"
@@ -56,7 +56,7 @@ def propose_files(
     report = Report()
     cameras = _known(known)
     rows: list[dict[str, Any]] = []
-    names = FrameNames()
+    names = UniqueNames()
     for picture in read_pictures(sources, settings, report):
         frame = names.name(picture.stem)
         rows.append(_propose_one(picture, frame, out, cameras, size))
@@ -84,12 +84,12 @@ def _propose_one(
 ) -> dict[str, Any]:
     began = time.perf_counter()
     if picture.image is None:
-        found = Proposal("nothing", picture.problem)
+        found = FrameProposal("nothing", picture.problem)
     else:
         try:
             found = propose(picture.image, known=known)
         except (GeometryError, np.linalg.LinAlgError) as error:
-            found = Proposal("nothing", f"the picture cannot be solved ({error})")
+            found = FrameProposal("nothing", f"the picture cannot be solved ({error})")
     milliseconds = 1000 * (time.perf_counter() - began)
     file = resolve_inside(out, camera_name(frame))
     if found.outcome == "proposed" and found.camera is not None and picture.image is not None:
@@ -103,7 +103,7 @@ def _propose_one(
     return _row(frame, found, milliseconds)
 
 
-def _row(frame: str, found: Proposal, milliseconds: float) -> dict[str, Any]:
+def _row(frame: str, found: FrameProposal, milliseconds: float) -> dict[str, Any]:
     agreement, snapped = found.agreement, found.snapped
     return {
         "frame": frame,

@@ -26,7 +26,7 @@ from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy
 from app.soccer.solution import SOLVER_VERSION, Calibration
 from app.solving.calibrate import calibrate_station, calibration_key
-from app.solving.match_model import Place
+from app.solving.match_model import FramePlace
 from app.solving.match_position import Places, pan_of, place_of
 from app.store.digest import digest
 from app.store.groups import StoredGroup, read_groups
@@ -350,7 +350,7 @@ def _estimate(task: _Task) -> tuple[_Task, dict[int, dict[str, SharedPosition]]]
     return replace(task, pictures=()), positions
 
 
-def _alone(task: _Task) -> Iterator[tuple[_Picture, Calibration | None, Place | None]]:
+def _alone(task: _Task) -> Iterator[tuple[_Picture, Calibration | None, FramePlace | None]]:
     """Pictures, calibrated; None where solving would take no position from others."""
     for picture in task.pictures:
         station = picture.station

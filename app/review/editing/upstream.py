@@ -17,7 +17,7 @@ KIND = "upstream_changed"
 
 
 @dataclass(frozen=True)
-class Kept:
+class KeptEdit:
     """Something a person edited and the dataset changed too: the person's version stayed."""
 
     view: str | None
@@ -33,7 +33,7 @@ class Followed:
 
     group: Group
     base: Group
-    kept: tuple[Kept, ...]
+    kept: tuple[KeptEdit, ...]
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ class FollowedStation:
 
     station: Station
     base: Station
-    kept: Kept | None
+    kept: KeptEdit | None
 
 
 def follow_group(stored: StoredGroup, incoming: Group) -> Followed:
@@ -52,7 +52,7 @@ def follow_group(stored: StoredGroup, incoming: Group) -> Followed:
     """
     views: list[View] = []
     bases: list[View] = []
-    kept: list[Kept] = []
+    kept: list[KeptEdit] = []
     for view in incoming.views:
         result, base, noticed = _follow_view(stored, view)
         views.append(result)
@@ -63,7 +63,7 @@ def follow_group(stored: StoredGroup, incoming: Group) -> Followed:
             views.append(view)
             bases.append(view)
             sentence = f"{view.key} is gone from the dataset; a person had edited it, so it stays"
-            kept.append(Kept(view.key, sentence))
+            kept.append(KeptEdit(view.key, sentence))
     return Followed(
         replace(incoming, views=tuple(views)), replace(incoming, views=tuple(bases)), tuple(kept)
     )
@@ -94,17 +94,17 @@ def follow_station(
     kept = None
     if station_digest(incoming) not in (stored.digest, stored.source_digest):
         sentence = f"the dataset has new lines or a new camera for {incoming.key}; edits stay"
-        kept = Kept(None, sentence)
+        kept = KeptEdit(None, sentence)
     # What no edit can touch follows all the same.
     station = incoming.with_said(stored.station)
     return FollowedStation(station, incoming, kept)
 
 
-def _follow_view(stored: StoredGroup, view: View) -> tuple[View, View, list[Kept]]:
+def _follow_view(stored: StoredGroup, view: View) -> tuple[View, View, list[KeptEdit]]:
     old = stored.group.view(view.key)
     if old is None or not keeps_station(stored, view):
         return view, view, []
-    kept: list[Kept] = []
+    kept: list[KeptEdit] = []
     result = base = view
     if not view.included and not old.included:
         # Saying why is no edit of what is solved; the dataset's word counts where it has one.
@@ -114,7 +114,7 @@ def _follow_view(stored: StoredGroup, view: View) -> tuple[View, View, list[Kept
         # Neither what it said before nor what the person says.
         if view_digest(view) not in stored.view_digests[view.key]:
             sentence = f"the dataset has another ball in {view.key}; the edited one stays"
-            kept.append(Kept(view.key, sentence))
+            kept.append(KeptEdit(view.key, sentence))
     if result.balls == old.balls:
         # How noisy they are is no word of the dataset's.
         result = replace(result, noise=old.noise)
@@ -123,5 +123,5 @@ def _follow_view(stored: StoredGroup, view: View) -> tuple[View, View, list[Kept
         result = replace(result, station=followed.station)
         base = replace(base, station=followed.base)
         if followed.kept is not None:
-            kept.append(Kept(view.key, followed.kept.sentence))
+            kept.append(KeptEdit(view.key, followed.kept.sentence))
     return result, base, kept

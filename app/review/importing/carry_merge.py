@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 from app.review.editing.lineage import Lineage, pitch_size
 from app.review.editing.pitches import give_pitch
-from app.review.editing.upstream import Kept
+from app.review.editing.upstream import KeptEdit
 from app.review.importing.body import import_body, places_of
 from app.review.importing.carry_parse import CarriedGroup
 from app.review.importing.ingest import IngestReport, Origin, note_kept
@@ -99,8 +99,8 @@ def merge_group(
 
 def _merged(
     stored: StoredGroup, lineage: Lineage, carried: CarriedGroup
-) -> tuple[Group, list[Kept]]:
-    group, kept = stored.group, list[Kept]()
+) -> tuple[Group, list[KeptEdit]]:
+    group, kept = stored.group, list[KeptEdit]()
     for view in stored.group.views:
         other, base = carried.group.view(view.key), carried.base.view(view.key)
         if other is None or base is None or other.station.shared != view.station.shared:
@@ -121,7 +121,7 @@ def _merged(
     return group, kept
 
 
-def _kept(view: str | None, decision: str, what: str) -> list[Kept]:
+def _kept(view: str | None, decision: str, what: str) -> list[KeptEdit]:
     if decision == CONFLICT:
         sentence = f"another installation edited the {what} too; what is here stays"
     elif decision == UPSTREAM:
@@ -131,7 +131,7 @@ def _kept(view: str | None, decision: str, what: str) -> list[Kept]:
         )
     else:
         return []
-    return [Kept(view, sentence)]
+    return [KeptEdit(view, sentence)]
 
 
 def _pitch_sides(stored: StoredGroup, lineage: Lineage, carried: CarriedGroup) -> tuple[Side, Side]:
@@ -160,7 +160,7 @@ def _other_station(carried: CarriedGroup, view: View, base: View) -> Side:
     return Side(station_digest(view.station), station_digest(base.station), past)
 
 
-def _not_noticed(session: Session, group_id: int, kept: list[Kept]) -> list[Kept]:
+def _not_noticed(session: Session, group_id: int, kept: list[KeptEdit]) -> list[KeptEdit]:
     """Those of the findings that are not there already."""
     if not kept:
         return []

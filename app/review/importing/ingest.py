@@ -16,7 +16,7 @@ from app.review.datasets.paint_reading import outdated_where_people_moved
 from app.review.editing.edit import SetPaint, SetPositions
 from app.review.editing.pitches import give_pitch
 from app.review.editing.shared_stations import SharedStations
-from app.review.editing.upstream import KIND, Kept, follow_group
+from app.review.editing.upstream import KIND, KeptEdit, follow_group
 from app.review.importing.body import import_body, places_of
 from app.review.importing.group_limits import MAX_VIEWS, GroupLimits
 from app.review.importing.missing import GONE, note_gone, of_read_matches
@@ -309,14 +309,14 @@ def _edited_pitch(session: Session, stored: StoredGroup, incoming: Group) -> Pit
     return stored.group.pitch if is_own else None
 
 
-def note_kept(session: Session, stored: StoredGroup, kept: Sequence[Kept]) -> list[Kept]:
+def note_kept(session: Session, stored: StoredGroup, kept: Sequence[KeptEdit]) -> list[KeptEdit]:
     """Save what imports noticed about a group: this one, and earlier ones as far as it holds.
 
     A finding goes when its view is as the dataset has it now. Returns what is noticed then.
     """
     fresh = {item.view for item in kept}
     noticed = [
-        Kept(view, sentence)
+        KeptEdit(view, sentence)
         for view, sentence in group_findings(session, stored.id)
         if view is not None
         and view not in fresh

@@ -48,7 +48,7 @@ class Kind(StrEnum):
 
 
 @dataclass(frozen=True)
-class Place:
+class Whereabouts:
     """Where something belongs.
 
     Attributes:
@@ -62,7 +62,7 @@ class Place:
     called: str | None = None
 
 
-def role_at(place: Place, roles: DatasetRoles, name: str) -> Role:
+def role_at(place: Whereabouts, roles: DatasetRoles, name: str) -> Role:
     """What somebody is where something belongs; ``none``: they do not see it.
 
     Args:
@@ -86,7 +86,7 @@ class Named:
     by: str | int
 
 
-def find_place(store: Store, named: Named, sight: Sight) -> Place | None:
+def find_place(store: Store, named: Named, sight: Sight) -> Whereabouts | None:
     """Where something is that an address names; None where there is nothing of that name.
 
     Args:
@@ -103,29 +103,29 @@ def find_place(store: Store, named: Named, sight: Sight) -> Place | None:
         if not isinstance(named.by, int):
             return None
         dataset = dataset_of(session, named.kind.value, named.by)
-    return None if dataset is None else Place(dataset)
+    return None if dataset is None else Whereabouts(dataset)
 
 
-def _dataset(session: Session, named: str | int, _sight: Sight) -> Place | None:
+def _dataset(session: Session, named: str | int, _sight: Sight) -> Whereabouts | None:
     row = find_dataset(session, named)
-    return None if row is None else Place(int(row.id))
+    return None if row is None else Whereabouts(int(row.id))
 
 
-def _job(session: Session, named: str | int, _sight: Sight) -> Place | None:
+def _job(session: Session, named: str | int, _sight: Sight) -> Whereabouts | None:
     number = _number(named)
     row = None if number is None else owner_of_job(session, number)
-    return None if row is None else Place(row.dataset_id, frozenset({row.actor}))
+    return None if row is None else Whereabouts(row.dataset_id, frozenset({row.actor}))
 
 
-def _version(session: Session, named: str | int, sight: Sight) -> Place | None:
+def _version(session: Session, named: str | int, sight: Sight) -> Whereabouts | None:
     """By id, name or hash, among the datasets that somebody sees."""
     rows = versions_like(session, str(named))
     every = _fitting(rows, str(named))
     seen = _fitting([row for row in rows if sight.sees(row.dataset_id)], str(named))
     if len(seen) == 1:
-        return Place(seen[0].dataset_id, called=str(seen[0].id))
+        return Whereabouts(seen[0].dataset_id, called=str(seen[0].id))
     # Several: the route says so, and which datasets they are of.
-    return Place(seen[0].dataset_id) if seen and len(seen) == len(every) else None
+    return Whereabouts(seen[0].dataset_id) if seen and len(seen) == len(every) else None
 
 
 def _fitting(rows: Sequence[Any], text: str) -> list[Any]:
@@ -136,12 +136,12 @@ def _fitting(rows: Sequence[Any], text: str) -> list[Any]:
     return fitting
 
 
-def _upload(store: Store, named: str | int) -> Place | None:
+def _upload(store: Store, named: str | int) -> Whereabouts | None:
     try:
         found = get_upload(store.settings, str(named))
     except NotFoundError:
         return None
-    return Place(None, frozenset(found.by))
+    return Whereabouts(None, frozenset(found.by))
 
 
 def _number(named: str | int) -> int | None:
@@ -150,7 +150,7 @@ def _number(named: str | int) -> int | None:
     return int(named) if named.isascii() and named.isdigit() and len(named) < 19 else None
 
 
-_FIND: Mapping[Kind, Callable[[Session, Any, Sight], Place | None]] = {
+_FIND: Mapping[Kind, Callable[[Session, Any, Sight], Whereabouts | None]] = {
     Kind.DATASET: _dataset,
     Kind.NEW_DATASET: _dataset,
     Kind.JOB: _job,

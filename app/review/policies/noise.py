@@ -17,7 +17,7 @@ from app.soccer.policy import CALIBRATION, POLICIES, THRESHOLDS, Policy
 from app.solving.ball_noise import BallNoise, Miss, Sigma, estimate_ball_noise, misses_of
 from app.solving.line_noise import LineEstimate, LineEvidence, estimate_line_noise
 from app.solving.resect import REFERENCE_DIAGONAL, view_line_evidence, view_line_noise
-from app.solving.source_noise import Source, SourceFactors, SourceNoise, estimate_sources
+from app.solving.source_noise import BallSource, SourceFactors, SourceNoise, estimate_sources
 from app.solving.triangulate import sights_of
 from app.store.noise import Factor, Factors, factor_of, read_factors
 from app.store.session import Session
@@ -126,7 +126,7 @@ def read_noise(store: Store, dataset: str | int) -> Noise:
     """
     state = read_policy(store, dataset)
     misses: list[Miss] = []
-    seen: list[tuple[Miss, Mapping[str, Sequence[Source]]]] = []
+    seen: list[tuple[Miss, Mapping[str, Sequence[BallSource]]]] = []
     lines: dict[str, _ViewLines] = {}
     ids = _solved(store, state.dataset_id)
     chosen = ids[:: max(-(-len(ids) // MAX_GROUPS), 1)]
@@ -214,18 +214,18 @@ def _groups(store: Store, chosen: Sequence[int]) -> Iterator[tuple[GroupState, M
         yield from ((state, placed.get(state.id, {})) for state in states)
 
 
-def _sources_of(state: GroupState, placed: Mapping[str, str]) -> dict[str, list[Source]]:
+def _sources_of(state: GroupState, placed: Mapping[str, str]) -> dict[str, list[BallSource]]:
     """The static camera of each view, and who placed its ball, by the view's key."""
-    found: dict[str, list[Source]] = {}
+    found: dict[str, list[BallSource]] = {}
     for view in state.group.views:
-        camera = [Source("camera", view.station.key)] if view.station.shared else []
-        person = [Source("person", placed[view.key])] if view.key in placed else []
+        camera = [BallSource("camera", view.station.key)] if view.station.shared else []
+        person = [BallSource("person", placed[view.key])] if view.key in placed else []
         found[view.key] = camera + person
     return found
 
 
 def _sources(
-    seen: Sequence[tuple[Miss, Mapping[str, Sequence[Source]]]], ball: BallNoise, policy: Policy
+    seen: Sequence[tuple[Miss, Mapping[str, Sequence[BallSource]]]], ball: BallNoise, policy: Policy
 ) -> SourceFactors:
     """Noise of the sources of some views, beside what is known of the dataset."""
     click = policy.click_sigma_px if ball.click is None else ball.click.value
@@ -243,7 +243,7 @@ def _factors(found: SourceFactors) -> Factors:
     factors = []
     for camera in cameras:
         for person in people:
-            sources = (Source("camera", camera), Source("person", person))
+            sources = (BallSource("camera", camera), BallSource("person", person))
             factors.append(Factor(camera or None, person or None, found.factor(sources)))
     return tuple(factors) if any(item.ratio != 1 for item in factors) else ()
 

@@ -34,7 +34,7 @@ _FEW = 6
 """From so many on a median has an interval of 95 % that rests on no assumption."""
 
 
-class Source(StrEnum):
+class TruthSource(StrEnum):
     """Where the truth of a gold group is from."""
 
     VERDICT = "verdict"
@@ -54,7 +54,7 @@ class GoldGroup:
     start: str
     marked: str
     marked_by: str
-    source: Source
+    source: TruthSource
 
 
 @dataclass(frozen=True)
@@ -243,7 +243,7 @@ def _known(session: Session, row: Any) -> tuple[GoldGroup, Json]:
         said["start"],
         said["marked"],
         said["marked_by"],
-        Source(truth.get("source", Source.VERDICT)),
+        TruthSource(truth.get("source", TruthSource.VERDICT)),
     )
     return gold, truth
 

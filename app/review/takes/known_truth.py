@@ -18,7 +18,7 @@ from app.datasets.camera_json import camera_to_json
 from app.errors import ConflictError, InputError
 from app.review.datasets.dataset import dataset_id
 from app.review.queue.query import MAX_LISTED_LENGTH, parse_query
-from app.review.takes.gold import KIND, Source
+from app.review.takes.gold import KIND, TruthSource
 from app.review.versions.version import Version, find_version, thaw
 from app.sample.scene import SceneTruth
 from app.sample.truth import TRUTH, read_truth
@@ -56,7 +56,7 @@ class GoldChoice:
         start: What annotators begin with.
     """
 
-    source: Source
+    source: TruthSource
     version: str | None = None
     query: str = ""
     size: int = MOST
@@ -157,13 +157,17 @@ def _sample_truth(group: Group, truth: SceneTruth) -> Json:
         center = view.camera.project(np.array([view.ball]))[0]
         views[view.view] = {"camera": camera_to_json(view.camera), "center": [*map(float, center)]}
     # Whether a group is good enough is a question to the policy, which no scene answers.
-    said = {"group": group_to_json(group), "verdict": "unreviewed", "source": str(Source.SAMPLE)}
+    said = {
+        "group": group_to_json(group),
+        "verdict": "unreviewed",
+        "source": str(TruthSource.SAMPLE),
+    }
     return {**said, "ball": [*truth.ball], "views": views}
 
 
 def _version(store: Store, dataset: str | int, choice: GoldChoice) -> Version | None:
     """The version that knows the truth; None where another source does."""
-    if choice.source is not Source.VERSION:
+    if choice.source is not TruthSource.VERSION:
         return None
     if choice.version is None:
         raise InputError("say which version knows the truth", pointer="/version")
@@ -185,11 +189,11 @@ def _of_version(
         (frozen,) = thaw(session, version, [row])
         verdict = (row.verdict or {}).get("state", "unreviewed")
         said = {"group": group_to_json(frozen.group), "verdict": verdict, "ball": [*row.ball]}
-        yield ids[row.key], {**said, "source": str(Source.VERSION)}
+        yield ids[row.key], {**said, "source": str(TruthSource.VERSION)}
 
 
-def _nothing(source: Source) -> InputError:
-    if source is Source.SAMPLE:
+def _nothing(source: TruthSource) -> InputError:
+    if source is TruthSource.SAMPLE:
         return InputError(
             "nothing is known of these groups",
             hint=f"Their frames have to lie where the sample was written, beside its {TRUTH}.",

@@ -23,9 +23,9 @@ from app.store.people import person_by_name
 from app.store.session import Session
 from app.store.store import Store
 from app.store.threads import (
-    Place,
     StoredComment,
     StoredThread,
+    ThreadGroup,
     change_comment,
     delete_thread,
     find_group,
@@ -222,7 +222,7 @@ def remove(
 
 def _say(
     session: Session,
-    group: Place,
+    group: ThreadGroup,
     thread_id: int,
     text: str,
     actor: str,
@@ -240,7 +240,7 @@ def _say(
 
 def _ring(
     session: Session,
-    group: Place,
+    group: ThreadGroup,
     thread_id: int,
     actor: str,
     mentioned: Iterable[str],
@@ -263,7 +263,7 @@ def _ring(
         )
 
 
-def _seeing(session: Session, group: Place, names: Iterable[str]) -> dict[str, int]:
+def _seeing(session: Session, group: ThreadGroup, names: Iterable[str]) -> dict[str, int]:
     """Ids of those among some names who see a group's dataset; the others are not told apart."""
     found: dict[str, int] = {}
     for name in names:
@@ -280,7 +280,7 @@ def _sees(row: Any) -> bool:
     return bool(here != Role.NONE)
 
 
-def _log(session: Session, group: Place, actor: str, time: str, **said: Any) -> None:
+def _log(session: Session, group: ThreadGroup, actor: str, time: str, **said: Any) -> None:
     body = {name: value for name, value in said.items() if value is not None}
     append(session, [Entry(COMMENT, actor, time, body, group.dataset_id, group.group_id)])
 
@@ -294,7 +294,7 @@ def _checked(text: str) -> str:
     return text
 
 
-def _need_group(session: Session, group_id: int) -> Place:
+def _need_group(session: Session, group_id: int) -> ThreadGroup:
     group = find_group(session, group_id)
     if group is None:
         raise NotFoundError(f"there is no group {group_id}")

@@ -16,7 +16,14 @@ from app.errors import ConflictError
 from app.review.queue.query import MAX_LISTED_LENGTH, parse_query
 from app.review.verdicts.verdict import Verdict, check_verdict
 from app.store.answers import Keep, SavedProgress, keep_nothing
-from app.store.batches import Batch, Spans, find_batch, insert_batch, read_batches, update_batch
+from app.store.batches import (
+    BulkVerdict,
+    Spans,
+    find_batch,
+    insert_batch,
+    read_batches,
+    update_batch,
+)
 from app.store.clock import now
 from app.store.listing import Listing, read_columns
 from app.store.log import Entry, append
@@ -180,7 +187,7 @@ def _require_expected(found: SortedOut, expected: int | None) -> None:
         )
 
 
-def list_batches(store: Store, dataset_id: int, limit: int = 20) -> list[Batch]:
+def list_batches(store: Store, dataset_id: int, limit: int = 20) -> list[BulkVerdict]:
     """The newest bulk verdicts of a dataset, the newest first."""
     with store.read() as session:
         return read_batches(session, dataset_id, limit)
@@ -295,7 +302,7 @@ class BatchRun:
         (log_id,) = append(session, [entry])
         update_batch(session, self.batch, log_id=log_id)
 
-    def _standing(self, session: Session) -> Batch | None:
+    def _standing(self, session: Session) -> BulkVerdict | None:
         """The batch as it is stored, which others may go on with or take back; None before it is.
 
         Raises:

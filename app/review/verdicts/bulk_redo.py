@@ -10,7 +10,7 @@ from app.review.verdicts.bulk import ASKED, BatchRun, Refusal, sort_out
 from app.review.verdicts.bulk_undo import read_batch
 from app.review.verdicts.verdict import check_verdict
 from app.store.answers import Keep, SavedProgress, keep_nothing
-from app.store.batches import Batch, Spans, update_batch
+from app.store.batches import BulkVerdict, Spans, update_batch
 from app.store.listing import read_columns
 from app.store.session import Session
 from app.store.solutions import present_keys
@@ -82,13 +82,13 @@ def redo_batch(
     return report
 
 
-def _report(batch: Batch, run: BatchRun, refused: Counter[str]) -> RedoReport:
+def _report(batch: BulkVerdict, run: BatchRun, refused: Counter[str]) -> RedoReport:
     kept = batch.changed - run.changed - refused.total()
     reasons = tuple(Refusal(reason, groups) for reason, groups in refused.items())
     return RedoReport(run.batch, run.changed, kept, reasons)
 
 
-def _spans(batch: Batch) -> Spans:
+def _spans(batch: BulkVerdict) -> Spans:
     """First and last id of the verdicts that took a batch back, chunk by chunk."""
     if batch.undone is None:
         raise ConflictError("this batch was not taken back, so there is nothing to give again")

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from app.errors import ConflictError, NotFoundError
 from app.review.verdicts.bulk import save_verdicts
 from app.store.answers import Keep, keep_nothing
-from app.store.batches import Batch, Spans, find_batch, update_batch
+from app.store.batches import BulkVerdict, Spans, find_batch, update_batch
 from app.store.clock import now
 from app.store.log import Entry, append
 from app.store.session import Session
@@ -53,7 +53,7 @@ def undo_batch(
                 return report
 
 
-def _standing(session: Session, batch_id: int) -> Batch:
+def _standing(session: Session, batch_id: int) -> BulkVerdict:
     """A batch that was not taken back, or not wholly.
 
     Raises:
@@ -71,7 +71,7 @@ def _span(verdicts: Sequence[StoredVerdict]) -> Spans:
     return [(verdicts[0].id, verdicts[-1].id)] if verdicts else []
 
 
-def _close(session: Session, batch: Batch, report: UndoReport, actor: str) -> None:
+def _close(session: Session, batch: BulkVerdict, report: UndoReport, actor: str) -> None:
     """Say of a batch, and in the log, that it was taken back."""
     at = now()
     update_batch(session, batch.id, undone=at, undone_by=actor)
@@ -79,7 +79,7 @@ def _close(session: Session, batch: Batch, report: UndoReport, actor: str) -> No
     append(session, [entry])
 
 
-def read_batch(session: Session, batch_id: int) -> Batch:
+def read_batch(session: Session, batch_id: int) -> BulkVerdict:
     """A batch by its id.
 
     Raises:
@@ -92,7 +92,7 @@ def read_batch(session: Session, batch_id: int) -> Batch:
 
 
 def _restore(
-    session: Session, batch: Batch, first: int, last: int, actor: str
+    session: Session, batch: BulkVerdict, first: int, last: int, actor: str
 ) -> list[StoredVerdict]:
     """Take one chunk back; returns the verdicts that do it, of groups not judged since."""
     at, number = now(), next_verdict_id(session)

@@ -38,7 +38,7 @@ class Move:
 
 
 @dataclass(frozen=True)
-class Change:
+class ChangedGroup:
     """A group of both versions: ``what`` of annotations, verdict, split and ball is another."""
 
     group: str
@@ -63,7 +63,7 @@ class VersionDiff:
     added: tuple[Passage, ...]
     dropped: tuple[Passage, ...]
     moved: tuple[Move, ...]
-    changed: tuple[Change, ...]
+    changed: tuple[ChangedGroup, ...]
     settings: tuple[Setting, ...]
     unchanged: int
 
@@ -179,14 +179,14 @@ def _word(value: Any) -> str:
     return "not asked" if value is None else str(value)
 
 
-def _change(before: Any, after: Any) -> Change:
+def _change(before: Any, after: Any) -> ChangedGroup:
     differ = {
         "annotations": before.said != after.said,
         "verdict": before.verdict != after.verdict,
         "split": (before.split, before.splits) != (after.split, after.splits),
         "ball": (before.ball is None) != (after.ball is None),
     }
-    return Change(after.key, tuple(name for name, differs in differ.items() if differs))
+    return ChangedGroup(after.key, tuple(name for name, differs in differ.items() if differs))
 
 
 def _move(before: Any, after: Any) -> Move | None:

@@ -65,7 +65,7 @@ GONE = 410
 
 
 @dataclass(frozen=True)
-class Answer:
+class Attempt:
     """What came of one try: ``problem`` is None where it arrived."""
 
     status: int | None
@@ -154,7 +154,7 @@ class WebhookSender:
                     self._note(session, row, answer)
         return len(answers)
 
-    async def _try_all(self, due: Sequence[Any]) -> list[tuple[Any, Answer]]:
+    async def _try_all(self, due: Sequence[Any]) -> list[tuple[Any, Attempt]]:
         async with httpx.AsyncClient(
             timeout=SECONDS, follow_redirects=False, trust_env=False, verify=_trusted()
         ) as client:
@@ -198,24 +198,24 @@ class WebhookSender:
         seconds = (datetime.fromisoformat(due) - self._clock()).total_seconds()
         return min(max(seconds, 0.0), POLL_SECONDS)
 
-    async def _try(self, client: httpx.AsyncClient, row: Any) -> Answer:
+    async def _try(self, client: httpx.AsyncClient, row: Any) -> Attempt:
         """One try; whatever goes wrong with one address is its own answer."""
         try:
             async with asyncio.timeout(SECONDS):
                 status = await self._post(client, row)
         except ReviewError as error:
-            return Answer(None, error.message)
+            return Attempt(None, error.message)
         except (TimeoutError, httpx.TimeoutException):
-            return Answer(None, f"no answer within {SECONDS:.0f} s")
+            return Attempt(None, f"no answer within {SECONDS:.0f} s")
         except httpx.HTTPError as error:
-            return Answer(None, f"it could not be reached: {error}"[:300])
+            return Attempt(None, f"it could not be reached: {error}"[:300])
         except Exception as error:
             log.exception("a message could not be sent", webhook=row.webhook_id)
-            return Answer(None, f"it could not be sent: {error}"[:300])
+            return Attempt(None, f"it could not be sent: {error}"[:300])
         if 200 <= status < 300:
-            return Answer(status, None)
+            return Attempt(status, None)
         redirected = " (redirects are not followed)" if 300 <= status < 400 else ""
-        return Answer(status, f"it answered {status}{redirected}")
+        return Attempt(status, f"it answered {status}{redirected}")
 
     async def _post(self, client: httpx.AsyncClient, row: Any) -> int:
         settings = self._store.settings
@@ -225,7 +225,7 @@ class WebhookSender:
         async with client.stream("POST", row.url, content=row.body, headers=headers) as answer:
             return answer.status_code
 
-    def _note(self, session: Session, row: Any, answer: Answer) -> None:
+    def _note(self, session: Session, row: Any, answer: Attempt) -> None:
         now = self._clock()
         tried = {"attempts": row.attempts + 1, "tried": _text(now), "status": answer.status}
         values: dict[str, Any] = {**tried, "problem": answer.problem, "next_at": None}
@@ -239,7 +239,7 @@ class WebhookSender:
         if values.get("state") == FAILED:
             self._turn_off(session, row, answer)
 
-    def _turn_off(self, session: Session, row: Any, answer: Answer) -> None:
+    def _turn_off(self, session: Session, row: Any, answer: Attempt) -> None:
         """Tell nobody any more who wants nothing, or has taken nothing for as long as one tries."""
         if answer.status == GONE:
             update_webhook(session, row.webhook_id, {"off": "it answered 410: it wants no more"})

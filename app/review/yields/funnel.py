@@ -27,7 +27,7 @@ ANSWERED = tuple(
 
 
 @dataclass(frozen=True)
-class Step:
+class FunnelStep:
     """One step of the funnel: how many groups are left after it, and how many it dropped."""
 
     gate: str
@@ -36,7 +36,7 @@ class Step:
 
 
 @dataclass(frozen=True)
-class Curve:
+class ThresholdCurve:
     """Groups with the ball in two views or more that qualify, against the JaC threshold."""
 
     gamma_percent: float
@@ -45,7 +45,7 @@ class Curve:
 
 
 @dataclass(frozen=True)
-class Part:
+class FunnelPart:
     """Groups of one split, one bin of distance or with one finding, and how many pass."""
 
     name: str
@@ -78,12 +78,12 @@ class Yield:
     groups: int
     passing: int
     unsolved: int
-    funnel: tuple[Step, ...]
+    funnel: tuple[FunnelStep, ...]
     given_not_measured: int
-    curves: tuple[Curve, ...]
-    splits: tuple[Part, ...]
-    distances: tuple[Part, ...]
-    findings: tuple[Part, ...]
+    curves: tuple[ThresholdCurve, ...]
+    splits: tuple[FunnelPart, ...]
+    distances: tuple[FunnelPart, ...]
+    findings: tuple[FunnelPart, ...]
     leakage: tuple[Leak, ...]
     gained: int
     lost: int
@@ -141,13 +141,13 @@ def _answer(snapshot: Snapshot, policy: Policy, total: Tally, unanswered: tuple[
         funnel=_funnel(snapshot, total.dropped, policy),
         given_not_measured=total.unmeasured,
         curves=tuple(
-            Curve(gamma, tuple(counts.tolist()))
+            ThresholdCurve(gamma, tuple(counts.tolist()))
             for gamma, counts in zip(GAMMAS_PERCENT, total.curves, strict=True)
         ),
         splits=_splits(snapshot, total),
         distances=_distances(snapshot, total),
         findings=tuple(
-            Part(kind, groups, passing)
+            FunnelPart(kind, groups, passing)
             for kind, (groups, passing) in zip(FINDINGS, total.findings.tolist(), strict=True)
         ),
         leakage=_leaks(snapshot.places),
@@ -157,7 +157,7 @@ def _answer(snapshot: Snapshot, policy: Policy, total: Tally, unanswered: tuple[
     )
 
 
-def _funnel(snapshot: Snapshot, dropped: IntArray, policy: Policy) -> tuple[Step, ...]:
+def _funnel(snapshot: Snapshot, dropped: IntArray, policy: Policy) -> tuple[FunnelStep, ...]:
     """Gates that the policy asks for, in order, after the groups that are not solved."""
     inactive = {
         "agreement": policy.min_agreement is None,
@@ -167,30 +167,30 @@ def _funnel(snapshot: Snapshot, dropped: IntArray, policy: Policy) -> tuple[Step
     }
     left, steps = snapshot.solved, []
     if snapshot.unsolved:
-        steps.append(Step(UNSOLVED, left, snapshot.unsolved))
+        steps.append(FunnelStep(UNSOLVED, left, snapshot.unsolved))
     for place, gate in enumerate(GATES):
         if not inactive.get(gate, False):
             left -= int(dropped[place])
-            steps.append(Step(gate, left, int(dropped[place])))
+            steps.append(FunnelStep(gate, left, int(dropped[place])))
     return tuple(steps)
 
 
-def _splits(snapshot: Snapshot, total: Tally) -> tuple[Part, ...]:
+def _splits(snapshot: Snapshot, total: Tally) -> tuple[FunnelPart, ...]:
     everyone: Counter[str] = Counter()
     for (_, split), groups in snapshot.places.items():
         everyone[split] += groups
     return tuple(
-        Part(split, groups, total.splits[split]) for split, groups in sorted(everyone.items())
+        FunnelPart(split, groups, total.splits[split]) for split, groups in sorted(everyone.items())
     )
 
 
-def _distances(snapshot: Snapshot, total: Tally) -> tuple[Part, ...]:
+def _distances(snapshot: Snapshot, total: Tally) -> tuple[FunnelPart, ...]:
     """By distance of the ball; groups that have none under the policy stand apart, last."""
     groups, passing = total.distances.tolist()
     groups[-1] += snapshot.unsolved
     ends: list[float | None] = [*DISTANCES[1:], None, None]
     return tuple(
-        Part("", groups[bin_], passing[bin_], low, ends[bin_])
+        FunnelPart("", groups[bin_], passing[bin_], low, ends[bin_])
         for bin_, low in enumerate([*DISTANCES, None])
     )
 

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from app.datasets.csv_text import Table, cell, is_missing, numbers_in, plain_list, read_rows
+from app.datasets.csv_text import CsvTable, cell, is_missing, numbers_in, plain_list, read_rows
 from app.datasets.file_tree import DEFAULT_LIMITS, Limits
 from app.errors import DatasetFormatError
 
@@ -50,7 +50,7 @@ class TestPlainList:
 class TestTable:
     def test_the_index_column_comes_first_and_has_no_name(self) -> None:
         file = io.StringIO()
-        table = Table(file, ["a", "b"])
+        table = CsvTable(file, ["a", "b"])
         table.add([1.5, None])
         table.add(["x,y", False])
         assert file.getvalue() == ',a,b\n0,1.5,\n1,"x,y",False\n'
@@ -83,7 +83,7 @@ class TestReadRows:
     @given(st.text(st.characters(exclude_categories=["Cs"])))
     def test_any_text_comes_back_through_a_table(self, text: str) -> None:
         file = io.StringIO(newline="")
-        Table(file, ("a",)).add([text])
+        CsvTable(file, ("a",)).add([text])
         ((_, row),) = read_rows(file.getvalue().encode(), "f", ("a",), DEFAULT_LIMITS)
         expected = text.replace("\r\n", "\n").replace("\r", "\n")
         # An apostrophe that the text itself has before a formula cannot be told from the escape.

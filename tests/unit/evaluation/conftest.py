@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.evaluation.frame import Detection, Frame, Judged
+from app.evaluation.frame import Detection, Frame, JudgedFrame
 from app.geometry.camera import Camera
 from app.geometry.sphere import optimal_diameter
 from app.soccer.frames import Box, ImagePoint
@@ -58,13 +58,13 @@ def make_frame() -> MakeFrame:
 
 
 @pytest.fixture
-def make_judged(make_frame: MakeFrame) -> Callable[..., Judged]:
+def make_judged(make_frame: MakeFrame) -> Callable[..., JudgedFrame]:
     """Makes a judged frame from boxes with scores."""
 
     def make(
         truth: Box | None, *found: tuple[Box, float], identity: int = 1, match: str = "m"
-    ) -> Judged:
+    ) -> JudgedFrame:
         detections = tuple(Detection(box, score) for box, score in found)
-        return Judged(make_frame(identity, match=match), truth, detections)
+        return JudgedFrame(make_frame(identity, match=match), truth, detections)
 
     return make

@@ -17,7 +17,7 @@ from app.evaluation.average_precision import (
     interpolated,
     mean_interpolated,
 )
-from app.evaluation.frame import Detection, Judged
+from app.evaluation.frame import Detection, JudgedFrame
 from app.soccer.frames import Box
 
 BALL = Box(100, 100, 10, 10)
@@ -27,7 +27,7 @@ AWAY = Box(300, 300, 10, 10)
 
 
 @pytest.fixture
-def random_judged(make_frame) -> list[Judged]:
+def random_judged(make_frame) -> list[JudgedFrame]:
     """Two hundred frames; some without a ball, many scores alike."""
     rng = np.random.default_rng(0)
     judged = []
@@ -40,11 +40,11 @@ def random_judged(make_frame) -> list[Judged]:
             width, height = (10 * rng.uniform(0.7, 1.4, 2)).tolist()
             found.append(Detection(Box(x, y, width, height), float(np.round(rng.random(), 1))))
         found.sort(key=lambda item: -item.score)
-        judged.append(Judged(make_frame(number + 1), truth, tuple(found)))
+        judged.append(JudgedFrame(make_frame(number + 1), truth, tuple(found)))
     return judged
 
 
-def by_pycocotools(judged: list[Judged]) -> tuple[float, float]:
+def by_pycocotools(judged: list[JudgedFrame]) -> tuple[float, float]:
     """AP at 0.5 and over all thresholds, by the reference."""
     from pycocotools.coco import COCO
     from pycocotools.cocoeval import COCOeval

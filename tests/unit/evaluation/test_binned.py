@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from app.evaluation.binned import DISTANCE, PARALLAX, SIZE, detection_table, error_figure
-from app.evaluation.frame import Detection, Judged
+from app.evaluation.frame import Detection, JudgedFrame
 from app.evaluation.place import measure_frame
 from app.evaluation.result import FrameResult
 from tests.unit.evaluation.conftest import DIAMETER
@@ -58,8 +58,8 @@ class TestDetectionTable:
     def test_each_bin_is_an_evaluation_of_its_own(self, make_frame) -> None:
         near, far = make_frame(1, distance=25.0), make_frame(2, distance=85.0)
         judged = [
-            Judged(near, near.boxes["optimized"], (Detection(near.boxes["optimized"], 0.9),)),
-            Judged(far, far.boxes["optimized"], ()),
+            JudgedFrame(near, near.boxes["optimized"], (Detection(near.boxes["optimized"], 0.9),)),
+            JudgedFrame(far, far.boxes["optimized"], ()),
         ]
         results = [measure_frame(item, DIAMETER) for item in judged]
         table = detection_table(judged, results, DISTANCE)

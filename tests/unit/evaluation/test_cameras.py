@@ -7,7 +7,7 @@ import pytest
 
 from app.evaluation.bootstrap import Resamples
 from app.evaluation.cameras import cameras_table, jac_figure, score_cameras
-from app.evaluation.table import Frames
+from app.evaluation.table import FrameRange
 from app.geometry.rotation import rotation_from_pan_tilt_roll
 from app.soccer.annotation import make_lines
 from app.soccer.pitch import MARKINGS, Pitch
@@ -66,7 +66,7 @@ class TestCamerasTable:
         assert table.cell("predicted", "challenge").value == pytest.approx(0.5)
         assert table.cell("predicted", "jac_2").of == 2
         assert table.cell("predicted", "error_median_px").value == pytest.approx(0, abs=0.5)
-        assert table.row("predicted").frames == Frames("predicted_jac")
+        assert table.row("predicted").frames == FrameRange("predicted_jac")
         assert "The list of frames has 1 of them" in table.note
 
 

@@ -8,7 +8,7 @@ from app.evaluation.bootstrap import Resamples
 from app.evaluation.careful import boxes_figure, boxes_table
 from app.evaluation.evaluate import Inputs, Options, evaluate
 from app.evaluation.frame import Detection
-from app.evaluation.table import Frames
+from app.evaluation.table import FrameRange
 
 
 class TestBoxesTable:
@@ -40,7 +40,7 @@ class TestBoxesTable:
         )
         table = result.table("boxes")
         opening = {row.name: row.frames for row in table.rows if row.frames}
-        assert opening == {"annotated": Frames("box_iou")}
+        assert opening == {"annotated": FrameRange("box_iou")}
         kept = [item.box_iou for item in result.frames if item.box_iou is not None]
         assert kept == [pytest.approx(table.cell("annotated", "iou").value)]
 

@@ -4,14 +4,14 @@ from dataclasses import replace
 
 import pytest
 
-from app.evaluation.frame import Detection, Judged
+from app.evaluation.frame import Detection, JudgedFrame
 from app.evaluation.place import measure_frame, place_error
 from app.soccer.frames import Box, ImagePoint
 from tests.unit.evaluation.conftest import DIAMETER, camera_at
 
 
-def judged(frame, *found: Detection) -> Judged:
-    return Judged(frame, frame.boxes["optimized"], found)
+def judged(frame, *found: Detection) -> JudgedFrame:
+    return JudgedFrame(frame, frame.boxes["optimized"], found)
 
 
 class TestPlaceError:
@@ -77,5 +77,7 @@ class TestMeasureFrame:
 
     def test_a_frame_without_ball_has_no_hit(self, make_frame) -> None:
         frame = replace(make_frame(), absent=True, point=None)
-        found = measure_frame(Judged(frame, None, (Detection(Box(5, 5, 9, 9), 0.9),)), DIAMETER)
+        found = measure_frame(
+            JudgedFrame(frame, None, (Detection(Box(5, 5, 9, 9), 0.9),)), DIAMETER
+        )
         assert (found.ball, found.score, found.iou, found.hit_iou) == (False, 0.9, None, None)

@@ -8,12 +8,12 @@ import numpy.typing as npt
 import pytest
 
 from app.geometry.rotation import rotation_from_pan_tilt_roll
-from app.paint.agreement import Agreement
+from app.paint.agreement import PaintAgreement
 from app.paint.candidates import Library
 from app.paint.evidence import read_picture, seek, to_paint_evidence, trace
 from app.paint.propose import (
-    Frame,
     Ranked,
+    SearchedFrame,
     propose,
     read_frame,
     scaled,
@@ -120,10 +120,10 @@ class TestPropose:
         true = looking((-3.0, 56.0, -16.0), (50.0, 0.0, 0.0), 2900.0, size=SMALL)
         names = ("Side line right", "Small rect. right main", "Small rect. right top")
         frame = read_frame(lawn(marked(true, *names)))
-        assert isinstance(frame, Frame)
+        assert isinstance(frame, SearchedFrame)
         snapped = snap_reading(frame.reading, true, PITCH, (4.0, 3.0, 3.0), CalibrationPolicy())
         assert snapped.reason is None
-        seen = Agreement(0.9, 0.9, 400)
+        seen = PaintAgreement(0.9, 0.9, 400)
         reason = why_unsure([Ranked(snapped, seen, 1.0)])
         assert reason is not None and "too few markings" in reason
 

@@ -4,7 +4,7 @@ import pytest
 from app.soccer.annotation import make_lines
 from app.soccer.policy import CalibrationPolicy
 from app.solving.calibrate import calibrate, calibrate_near
-from app.solving.match_model import Place
+from app.solving.match_model import FramePlace
 from app.solving.match_position import NO_PLACES, Places, place_of, share_position
 from app.solving.resect import PositionPrior, match_prior
 from tests.cameras import SIZE, looking
@@ -15,7 +15,7 @@ STAND = np.array([1.0, 60.0, -14.0])
 
 
 def place(position, sigma=0.4, pan=0.5):
-    return Place(np.array(position, dtype=float), sigma**2 * np.eye(3), pan)
+    return FramePlace(np.array(position, dtype=float), sigma**2 * np.eye(3), pan)
 
 
 def off(x, y, z):
@@ -75,7 +75,7 @@ class TestPrior:
 
     def test_the_place_moves_with_the_direction_of_view(self):
         turned = [
-            Place(it.position + np.array([2.0 * pan, 0.0, 0.0]), it.covariance, pan)
+            FramePlace(it.position + np.array([2.0 * pan, 0.0, 0.0]), it.covariance, pan)
             for pan in (-0.6, -0.3, 0.3, 0.6)
             for it in around(STAND, 5, seed=int(10 * pan) + 9)
         ]
@@ -83,7 +83,7 @@ class TestPrior:
         assert right - left == pytest.approx([2.0, 0.0, 0.0], abs=0.4)
 
     def test_frames_that_look_elsewhere_say_less(self):
-        turned = [Place(it.position, it.covariance, -0.6) for it in around(STAND, 100)]
+        turned = [FramePlace(it.position, it.covariance, -0.6) for it in around(STAND, 100)]
         there, elsewhere = (Places(turned).prior(pan).sigma for pan in (-0.6, 0.5))
         assert (there < 0.2).all()
         assert elsewhere[0] > 1.0

@@ -1,6 +1,6 @@
 import numpy as np
 
-from app.solving.match_model import Place
+from app.solving.match_model import FramePlace
 from app.solving.match_runs import guess_matches
 
 STAND = np.array([0.3, 60.0, -14.0])
@@ -13,7 +13,8 @@ def turning(stand, count, seed=0, slope=2.0, sigma=0.4):
     pans = np.where(np.arange(count) % 2, 0.6, -0.6) + generator.normal(0, 0.1, count)
     moved = stand + np.outer(pans, [slope, 0.0, 0.0]) + generator.normal(0, sigma, (count, 3))
     return [
-        Place(at, sigma**2 * np.eye(3), float(pan)) for at, pan in zip(moved, pans, strict=True)
+        FramePlace(at, sigma**2 * np.eye(3), float(pan))
+        for at, pan in zip(moved, pans, strict=True)
     ]
 
 
@@ -36,7 +37,7 @@ class TestGuessMatches:
 
     def test_one_odd_frame_does_not_end_a_match(self):
         frames = turning(STAND, 8)
-        frames[3] = Place(STAND + np.array([0.0, 15.0, -10.0]), frames[3].covariance, 0.5)
+        frames[3] = FramePlace(STAND + np.array([0.0, 15.0, -10.0]), frames[3].covariance, 0.5)
         assert guess_matches(frames) == [0] * 8
 
     def test_frames_that_say_nothing_are_each_their_own(self):

@@ -9,19 +9,19 @@ import pytest
 from scipy.special import ndtri
 
 from app.solving.ball_noise import Miss
-from app.solving.source_noise import Source, SourceFactors, SourceNoise, estimate_sources
+from app.solving.source_noise import BallSource, SourceFactors, SourceNoise, estimate_sources
 
 TRUE = {"ann": 1.0, "bea": 1.0, "cleo": 3.0, "dora": 0.5}
 KNOWN = 0.2
-Seen = tuple[Miss, Mapping[str, Sequence[Source]]]
+Seen = tuple[Miss, Mapping[str, Sequence[BallSource]]]
 
 
-def person(name: str) -> Source:
-    return Source("person", name)
+def person(name: str) -> BallSource:
+    return BallSource("person", name)
 
 
-def camera(name: str) -> Source:
-    return Source("camera", name)
+def camera(name: str) -> BallSource:
+    return BallSource("camera", name)
 
 
 def drawn(

@@ -28,7 +28,7 @@ from app.solving.spread import (
     longest_sigma,
     pixel_spread,
 )
-from app.solving.triangulate import Sight
+from app.solving.triangulate import Sighting
 from app.solving.verdict import judge
 from tests.cameras import SIZE, WIDE_LENSES, looking, wide
 from tests.unit.solving.conftest import BEHIND_GOAL, MAIN, OPPOSITE, given_view
@@ -68,12 +68,12 @@ class TestCalibrationSpread:
         spread = calibration_spread(calibration, SIZE, np.zeros(3))
         # 20 cm at 20 m are 10 px for 1000 px a radian.
         assert np.allclose(spread, [[100.0, 0.0], [0.0, 0.0]])
-        sight = Sight("a", calibration, ImagePoint(639.5, 359.5), 0.0, SIZE)
+        sight = Sighting("a", calibration, ImagePoint(639.5, 359.5), 0.0, SIZE)
         noise = (SIZE.diagonal / CLICK_DIAGONAL) ** 2
         assert np.allclose(pixel_spread(sight, np.zeros(3), PAPER), spread + noise * np.eye(2))
 
     def test_a_given_camera_counts_as_exact_until_the_policy_knows_better(self):
-        sight = Sight("a", Calibration("given", MAIN), ImagePoint(639.5, 359.5), 0.0, SIZE)
+        sight = Sighting("a", Calibration("given", MAIN), ImagePoint(639.5, 359.5), 0.0, SIZE)
         noise = (SIZE.diagonal / CLICK_DIAGONAL) ** 2
         blurred = replace(PAPER, given_sigma_px=7.0)
         assert np.allclose(pixel_spread(sight, np.array(BALL), PAPER), noise * np.eye(2))

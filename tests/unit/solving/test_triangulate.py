@@ -16,7 +16,7 @@ from app.soccer.frames import Box, ImagePoint, ImageSize
 from app.soccer.group import Station, View
 from app.soccer.policy import PAPER
 from app.soccer.solution import Calibration
-from app.solving.triangulate import Sight, lines_of_sight, meet, sights_of
+from app.solving.triangulate import Sighting, lines_of_sight, meet, sights_of
 from tests.cameras import SIZE
 from tests.unit.solving.conftest import BEHIND_GOAL, MAIN, OPPOSITE, given_view
 
@@ -36,15 +36,17 @@ ALONG_X = Camera(
 )
 
 
-def sight(key: str, camera: Camera, center: tuple[float, float]) -> Sight:
-    return Sight(key, Calibration("given", camera), ImagePoint(*center), 8.0, ImageSize(1001, 1001))
+def sight(key: str, camera: Camera, center: tuple[float, float]) -> Sighting:
+    return Sighting(
+        key, Calibration("given", camera), ImagePoint(*center), 8.0, ImageSize(1001, 1001)
+    )
 
 
-def looks_at(key: str, camera: Camera, point: tuple[float, float, float]) -> Sight:
+def looks_at(key: str, camera: Camera, point: tuple[float, float, float]) -> Sighting:
     return sight(key, camera, tuple(camera.project(np.array([point]))[0]))
 
 
-def sights(*views: View, cameras=(MAIN, BEHIND_GOAL)) -> list[Sight]:
+def sights(*views: View, cameras=(MAIN, BEHIND_GOAL)) -> list[Sighting]:
     return sights_of(views, [Calibration("given", camera) for camera in cameras])
 
 

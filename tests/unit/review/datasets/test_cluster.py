@@ -11,7 +11,14 @@ import pytest
 
 from app.errors import ClusterError, InputError, NotFoundError
 from app.review.datasets import cluster
-from app.review.datasets.cluster import Cluster, Place, build, carry_out, read_place, require_same
+from app.review.datasets.cluster import (
+    Cluster,
+    SchedulerPlace,
+    build,
+    carry_out,
+    read_place,
+    require_same,
+)
 from app.review.datasets.fan_out import fan_out
 from tests.certificates import write_keys
 from tests.waiting import SECONDS
@@ -46,7 +53,7 @@ def of_another_version() -> dict[str, str]:
 
 
 @pytest.fixture(scope="module")
-def place() -> Iterator[Place]:
+def place() -> Iterator[SchedulerPlace]:
     from distributed import LocalCluster
 
     with LocalCluster(
@@ -57,7 +64,7 @@ def place() -> Iterator[Place]:
         dashboard_address=None,
         host="127.0.0.1",
     ) as local:
-        yield Place(local.scheduler_address)
+        yield SchedulerPlace(local.scheduler_address)
 
 
 class TestReadPlace:
@@ -111,7 +118,7 @@ class TestRequireSame:
 
 
 class TestCluster:
-    def test_results_come_back_and_so_do_errors_as_they_are(self, place: Place) -> None:
+    def test_results_come_back_and_so_do_errors_as_they_are(self, place: SchedulerPlace) -> None:
         with Cluster(place) as executor:
             assert sorted(fan_out(double, range(20), executor)) == list(range(0, 40, 2))
             with pytest.raises(NotFoundError, match="there is no 7") as refused:
@@ -120,13 +127,13 @@ class TestCluster:
 
     @pytest.mark.parametrize("work", [late, unreadable])
     def test_what_has_no_result_is_an_error_and_not_done_again_and_again(
-        self, place: Place, work: Callable[[int], object]
+        self, place: SchedulerPlace, work: Callable[[int], object]
     ) -> None:
         with Cluster(place) as executor, pytest.raises((TimeoutError, NotFoundError)):
             executor.submit(work, 7).result(SECONDS)
 
     def test_what_is_lost_while_it_is_fetched_is_done_again(
-        self, place: Place, monkeypatch: pytest.MonkeyPatch
+        self, place: SchedulerPlace, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         from distributed import Future as Sent
 
@@ -146,7 +153,7 @@ class TestCluster:
         assert lost
 
     def test_a_worker_of_another_version_does_nothing(
-        self, place: Place, monkeypatch: pytest.MonkeyPatch
+        self, place: SchedulerPlace, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         with Cluster(place) as executor:
             asked: Future[int] = executor.submit(
@@ -161,5 +168,5 @@ class TestCluster:
     def test_who_waits_for_nobody_is_told(self, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(cluster, "_CONNECT_S", 0.5)
         with pytest.raises(ClusterError, match="no scheduler answers at") as refused:
-            Cluster(Place("tcp://127.0.0.1:9"))
+            Cluster(SchedulerPlace("tcp://127.0.0.1:9"))
         assert refused.value.hint == "Start one: touchline scheduler tcp://127.0.0.1:9"

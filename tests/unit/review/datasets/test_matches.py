@@ -6,7 +6,7 @@ import pytest
 from app.datasets.sn_calibration import LineFile
 from app.errors import DatasetFormatError
 from app.review.datasets.matches import read_matches, shares_of
-from app.solving.match_model import Place
+from app.solving.match_model import FramePlace
 from tests.cameras import SIZE
 
 
@@ -15,7 +15,7 @@ def files(*stems):
 
 
 def places(*ys):
-    return [Place(np.array([0.0, y, -15.0]), 0.01 * np.eye(3), 0.0) for y in ys]
+    return [FramePlace(np.array([0.0, y, -15.0]), 0.01 * np.eye(3), 0.0) for y in ys]
 
 
 class TestReadMatches:

@@ -19,7 +19,7 @@ from app.datasets.sn_calibration_reader import read_line_files
 from app.datasets.sn_calibration_writer import write_line_files
 from app.errors import InputError
 from app.review.datasets.paint_files import agree_files, snap_files
-from app.review.datasets.picture_files import FrameNames
+from app.review.datasets.picture_files import UniqueNames
 from app.sample.render import render
 from app.soccer.frames import ImageSize
 from tests.scenes import make_scenes
@@ -105,7 +105,7 @@ class TestSnapFiles:
         assert not (out / "lines" / "broken.json").exists()
 
     def test_invented_names_take_no_other_pictures_name(self):
-        names = FrameNames()
+        names = UniqueNames()
         assert [names.name(stem) for stem in ("a", "a", "a_2")] == ["a", "a_2", "a_2_2"]
 
     def test_pictures_without_a_line_file_are_an_error_when_there_is_no_other(

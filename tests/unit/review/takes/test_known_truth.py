@@ -17,7 +17,7 @@ from app.review.editing.submit import load, submit
 from app.review.importing.ingest import ingest
 from app.review.people.people import invite
 from app.review.people.roles import Role
-from app.review.takes.gold import Source, read_report
+from app.review.takes.gold import TruthSource, read_report
 from app.review.takes.known_truth import GoldChoice, mark_known
 from app.review.takes.mixing import Terms, begin_next
 from app.review.takes.take import begin_take, get_take_of
@@ -36,7 +36,7 @@ from app.store.takes import GOLD
 from tests.scenes import make_scenes
 from tests.unit.review.takes.begun import begin_for_batch
 
-SAMPLE = GoldChoice(Source.SAMPLE, start="bare")
+SAMPLE = GoldChoice(TruthSource.SAMPLE, start="bare")
 
 
 @pytest.fixture
@@ -93,7 +93,7 @@ class TestSample:
         drawn_as_it_is(store, take.copy_id, scene, 0.0)
         judge(store, take.copy_id, "ann")
         report = read_report(store, "demo")
-        assert {one.source for one in report.groups} == {Source.SAMPLE}
+        assert {one.source for one in report.groups} == {TruthSource.SAMPLE}
         ((result,),) = [person.results for person in report.people]
         assert result.error.line_px < 0.5 and result.error.ball_px < 0.01
         assert result.error.ball_m < 0.05
@@ -137,14 +137,14 @@ class TestVersion:
         ball = BallAnnotation(box=Box(10.0, 10.0, 14.0, 14.0))
         frozen = load(store, 2)
         submit(store, 2, SetBall(key, ball), if_match=frozen.etag, actor="cy")
-        choice = GoldChoice(Source.VERSION, version="v1")
+        choice = GoldChoice(TruthSource.VERSION, version="v1")
         assert mark_known(store, "demo", choice, actor="lea").groups == (2,)
         take = begin_for_batch(store, 2, "dee", kind=GOLD, nameless=True)
         judge(store, take.copy_id, "dee")
         ((result,),) = [person.results for person in read_report(store, "demo").people]
         assert (result.right, result.error.ball_px, result.error.line_px) == (True, 0, 0)
         with pytest.raises(InputError, match="which version"):
-            mark_known(store, "demo", GoldChoice(Source.VERSION), actor="lea")
+            mark_known(store, "demo", GoldChoice(TruthSource.VERSION), actor="lea")
 
 
 class TestRunningBatch:
