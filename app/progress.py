@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Protocol
 
 
-class Progress(Protocol):
+class TellProgress(Protocol):
     """Called every now and then with how much is done.
 
     It may raise (``errors.JobCancelled``) to end the work there.
@@ -22,8 +22,8 @@ class Progress(Protocol):
 
 
 def telling(
-    progress: Progress, sentence: str, *, start: int = 0, total: int | None = None
-) -> Progress:
+    progress: TellProgress, sentence: str, *, start: int = 0, total: int | None = None
+) -> TellProgress:
     """A progress for one part of some work: its counts go on from ``start``, under a sentence.
 
     Args:

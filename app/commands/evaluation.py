@@ -14,7 +14,7 @@ from app.commands.options import BallBox, Dataset, Json, acting, parse_size
 from app.commands.predictions import print_set
 from app.commands.server import Server, connected, given_server
 from app.commands.terminal import print_json, say, show_progress
-from app.progress import Progress
+from app.progress import TellProgress
 from app.soccer.frames import ImageSize
 
 if TYPE_CHECKING:
@@ -194,7 +194,7 @@ _Values = dict[str, Any]
 
 
 def _evaluate(
-    dataset: str, request: SourcesRequest, out: Path | None, progress: Progress
+    dataset: str, request: SourcesRequest, out: Path | None, progress: TellProgress
 ) -> tuple[_Values, list[_Values]]:
     """The evaluation and the sets that were made or found for it, as plain values."""
     from app.review.evaluating.folder import evaluation_values, write_evaluation
@@ -208,7 +208,7 @@ def _evaluate(
 
 
 def _evaluate_at(
-    server: Server, dataset: str, request: SourcesRequest, out: Path | None, progress: Progress
+    server: Server, dataset: str, request: SourcesRequest, out: Path | None, progress: TellProgress
 ) -> tuple[_Values, list[_Values]]:
     """As ``_evaluate``, by a server."""
     from app.commands import remote

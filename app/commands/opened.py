@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from app.commands.options import read_settings
 from app.commands.server import require_home
 from app.commands.terminal import show_progress
-from app.progress import Progress
+from app.progress import TellProgress
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
@@ -31,7 +31,7 @@ def opened_store(settings: Settings | None = None) -> Iterator[Store]:
 @contextmanager
 def opened_to_solve(
     what: str, workers: int | None, cluster: str | None = None
-) -> Iterator[tuple[Store, Executor | None, Progress]]:
+) -> Iterator[tuple[Store, Executor | None, TellProgress]]:
     """The database, where its datasets are solved, and a bar that says what is done."""
     settings = read_settings(cluster=cluster)
     with (

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 from app.errors import InputError, NotFoundError
 from app.finite import json_text
 from app.object_store.address import is_address
-from app.progress import Progress
+from app.progress import TellProgress
 
 if TYPE_CHECKING:
     from app.review.evaluating.prediction_source import PredictionSource, SourcesRequest
@@ -51,7 +51,7 @@ def import_values(
     frames: str | None,
     policy: str,
     dry_run: bool,
-    progress: Progress,
+    progress: TellProgress,
 ) -> tuple[dict[str, Any], tuple[str, str | None] | None]:
     """Send files, and let the server read them; a text is an address in a store of the server.
 
@@ -98,7 +98,7 @@ def _report(result: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def export_values(
-    client: Client, out: Path | str, request: Mapping[str, Any], progress: Progress
+    client: Client, out: Path | str, request: Mapping[str, Any], progress: TellProgress
 ) -> dict[str, Any]:
     """Let the server write an export, and fetch it to ``out``: a folder, or a zip by its ending.
 
@@ -127,7 +127,7 @@ def export_values(
 
 
 def freeze_values(
-    client: Client, dataset: str, request: dict[str, Any], progress: Progress, *, dry_run: bool
+    client: Client, dataset: str, request: dict[str, Any], progress: TellProgress, *, dry_run: bool
 ) -> dict[str, Any]:
     """Let the server freeze a dataset; without a name it is the next vN."""
     if request["name"] is None:
@@ -200,7 +200,7 @@ def evaluate(
     client: Client,
     dataset: str,
     asked: SourcesRequest,
-    progress: Progress,
+    progress: TellProgress,
 ) -> tuple[dict[str, Any], list[dict[str, Any]]]:
     """Send predictions, and let the server measure them.
 
@@ -319,7 +319,7 @@ def _as_file(path: Path) -> Iterator[Path]:
         yield packed
 
 
-def _told(progress: Progress) -> Callable[[dict[str, Any]], None]:
+def _told(progress: TellProgress) -> Callable[[dict[str, Any]], None]:
     return lambda job: progress(job["done"], job["total"], job["sentence"])
 
 

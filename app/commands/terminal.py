@@ -15,7 +15,7 @@ from threading import Event
 from typing import Any, TextIO, TypeVar, cast
 
 from app.finite import finite, json_text
-from app.progress import Progress
+from app.progress import TellProgress
 
 Row = TypeVar("Row")
 
@@ -37,7 +37,7 @@ def harmless(text: str) -> str:
 
 
 @contextmanager
-def show_progress(what: str) -> Iterator[Progress]:
+def show_progress(what: str) -> Iterator[TellProgress]:
     """A bar on stderr while something runs; without a terminal, nothing."""
     from rich import progress as rich
     from rich.console import Console

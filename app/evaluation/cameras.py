@@ -12,7 +12,7 @@ from app.evaluation.figure import Axis, Figure, Mark, Panel, Series
 from app.evaluation.frame import Frame
 from app.evaluation.table import Cell, Column, FrameRange, Row, Table
 from app.geometry.camera import Camera
-from app.progress import Progress
+from app.progress import TellProgress
 from app.soccer.solution import GAMMAS_PERCENT
 from app.solving.score import SHARE_ABOVE, FrameScore, score, score_frame
 
@@ -30,7 +30,7 @@ Scores = dict[int, FrameScore | None]
 
 
 def score_cameras(
-    frames: Sequence[Frame], cameras: Mapping[int, Camera], progress: Progress | None = None
+    frames: Sequence[Frame], cameras: Mapping[int, Camera], progress: TellProgress | None = None
 ) -> Scores:
     """Every frame with lines against its camera; a static camera's same lines are measured once."""
     scores: Scores = {}

@@ -19,7 +19,7 @@ from app.evaluation.place import measure_frame
 from app.evaluation.result import Evaluation, FrameResult
 from app.evaluation.table import Table
 from app.geometry.camera import Camera
-from app.progress import Progress, telling
+from app.progress import TellProgress, telling
 from app.soccer.frames import Box
 
 
@@ -63,7 +63,7 @@ def evaluate(
     frames: Sequence[Frame],
     inputs: Inputs,
     options: Options,
-    progress: Progress | None = None,
+    progress: TellProgress | None = None,
 ) -> Evaluation:
     """Every table and figure that the inputs allow.
 
@@ -107,7 +107,9 @@ def evaluate(
     )
 
 
-def _score(frames: Sequence[Frame], inputs: Inputs, say: Progress) -> tuple[Scores, Scores] | None:
+def _score(
+    frames: Sequence[Frame], inputs: Inputs, say: TellProgress
+) -> tuple[Scores, Scores] | None:
     """Predicted cameras and the dataset's own against the lines."""
     if inputs.cameras is None:
         return None

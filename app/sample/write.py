@@ -24,7 +24,7 @@ from app.datasets.soccernet_v3_writer import write_soccernet_v3
 from app.durable import PARTIAL
 from app.errors import InputError
 from app.finite import json_text
-from app.progress import Progress
+from app.progress import TellProgress
 from app.sample.fixture import group_counts, make_fixture
 from app.sample.render import render
 from app.sample.scenes import make_match
@@ -79,7 +79,7 @@ def write_sample(
     seed: int = SEED,
     labels_only: bool = False,
     faults: bool = True,
-    progress: Progress | None = None,
+    progress: TellProgress | None = None,
     workers: int | None = None,
 ) -> SampleReport:
     """Write ``<league>/<season>/<match>/{Labels-v3.json, Frames-v3.zip}`` and ``truth.json``.
@@ -137,7 +137,7 @@ def _staged(out: Path) -> Iterator[Path]:
 
 
 def _write_labels(
-    out: Path, jobs: list[_Job], run: _Mapper, total: int, progress: Progress | None
+    out: Path, jobs: list[_Job], run: _Mapper, total: int, progress: TellProgress | None
 ) -> SampleReport:
     done = views = faults = 0
     temporary = out / f".{TRUTH}.part"
@@ -170,7 +170,7 @@ def _label_match(job: _Job) -> _Labelled:
 
 
 def _write_frames(
-    out: Path, matches: list[_Job], run: _Mapper, total: int, progress: Progress | None
+    out: Path, matches: list[_Job], run: _Mapper, total: int, progress: TellProgress | None
 ) -> None:
     done = 0
     jobs = [part for match in matches for part in _parts(match)]

@@ -19,7 +19,7 @@ from app.datasets.sn_calibration_reader import read_line_files
 from app.durable import replace_file
 from app.errors import InputError
 from app.finite import json_text
-from app.progress import Progress
+from app.progress import TellProgress
 from app.review.datasets.matches import MatchShare, read_matches, shares_of
 from app.review.datasets.pictures import as_taken, picture_for
 from app.soccer.finding import Finding
@@ -68,7 +68,7 @@ def calibrate_files(
     picture: Path | None = None,
     guess_picture: bool = False,
     executor: Executor,
-    progress: Progress | None = None,
+    progress: TellProgress | None = None,
 ) -> dict[str, Any]:
     """Write a camera file for each line file, and what was noticed on the way.
 

@@ -33,7 +33,7 @@ from app.paint.grass import field_of_play, why_no_field
 from app.paint.propose import LEAST_SIDE
 from app.paint.ridges import line_like
 from app.paint.snap import Snapped, snap
-from app.progress import Progress
+from app.progress import TellProgress
 from app.review.datasets.picture_files import PictureFile, UniqueNames, picture_stems, read_pictures
 from app.soccer.frames import ImageSize
 from app.soccer.pitch import Pitch
@@ -55,7 +55,7 @@ def snap_files(
     out: Path,
     *,
     settings: Settings,
-    progress: Progress | None = None,
+    progress: TellProgress | None = None,
 ) -> list[dict[str, Any]]:
     """Cameras from clicks and paint: ``camera_<stem>.json``, ``lines/<stem>.json``, ``snap.json``.
 
@@ -89,7 +89,11 @@ def snap_files(
 
 
 def agree_files(
-    cameras: Path, images: Sequence[Path], *, settings: Settings, progress: Progress | None = None
+    cameras: Path,
+    images: Sequence[Path],
+    *,
+    settings: Settings,
+    progress: TellProgress | None = None,
 ) -> list[dict[str, Any]]:
     """How well cameras and the paint of their pictures agree, a row for each picture.
 

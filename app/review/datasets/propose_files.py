@@ -20,7 +20,7 @@ from app.errors import GeometryError, InputError
 from app.finite import json_text
 from app.geometry.camera import Camera
 from app.paint.propose import FrameProposal, propose
-from app.progress import Progress
+from app.progress import TellProgress
 from app.review.datasets.picture_files import PictureFile, UniqueNames, read_pictures
 from app.soccer.frames import ImageSize
 
@@ -34,7 +34,7 @@ def propose_files(
     *,
     size: ImageSize | None = None,
     known: Sequence[Path] = (),
-    progress: Progress | None = None,
+    progress: TellProgress | None = None,
 ) -> list[dict[str, Any]]:
     """Write a camera file for each picture whose camera is certain, and what became of each.
 

@@ -14,7 +14,7 @@ from app.datasets.report import Report
 from app.datasets.sn_calibration_reader import read_line_files
 from app.errors import DatasetFormatError
 from app.geometry.camera import Camera
-from app.progress import Progress
+from app.progress import TellProgress
 from app.soccer.annotation import Lines, make_lines
 from app.soccer.frames import ImageSize
 from app.soccer.pitch import Pitch
@@ -27,7 +27,7 @@ def score_files(
     *,
     size: ImageSize,
     without: Path | None = None,
-    progress: Progress | None = None,
+    progress: TellProgress | None = None,
 ) -> dict[str, Any]:
     """Measure camera files against line files.
 

@@ -16,7 +16,7 @@ from app.child import Allowance, ChildEnded
 from app.child_figures import FIGURES
 from app.child_pool import ChildPool, PoolTask
 from app.errors import ConflictError, ImageError
-from app.progress import Progress
+from app.progress import TellProgress
 from app.review.datasets.dataset import DatasetHead, need_dataset, require_matches
 from app.review.datasets.paint_reading import (
     PaintTask,
@@ -139,7 +139,7 @@ def read_paint(
     actor: str,
     run: str | None = None,
     children: int | None = None,
-    progress: Progress | None = None,
+    progress: TellProgress | None = None,
     require_wanted: Callable[[], None] | None = None,
 ) -> DatasetPaint:
     """Read the paint of pictures and give it to their groups; stale until solved.

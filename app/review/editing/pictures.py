@@ -13,7 +13,7 @@ from concurrent.futures import Executor
 from dataclasses import dataclass
 
 from app.errors import GeometryError
-from app.progress import Progress
+from app.progress import TellProgress
 from app.review.datasets.dataset import need_dataset, read_dataset_head, require_matches
 from app.review.datasets.fan_out import fan_out
 from app.review.editing.edit import SetPicture
@@ -90,7 +90,7 @@ def estimate_pictures(
     store: Store,
     dataset: str | int,
     executor: Executor | None = None,
-    progress: Progress | None = None,
+    progress: TellProgress | None = None,
     only: Collection[str] | None = None,
 ) -> list[PictureState]:
     """What the lines of each match's main cameras say of their pictures; saves nothing.

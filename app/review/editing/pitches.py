@@ -13,7 +13,7 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 from app.errors import GeometryError, InputError, NotFoundError
-from app.progress import Progress
+from app.progress import TellProgress
 from app.review.datasets.dataset import read_dataset_head
 from app.review.datasets.fan_out import fan_out
 from app.review.editing.codec import edit_from_json
@@ -127,7 +127,7 @@ def estimate_pitches(
     store: Store,
     dataset: str | int,
     executor: Executor | None = None,
-    progress: Progress | None = None,
+    progress: TellProgress | None = None,
 ) -> DatasetPitches:
     """Estimate the pitch of every match whose lines are others than when it was estimated last.
 

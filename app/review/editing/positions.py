@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from app.errors import ConflictError, NotFoundError
-from app.progress import Progress
+from app.progress import TellProgress
 from app.review.datasets.dataset import DatasetHead, read_dataset_head
 from app.review.datasets.fan_out import fan_out
 from app.review.editing.codec import edit_from_json
@@ -132,7 +132,7 @@ def share_positions(
     *,
     actor: str,
     executor: Executor | None = None,
-    progress: Progress | None = None,
+    progress: TellProgress | None = None,
     require_wanted: Callable[[], None] | None = None,
 ) -> DatasetPositions:
     """Estimate where matches' main cameras stand, and give it to their groups; stale until solved.

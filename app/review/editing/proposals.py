@@ -17,7 +17,7 @@ from app.child_figures import FIGURES
 from app.child_pool import ChildPool
 from app.errors import ImageError, NotFoundError
 from app.paint.propose import SEARCH_VERSION
-from app.progress import Progress
+from app.progress import TellProgress
 from app.review.datasets.dataset import DatasetHead, need_dataset, require_matches
 from app.review.datasets.proposal_reading import UNREADABLE, ProposalTask, read_proposal
 from app.review.editing.etags import read_head
@@ -123,7 +123,7 @@ def propose_views(
     matches: Collection[str] | None = None,
     *,
     children: int | None = None,
-    progress: Progress | None = None,
+    progress: TellProgress | None = None,
     require_wanted: Callable[[], None] | None = None,
 ) -> ProposalRun:
     """Look at the pictures of all views that have neither a given camera nor one of their lines.

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, field
 
-from app.progress import Progress
+from app.progress import TellProgress
 from app.review.datasets.dataset import (
     DatasetHead,
     get_dataset_head,
@@ -76,7 +76,7 @@ def solve_dataset(
     store: Store,
     dataset: str | int,
     executor: Executor | None = None,
-    progress: Progress | None = None,
+    progress: TellProgress | None = None,
     stop: Callable[[], bool] = lambda: False,
 ) -> SolveReport:
     """Solve what is stale in a dataset.

@@ -13,7 +13,7 @@ from functools import partial
 
 from app.errors import ConflictError, InputError, NotFoundError, StaleRevisionError
 from app.evaluation.prediction_run import box_problem
-from app.progress import Progress
+from app.progress import TellProgress
 from app.review.datasets.dataset import read_dataset_head
 from app.review.editing.edit import SetBall, need_view
 from app.review.editing.etags import require_unchanged, said_of
@@ -127,7 +127,7 @@ def accept(
     request: AcceptRequest,
     *,
     actor: str,
-    progress: Progress | None = None,
+    progress: TellProgress | None = None,
     keep: Keep[AcceptReport] = keep_nothing,
 ) -> AcceptReport:
     """Make an edit of every prediction that a person accepts; done again it changes nothing.

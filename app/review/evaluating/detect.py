@@ -11,7 +11,7 @@ import numpy as np
 from app.config import Settings
 from app.errors import ImageError, InputError, NotFoundError, StorageError, TooLargeError
 from app.evaluation.frame import Detection
-from app.progress import Progress
+from app.progress import TellProgress
 from app.review.datasets.dataset import read_dataset_head
 from app.review.evaluating.onnx_model import OnnxModel
 from app.review.evaluating.predictions import (
@@ -58,7 +58,7 @@ def detect(
     request: DetectRequest,
     *,
     actor: str,
-    progress: Progress | None = None,
+    progress: TellProgress | None = None,
 ) -> PredictionSet:
     """Run a detector over frames; the set appears whole, when all of them were looked at.
 

@@ -10,7 +10,7 @@ from app.errors import InputError, NotFoundError
 from app.evaluation.evaluate import Inputs, Options, evaluate
 from app.evaluation.frame import BOX_KINDS, Detection
 from app.evaluation.result import Evaluation
-from app.progress import Progress
+from app.progress import TellProgress
 from app.review.datasets.dataset import DatasetHead, read_dataset_head
 from app.review.evaluating.careful_boxes import careful_boxes
 from app.review.evaluating.evaluation import read_evaluation
@@ -80,7 +80,7 @@ def run_evaluation(
     request: EvaluationRequest,
     *,
     actor: str,
-    progress: Progress | None = None,
+    progress: TellProgress | None = None,
 ) -> StoredEvaluation:
     """Evaluate and keep the result; what it pins makes it repeatable.
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from app.datasets.report import Report
 from app.datasets.trees import open_tree
 from app.errors import NotFoundError
-from app.progress import Progress
+from app.progress import TellProgress
 from app.review.evaluating.evaluation_run import EvaluationRequest, run_evaluation
 from app.review.evaluating.prediction_reader import PredictionFiles
 from app.review.evaluating.predictions import add_predictions, find_predictions
@@ -86,7 +86,7 @@ def evaluate_sources(
     asked: SourcesRequest,
     *,
     actor: str,
-    progress: Progress | None = None,
+    progress: TellProgress | None = None,
 ) -> EvaluatedSources:
     """Read predictions and careful boxes into sets, and evaluate them.
 

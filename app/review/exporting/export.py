@@ -19,7 +19,7 @@ from app.datasets.view_files import PutText, ViewFiles
 from app.errors import InputError
 from app.object_store.address import is_address
 from app.object_store.path import StoredPath
-from app.progress import Progress
+from app.progress import TellProgress
 from app.review.datasets.dataset import read_dataset_head
 from app.review.datasets.licence import licence_of
 from app.review.exporting.formats import (
@@ -110,7 +110,7 @@ def export(
     images: str = "none",
     views: str = "valid",
     version: str | None = None,
-    progress: Progress | None = None,
+    progress: TellProgress | None = None,
     read: ReadPicture | None = None,
 ) -> ExportReport:
     """Write a dataset's accepted groups, or all groups, in a format that consumers read.
@@ -278,7 +278,7 @@ class _Run:
         source: ExportSource,
         options: _Options,
         images: ExportImages,
-        progress: Progress | None,
+        progress: TellProgress | None,
     ):
         self._source, self._options = source, options
         self._images, self._progress = images, progress

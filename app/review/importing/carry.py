@@ -16,7 +16,7 @@ from app.datasets.file_tree import Root
 from app.datasets.manifest import Manifest, write_manifest
 from app.datasets.store_output import output_anywhere
 from app.finite import json_text
-from app.progress import Progress
+from app.progress import TellProgress
 from app.review.datasets.dataset import DatasetHead, read_dataset_head
 from app.review.datasets.licence import licence_text
 from app.review.editing.lineage import Lineage, Lineages, station_lineage
@@ -49,7 +49,7 @@ _BATCH = 200
 
 
 def carry_out(
-    store: Store, dataset: str | int, out: Root, progress: Progress | None = None
+    store: Store, dataset: str | int, out: Root, progress: TellProgress | None = None
 ) -> dict[str, int]:
     """Write everything that was said about a dataset, from one snapshot; returns counts.
 
@@ -112,7 +112,9 @@ def _stations(session: Session, dataset_id: int) -> Iterator[Json]:
         }
 
 
-def _groups(session: Session, dataset: DatasetHead, progress: Progress | None) -> Iterator[Json]:
+def _groups(
+    session: Session, dataset: DatasetHead, progress: TellProgress | None
+) -> Iterator[Json]:
     lineages = Lineages(session, dataset.id)
     ids = [group.id for group in known_groups(session, dataset.id)]
     for start in range(0, len(ids), _BATCH):

@@ -16,7 +16,7 @@ from app.datasets.file_tree import FileTree, Limits, Root
 from app.datasets.report import Report
 from app.datasets.trees import open_tree
 from app.errors import DatasetFormatError, InputError
-from app.progress import Progress
+from app.progress import TellProgress
 from app.review.datasets.dataset import insert_dataset
 from app.review.editing.lineage import Lineages, base_digest, station_lineage
 from app.review.importing.carry import GROUPS, SPARE, STATIONS
@@ -82,7 +82,7 @@ def carry_in(
     *,
     source: str,
     actor: str,
-    progress: Progress | None = None,
+    progress: TellProgress | None = None,
     dry_run: bool = False,
 ) -> IngestReport:
     """Merge what ``carry_out`` wrote into a dataset, which is made when there is none.
@@ -115,7 +115,7 @@ def carry_in(
     return result
 
 
-def _carry(run: _Run, tree: FileTree, report: Report, progress: Progress | None) -> None:
+def _carry(run: _Run, tree: FileTree, report: Report, progress: TellProgress | None) -> None:
     stations = {item.station.key: item for item in _parsed(tree, STATIONS, report, parse_station)}
     with attempt(run.store, keep=run.keep) as session:
         origin = run.origin(session)

@@ -16,7 +16,7 @@ from app.child import Allowance, Child, ChildEnded
 from app.child_figures import FIGURES
 from app.config import Settings
 from app.errors import DamagedError, TooLargeError
-from app.progress import Progress
+from app.progress import TellProgress
 from app.review.importing.sources import Source, import_source
 from app.soccer.policy import Policy
 from app.store.store import Store
@@ -55,7 +55,7 @@ def import_apart(
     *,
     actor: str,
     dry_run: bool,
-    progress: Progress,
+    progress: TellProgress,
     stop: Callable[[], None],
     policy: Policy | None = None,
 ) -> Outcome:

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from app.datasets.report import Report
 from app.object_store.address import is_address
-from app.progress import Progress
+from app.progress import TellProgress
 from app.review.datasets.dataset import insert_dataset
 from app.review.datasets.paint_reading import outdated_where_people_moved
 from app.review.editing.edit import SetPaint, SetPositions
@@ -80,7 +80,7 @@ def ingest(
     *,
     source: str,
     actor: str,
-    progress: Progress | None = None,
+    progress: TellProgress | None = None,
     dry_run: bool = False,
     policy: Policy | None = PAPER,
     told: Report | None = None,

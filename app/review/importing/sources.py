@@ -23,7 +23,7 @@ from app.datasets.sn_calibration import DEFAULT_SIZE
 from app.datasets.sn_calibration_reader import read_sn_calibration
 from app.datasets.soccernet_v3_reader import read_soccernet_v3
 from app.datasets.soccernet_v3d_reader import read_soccernet_v3d
-from app.progress import Progress
+from app.progress import TellProgress
 from app.review.importing.cameras import ingest_cameras
 from app.review.importing.ingest import IngestReport, ingest
 from app.review.importing.spare import SpareFrame, ingest_spare
@@ -151,7 +151,7 @@ def import_source(
     dataset: str,
     source: Source,
     settings: Settings,
-    progress: Progress | None = None,
+    progress: TellProgress | None = None,
     *,
     actor: str = "local",
     dry_run: bool = False,

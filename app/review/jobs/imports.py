@@ -9,7 +9,7 @@ from typing import Any
 from app.config import Settings
 from app.datasets.file_tree import Root
 from app.errors import InputError
-from app.progress import Progress
+from app.progress import TellProgress
 from app.review.datasets.dataset import get_dataset_head, require_name
 from app.review.editing.paint import has_pictures
 from app.review.importing.folders import resolve_folder
@@ -165,7 +165,7 @@ def _following(jobs: Jobs, store: Store, dataset: str, actor: str) -> dict[str, 
     return {"solve_job": solve.id, "paint_job": paint}
 
 
-def _step(progress: JobProgress, sentence: str) -> Progress:
+def _step(progress: JobProgress, sentence: str) -> TellProgress:
     def step(done: int, _total: int | None = None, _sentence: str = "") -> None:
         progress(done, None, f"{sentence} {done:,} groups so far.")
 

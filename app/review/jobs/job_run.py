@@ -10,7 +10,7 @@ from typing import Any
 import structlog
 
 from app.errors import JobCancelled, ReviewError
-from app.progress import Progress
+from app.progress import TellProgress
 from app.store.codecs import Json
 from app.store.jobs import CANCELLED, DONE, FAILED
 
@@ -34,7 +34,7 @@ class FailedWithReportError(ReviewError):
         self.result = result
 
 
-def counting(progress: JobProgress, what: str) -> Progress:
+def counting(progress: JobProgress, what: str) -> TellProgress:
     """A progress that says its numbers in words, too: ``1,200 of 12,764 groups solved``."""
 
     def count(done: int, total: int | None = None, _sentence: str = "") -> None:

@@ -10,7 +10,7 @@ from pathlib import Path
 from app.config import Settings
 from app.datasets.match_frames import ARCHIVE
 from app.errors import ConflictError, NotFoundError
-from app.progress import Progress, telling
+from app.progress import TellProgress, telling
 from app.review.datasets.delete import delete_dataset
 from app.review.editing.recompute import solve_dataset
 from app.review.editing.state import GroupState, read_states
@@ -118,7 +118,7 @@ def practice_work(store: Store, settings: Settings, *, again: bool, actor: str) 
 
 
 def make_practice_dataset(
-    store: Store, settings: Settings, progress: Progress, *, again: bool = False, actor: str
+    store: Store, settings: Settings, progress: TellProgress, *, again: bool = False, actor: str
 ) -> dict[str, Json]:
     """Draw, import and solve the lessons; done once, nothing more unless ``again``.
 
@@ -141,7 +141,7 @@ def make_practice_dataset(
 
 
 def _made(
-    store: Store, settings: Settings, progress: Progress, *, again: bool, actor: str
+    store: Store, settings: Settings, progress: TellProgress, *, again: bool, actor: str
 ) -> list[int]:
     """Ids of the lessons, once they are drawn, imported and solved."""
     folder = settings.home / DATASET

@@ -13,7 +13,7 @@ from typing import Any
 
 from app.datasets.manifest import software_version
 from app.errors import ConflictError, InputError
-from app.progress import Progress
+from app.progress import TellProgress
 from app.review.datasets.dataset import DatasetHead, read_dataset_head
 from app.review.datasets.licence import licence_text
 from app.review.versions.membership import RULES, Candidate, read_candidates, require_solved
@@ -127,7 +127,7 @@ def freeze(
     request: FreezeRequest,
     *,
     actor: str,
-    progress: Progress | None = None,
+    progress: TellProgress | None = None,
 ) -> Version:
     """Freeze a dataset as it is in one snapshot.
 
@@ -167,7 +167,7 @@ class _Run:
         dataset: DatasetHead,
         request: FreezeRequest,
         candidates: Sequence[Candidate],
-        progress: Progress | None,
+        progress: TellProgress | None,
     ):
         self._store, self._session, self._dataset = store, session, dataset
         self._request, self._candidates, self._progress = request, candidates, progress

@@ -10,7 +10,7 @@ from itertools import islice
 from typing import Any
 
 from app.errors import JobCancelled, ReviewError, StorageError
-from app.progress import Progress
+from app.progress import TellProgress
 from app.review.datasets.fan_out import fan_out
 from app.review.versions.version import (
     Version,
@@ -131,7 +131,7 @@ def verify(
     store: Store,
     version_id: int,
     executor: Executor | None = None,
-    progress: Progress | None = None,
+    progress: TellProgress | None = None,
 ) -> VerifyReport:
     """Compute a version from its frozen annotations and compare all of it.
 
@@ -169,7 +169,7 @@ def verify_and_keep(
     store: Store,
     version_id: int,
     executor: Executor | None = None,
-    progress: Progress | None = None,
+    progress: TellProgress | None = None,
     *,
     actor: str,
 ) -> VerifyReport:

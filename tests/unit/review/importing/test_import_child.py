@@ -15,7 +15,7 @@ import pytest
 from app.child_figures import FIGURES
 from app.datasets.soccernet_v3_writer import write_soccernet_v3
 from app.errors import DamagedError, JobCancelled, TooLargeError
-from app.progress import Progress
+from app.progress import TellProgress
 from app.review.datasets.dataset import list_datasets
 from app.review.importing import import_child
 from app.review.importing.import_child import Outcome, import_apart
@@ -35,7 +35,7 @@ def apart(
     dataset: str = "apart",
     *,
     dry_run: bool = False,
-    progress: Progress = lambda *told: None,
+    progress: TellProgress = lambda *told: None,
     stop: Callable[[], None] = wanted,
 ) -> Outcome:
     source = Source("soccernet-v3", path, name="data")

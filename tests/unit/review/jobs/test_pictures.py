@@ -10,7 +10,7 @@ from typing import Any, NoReturn
 import pytest
 
 from app.errors import NotFoundError
-from app.progress import Progress
+from app.progress import TellProgress
 from app.review.editing.pictures import read_pictures
 from app.review.editing.recompute import stale_groups
 from app.review.importing.ingest import ingest
@@ -141,7 +141,7 @@ def test_a_server_that_stops_leaves_an_estimate_to_the_next_one(
     started = threading.Event()
 
     def endless(
-        _store: Store, _dataset: int, _pool: object, told: Progress, _only: object
+        _store: Store, _dataset: int, _pool: object, told: TellProgress, _only: object
     ) -> NoReturn:
         started.set()
         while True:
