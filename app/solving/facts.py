@@ -16,11 +16,12 @@ from typing import Any, cast
 import numpy as np
 
 from app.geometry.arrays import BoolArray, FloatArray, IntArray
-from app.geometry.resection import PARAMETERS, parameters_from_camera
+from app.geometry.resection import PARAMETERS
 from app.geometry.triangulation import moved_points
 from app.soccer.group import View
-from app.soccer.picture import camera_aspect, taken_camera
+from app.soccer.picture import camera_aspect
 from app.soccer.solution import Calibration
+from app.solving.camera_numbers import WHOLE, CameraNumbers
 from app.solving.triangulate import Meeting, lines_of_sight, meet, sights_of
 
 STEP_PX = 0.5
@@ -199,7 +200,7 @@ COLUMNS: dict[str, tuple[type, tuple[int, ...]]] = {
     "pair_point": (np.float64, (3,)),
     "pair_moved": (np.float64, (2, 2, 2, 3)),
     "view_agreement": (np.float64, ()),
-    "view_picture": (np.float64, (3, PARAMETERS + 3)),
+    "view_picture": (np.float64, (3, WHOLE)),
     "view_stretch": (np.float64, (2,)),
     "view_noise": (np.float64, ()),
 }
@@ -250,8 +251,15 @@ def facts_of(
     balls = [None if view.ball is None or view.ball.inferred else view.ball for view in views]
     boxes = [ball.box if ball is not None else None for ball in balls]
     diagonals = [view.size.diagonal for view in views]
-    parameters, covariances = _uncertainties(calibrations, diagonals)
-    pictures, stretches = _pictures(views, calibrations, parameters, covariances)
+    numbers = list(map(CameraNumbers.of, calibrations, diagonals))
+    parameters, covariances, pictures = (
+        np.zeros((len(views), *shape))
+        for shape in ((PARAMETERS,), (PARAMETERS, PARAMETERS), (3, WHOLE))
+    )
+    for place, known in enumerate(numbers):
+        if known is not None:
+            parameters[place], covariances[place] = known.parameters, known.covariance
+            pictures[place] = 0.0 if known.picture is None else known.picture
     places = {view.key: place for place, view in enumerate(views)}
     slopes, axes = _rays(meetings, places)
     return Facts(
@@ -285,46 +293,25 @@ def facts_of(
         pair_point=_rows([item.point for item in meetings], 3),
         pair_moved=_moved(meetings),
         view_picture=pictures,
-        view_stretch=stretches,
+        view_stretch=_stretches(views, calibrations, numbers),
         view_noise=np.array([view.noise for view in views], float),
     )
 
 
-def _uncertainties(
-    calibrations: Sequence[Calibration], diagonals: Sequence[float]
-) -> tuple[FloatArray, FloatArray]:
-    """Parameters and their covariance of the cameras that have one, zeros for the others."""
-    parameters = np.zeros((len(calibrations), PARAMETERS))
-    covariances = np.zeros((len(calibrations), PARAMETERS, PARAMETERS))
-    for place, (item, diagonal) in enumerate(zip(calibrations, diagonals, strict=True)):
-        if item.camera is not None and item.covariance is not None:
-            parameters[place] = parameters_from_camera(item.camera, diagonal / 2)
-            covariances[place] = np.reshape(item.covariance, (PARAMETERS, PARAMETERS))
-    return parameters, covariances
-
-
-def _pictures(
+def _stretches(
     views: Sequence[View],
     calibrations: Sequence[Calibration],
-    parameters: FloatArray,
-    covariances: FloatArray,
-) -> tuple[FloatArray, FloatArray]:
-    """``view_picture`` and ``view_stretch``; parameters and covariances become those as taken."""
-    width = PARAMETERS + 3
-    pictures, stretches = np.zeros((len(views), 3, width)), np.zeros((len(views), 2))
-    stretches[:, 0] = 1.0
-    for place, (view, item) in enumerate(zip(views, calibrations, strict=True)):
-        if item.camera is None or item.picture_covariance is None:
+    numbers: Sequence[CameraNumbers | None],
+) -> FloatArray:
+    """``view_stretch``: one and nothing where the picture is as it was taken."""
+    stretches = np.tile((1.0, 0.0), (len(views), 1))
+    for place, (view, item, known) in enumerate(zip(views, calibrations, numbers, strict=True)):
+        if item.camera is None or known is None or known.picture is None:
             continue
-        whole = np.reshape(item.picture_covariance, (width, width))
-        camera, half = taken_camera(item.camera), view.size.diagonal / 2
-        parameters[place] = parameters_from_camera(camera, half)
-        covariances[place] = whole[:PARAMETERS, :PARAMETERS]
-        pictures[place] = whole[PARAMETERS:]
         center = None if view.ball is None else view.ball.center
         foot = 0.0 if center is None else center[0] - item.camera.principal_point[0]
         stretches[place] = camera_aspect(item.camera), foot
-    return pictures, stretches
+    return stretches
 
 
 def _rays(meetings: Sequence[Meeting], places: Mapping[str, int]) -> tuple[FloatArray, FloatArray]:

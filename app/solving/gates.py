@@ -118,19 +118,11 @@ def _calibratable(group: _Group) -> Gate:
 
 def _jac(group: _Group, policy: Policy) -> Gate:
     measured = [(view.jac, view) for view in group.views if view.jac is not None]
-    fallen = [(jac, view) for jac, view in measured if view.failed == "jac"]
-    blamed = "jac" in group.failed
     if not measured:
         given = any(view.calibration.source == "given" for view in group.views)
         sentence = "not measured, the cameras were given" if given else "nothing to measure"
         return Gate("jac", True, None, policy.min_jac, None, sentence)
-    shown = fallen if blamed else [item for item in measured if item[1].failed is None] or measured
-    jac, view = min(shown, key=lambda item: item[0])
-    sentence = f"{'worst ' if len(shown) > 1 else ''}{_beside(jac, policy.min_jac)} · {view.letter}"
-    if fallen and not blamed:
-        sentence += f"; {_letters([view for _, view in fallen])} below, not used"
-    key = view.key if blamed else None
-    return _gate("jac", not blamed, jac, policy.min_jac, sentence, view=key)
+    return _worst("jac", group, measured, policy.min_jac)
 
 
 def _agreement(group: _Group, policy: Policy) -> Iterator[Gate]:
@@ -142,16 +134,22 @@ def _agreement(group: _Group, policy: Policy) -> Iterator[Gate]:
     if not measured:
         yield Gate("agreement", True, None, threshold, None, "no paint was read")
         return
-    blamed = "agreement" in group.failed
-    fallen = [item for item in measured if item[1].failed == "agreement"]
+    yield _worst("agreement", group, measured, threshold)
+
+
+def _worst(
+    name: str, group: _Group, measured: Sequence[tuple[float, JudgedView]], threshold: float
+) -> Gate:
+    """A gate of views, by the smallest number of those that it judges."""
+    blamed = name in group.failed
+    fallen = [item for item in measured if item[1].failed == name]
     shown = fallen if blamed else [item for item in measured if item[1].failed is None] or measured
     value, view = min(shown, key=lambda item: item[0])
-    worst = "worst " if len(shown) > 1 else ""
-    sentence = f"{worst}{_beside(value, threshold)} · {view.letter}"
+    sentence = f"{'worst ' if len(shown) > 1 else ''}{_beside(value, threshold)} · {view.letter}"
     if fallen and not blamed:
         sentence += f"; {_letters([view for _, view in fallen])} below, not used"
     key = view.key if blamed else None
-    yield _gate("agreement", not blamed, value, threshold, sentence, view=key)
+    return _gate(name, not blamed, value, threshold, sentence, view=key)
 
 
 _FALLEN_AT = {

@@ -8,12 +8,12 @@ from threading import Lock
 import numpy as np
 
 from app.geometry.arrays import BoolArray, FloatArray, IntArray
-from app.geometry.camera import Camera
-from app.geometry.resection import PARAMETERS, parameters_from_camera, projection_jacobians
+from app.geometry.resection import PARAMETERS, projection_jacobians
 from app.soccer.frames import ImageSize
-from app.soccer.picture import camera_aspect, taken_camera
+from app.soccer.picture import camera_aspect
 from app.soccer.policy import Policy
 from app.soccer.solution import Calibration
+from app.solving.camera_numbers import WHOLE, CameraNumbers
 from app.solving.facts import STEP_PX, Facts
 from app.solving.triangulate import Sighting
 
@@ -90,12 +90,12 @@ def picture_spreads(
         stretches: Aspect, and how far right of the axis the point is seen, pixels, shape (N, 2).
     """
     half = diagonals / 2
-    jacobians = np.zeros((len(points), 2, PARAMETERS + 3))
+    jacobians = np.zeros((len(points), 2, WHOLE))
     jacobians[:, :, :PARAMETERS] = projection_jacobians(parameters, points, half)
     jacobians[:, 0, :PARAMETERS] *= stretches[:, :1]
     jacobians[:, 0, PARAMETERS] = stretches[:, 1]
     jacobians[:, 0, PARAMETERS + 1] = jacobians[:, 1, PARAMETERS + 2] = half
-    whole = np.zeros((len(points), PARAMETERS + 3, PARAMETERS + 3))
+    whole = np.zeros((len(points), WHOLE, WHOLE))
     whole[:, :PARAMETERS, :PARAMETERS] = covariances
     whole[:, PARAMETERS:] = pictures
     whole[:, :PARAMETERS, PARAMETERS:] = pictures[:, :, :PARAMETERS].transpose(0, 2, 1)
@@ -170,34 +170,18 @@ def calibration_spread(calibration: Calibration, size: ImageSize, point: FloatAr
         size: Annotated size.
         point: In front of the camera, pitch frame, metres, shape (3,).
     """
-    if calibration.covariance is None or calibration.camera is None:
+    numbers, camera = CameraNumbers.of(calibration, size.diagonal), calibration.camera
+    if numbers is None or camera is None:
         return np.zeros((2, 2))
-    if calibration.picture_covariance is not None:
-        width = PARAMETERS + 3
-        whole = np.array(calibration.picture_covariance).reshape(width, width)
-        return _picture_spread(whole, calibration.camera, size, point)
-    parameters = parameters_from_camera(calibration.camera, size.diagonal / 2)
-    covariance = np.array(calibration.covariance).reshape(1, PARAMETERS, PARAMETERS)
-    diagonal = np.array([size.diagonal])
-    spread: FloatArray = carried_spreads(parameters[None], covariance, point[None], diagonal)[0]
-    return spread
-
-
-def _picture_spread(
-    whole: FloatArray, camera: Camera, size: ImageSize, point: FloatArray
-) -> FloatArray:
-    """``calibration_spread`` of a stretched or cropped picture; ``whole``: shape (11, 11)."""
-    pixel = camera.project(point[None])[0]
-    parameters = parameters_from_camera(taken_camera(camera), size.diagonal / 2)
-    stretch = np.array([camera_aspect(camera), pixel[0] - camera.principal_point[0]])
-    spread: FloatArray = picture_spreads(
-        parameters[None],
-        whole[None, :PARAMETERS, :PARAMETERS],
-        point[None],
-        np.array([size.diagonal]),
-        whole[None, PARAMETERS:],
-        stretch[None],
-    )[0]
+    known = numbers.parameters[None], numbers.covariance[None]
+    where = point[None], np.array([size.diagonal])
+    if numbers.picture is None:
+        spreads = carried_spreads(*known, *where)
+    else:
+        right = camera.project(point[None])[0, 0] - camera.principal_point[0]
+        stretch = np.array([[camera_aspect(camera), right]])
+        spreads = picture_spreads(*known, *where, numbers.picture[None], stretch)
+    spread: FloatArray = spreads[0]
     return spread
 
 
@@ -228,17 +212,17 @@ def sight_spreads(sights: Sequence[Sighting], points: FloatArray, policy: Policy
         np.array([sight.noise for sight in sights]),
     )
     spreads: FloatArray = noise[:, None, None] * np.eye(2)
-    plain = []
+    plain: dict[int, CameraNumbers] = {}
     for row, sight in enumerate(sights):
-        if sight.covariance is not None:
-            plain.append(row)
+        if sight.numbers is not None and sight.numbers.picture is None:
+            plain[row] = sight.numbers
         else:
-            # Nothing is known of the uncertainty of a given camera: zeros.
             spreads[row] += calibration_spread(sight.calibration, sight.size, points[row])
     if plain:
-        numbers = np.array([sights[row].parameters for row in plain])
-        covariances = np.array([sights[row].covariance for row in plain])
-        spreads[plain] += carried_spreads(numbers, covariances, points[plain], diagonals[plain])
+        rows = [*plain]
+        parameters = np.array([item.parameters for item in plain.values()])
+        covariances = np.array([item.covariance for item in plain.values()])
+        spreads[rows] += carried_spreads(parameters, covariances, points[rows], diagonals[rows])
     return spreads
 
 

@@ -10,12 +10,12 @@ import numpy as np
 
 from app.geometry.arrays import FloatArray
 from app.geometry.camera import MIN_DEPTH, Camera
-from app.geometry.resection import PARAMETERS, parameters_from_camera
 from app.geometry.triangulation import parallax_angle, triangulate_pairs
 from app.soccer.frames import ImagePoint, ImageSize
 from app.soccer.group import View
 from app.soccer.policy import Policy
 from app.soccer.solution import Calibration
+from app.solving.camera_numbers import CameraNumbers
 
 
 @dataclass(frozen=True)
@@ -71,18 +71,9 @@ class Sighting:
         return self.camera.undistort_jacobian(np.array(self.center))
 
     @cached_property
-    def parameters(self) -> FloatArray:
-        """Numbers of the camera that its calibration's covariance is about, shape (8,)."""
-        return parameters_from_camera(self.camera, self.size.diagonal / 2)
-
-    @cached_property
-    def covariance(self) -> FloatArray | None:
-        """Of the parameters, shape (8, 8); None for a given camera, and for a picture that may have
-        been stretched or cropped, of whom more is said."""
-        calibration = self.calibration
-        if calibration.covariance is None or calibration.picture_covariance is not None:
-            return None
-        return np.array(calibration.covariance).reshape(PARAMETERS, PARAMETERS)
+    def numbers(self) -> CameraNumbers | None:
+        """The camera as numbers; None where nobody says how exact it is."""
+        return CameraNumbers.of(self.calibration, self.size.diagonal)
 
     def tau_px(self, policy: Policy) -> float:
         """Largest reprojection error of a valid pair, pixels."""
