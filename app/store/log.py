@@ -179,6 +179,12 @@ def read_log(session: Session, *where: ColumnElement[bool], after: int = 0) -> I
         after = rows[-1].id
 
 
+def read_entries(session: Session, ids: Sequence[int]) -> Iterator[LogEntry]:
+    """The entries of some ids, however many, in order."""
+    for start in range(0, len(ids), _BATCH):
+        yield from read_log(session, LogModel.id.in_(ids[start : start + _BATCH]))
+
+
 def last_time(session: Session) -> str | None:
     """When the last entry was written; None for an empty log."""
     return session.scalar(select(LogModel.at).order_by(LogModel.id.desc()).limit(1))

@@ -13,7 +13,7 @@ from zlib_ng import zlib_ng
 from app.soccer.paint_evidence import PaintReading, reading_from_text
 from app.store.codecs import as_written, inflate, parse
 from app.store.dialect.statements import any_of, insert, values_of
-from app.store.log import LogEntry, read_log
+from app.store.log import LogEntry, read_entries
 from app.store.models import GroupModel, LogModel, PaintEvidenceModel, StationModel, ViewModel
 from app.store.session import Session
 
@@ -187,6 +187,4 @@ def _entries(session: Session, dataset_id: int) -> Iterator[LogEntry]:
         .where(LogModel.kind == PAINT, GroupModel.dataset_id == dataset_id)
         .order_by(LogModel.id)
     )
-    ids = list(session.scalars(statement))
-    for start in range(0, len(ids), _BATCH):
-        yield from read_log(session, LogModel.id.in_(ids[start : start + _BATCH]))
+    return read_entries(session, list(session.scalars(statement)))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from itertools import groupby
 from typing import Any
@@ -12,13 +12,12 @@ from sqlalchemy import func, select
 from app.soccer.group import SharedPosition
 from app.store.codecs import as_written, parse, positions_from_json
 from app.store.digest import digest
-from app.store.log import LogEntry, read_log
+from app.store.log import LogEntry, read_entries
 from app.store.models import GroupModel, LogModel, StationModel, ViewModel
 from app.store.session import Session
 
 POSITION = "position"
 """Kind of the log's entries that say where a match puts cameras, one for each group."""
-_BATCH = 500
 
 
 @dataclass
@@ -97,7 +96,7 @@ def position_inputs(
             func.max(LogModel.id), GroupModel.match, dataset_id=dataset_id, match=match
         ).group_by(GroupModel.match)
     ).all()
-    newest = {entry.id: entry for entry in _read(session, [number for number, _ in rows])}
+    newest = {entry.id: entry for entry in read_entries(session, [number for number, _ in rows])}
     found: dict[str, str | None] = {}
     for number, name in rows:
         entry: LogEntry | None = newest[number]
@@ -130,7 +129,7 @@ def _times(session: Session, dataset_id: int, match: str) -> Iterator[list[LogEn
     rows = session.execute(statement.order_by(LogModel.id.desc())).all()
     for _, of_time in groupby(rows, key=lambda row: row.at):
         ids = sorted(row.id for row in of_time)
-        entries = [entry for entry in _read(session, ids) if _is_of(entry, match)]
+        entries = [entry for entry in read_entries(session, ids) if _is_of(entry, match)]
         if entries:
             yield entries
 
@@ -148,8 +147,3 @@ def _given(*columns: Any, dataset_id: int, match: str | None) -> Any:
 def _is_of(entry: LogEntry, match: str) -> bool:
     """Whether the group was in the match then; the first entries did not say."""
     return bool(entry.body.get("match", match) == match)
-
-
-def _read(session: Session, ids: Sequence[int]) -> Iterator[LogEntry]:
-    for start in range(0, len(ids), _BATCH):
-        yield from read_log(session, LogModel.id.in_(ids[start : start + _BATCH]))

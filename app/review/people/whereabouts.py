@@ -120,15 +120,16 @@ def _job(session: Session, named: str | int, _sight: Sight) -> Whereabouts | Non
 def _version(session: Session, named: str | int, sight: Sight) -> Whereabouts | None:
     """By id, name or hash, among the datasets that somebody sees."""
     rows = versions_like(session, str(named))
-    every = _fitting(rows, str(named))
-    seen = _fitting([row for row in rows if sight.sees(row.dataset_id)], str(named))
+    every = versions_called(rows, str(named))
+    seen = versions_called([row for row in rows if sight.sees(row.dataset_id)], str(named))
     if len(seen) == 1:
         return Whereabouts(seen[0].dataset_id, called=str(seen[0].id))
     # Several: the route says so, and which datasets they are of.
     return Whereabouts(seen[0].dataset_id) if seen and len(seen) == len(every) else None
 
 
-def _fitting(rows: Sequence[Any], text: str) -> list[Any]:
+def versions_called(rows: Sequence[Any], text: str) -> list[Any]:
+    """The versions that a text names: by id, else by name, else by the first digits of the hash."""
     fitting = [row for row in rows if text == str(row.id)]
     fitting = fitting or [row for row in rows if text == row.name]
     if not fitting and len(text) >= MIN_HASH:

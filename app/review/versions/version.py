@@ -10,6 +10,7 @@ from typing import Any
 from app.errors import InputError, NotFoundError, StorageError
 from app.finite import quoted
 from app.review.datasets.dataset import read_dataset_head
+from app.review.people.whereabouts import MIN_HASH, versions_called
 from app.soccer.group import Group
 from app.soccer.policy import Policy
 from app.soccer.solution import Solution
@@ -21,9 +22,6 @@ from app.store.solutions import decode_camera, decode_solution
 from app.store.store import Store
 from app.store.verifications import Verification, read_verifications
 from app.store.versions import VersionGroup, all_versions, dataset_versions, version_row
-
-MIN_HASH = 8
-"""So many digits of a hash name a version."""
 
 
 @dataclass(frozen=True)
@@ -123,10 +121,7 @@ def version_called(store: Store, version: str, dataset: str | None = None) -> in
         return find_version(store, dataset, version).id
     with store.read() as session:
         found = _versions(session, all_versions(session))
-    fitting = [item for item in found if version == str(item.id)]
-    fitting = fitting or [item for item in found if version == item.name]
-    if not fitting and len(version) >= MIN_HASH:
-        fitting = [item for item in found if item.hash.startswith(version)]
+    fitting: list[Version] = versions_called(found, version)
     if not fitting:
         raise NotFoundError(f"there is no version {quoted(version)}")
     if len(fitting) > 1:
