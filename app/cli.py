@@ -1,4 +1,4 @@
-"""The command line: the second door."""
+"""The entry of the command ``touchline``."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The one way in which numbers leave: finite, or not at all; and texts: as JSON quotes them.
+"""Values on their way out as JSON: numbers that are infinite or NaN become null, texts are quoted.
 
 JSON, CSV and logs have no infinity and no NaN that every reader understands. A number that is
 neither known nor finite leaves as null, as an empty cell, as nothing.

@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from contextlib import closing
 from pathlib import PurePosixPath
 from typing import Any
 
@@ -16,7 +15,7 @@ from app.datasets.match_info import place_of, read_match_info
 from app.datasets.report import Report
 from app.datasets.sn_calibration import CAMERAS, LINES
 from app.datasets.synloc import camera_from_synloc, images_of, is_synloc
-from app.datasets.trees import open_tree
+from app.datasets.trees import opened_tree
 from app.errors import DatasetFormatError
 from app.geometry.camera import Camera
 
@@ -34,10 +33,9 @@ def read_cameras(path: Root, report: Report, limits: Limits = DEFAULT_LIMITS) ->
     ``<league>/<season>/<match>/`` before it where the file lies that deep. In an export as
     sn-calibration ``match_info.json`` says where each frame came from: that is its key.
     """
-    tree = open_tree(path, report, limits)
-    if tree is None:
-        return {}
-    with closing(tree):
+    with opened_tree(path, report, limits) as tree:
+        if tree is None:
+            return {}
         names = tree.names()
         cameras = cameras_of(tree, _camera_files(names), report, _places(tree, names))
     report.imported += len(cameras)

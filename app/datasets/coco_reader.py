@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from contextlib import closing
 from dataclasses import replace
 from pathlib import PurePosixPath
 from typing import Any
@@ -17,7 +16,7 @@ from app.datasets.report import Report
 from app.datasets.safe_path import check_name
 from app.datasets.soccernet_v3 import SPLITS
 from app.datasets.synloc import camera_from_synloc, is_synloc
-from app.datasets.trees import open_tree
+from app.datasets.trees import opened_tree
 from app.datasets.view_groups import PlacedView, ViewGroups
 from app.datasets.view_state import GroupHead, StateReader
 from app.errors import DatasetFormatError, UnsafePathError
@@ -54,10 +53,9 @@ def read_coco(
         calibration: What counts for a view that has a camera and lines (images of others).
         limits: Caps on what is read.
     """
-    tree = open_tree(root, report, limits)
-    if tree is None:
-        return
-    with closing(tree):
+    with opened_tree(root, report, limits) as tree:
+        if tree is None:
+            return
         names = tree.names()
         groups = ViewGroups(report)
         found = False

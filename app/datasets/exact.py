@@ -1,4 +1,4 @@
-"""Numbers that a file spells another way than we do, written so that they come back the same."""
+"""Numbers written so that a reader that scales or shifts them has exactly the same ones again."""
 
 from __future__ import annotations
 

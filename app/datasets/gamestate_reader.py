@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from contextlib import closing
 from dataclasses import dataclass, field
 from pathlib import PurePosixPath
 from typing import Any
@@ -17,7 +16,7 @@ from app.datasets.safe_path import check_name
 from app.datasets.sn_calibration_reader import lines_from_json
 from app.datasets.soccernet_record import MAX_SIDE
 from app.datasets.soccernet_v3 import SPLITS
-from app.datasets.trees import open_tree
+from app.datasets.trees import opened_tree
 from app.errors import DatasetFormatError, UnsafePathError
 from app.soccer.annotation import BallAnnotation, Extras, Lines
 from app.soccer.frames import Box, ImageSize
@@ -40,10 +39,9 @@ def read_gamestate(
     People go to ``Extras.boxes`` with their whole annotation; whatever else the file holds is
     kept for the way back.
     """
-    tree = open_tree(root, report, limits)
-    if tree is None:
-        return
-    with closing(tree):
+    with opened_tree(root, report, limits) as tree:
+        if tree is None:
+            return
         names = tree.names()
         files = [name for name in names if PurePosixPath(name).name == LABELS]
         if not files:

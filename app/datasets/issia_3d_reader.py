@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from contextlib import closing
 from pathlib import PurePosixPath
 
 from app.datasets import fields
@@ -13,7 +12,7 @@ from app.datasets.file_tree import DEFAULT_LIMITS, FileTree, Limits, Root
 from app.datasets.issia import TABLE_3D
 from app.datasets.issia_reader import IssiaFolder, IssiaOptions, complete, count
 from app.datasets.report import Report
-from app.datasets.trees import open_tree
+from app.datasets.trees import opened_tree
 from app.datasets.viper_reader import ViperTrack
 from app.errors import DatasetFormatError
 
@@ -30,10 +29,9 @@ def open_issia_3d(
     the table. Numbers of frames are those of the videos: ``options.frame_offset`` is not used.
     """
     found = IssiaFolder()
-    tree = open_tree(folder, report, limits)
-    if tree is None:
-        return found
-    with closing(tree):
+    with opened_tree(folder, report, limits) as tree:
+        if tree is None:
+            return found
         names = tree.names()
         tables = [name for name in names if PurePosixPath(name).name == TABLE_3D]
         if not tables:

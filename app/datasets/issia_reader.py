@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
-from contextlib import closing
 from dataclasses import dataclass, field
 from pathlib import PurePosixPath
 from typing import Any
@@ -17,7 +16,7 @@ from app.datasets.issia import CALIBRATION, DEFAULT_OFFSET, DEFAULT_SIZE, MATCH,
 from app.datasets.report import Report
 from app.datasets.sn_calibration import LineFile
 from app.datasets.sn_calibration_reader import line_files_of, read_line_files
-from app.datasets.trees import open_tree
+from app.datasets.trees import opened_tree
 from app.datasets.viper_reader import ViperTrack, read_viper
 from app.geometry.camera import Camera
 from app.soccer.annotation import BallAnnotation, Extras
@@ -140,10 +139,9 @@ def open_issia(
     ``options.lines``, else ``lines/cam1.json`` .. of the folder itself.
     """
     found = IssiaFolder()
-    tree = open_tree(folder, report, limits)
-    if tree is None:
-        return found
-    with closing(tree):
+    with opened_tree(folder, report, limits) as tree:
+        if tree is None:
+            return found
         names = tree.names()
         _read_tracks(tree, names, options, found, report, limits)
         complete(found, tree, names, options, report, limits)

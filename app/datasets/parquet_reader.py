@@ -5,7 +5,7 @@ from __future__ import annotations
 import shutil
 import tempfile
 from collections.abc import Iterator, Mapping
-from contextlib import closing, contextmanager
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path, PurePosixPath
 from typing import Any
@@ -16,7 +16,7 @@ from app.datasets.frame_names import IMAGE_SUFFIXES
 from app.datasets.json_text import read_json
 from app.datasets.parquet import pyarrow_modules
 from app.datasets.report import Report
-from app.datasets.trees import open_tree
+from app.datasets.trees import opened_tree
 from app.datasets.view_groups import PlacedView, ViewGroups
 from app.datasets.view_state import StateReader, extras_from_json
 from app.errors import DatasetFormatError
@@ -55,10 +55,9 @@ def read_parquet(root: Root, report: Report, *, limits: Limits = DEFAULT_LIMITS)
     Raises:
         InputError: pyarrow is not installed.
     """
-    tree = open_tree(root, report, limits)
-    if tree is None:
-        return
-    with closing(tree):
+    with opened_tree(root, report, limits) as tree:
+        if tree is None:
+            return
         names = tree.names()
         tables = [name for name in names if name.lower().endswith(".parquet")]
         if not tables:

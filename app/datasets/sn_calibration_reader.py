@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import closing
 from dataclasses import dataclass, field, replace
 from pathlib import PurePosixPath
 from typing import Any
@@ -17,7 +16,7 @@ from app.datasets.match_info import METADATA, PLACE, match_of, place_of, read_ma
 from app.datasets.report import Report
 from app.datasets.sn_calibration import LARGEST_UNIT, LineFile, split_and_size
 from app.datasets.soccernet_v3 import SPLITS
-from app.datasets.trees import open_tree
+from app.datasets.trees import opened_tree
 from app.errors import DatasetFormatError, UnknownMarkingError
 from app.soccer.annotation import Extras, Lines, make_lines
 from app.soccer.frames import ImagePoint, ImageSize
@@ -51,10 +50,9 @@ def read_line_files(
         by_folder: Whether a folder that is called as in our exports (``test-1280x720``) says the
             size of its images.
     """
-    tree = open_tree(path, report, limits)
-    if tree is None:
-        return
-    with closing(tree):
+    with opened_tree(path, report, limits) as tree:
+        if tree is None:
+            return
         names = tree.names()
         places = _places(read_match_info(tree, names, Report()))
         sizes = _sizes(map(_whole, names), path.stem) if by_folder else {}
@@ -209,10 +207,9 @@ def read_sn_calibration(
         calibration: What counts for a view that has a camera and lines.
         limits: Caps on what is read.
     """
-    tree = open_tree(path, report, limits)
-    if tree is None:
-        return
-    with closing(tree):
+    with opened_tree(path, report, limits) as tree:
+        if tree is None:
+            return
         names = tree.names()
         infos = read_match_info(tree, names, report)
         places = _places(infos)

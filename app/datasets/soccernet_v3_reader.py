@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import closing
 from dataclasses import replace
 from pathlib import PurePosixPath
 from typing import Any
@@ -22,7 +21,7 @@ from app.datasets.soccernet_v3 import (
     SPLITS,
     group_label,
 )
-from app.datasets.trees import open_tree
+from app.datasets.trees import opened_tree
 from app.errors import DatasetFormatError, UnsafePathError
 from app.soccer.group import Group, Station, View
 
@@ -40,10 +39,9 @@ def read_soccernet_v3(
         report: Takes what had to be left out.
         limits: Caps on what is read.
     """
-    tree = open_tree(root, report, limits)
-    if tree is None:
-        return
-    with closing(tree):
+    with opened_tree(root, report, limits) as tree:
+        if tree is None:
+            return
         names = tree.names()
         folders = [name[: -len(LABELS)] for name in names if PurePosixPath(name).name == LABELS]
         if not folders:

@@ -7,7 +7,6 @@ Either does alone. What was computed from them (JaC, 3D balls, errors) is comput
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from contextlib import closing
 from dataclasses import replace
 from pathlib import PurePosixPath
 from typing import Any
@@ -21,7 +20,7 @@ from app.datasets.soccernet_v3 import group_label
 from app.datasets.soccernet_v3_reader import MatchReader
 from app.datasets.soccernet_v3d import LABELS, TABLE
 from app.datasets.soccernet_v3d_table import SnTable, TableRow, read_snv3d_table
-from app.datasets.trees import open_tree
+from app.datasets.trees import opened_tree
 from app.errors import DatasetFormatError
 from app.soccer.group import Group, Station, View
 
@@ -53,10 +52,9 @@ def read_soccernet_v3d(
         calibration: What counts for a view that has a camera and lines.
         limits: Caps on what is read.
     """
-    tree = open_tree(root, report, limits)
-    if tree is None:
-        return
-    with closing(tree):
+    with opened_tree(root, report, limits) as tree:
+        if tree is None:
+            return
         names = tree.names()
         table = read_snv3d_table(tree, names, report, limits)
         folders = [name[: -len(LABELS)] for name in names if PurePosixPath(name).name == LABELS]

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import closing, contextmanager, nullcontext
+
 from app.datasets.file_tree import DEFAULT_LIMITS, FileTree, Limits, Root
 from app.datasets.folder_tree import FileAlone, FolderTree
 from app.datasets.plain_file import open_plain
@@ -33,6 +36,16 @@ def open_tree(path: Root, report: Report, limits: Limits = DEFAULT_LIMITS) -> Fi
     except OSError as error:
         report.note(str(path), None, None, f"cannot be read ({error.strerror})")
     return None
+
+
+@contextmanager
+def opened_tree(
+    path: Root, report: Report, limits: Limits = DEFAULT_LIMITS
+) -> Iterator[FileTree | None]:
+    """``open_tree`` for as long as somebody reads from it."""
+    tree = open_tree(path, report, limits)
+    with nullcontext() if tree is None else closing(tree):
+        yield tree
 
 
 def _open_stored(path: StoredPath, report: Report, limits: Limits) -> FileTree | None:

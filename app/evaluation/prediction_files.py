@@ -19,7 +19,6 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping
-from contextlib import closing
 from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
 from typing import Any
@@ -30,7 +29,7 @@ from app.datasets.csv_text import is_missing, numbers_in, read_rows
 from app.datasets.file_tree import DEFAULT_LIMITS, FileTree, Limits
 from app.datasets.json_text import read_json
 from app.datasets.report import Report
-from app.datasets.trees import open_tree
+from app.datasets.trees import opened_tree
 from app.errors import DatasetFormatError, InputError
 from app.evaluation.frame_names import FrameNames, NamedFrame
 from app.evaluation.prediction_run import (
@@ -92,10 +91,9 @@ def read_predictions(
             pointer="/format",
         )
     run = PredictionRun(names, category, size)
-    tree = open_tree(path, run.found.report, limits)
-    if tree is None:
-        raise run.found.report.problems[0]
-    with closing(tree):
+    with opened_tree(path, run.found.report, limits) as tree:
+        if tree is None:
+            raise run.found.report.problems[0]
         if format == "coco":
             _read_coco(tree, run, [] if images is None else _document(images, run, limits))
         elif format == "yolo":
@@ -151,10 +149,9 @@ Documents = list[tuple[str, Any]]
 
 
 def _document(path: Path, run: PredictionRun, limits: Limits) -> Documents:
-    tree = open_tree(path, run.found.report, limits)
-    if tree is None:
-        raise run.found.report.problems[0]
-    with closing(tree):
+    with opened_tree(path, run.found.report, limits) as tree:
+        if tree is None:
+            raise run.found.report.problems[0]
         return _json_documents(tree)
 
 

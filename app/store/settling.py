@@ -1,4 +1,4 @@
-"""Settling: the work on groups of batches is over, or waits again; a batch may be done by that."""
+"""Settling: notes that work on groups is done or waits again, and which batches are done by that."""
 
 from __future__ import annotations
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import time
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import closing
 from pathlib import Path, PurePosixPath
 from typing import Any
 
@@ -21,7 +20,7 @@ from app.datasets.safe_path import resolve_inside
 from app.datasets.sn_calibration import LineFile
 from app.datasets.sn_calibration_reader import lines_from_json
 from app.datasets.sn_calibration_writer import write_line_files
-from app.datasets.trees import open_tree
+from app.datasets.trees import opened_tree
 from app.durable import replace_file
 from app.errors import GeometryError, InputError, ReviewError
 from app.finite import json_text
@@ -152,11 +151,10 @@ class _Match:
 
 def _line_values(lines: Path, settings: Settings, report: Report) -> dict[str, Any]:
     """What the line files hold, by stem with folders; an error where it cannot be read."""
-    tree = open_tree(lines, report, Limits.of(settings))
-    if tree is None:
-        raise report.refusal(f"{lines} holds no line files")
     values: dict[str, Any] = {}
-    with closing(tree):
+    with opened_tree(lines, report, Limits.of(settings)) as tree:
+        if tree is None:
+            raise report.refusal(f"{lines} holds no line files")
         for name in tree.names():
             place = PurePosixPath(name)
             if place.suffix.lower() != ".json":

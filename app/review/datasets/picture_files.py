@@ -15,7 +15,7 @@ from app.config import Settings
 from app.datasets.file_tree import Limits
 from app.datasets.frame_names import IMAGE_SUFFIXES
 from app.datasets.report import Report
-from app.datasets.trees import open_tree
+from app.datasets.trees import opened_tree
 from app.errors import ReviewError
 from app.store.frames import ALLOWANCE
 from app.store.media import decode_picture
@@ -64,10 +64,9 @@ def read_pictures(
     """
     with closing(Child(ALLOWANCE)) as child:
         for source in sources:
-            tree = open_tree(source, report, Limits.of(settings))
-            if tree is None:
-                continue
-            with closing(tree):
+            with opened_tree(source, report, Limits.of(settings)) as tree:
+                if tree is None:
+                    continue
                 for name in tree.names():
                     if PurePosixPath(name).suffix.lower() not in IMAGE_SUFFIXES:
                         continue
@@ -86,10 +85,9 @@ def picture_stems(sources: Sequence[Path], settings: Settings) -> list[str]:
     """Stems of every picture of some folders, zips and files; nothing is decoded."""
     stems: list[str] = []
     for source in sources:
-        tree = open_tree(source, Report(), Limits.of(settings))
-        if tree is None:
-            continue
-        with closing(tree):
+        with opened_tree(source, Report(), Limits.of(settings)) as tree:
+            if tree is None:
+                continue
             places = [PurePosixPath(name) for name in tree.names()]
         stems += [
             str(place.with_suffix("")) for place in places if place.suffix.lower() in IMAGE_SUFFIXES

@@ -9,10 +9,11 @@ from dataclasses import dataclass
 from app.errors import NotFoundError
 from app.review.editing.ledger import Ledger, StationRecord
 from app.review.editing.replay import apply_entry
+from app.review.editing.state import need_group
 from app.soccer.group import Group, View
 from app.soccer.pitch import Pitch
 from app.store.aliases import shown_entries
-from app.store.groups import StoredGroup, read_groups
+from app.store.groups import StoredGroup
 from app.store.log import LogEntry, group_entries, station_entries
 from app.store.session import Session
 from app.store.store import Store
@@ -58,7 +59,7 @@ def history(store: Store, group_id: int) -> list[LogEntry]:
         NotFoundError: There is no such group.
     """
     with store.read() as session:
-        stored = _need(session, group_id)
+        stored = need_group(session, group_id)
         entries = list(_entries(session, stored))
         first = next(entry.id for entry in entries if entry.group_id is not None)
         told = (
@@ -76,7 +77,7 @@ def read_step(store: Store, group_id: int, entry_id: int) -> Step:
         NotFoundError: There is no such group, or no such entry of it.
     """
     with store.read() as session:
-        stored = _need(session, group_id)
+        stored = need_group(session, group_id)
         ledger = _static_cameras(stored)
         before: Group | None = None
         for entry in _entries(session, stored):
@@ -88,13 +89,6 @@ def read_step(store: Store, group_id: int, entry_id: int) -> Step:
                 (shown,) = shown_entries(session, [entry])
                 return _step(shown, before, ledger.group(group_id), stored.view_ids)
     raise NotFoundError(f"group {group_id} has no entry {entry_id}")
-
-
-def _need(session: Session, group_id: int) -> StoredGroup:
-    stored = read_groups(session, [group_id]).get(group_id)
-    if stored is None:
-        raise NotFoundError(f"there is no group {group_id}")
-    return stored
 
 
 def _entries(session: Session, stored: StoredGroup) -> Iterator[LogEntry]:

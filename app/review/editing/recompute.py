@@ -1,4 +1,4 @@
-"""Recompute: the work to do is what the data lacks, groups without a solution.
+"""Recompute: solves the groups of a dataset that have no solution under the present key.
 
 Killed anywhere it loses nothing but the chunks in hand.
 """

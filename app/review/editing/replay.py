@@ -1,4 +1,4 @@
-"""Replay: the ledger once more from the log alone, and the tables once more from that."""
+"""Replay: everything that was said, rebuilt from the log alone, and the tables from that."""
 
 from __future__ import annotations
 

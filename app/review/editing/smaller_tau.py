@@ -1,4 +1,4 @@
-"""Retell: the solutions of a dataset under a smaller tau, from those that are kept."""
+"""A dataset's solutions under a smaller tau, made from the kept ones instead of solved again."""
 
 from __future__ import annotations
 

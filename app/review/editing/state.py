@@ -149,6 +149,14 @@ class Record:
         )
 
 
+def need_group(session: Session, group_id: int) -> StoredGroup:
+    """A group whole; raises NotFoundError where there is none."""
+    stored = read_groups(session, [group_id]).get(group_id)
+    if stored is None:
+        raise NotFoundError(f"there is no group {group_id}")
+    return stored
+
+
 def read_record(session: Session, group_id: int) -> Record:
     """A group's record as it is in a session's snapshot.
 

@@ -21,7 +21,7 @@ from app.review.editing.follow_paint import PaintFollower
 from app.review.editing.known import known_calibrations
 from app.review.editing.point_limits import require_few_points_in_all
 from app.review.editing.solve_encoded import Solve, solve_encoded
-from app.review.editing.state import GroupState, Record, read_record, read_state
+from app.review.editing.state import GroupState, Record, need_group, read_record, read_state
 from app.review.editing.undo import next_step
 from app.soccer.group import Group
 from app.soccer.policy import Policy
@@ -31,7 +31,7 @@ from app.store.answers import Keep, keep_nothing
 from app.store.clock import now
 from app.store.codecs import Json
 from app.store.group_revisions import next_revision, save_revision
-from app.store.groups import StoredGroup, group_of_view, read_groups
+from app.store.groups import StoredGroup, group_of_view
 from app.store.log import Entry, append
 from app.store.paint import FOLLOWS, PAINT, insert_readings
 from app.store.queue import refresh_queue, update_row
@@ -173,9 +173,7 @@ def preview(
         SharedStationError: The picture of a static camera is said to be cropped or stretched.
     """
     with store.read() as session:
-        stored = read_groups(session, [group_id]).get(group_id)
-        if stored is None:
-            raise NotFoundError(f"there is no group {group_id}")
+        stored = need_group(session, group_id)
         group = stored.group
         edits = edits_of(group)
         require_few_points_in_all(group, edits)

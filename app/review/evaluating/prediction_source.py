@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import re
-from contextlib import closing
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from app.datasets.report import Report
-from app.datasets.trees import open_tree
+from app.datasets.trees import opened_tree
 from app.errors import NotFoundError
 from app.progress import TellProgress
 from app.review.evaluating.evaluation_run import EvaluationRequest, run_evaluation
@@ -151,10 +150,9 @@ def prediction_set(
 
 def guess_format(path: Path) -> str:
     """The format of predictions by the endings of their files; ``coco`` where none tells it."""
-    tree = open_tree(path, Report())
-    if tree is None:
-        return "coco"
-    with closing(tree):
+    with opened_tree(path, Report()) as tree:
+        if tree is None:
+            return "coco"
         endings = {Path(item).suffix.lower() for item in tree.names()}
     return next((format_ for ending, format_ in ENDINGS if ending in endings), "coco")
 

@@ -14,7 +14,7 @@ from typing import TypeVar
 
 from app.datasets.file_tree import FileTree, Limits, Root
 from app.datasets.report import Report
-from app.datasets.trees import open_tree
+from app.datasets.trees import opened_tree
 from app.errors import DatasetFormatError, InputError
 from app.progress import TellProgress
 from app.review.datasets.dataset import insert_dataset
@@ -101,17 +101,15 @@ def carry_in(
         dry_run: Say what would happen, and keep nothing.
     """
     result = IngestReport()
-    tree = open_tree(path, report, limits)
-    if tree is None:
-        return result
-    try:
-        head = read_head(tree)
-        run = _Run(store, dataset, head, source, actor, not dry_run, result, set())
-        _carry(run, tree, report, progress)
-    except DatasetFormatError as error:
-        report.skip(error)
-    finally:
-        tree.close()
+    with opened_tree(path, report, limits) as tree:
+        if tree is None:
+            return result
+        try:
+            head = read_head(tree)
+            run = _Run(store, dataset, head, source, actor, not dry_run, result, set())
+            _carry(run, tree, report, progress)
+        except DatasetFormatError as error:
+            report.skip(error)
     return result
 
 

@@ -20,10 +20,10 @@ from app.review.editing.edit import (
     StationEdit,
 )
 from app.review.editing.follow_paint import PaintFollower
-from app.review.editing.state import GroupState
+from app.review.editing.state import GroupState, need_group
 from app.review.editing.submit import current_etag, solved_in, submit
 from app.review.takes.copying import aligned
-from app.review.takes.take import Take, get_take, need_group, read_take
+from app.review.takes.take import Take, get_take, read_take
 from app.soccer.group import Group, Station
 from app.store.answers import Keep, Kept, keep_nothing
 from app.store.clock import now

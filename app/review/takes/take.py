@@ -11,6 +11,7 @@ from typing import Any
 
 from app.errors import ConflictError, ForbiddenError, NotFoundError
 from app.review.datasets.dataset import need_dataset
+from app.review.editing.state import need_group
 from app.review.editing.submit import solved
 from app.review.takes.copying import CopyOrder, copy_group, start_of
 from app.review.takes.handed_back import HandedBack, read_handed_back
@@ -18,7 +19,7 @@ from app.soccer.actors import person_of
 from app.store.agreement import forget_open
 from app.store.answers import Keep, keep_nothing
 from app.store.clock import now
-from app.store.groups import StoredGroup, read_groups
+from app.store.groups import read_groups
 from app.store.session import Session
 from app.store.store import Store
 from app.store.takes import (
@@ -303,14 +304,6 @@ def read_take(session: Session, take_id: int) -> Take:
     if row is None:
         raise NotFoundError(f"there is no annotation {take_id}")
     return _take(row)
-
-
-def need_group(session: Session, group_id: int) -> StoredGroup:
-    """A group whole; raises NotFoundError where there is none."""
-    stored = read_groups(session, [group_id]).get(group_id)
-    if stored is None:
-        raise NotFoundError(f"there is no group {group_id}")
-    return stored
 
 
 def _take(row: Any) -> Take:

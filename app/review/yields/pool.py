@@ -1,4 +1,4 @@
-"""Side by side: blocks of a table are worked on by as many threads as there are processors."""
+"""Pool: works on the blocks of a table in as many threads as there are processors."""
 
 from __future__ import annotations
 
