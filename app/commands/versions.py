@@ -83,35 +83,29 @@ def freeze(
     json_: Json = False,
 ) -> None:
     """Freeze a dataset as it is now into a version that never changes."""
-    cameras = tuple(f"cam{number}" for number in sorted(parse_cameras(test_cameras)))
-    server = given_server()
-    if server is not None:
-        from app.commands import remote
-        from app.review.versions.freeze import MAX_LICENCE
-
-        asked = {
-            "name": name or named,
-            "note": note,
-            "licence": licence if licence_file is None else read_text(licence_file, MAX_LICENCE),
-            "groups": groups.value,
-            "split": {
-                "kind": split.value,
-                "seed": seed,
-                "test_share": test_share,
-                "test_cameras": list(cameras),
-            },
-        }
-        with connected(server) as client, show_progress("Freezing") as progress:
-            found = remote.freeze_values(client, dataset, asked, progress, dry_run=dry_run)
-        print_values(found, json_)
-        return
     from app.review.versions.freeze import MAX_LICENCE, FreezeRequest, plan_freeze
     from app.review.versions.freeze import freeze as run_freeze
     from app.review.versions.version import next_name
     from app.soccer.split import Split
 
+    cameras = tuple(f"cam{number}" for number in sorted(parse_cameras(test_cameras)))
     chosen = Split(split.value, seed, test_share, cameras)
     text = licence if licence_file is None else read_text(licence_file, MAX_LICENCE)
+    server = given_server()
+    if server is not None:
+        from app.commands import remote
+
+        asked = {
+            "name": name or named,
+            "note": note,
+            "licence": text,
+            "groups": groups.value,
+            "split": vars(chosen),
+        }
+        with connected(server) as client, show_progress("Freezing") as progress:
+            found = remote.freeze_values(client, dataset, asked, progress, dry_run=dry_run)
+        print_values(found, json_)
+        return
     with opened_store() as store, show_progress("Freezing") as progress:
         title = name or named or next_name(store, dataset)
         request = FreezeRequest(title, note, text, chosen, groups.value)
