@@ -12,6 +12,7 @@ from app.store.log import (
     group_entries,
     groups_with_past,
     newest_entry,
+    read_entries,
     read_log,
     station_entries,
     verify_chain,
@@ -58,6 +59,22 @@ class TestReadLog:
                 9,
                 10,
             ]
+
+
+class TestReadEntries:
+    def test_few_ids_are_asked_for_at_once_and_all_come_in_order(self, store, monkeypatch) -> None:
+        fill(store, 10)
+        asked = []
+
+        def counting(session, *where):
+            asked.extend(len(item.right.value) for item in where)
+            return read_log(session, *where)
+
+        monkeypatch.setattr("app.store.log._BATCH", 3)
+        monkeypatch.setattr("app.store.log.read_log", counting)
+        with store.read() as session:
+            found = [entry.id for entry in read_entries(session, [1, 2, 4, 5, 7, 8, 9])]
+        assert (found, asked) == ([1, 2, 4, 5, 7, 8, 9], [3, 3, 1])
 
 
 class TestEntriesOfOne:
