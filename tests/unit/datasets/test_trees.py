@@ -18,7 +18,7 @@ from app.datasets.guess_format import guess_format
 from app.datasets.match_frames import MatchFrames
 from app.datasets.report import Report
 from app.datasets.soccernet_v3_reader import read_soccernet_v3
-from app.datasets.trees import open_tree
+from app.datasets.trees import open_tree, opened_tree
 from app.datasets.zip_tree import ZipTree
 from app.errors import DatasetFormatError, ImageError
 from app.store.archives import Archives
@@ -57,6 +57,21 @@ class TestOpenTree:
         assert open_tree(path, report) is None
         assert len(report.problems) == 1
         assert "not a complete zip file" in str(report.problems[0])
+
+
+class TestOpenedTree:
+    def test_it_is_closed_after_its_last_reader_and_what_is_not_there_is_none(
+        self, tmp_path: Path
+    ) -> None:
+        path = tmp_path / "a.zip"
+        with zipfile.ZipFile(path, "w") as archive:
+            archive.writestr("a.json", "{}")
+        with opened_tree(path, Report()) as tree:
+            assert tree is not None and tree.read_bytes("a.json") == b"{}"
+        with pytest.raises(ValueError, match="closed"):
+            tree.open("a.json")
+        with opened_tree(tmp_path / "none", Report()) as tree:
+            assert tree is None
 
 
 class TestFolderTree:
