@@ -7,7 +7,7 @@ from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field, StrictInt
 
-from app.api.schemas.document import Document
+from app.api.schemas.document import Document, ListDocument
 from app.review.people.access_tokens import DAYS, MOST_DAYS
 from app.review.people.roles import Scope
 
@@ -57,10 +57,8 @@ class AccessTokenDocument(Document):
     expired: bool = Field(description="It is good no more.")
 
 
-class AccessTokenList(Document):
+class AccessTokenList(ListDocument[AccessTokenDocument]):
     """Tokens, the newest first."""
-
-    items: list[AccessTokenDocument]
 
 
 class MadeAccessToken(Document):

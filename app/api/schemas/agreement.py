@@ -8,7 +8,7 @@ from typing import Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 from app.api.deps import MAX_ID
-from app.api.schemas.document import Document
+from app.api.schemas.document import Document, ListDocument
 from app.api.schemas.group import GroupDocument
 from app.review.agreement.adjudicate import Case
 from app.review.agreement.compare import Comparison
@@ -234,10 +234,8 @@ class WaitingDocument(Document):
     since: datetime
 
 
-class WaitingList(Document):
+class WaitingList(ListDocument[WaitingDocument]):
     """Groups that wait for a decision, those that disagree most first."""
-
-    items: list[WaitingDocument]
 
 
 class CaseTake(Document):

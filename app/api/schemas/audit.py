@@ -6,7 +6,7 @@ from datetime import datetime
 
 from pydantic import Field
 
-from app.api.schemas.document import Document
+from app.api.schemas.document import Document, ListDocument
 from app.review.people.audit import Family
 
 
@@ -27,8 +27,7 @@ class AuditEntryDocument(Document):
     hash: str = Field(description="Of the entry, in the chain of the log.")
 
 
-class AuditDocument(Document):
+class AuditDocument(ListDocument[AuditEntryDocument]):
     """Entries, the newest first."""
 
-    items: list[AuditEntryDocument]
     next: int | None = Field(description="`before` of the page after this one; null at the end.")

@@ -7,7 +7,7 @@ from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from app.api.schemas.document import Document
+from app.api.schemas.document import Document, ListDocument
 from app.review.people.bell import RingKind
 from app.review.people.whereabouts import MAX_ID
 
@@ -26,10 +26,9 @@ class RingDocument(Document):
     read: datetime | None = Field(description="When they have seen it; null: not yet.")
 
 
-class BellDocument(Document):
+class BellDocument(ListDocument[RingDocument]):
     """What somebody was told in the last 90 days, of what they see now, the newest first."""
 
-    items: list[RingDocument]
     unread: int = Field(description="How much of all of it they have not seen yet.")
 
 

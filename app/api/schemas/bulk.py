@@ -7,7 +7,7 @@ from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from app.api.schemas.document import Document
+from app.api.schemas.document import Document, ListDocument
 from app.api.schemas.group import State
 from app.review.queue.query import MAX_LISTED_LENGTH
 from app.review.verdicts.bulk import BatchReport, BulkPlan
@@ -118,10 +118,8 @@ class BatchDocument(Document):
     redone: int | None = Field(description="The batch that gave it again after it was undone.")
 
 
-class BatchList(Document):
+class BatchList(ListDocument[BatchDocument]):
     """Bulk verdicts, the newest first."""
-
-    items: list[BatchDocument]
 
 
 class UndoDocument(Document):

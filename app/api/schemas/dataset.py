@@ -7,7 +7,7 @@ from typing import Annotated
 
 from pydantic import AliasPath, BaseModel, ConfigDict, Field
 
-from app.api.schemas.document import Document
+from app.api.schemas.document import Document, ListDocument
 from app.api.schemas.policy import PolicyDocument
 
 
@@ -26,10 +26,8 @@ class DatasetDocument(Document):
     created: datetime
 
 
-class DatasetList(Document):
+class DatasetList(ListDocument[DatasetDocument]):
     """Every dataset, by name."""
-
-    items: list[DatasetDocument]
 
 
 class Progress(Document):

@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 
-from app.api.schemas.document import Document
+from app.api.schemas.document import Document, ListDocument
 from app.api.schemas.version import VersionId
 from app.evaluation.table import Cell
 from app.review.evaluating.evaluation import Comparison, read_tables
@@ -136,10 +136,8 @@ class EvaluationRow(Document):
     )
 
 
-class EvaluationList(Document):
+class EvaluationList(ListDocument[EvaluationRow]):
     """The runs of a dataset, the newest first."""
-
-    items: list[EvaluationRow]
 
 
 class EvaluationDocument(EvaluationRow):
@@ -236,10 +234,9 @@ class FrameDocument(Document):
     box_iou: float | None
 
 
-class FrameList(Document):
+class FrameList(ListDocument[FrameDocument]):
     """Frames behind a number; `next` is the cursor of the page after this one."""
 
-    items: list[FrameDocument]
     next: Annotated[str, Field(coerce_numbers_to_str=True)] | None
     total: int
 

@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, StrictBool
 
+from app.api.schemas.document import ListDocument
 from app.api.schemas.job import JobDocument
 from app.api.schemas.version import VersionId
 from app.datasets.format_names import ExportFormat
@@ -116,8 +117,7 @@ class ExportDocument(BaseModel):
         )
 
 
-class ExportPage(BaseModel):
+class ExportPage(ListDocument[ExportDocument]):
     """Exports, the newest first; ``next`` is the cursor of the next page."""
 
-    items: list[ExportDocument]
     next: str | None

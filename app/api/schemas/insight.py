@@ -6,7 +6,7 @@ from typing import Any
 
 from pydantic import Field, model_validator
 
-from app.api.schemas.document import Document
+from app.api.schemas.document import Document, ListDocument
 from app.api.schemas.solution import XY, FixDocument, Jac, OfferDocument
 from app.review.editing.remedies import Remedy
 
@@ -40,10 +40,8 @@ class RemedyDocument(Document):
         return value
 
 
-class Remedies(Document):
+class Remedies(ListDocument[RemedyDocument]):
     """What would make a group pass, the gentlest first; empty when it passes."""
-
-    items: list[RemedyDocument]
 
 
 class InfluenceDocument(Document):
@@ -61,7 +59,5 @@ class InfluenceDocument(Document):
     )
 
 
-class Influences(Document):
+class Influences(ListDocument[InfluenceDocument]):
     """The influence of every annotated marking of a view."""
-
-    items: list[InfluenceDocument]

@@ -7,7 +7,7 @@ from typing import Any, Literal
 
 from pydantic import Field
 
-from app.api.schemas.document import Document
+from app.api.schemas.document import Document, ListDocument
 
 JobKind = Literal[
     "solve",
@@ -55,8 +55,7 @@ class JobDocument(Document):
     actor: str
 
 
-class JobPage(Document):
+class JobPage(ListDocument[JobDocument]):
     """Jobs, the newest first; ``next`` is the cursor of the next page."""
 
-    items: list[JobDocument]
     next: str | None

@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from app.api.schemas.document import Document
+from app.api.schemas.document import Document, ListDocument
 
 Base64url = Annotated[str, Field(min_length=1, max_length=16_384, pattern=r"^[A-Za-z0-9_-]+$")]
 _EXAMPLE = {"id": "q0xBeRXL", "rawId": "q0xBeRXL", "type": "public-key"}
@@ -123,10 +123,9 @@ class PasskeyDocument(Document):
     used: datetime | None = Field(description="When it logged in last; null: never.")
 
 
-class PasskeyList(Document):
+class PasskeyList(ListDocument[PasskeyDocument]):
     """One's own passkeys, the oldest first."""
 
-    items: list[PasskeyDocument]
     unavailable: str | None = Field(
         description="Why none can be made or used at this address; null: they can."
     )

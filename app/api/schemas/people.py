@@ -8,7 +8,7 @@ from typing import Annotated
 from pydantic import BaseModel, ConfigDict, Field, StrictBool
 from pydantic.config import JsonDict
 
-from app.api.schemas.document import Document
+from app.api.schemas.document import Document, ListDocument
 from app.review.people.logins import Way
 from app.review.people.roles import Action, Role
 
@@ -188,10 +188,8 @@ class OpenSessionDocument(Document):
     expires: datetime = Field(description="When it ends, however much it is used.")
 
 
-class OpenSessionList(Document):
+class OpenSessionList(ListDocument[OpenSessionDocument]):
     """Sessions, the one that was used last first."""
-
-    items: list[OpenSessionDocument]
 
 
 class NewUser(BaseModel):
@@ -239,10 +237,9 @@ class UserDocument(Document):
     )
 
 
-class UserList(Document):
+class UserList(ListDocument[UserDocument]):
     """Everybody, by name."""
 
-    items: list[UserDocument]
     adopted_by: str | None = Field(
         default=None,
         description="As whose that is shown which was done before there were accounts.",
@@ -279,7 +276,5 @@ class MemberDocument(Document):
     single: Role | None = Field(description="What is said of this dataset; null: nothing.")
 
 
-class MemberList(Document):
+class MemberList(ListDocument[MemberDocument]):
     """Everybody who can log in, by name; those of role `none` do not see the dataset."""
-
-    items: list[MemberDocument]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from app.api.schemas.document import Document
+from app.api.schemas.document import Document, ListDocument
 from app.api.schemas.group import PictureDocument
 from app.api.schemas.view import PictureEdit
 
@@ -20,10 +20,8 @@ class MatchPictureDocument(Document):
     mixed: bool = Field(description="They are not all alike.")
 
 
-class MatchPicturesDocument(Document):
+class MatchPicturesDocument(ListDocument[MatchPictureDocument]):
     """The pictures of a dataset's matches, by name of the match."""
-
-    items: list[MatchPictureDocument]
 
 
 class PictureEstimateRequest(BaseModel):

@@ -7,7 +7,7 @@ from typing import Any
 
 from pydantic import AliasPath, BaseModel, ConfigDict, Field, create_model
 
-from app.api.schemas.document import Document
+from app.api.schemas.document import Document, ListDocument
 from app.review.policies.policy import PolicyState
 from app.review.policies.text import MAX_CHARACTERS, policy_to_yaml, policy_values
 from app.soccer.policy import Asks, CalibrationPolicy, Policy, thresholds_of
@@ -138,10 +138,9 @@ class PolicyFieldDocument(Document):
     optional: bool = Field(description="Whether it can be null.")
 
 
-class PolicyCatalogue(Document):
+class PolicyCatalogue(ListDocument[ShippedPolicyDocument]):
     """The policies that come with the software, and every threshold there is."""
 
-    items: list[ShippedPolicyDocument]
     fields: list[PolicyFieldDocument]
 
 

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, StrictBool, StrictInt, model_validator
 
-from app.api.schemas.document import Document
+from app.api.schemas.document import Document, ListDocument
 from app.review.evaluating.accept import SHOWN, AcceptPlan, AcceptReport, AcceptRequest
 from app.review.evaluating.group_predictions import GroupPredictions
 from app.soccer.frames import ImageSize
@@ -114,10 +114,8 @@ class PredictionSetDocument(Document):
     report: PredictionReport
 
 
-class PredictionSetList(Document):
+class PredictionSetList(ListDocument[PredictionSetDocument]):
     """The sets of a dataset, the newest first."""
-
-    items: list[PredictionSetDocument]
 
 
 class ViewPrediction(Document):
@@ -143,10 +141,8 @@ class ViewPrediction(Document):
         )
 
 
-class ViewPredictions(Document):
+class ViewPredictions(ListDocument[ViewPrediction]):
     """What was predicted for a view, the newest set first, the surest box first."""
-
-    items: list[ViewPrediction]
 
 
 class GroupPrediction(ViewPrediction):

@@ -7,7 +7,7 @@ from typing import Literal
 from pydantic import BaseModel, ConfigDict, Field, StrictBool
 
 from app.api.schemas.annotation import LineDocuments, lines_document
-from app.api.schemas.document import Document
+from app.api.schemas.document import Document, ListDocument
 from app.store.proposals import Proposal
 
 
@@ -26,10 +26,8 @@ class MatchProposalsDocument(Document):
     accepted: int = Field(description="Views that have lines as they were proposed by now.")
 
 
-class DatasetProposalsDocument(Document):
+class DatasetProposalsDocument(ListDocument[MatchProposalsDocument]):
     """What was proposed for the views of a dataset, by name of the match."""
-
-    items: list[MatchProposalsDocument]
 
 
 class DatasetProposalsRequest(BaseModel):
@@ -98,7 +96,5 @@ class GroupProposal(BaseModel):
         )
 
 
-class GroupProposals(BaseModel):
+class GroupProposals(ListDocument[GroupProposal]):
     """What was proposed for the views of a group, in their order."""
-
-    items: list[GroupProposal]

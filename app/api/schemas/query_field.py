@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pydantic import Field
 
-from app.api.schemas.document import Document
+from app.api.schemas.document import Document, ListDocument
 from app.review.queue.fields import Kind
 
 
@@ -33,8 +33,7 @@ class QueryOrderDocument(Document):
     meaning: str
 
 
-class QueryFieldList(Document):
+class QueryFieldList(ListDocument[QueryFieldDocument]):
     """All that a query can ask."""
 
-    items: list[QueryFieldDocument]
     sorts: list[QueryOrderDocument]

@@ -7,7 +7,7 @@ from typing import Any, Literal
 
 from pydantic import Field
 
-from app.api.schemas.document import Document
+from app.api.schemas.document import Document, ListDocument
 from app.api.schemas.group import State, image_address
 from app.api.schemas.solution import FailingGate, FindingDocument, FixDocument, OfferDocument
 from app.review.editing.past import STATION_EDITS
@@ -112,10 +112,9 @@ _SAME = tuple(
 )
 
 
-class GroupPage(Document):
+class GroupPage(ListDocument[GroupRow]):
     """Groups that match, in order; `next` is the cursor of the page after this one."""
 
-    items: list[GroupRow]
     next: str | None
     total: int = Field(description="How many match in all.")
 
@@ -159,10 +158,9 @@ class FindingRow(Document):
         return FindingRow(group=found.group.key, group_id=found.group_id, **dict(said))
 
 
-class FindingList(Document):
+class FindingList(ListDocument[FindingRow]):
     """Findings of a dataset, by number of the group."""
 
-    items: list[FindingRow]
     next: str | None
     total: int = Field(description="How many groups have findings.")
 
@@ -191,7 +189,5 @@ class LogEntryDocument(Document):
         return LogEntryDocument.model_validate({**values, "body": body})
 
 
-class History(Document):
+class History(ListDocument[LogEntryDocument]):
     """What people and imports did to a group, oldest first."""
-
-    items: list[LogEntryDocument]

@@ -7,7 +7,7 @@ from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from app.api.schemas.document import Document
+from app.api.schemas.document import Document, ListDocument
 from app.review.queue.saved_views import MAX_NAME
 
 
@@ -34,10 +34,8 @@ class SavedViewDocument(Document):
     groups: int = Field(description="How many match now.")
 
 
-class SavedViewList(Document):
+class SavedViewList(ListDocument[SavedViewDocument]):
     """Saved views, by name."""
-
-    items: list[SavedViewDocument]
 
 
 class ReviewerDocument(Document):
@@ -51,7 +49,5 @@ class ReviewerDocument(Document):
     last: datetime = Field(description="Time of the last verdict.")
 
 
-class ReviewerList(Document):
+class ReviewerList(ListDocument[ReviewerDocument]):
     """Everybody who has judged a group, the most active first."""
-
-    items: list[ReviewerDocument]

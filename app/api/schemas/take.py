@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from app.api.schemas.document import Document
+from app.api.schemas.document import Document, ListDocument
 from app.review.queue.query import MAX_LISTED_LENGTH
 from app.review.takes.guidelines import MAX_LETTERS
 from app.review.takes.hand_back import MAX_REASON
@@ -68,10 +68,8 @@ class TakeDocument(Document):
     )
 
 
-class TakeList(Document):
+class TakeList(ListDocument[TakeDocument]):
     """Own annotations, oldest first: for a lead everybody's, else those of whoever asks."""
-
-    items: list[TakeDocument]
 
 
 class GoldEdit(BaseModel):

@@ -7,7 +7,7 @@ from typing import Annotated, Self
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from app.api.schemas.document import Document
+from app.api.schemas.document import Document, ListDocument
 from app.review.talk.comments import LONGEST
 from app.soccer.actors import is_of, person_of
 from app.store.threads import StoredComment, StoredThread
@@ -102,10 +102,8 @@ class ThreadDocument(Document):
 _SAME = ("id", "view", "created", "resolved", "resolved_by")
 
 
-class ThreadList(Document):
+class ThreadList(ListDocument[ThreadDocument]):
     """Everything that people say to each other about a group."""
-
-    items: list[ThreadDocument]
 
 
 class PeopleOfGroup(Document):

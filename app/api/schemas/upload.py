@@ -6,6 +6,7 @@ from datetime import datetime
 
 from pydantic import BaseModel, Field
 
+from app.api.schemas.document import ListDocument
 from app.store.uploads import Upload
 
 
@@ -25,9 +26,8 @@ class UploadDocument(BaseModel):
         return UploadDocument.model_validate(vars(upload))
 
 
-class UploadList(BaseModel):
+class UploadList(ListDocument[UploadDocument]):
     """Uploads, the newest first."""
 
-    items: list[UploadDocument]
     max_bytes: int = Field(description="Largest file that is taken.")
     days: int = Field(description="After so many days an upload expires.")

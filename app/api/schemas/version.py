@@ -15,7 +15,7 @@ from pydantic import (
     model_validator,
 )
 
-from app.api.schemas.document import Document
+from app.api.schemas.document import Document, ListDocument
 from app.api.schemas.policy import PolicyDocument
 from app.review.versions.diff import VersionDiff
 from app.review.versions.freeze import MAX_LICENCE, MAX_NOTE, FreezeRequest
@@ -162,10 +162,8 @@ class VersionDocument(Document):
     )
 
 
-class VersionList(Document):
+class VersionList(ListDocument[VersionDocument]):
     """The versions of a dataset, newest first."""
-
-    items: list[VersionDocument]
 
 
 class VersionManifest(BaseModel):

@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, StrictBool, model_validator
 
+from app.api.schemas.document import ListDocument
 from app.api.schemas.group import image_address
 from app.soccer.picture import ASPECTS, MAX_SHIFT, OPEN, PictureGeometry
 from app.soccer.reasons import MAX_NOTE, Reason
@@ -100,10 +101,9 @@ class Neighbour(BaseModel):
     image: str = Field(description="Address of the frame.")
 
 
-class NeighbourList(BaseModel):
+class NeighbourList(ListDocument[Neighbour]):
     """The frames around a view's, in their order; `sentence` says why there are none."""
 
-    items: list[Neighbour]
     sentence: str | None
 
     @staticmethod

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from app.api.schemas.document import Document
+from app.api.schemas.document import Document, ListDocument
 from app.review.webhooks.addresses import LONGEST
 from app.review.webhooks.messages import CHOSEN, Kind
 
@@ -57,10 +57,9 @@ class WebhookDocument(Document):
     failed: int = Field(description="Messages of the last 30 days that were given up.")
 
 
-class WebhookList(Document):
+class WebhookList(ListDocument[WebhookDocument]):
     """Webhooks of a dataset, and what they may be."""
 
-    items: list[WebhookDocument]
     allowed: list[str] = Field(description="How the operator lets addresses begin.")
     kinds: list[Kind] = Field(description="What a webhook may be told.")
 
@@ -88,7 +87,5 @@ class DeliveryDocument(Document):
     problem: str | None = Field(description="Why the last try failed.")
 
 
-class DeliveryList(Document):
+class DeliveryList(ListDocument[DeliveryDocument]):
     """What a webhook was told, newest first."""
-
-    items: list[DeliveryDocument]

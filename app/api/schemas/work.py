@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 from app.api.deps import MAX_ID
-from app.api.schemas.document import Document
+from app.api.schemas.document import Document, ListDocument
 from app.api.schemas.event import PresenceDocument
 from app.api.schemas.take import HandedBackDocument
 from app.review.queue.query import MAX_LISTED_LENGTH
@@ -99,10 +99,8 @@ class WorkBatchDocument(Document):
     last: datetime | None = Field(description="When one of them was handed in or settled last.")
 
 
-class WorkBatchList(Document):
+class WorkBatchList(ListDocument[WorkBatchDocument]):
     """Batches; open ones and those that are due first come first."""
-
-    items: list[WorkBatchDocument]
 
 
 class BatchGroupDocument(Document):
@@ -119,10 +117,8 @@ class BatchGroupDocument(Document):
     here: list[str] = Field(description="Who has it open.")
 
 
-class BatchGroupList(Document):
+class BatchGroupList(ListDocument[BatchGroupDocument]):
     """The groups of a batch in the order in which they are given out."""
-
-    items: list[BatchGroupDocument]
 
 
 class NextGroup(BaseModel):
@@ -172,10 +168,8 @@ class MyBatchDocument(Document):
     )
 
 
-class MyWork(Document):
+class MyWork(ListDocument[MyBatchDocument]):
     """Open batches that are one's own, those that are due first, first."""
-
-    items: list[MyBatchDocument]
 
 
 class PaceDocument(Document):
@@ -206,7 +200,5 @@ class TeamBatchDocument(Document):
     people: list[PaceDocument]
 
 
-class TeamWork(Document):
+class TeamWork(ListDocument[TeamBatchDocument]):
     """Every batch of a dataset, and who has done what."""
-
-    items: list[TeamBatchDocument]
