@@ -10,8 +10,11 @@ from pydantic import BaseModel, ConfigDict, Field
 from app.api.deps import MAX_ID
 from app.api.schemas.document import Document, ListDocument
 from app.api.schemas.group import GroupDocument
-from app.review.agreement.adjudicate import Case
-from app.review.agreement.compare import Comparison
+from app.evaluation.agreement_limits import Disagreement, Spread
+from app.evaluation.annotation_distance import Ball3DDistance, LineDistance, ViewDistance
+from app.review.agreement.adjudicate import Case, Waiting
+from app.review.agreement.compare import Comparison, Pair
+from app.review.agreement.summary import GroupAgreement, PeopleAgreement
 
 Side = Literal["a", "b"]
 BallState = Literal["seen", "occluded", "out_of_view", "none", "several"]
@@ -28,15 +31,13 @@ class LimitsDocument(Document):
     jac: float = Field(description="The least JaC of one's camera with the other's lines.")
 
 
-class LineDistanceDocument(Document):
+class LineDistanceDocument(Document, shows=LineDistance):
     """One marking as both drew it."""
 
-    marking: str
     only: Side | None = Field(description="Who alone drew it; null: both did.")
     mean_px: float | None = Field(
         description="Mean distance of each one's points from the other's line."
     )
-    largest_px: float | None
 
 
 class BallDistanceDocument(Document):
@@ -48,11 +49,9 @@ class BallDistanceDocument(Document):
     diameter_px: float | None = Field(description="Of b less that of a.")
 
 
-class ViewDistanceDocument(Document):
+class ViewDistanceDocument(Document, shows=ViewDistance):
     """One view."""
 
-    view: str
-    included: tuple[bool, bool]
     lines: list[LineDistanceDocument]
     ball: BallDistanceDocument
     jac: tuple[float | None, float | None] = Field(
@@ -61,13 +60,9 @@ class ViewDistanceDocument(Document):
     position_m: float | None = Field(description="Between both cameras.")
 
 
-class Ball3DDistanceDocument(Document):
+class Ball3DDistanceDocument(Document, shows=Ball3DDistance):
     """Both 3D balls."""
 
-    a: bool
-    b: bool
-    distance_m: float | None
-    sigmas_m: tuple[float | None, float | None]
     p_value: float | None = Field(
         description="How often chance alone would put them as far apart, were both sigmas true."
     )
@@ -84,22 +79,15 @@ class GroupDistanceDocument(Document):
     ball: Ball3DDistanceDocument
 
 
-class DisagreementDocument(Document):
+class DisagreementDocument(Document, shows=Disagreement):
     """Something that two annotations say differently."""
 
-    kind: str
     sentence: str = Field(description="For people; a and b stand for the two.")
-    view: str | None
-    marking: str | None
-    value: float | None
-    limit: float | None
 
 
-class AnnotationPairDocument(Document):
+class AnnotationPairDocument(Document, shows=Pair):
     """Two of the annotations, by their places in `groups`, from 0."""
 
-    a: int
-    b: int
     distance: GroupDistanceDocument
     disagreements: list[DisagreementDocument] = Field(description="The worst first.")
 
@@ -161,11 +149,9 @@ class CoefficientDocument(Document):
     items: int = Field(description="Groups that it is computed from.")
 
 
-class SpreadDocument(Document):
+class SpreadDocument(Document, shows=Spread):
     """The middle and the bad end of a measure."""
 
-    count: int
-    median: float | None
     tail: float | None = Field(description="95th percentile; of JaC the 5th.")
 
 
@@ -180,33 +166,24 @@ class SpreadsDocument(Document):
     position_m: SpreadDocument
 
 
-class PeopleAgreementDocument(Document):
+class PeopleAgreementDocument(Document, shows=PeopleAgreement):
     """How far two people agree, or all of them."""
 
-    people: list[str]
-    groups: int
     kappa: CoefficientDocument | None = Field(
         description="Cohen's of two; Fleiss' of all, where each group has equally many verdicts."
     )
     spreads: SpreadsDocument
 
 
-class GroupAgreementDocument(Document):
+class GroupAgreementDocument(Document, shows=GroupAgreement):
     """What one group came to."""
 
-    group: int
-    number: int
-    batch: int | None
     state: Literal["agreed", "open", "decided"]
-    people: list[str]
-    verdicts: list[str | None]
     worst: float = Field(description="How many times its limit the worst disagreement was.")
-    disagreements: int
     spreads: SpreadsDocument
     outcome: Literal["take", "start"] | None
     taken: str | None = Field(description="Whose annotation was taken over.")
     decided: datetime | None
-    decided_by: str | None
 
 
 class AgreementDocument(Document):
@@ -222,15 +199,9 @@ class AgreementDocument(Document):
     groups: list[GroupAgreementDocument] = Field(description="The worst first.")
 
 
-class WaitingDocument(Document):
+class WaitingDocument(Document, shows=Waiting):
     """A group that waits for a decision."""
 
-    group: int
-    number: int
-    batch: int | None
-    people: list[str]
-    worst: float
-    disagreements: int
     since: datetime
 
 

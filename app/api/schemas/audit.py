@@ -7,21 +7,16 @@ from datetime import datetime
 from pydantic import Field
 
 from app.api.schemas.document import Document, ListDocument
-from app.review.people.audit import Family
+from app.review.people.audit import AuditEntry
 
 
-class AuditEntryDocument(Document):
+class AuditEntryDocument(Document, shows=AuditEntry):
     """One thing that somebody said or did."""
 
-    id: int
     at: datetime
     actor: str = Field(description="The person, with the name of the token where a script asked.")
-    family: Family
     kind: str = Field(description="Of the entry in the log.")
-    sentence: str
     dataset: str | None = Field(description="null: of none, or it is gone.")
-    group_id: int | None
-    group: str | None
     network: str | None = Field(description="From which address, where that is known.")
     address: str | None = Field(description="Of the page that it is about.")
     hash: str = Field(description="Of the entry, in the chain of the log.")

@@ -10,7 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from app.api.schemas.document import Document, ListDocument
 from app.api.schemas.group import State
 from app.review.queue.query import MAX_LISTED_LENGTH
-from app.review.verdicts.bulk import BatchReport, BulkPlan
+from app.review.verdicts.bulk import BatchReport, BulkPlan, Refusal, SampleGroup
 from app.soccer.reasons import Reason
 
 
@@ -44,20 +44,12 @@ class BulkVerdict(BaseModel):
     )
 
 
-class RefusalDocument(Document):
+class RefusalDocument(Document, shows=Refusal):
     """Groups that are left alone: `unsolved`, `needs_note` (they fail a gate), `no_picture`."""
 
-    reason: str
-    groups: int
 
-
-class SampleDocument(Document):
+class SampleDocument(Document, shows=SampleGroup):
     """One of the groups that would change, with the number and label that the queue shows."""
-
-    id: int
-    key: str
-    number: int
-    label: str
 
 
 class BulkResult(Document):

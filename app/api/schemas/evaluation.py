@@ -9,7 +9,10 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_valida
 
 from app.api.schemas.document import Document, ListDocument
 from app.api.schemas.version import VersionId
-from app.evaluation.table import Cell
+from app.evaluation.comparison import Difference
+from app.evaluation.figure import Axis, Mark
+from app.evaluation.result import FrameResult
+from app.evaluation.table import Cell, Column, Frames, Row
 from app.review.evaluating.evaluation import Comparison, read_tables
 from app.review.evaluating.evaluation_run import EvaluationRequest
 
@@ -57,38 +60,21 @@ class EvaluationBody(BaseModel):
         return EvaluationRequest(**{**self.model_dump(), "version": version})
 
 
-class CellDocument(Document):
+class CellDocument(Document, shows=Cell):
     """One number with its 95 % interval, computed from `count` of `of` items."""
 
-    value: float | None
-    low: float | None
-    high: float | None
-    count: int
-    of: int
 
-
-class ColumnDocument(Document):
+class ColumnDocument(Document, shows=Column):
     """What a column holds; `better` is `higher`, `lower` or empty."""
 
-    name: str
-    label: str
-    unit: str
-    better: str
 
-
-class FramesLink(Document):
+class FramesLink(Document, shows=Frames):
     """The frames behind a number, as parameters of `/evaluations/{id}/frames`."""
 
-    field: str
-    low: float | None
-    high: float | None
 
-
-class RowDocument(Document):
+class RowDocument(Document, shows=Row):
     """One line of a table, its cells in the order of the columns."""
 
-    name: str
-    label: str
     cells: list[CellDocument]
     frames: FramesLink | None
 
@@ -151,13 +137,8 @@ class EvaluationDocument(EvaluationRow):
     figures: list[str] = Field(description="Names for `/evaluations/{id}/figures/{name}.json`.")
 
 
-class AxisDocument(Document):
+class AxisDocument(Document, shows=Axis):
     """What an axis shows; `low` and `high` fix its ends where they are not null."""
-
-    label: str
-    unit: str
-    low: float | None
-    high: float | None
 
 
 class SeriesDocument(Document):
@@ -178,12 +159,10 @@ class SeriesDocument(Document):
     )
 
 
-class MarkDocument(Document):
+class MarkDocument(Document, shows=Mark):
     """A dashed line across a panel."""
 
     axis: Literal["x", "y"]
-    at: float
-    label: str
 
 
 class PanelDocument(Document):
@@ -206,32 +185,11 @@ class FigureDocument(Document):
     panels: list[PanelDocument]
 
 
-class FrameDocument(Document):
+class FrameDocument(Document, shows=FrameResult):
     """One judged frame; null where a number does not exist."""
 
     frame_id: int = Field(description="Id of the view, below 0 where it is gone.")
-    group_id: int
-    group: str
-    view: str
-    match: str
     ball: bool = Field(description="Whether the frame shows a ball.")
-    detections: int
-    score: float | None
-    iou: float | None
-    hit_score: float | None
-    hit_iou: float | None
-    distance_m: float | None
-    diameter_px: float | None
-    parallax_degrees: float | None
-    size_error_percent: float | None
-    error_m: float | None
-    error_percent: float | None
-    any_error_m: float | None
-    predicted_error_m: float | None
-    predicted_error_percent: float | None
-    predicted_any_error_m: float | None
-    predicted_jac: float | None
-    box_iou: float | None
 
 
 class FrameList(ListDocument[FrameDocument]):
@@ -241,13 +199,9 @@ class FrameList(ListDocument[FrameDocument]):
     total: int
 
 
-class DifferenceDocument(Document):
+class DifferenceDocument(Document, shows=Difference):
     """One number of both runs; `change` is the second minus the first."""
 
-    table: str
-    row: str
-    column: str
-    label: str
     first: CellDocument | None
     second: CellDocument | None
     change: float | None

@@ -14,6 +14,8 @@ from app.api.schemas.policy import PolicyDocument
 from app.api.schemas.solution import SolutionDocument
 from app.review.editing.state import GroupState
 from app.soccer.group import Group, View
+from app.soccer.pitch import Pitch
+from app.soccer.reasons import LeftOut
 from app.store.neighbours import counts_time
 
 State = Literal["unreviewed", "accepted", "rejected", "deferred"]
@@ -26,11 +28,8 @@ class DatasetName(Document):
     name: str
 
 
-class PitchSize(Document):
+class PitchSize(Document, shows=Pitch):
     """Length and width of the pitch, metres."""
-
-    length: float
-    width: float
 
 
 class VerdictDocument(Document):
@@ -74,11 +73,8 @@ class StationDocument(Document):
     etag: str = Field(description="For If-Match on `/stations/{id}/lines`.")
 
 
-class LeftOutDocument(Document):
+class LeftOutDocument(Document, shows=LeftOut):
     """Why a person left a view out of its group."""
-
-    reason: str
-    note: str | None
 
 
 class ViewDocument(Document):

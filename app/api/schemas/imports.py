@@ -8,6 +8,7 @@ from pydantic import BaseModel, ConfigDict, Field, StrictBool, model_validator
 
 from app.api.schemas.document import Document
 from app.datasets.format_names import ImportFormat
+from app.review.importing.folders import FolderItem
 from app.review.jobs.imports import ImportRequest
 
 Camera = Annotated[int, Field(ge=0, le=999)]
@@ -109,12 +110,8 @@ class ImportBody(BaseModel):
         )
 
 
-class FolderEntry(Document):
+class FolderEntry(Document, shows=FolderItem):
     """A folder or a file that an import can name."""
-
-    path: str
-    name: str
-    folder: bool
 
 
 class FolderDocument(Document):

@@ -8,6 +8,7 @@ from pydantic import Field, model_validator
 
 from app.api.schemas.document import Document, ListDocument
 from app.api.schemas.solution import XY, FixDocument, Jac, OfferDocument
+from app.review.editing.influence import Influence
 from app.review.editing.remedies import Remedy
 
 
@@ -44,15 +45,13 @@ class Remedies(ListDocument[RemedyDocument]):
     """What would make a group pass, the gentlest first; empty when it passes."""
 
 
-class InfluenceDocument(Document):
+class InfluenceDocument(Document, shows=Influence):
     """What the camera would be without one marking."""
 
-    marking: str
     jac: Jac | None = Field(description="JaC of the view as it is, by gamma in per cent.")
     jac_without: Jac | None = Field(
         description="JaC of the other markings, with a camera that is calibrated without this one."
     )
-    largest_px: float | None
     largest_px_without: float | None = Field(
         description="Distance of its points from the marking, with a camera that is calibrated "
         "without them."

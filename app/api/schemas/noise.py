@@ -5,14 +5,15 @@ from __future__ import annotations
 from pydantic import Field
 
 from app.api.schemas.document import Document
+from app.review.policies.noise import Advice, LineNoiseSummary
+from app.solving.ball_noise import Sigma
+from app.solving.line_noise import Interval
 
 
-class SigmaDocument(Document):
+class SigmaDocument(Document, shows=Sigma):
     """An estimated standard deviation, pixels at 1920 x 1080."""
 
-    value: float
     low: float = Field(description="End of the 95 % interval.")
-    high: float
     numbers: int = Field(description="Independent numbers that rays leave unexplained.")
     left_out: int = Field(description="Those among them that noise does not explain.")
 
@@ -39,22 +40,16 @@ class SourceNoiseDocument(Document):
     differs: bool = Field(description="The interval leaves out the dataset's sigma.")
 
 
-class LineNoiseDocument(Document):
+class LineNoiseDocument(Document, shows=LineNoiseSummary):
     """Noise of clicks on field lines: medians over images."""
 
     sigma_px: float = Field(description="Pixels at 960 x 540.")
     low: float = Field(description="Half of the images lie between this and `high`.")
-    high: float
     share: float = Field(description="Of the variance, what points of a marking have in common.")
-    views: int
 
 
-class IntervalDocument(Document):
+class IntervalDocument(Document, shows=Interval):
     """A number with the ends of its 95 % interval."""
-
-    value: float
-    low: float
-    high: float
 
 
 class LineEstimateDocument(Document):
@@ -67,16 +62,10 @@ class LineEstimateDocument(Document):
     views: int = Field(description="Images that it rests on.")
 
 
-class AdviceDocument(Document):
+class AdviceDocument(Document, shows=Advice):
     """A threshold of the policy and what the dataset says of it."""
 
-    name: str
-    label: str
-    unit: str
     present: float | None = Field(description="Null: the policy leaves it to each image.")
-    estimate: float
-    low: float
-    high: float
     agrees: bool = Field(description="The interval holds the present value.")
 
 

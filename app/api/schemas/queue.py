@@ -13,6 +13,7 @@ from app.api.schemas.solution import FailingGate, FindingDocument, FixDocument, 
 from app.review.editing.past import STATION_EDITS
 from app.review.queue.findings import GroupFindings
 from app.review.queue.listing import GroupRow as QueueRow
+from app.review.queue.listing import Neighbours as QueueNeighbours
 from app.soccer.finding import Finding
 from app.store.log import LogEntry
 
@@ -126,13 +127,10 @@ class GroupIds(Document):
     total: int = Field(description="How many match in all.")
 
 
-class Neighbours(Document):
+class Neighbours(Document, shows=QueueNeighbours):
     """Where a group stands among those that match, and what comes before and after it."""
 
     index: int | None = Field(description="From 0; null when the group does not match.")
-    total: int
-    previous: list[int]
-    next: list[int]
 
 
 class FindingRow(Document):

@@ -9,6 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from app.api.schemas.document import Document, ListDocument
 from app.review.queue.saved_views import MAX_NAME
+from app.review.verdicts.reviewers import Reviewer
 
 
 class NewSavedView(BaseModel):
@@ -38,13 +39,10 @@ class SavedViewList(ListDocument[SavedViewDocument]):
     """Saved views, by name."""
 
 
-class ReviewerDocument(Document):
+class ReviewerDocument(Document, shows=Reviewer):
     """One person's verdicts."""
 
-    name: str
     accepted: int = Field(description="Groups whose verdict is this person's now.")
-    rejected: int
-    deferred: int
     today: int = Field(description="Groups judged since midnight UTC.")
     last: datetime = Field(description="Time of the last verdict.")
 

@@ -15,12 +15,12 @@ from app.geometry.camera import Camera
 from app.geometry.lens import BROWN_CONRADY
 from app.review.editing.codec import edit_to_json
 from app.review.editing.fixes import offers
-from app.soccer.camera_sigma import camera_sigma
-from app.soccer.finding import Finding
+from app.soccer.camera_sigma import CameraSigma, camera_sigma
+from app.soccer.finding import Finding, Fix
 from app.soccer.frames import Box, ImageSize
 from app.soccer.group import Group
 from app.soccer.pitch import Pitch
-from app.soccer.solution import GAMMAS_PERCENT, BallFit, Calibration, Solution
+from app.soccer.solution import GAMMAS_PERCENT, BallFit, Calibration, Pair, Solution, Suspect
 from app.solving.calibrate import DRAWN_DIGITS
 from app.solving.jaccard import project_markings
 
@@ -90,25 +90,14 @@ class MarkingDocument(Document):
     )
 
 
-class SuspectDocument(Document):
+class SuspectDocument(Document, shows=Suspect):
     """A marking whose label looks wrong, and what would fit."""
 
-    marking: str
-    suggested: str | None
-    confidence: float
     error_px: Measured
-    suggested_error_px: Measured
 
 
-class CameraSigmaDocument(Document):
+class CameraSigmaDocument(Document, shows=CameraSigma):
     """One standard deviation of each number of a camera."""
-
-    pan_degrees: float
-    tilt_degrees: float
-    roll_degrees: float
-    position_meters: XYZ
-    focal_px: float
-    k1: float
 
 
 class PaintFitDocument(Document):
@@ -182,22 +171,15 @@ def _calibration_document(value: Any, info: ValidationInfo) -> Any:
     return _kept_document(value, group.pitch, group.view(info.data["view"]).size)
 
 
-class BallFitDocument(Document):
+class BallFitDocument(Document, shows=BallFit):
     """The 3D ball seen again in one view."""
 
     reprojected: XY | None
-    error_px: float | None
-    error_percent: float | None
-    optimized_diameter_px: float | None
     optimized_box: XYWH | None
-    optimized_error_m: float | None
     exact_box: XYWH | None
-    size_ratio: float | None
-    depth_m: float | None
     monocular: XYZ | None = Field(
         description="The ball as this view alone places it, from the size of its box."
     )
-    monocular_error_m: float | None
     depth_per_px_m: float | None = Field(
         description="Metres of depth of the monocular ball for a pixel of diameter."
     )
@@ -232,17 +214,11 @@ class ViewSolutionDocument(Document):
         )
 
 
-class PairDocument(Document):
+class PairDocument(Document, shows=Pair):
     """The ball triangulated from two views; pitch frame, metres, z down."""
 
-    a: str
-    b: str
-    point: XYZ
     errors_px: tuple[Measured, Measured]
-    baseline_m: float
     parallax_degrees: Measured
-    valid: bool
-    failed: str | None
 
 
 class Ball3DDocument(Document):
@@ -307,14 +283,8 @@ class FailingGate(Document):
     sentence: str
 
 
-class FixDocument(Document):
+class FixDocument(Document, shows=Fix):
     """An edit that a finding proposes."""
-
-    action: str
-    view: str | None
-    marking: str | None
-    to: str | None
-    index: int | None
 
 
 def _said(edit: Any) -> Any:
@@ -331,17 +301,9 @@ class OfferDocument(Document):
     )
 
 
-class FindingDocument(Document):
+class FindingDocument(Document, shows=Finding):
     """Something that a person should look at."""
 
-    kind: str
-    sentence: str
-    view: str | None
-    marking: str | None
-    suggested: str | None
-    number: float | None
-    threshold: float | None
-    confidence: float | None
     fix: FixDocument | None
     offers: list[OfferDocument] = Field(
         description="Edits that carry the fix out: none when only a person can, several to choose "

@@ -5,13 +5,12 @@ from __future__ import annotations
 from pydantic import AliasPath, Field
 
 from app.api.schemas.document import Document
+from app.review.queue.statistics import Series, Share
 
 
-class SplitSeries(Document):
+class SplitSeries(Document, shows=Series):
     """The bars of one split."""
 
-    split: str
-    counts: list[int]
     unknown: int = Field(description="Groups that have no such number.")
 
 
@@ -54,14 +53,8 @@ class PositionsDocument(Document):
     outside: int = Field(description="Balls that lie outside all cells.")
 
 
-class MatchShare(Document):
+class MatchShare(Document, shows=Share):
     """Groups of a match in one split."""
-
-    match: str
-    split: str
-    groups: int
-    passing: int
-    accepted: int
 
 
 class SplitShare(Document):

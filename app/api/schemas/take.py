@@ -9,9 +9,11 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from app.api.schemas.document import Document, ListDocument
 from app.review.queue.query import MAX_LISTED_LENGTH
-from app.review.takes.guidelines import MAX_LETTERS
+from app.review.takes.gold import GoldGroup, GoldResult, Middle, PersonResults
+from app.review.takes.guidelines import MAX_LETTERS, GuidelineVersion
 from app.review.takes.hand_back import MAX_REASON
 from app.review.takes.known_truth import MOST
+from app.review.takes.take import TakeView
 
 
 class HandedBackDocument(Document):
@@ -48,20 +50,17 @@ class TakeHandBack(HandBack):
     take: Annotated[int, Field(ge=1, le=2**63 - 1)]
 
 
-class TakeDocument(Document):
+class TakeDocument(Document, shows=TakeView):
     """Somebody's own annotation of a group, made on a copy that nobody else sees."""
 
-    id: int
     batch: int | None = Field(description="The batch that it is for; null: none.")
     group: int = Field(description="The copy: a group like any other.")
     dataset: int = Field(description="Of the groups that this is a copy of one of.")
     of: int | None = Field(description="The group that it is a copy of, where that may be known.")
     title: str = Field(description="What people call the group.")
-    person: str
     place: int = Field(description="Which one of this person in this batch, from 1.")
     begun: datetime
     handed_in: datetime | None
-    verdict: str | None
     settled: datetime | None = Field(description="When something was decided about it.")
     handed_back: HandedBackDocument | None = Field(
         description="Why its person has it back; null: they have not."
@@ -123,14 +122,10 @@ class GoldChosenDocument(Document):
     left_out: int = Field(description="Groups of which nothing is known that could be the truth.")
 
 
-class GoldGroupDocument(Document):
+class GoldGroupDocument(Document, shows=GoldGroup):
     """A group whose truth is known."""
 
-    group: int
-    label: str
-    start: str
     marked: datetime
-    marked_by: str
     source: Literal["verdict", "sample", "version"] = Field(
         description="Where its truth is from: what it held when it was marked, the sample's own files, "
         "or a frozen version."
@@ -149,39 +144,27 @@ class AnnotationErrorDocument(Document):
     ball_m: float | None = Field(description="Distance of the 3D balls, metres.")
 
 
-class GoldResultDocument(Document):
+class GoldResultDocument(Document, shows=GoldResult):
     """What one person made of a gold group."""
 
-    group: int
-    label: str
     handed_in: datetime
-    verdict: str | None
     true_verdict: str = Field(title="Known Verdict")
     right: bool | None = Field(description="Whether they judged as is true; null: not judged.")
     error: AnnotationErrorDocument
 
 
-class MiddleDocument(Document):
+class MiddleDocument(Document, shows=Middle):
     """A median with an interval of 95 %, which fewer than six numbers do not have."""
 
-    count: int
-    median: float | None
-    low: float | None
-    high: float | None
 
-
-class PersonResultsDocument(Document):
+class PersonResultsDocument(Document, shows=PersonResults):
     """What somebody made of gold groups, oldest first."""
 
-    person: str
     results: list[GoldResultDocument]
     line_px: MiddleDocument
     ball_px: MiddleDocument
     ball_m: MiddleDocument
-    judged: int
-    right: int
     right_low: float | None = Field(description="Wilson's interval of the share, 95 %.")
-    right_high: float | None
 
 
 class GoldReportDocument(Document):
@@ -191,12 +174,10 @@ class GoldReportDocument(Document):
     people: list[PersonResultsDocument]
 
 
-class GuidelineVersionDocument(Document):
+class GuidelineVersionDocument(Document, shows=GuidelineVersion):
     """One version of the guidelines."""
 
-    number: int
     written: datetime
-    written_by: str
 
 
 class GuidelinesDocument(Document):

@@ -17,8 +17,9 @@ from pydantic import (
 
 from app.api.schemas.document import Document, ListDocument
 from app.api.schemas.policy import PolicyDocument
-from app.review.versions.diff import VersionDiff
+from app.review.versions.diff import Move, Passage, Setting, VersionDiff
 from app.review.versions.freeze import MAX_LICENCE, MAX_NOTE, FreezeRequest
+from app.review.versions.verify import Difference
 from app.soccer.split import TEST_CAMERAS, Split
 from app.store.verifications import Verification
 
@@ -90,13 +91,8 @@ class FreezePlanDocument(Document):
     unsolved: int = Field(description="How many of the groups that enter have to be solved first.")
 
 
-class FrozenDifferenceDocument(Document):
+class FrozenDifferenceDocument(Document, shows=Difference):
     """Something that did not come out as it was frozen; `group` null: the version itself."""
-
-    group: str | None
-    place: str
-    frozen: Any
-    now: Any
 
 
 class VerificationDocument(Document):
@@ -196,18 +192,13 @@ class VersionName(BaseModel):
     hash: str
 
 
-class PassageDocument(BaseModel):
+class PassageDocument(Document, shows=Passage):
     """A group that came or went; ``why`` it was not in the other version."""
 
-    group: str
-    why: str
 
-
-class MoveDocument(BaseModel):
+class MoveDocument(Document, shows=Move):
     """A 3D ball that lies elsewhere; pitch frame, metres."""
 
-    group: str
-    metres: float
     before: Point
     after: Point
 
@@ -219,12 +210,8 @@ class ChangeDocument(BaseModel):
     what: list[Literal["annotations", "verdict", "split", "ball"]]
 
 
-class SettingDocument(BaseModel):
+class SettingDocument(Document, shows=Setting):
     """A value of policy, solver or split that differs."""
-
-    name: str
-    before: Any
-    after: Any
 
 
 class VersionDiffDocument(BaseModel):

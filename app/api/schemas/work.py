@@ -13,6 +13,7 @@ from app.api.schemas.event import PresenceDocument
 from app.api.schemas.take import HandedBackDocument
 from app.review.queue.query import MAX_LISTED_LENGTH
 from app.review.work.batches import MAX_NAME, MOST_GROUPS, MOST_VERDICTS, Part
+from app.review.work.progress import Pace
 
 Name = Annotated[str, Field(min_length=1, max_length=MAX_NAME)]
 People = Annotated[list[Annotated[str, Field(max_length=60)]], Field(max_length=200)]
@@ -172,12 +173,9 @@ class MyWork(ListDocument[MyBatchDocument]):
     """Open batches that are one's own, those that are due first, first."""
 
 
-class PaceDocument(Document):
+class PaceDocument(Document, shows=Pace):
     """What somebody has done in a batch."""
 
-    name: str
-    handed_in: int
-    judged: int
     groups: int = Field(description="Handed in or judged, each counted once.")
     minutes: float = Field(
         description="How long they worked: the time between what they did, pauses of more than "

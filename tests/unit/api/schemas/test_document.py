@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import pytest
-from pydantic import ValidationError
+from pydantic import Field, ValidationError
 
+from app.api.schemas.document import Document
 from app.api.schemas.evaluation import FrameList
 from app.api.schemas.policy import PolicyDocument
 from app.api.schemas.solution import FailingGate
@@ -39,6 +40,42 @@ class TestDocument:
 
     def test_a_page_names_the_next_one_by_text(self) -> None:
         assert FrameList(items=[], next=50, total=51).next == "50"
+
+
+class TestWhatShowsADataclass:
+    def test_has_its_fields_in_their_order_and_those_of_its_own_after_them(self) -> None:
+        assert list(KickDocument.model_fields) == ["minute", "player", "far"]
+
+    def test_says_more_of_a_field_where_it_writes_that_down(self) -> None:
+        described = {name: field.description for name, field in KickDocument.model_fields.items()}
+        assert described == {"minute": None, "player": "Who kicked.", "far": None}
+
+    def test_needs_every_field_even_where_the_dataclass_does_not(self) -> None:
+        assert KickDocument.model_json_schema()["required"] == ["minute", "player", "far"]
+
+    def test_reads_fields_and_properties_off_the_value(self) -> None:
+        document = KickDocument.model_validate(Kick(7, "anna"))
+        assert document.model_dump() == {"minute": 7, "player": "anna", "far": True}
+
+
+@dataclass(frozen=True)
+class Kick:
+    """A kick of the ball."""
+
+    minute: int
+    player: str | None = None
+
+    @property
+    def far(self) -> bool:
+        """Whether it flew far."""
+        return True
+
+
+class KickDocument(Document, shows=Kick):
+    """A kick of the ball as it travels."""
+
+    far: bool
+    player: str | None = Field(description="Who kicked.")
 
 
 @dataclass(frozen=True)
