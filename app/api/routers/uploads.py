@@ -72,7 +72,7 @@ async def upload_file(
         require_size(services.settings, int(declared))
     upload = await _receive(request, services, name, actor)
     response.headers["Location"] = f"/api/v1/uploads/{upload.id}"
-    return UploadDocument.of(upload)
+    return UploadDocument.model_validate(upload)
 
 
 async def _receive(request: Request, services: Services, name: str, actor: str) -> Upload:
@@ -126,7 +126,7 @@ def get_uploads(services: AppServices, sight: Sees) -> UploadList:
         if sight.sees(None) or any(sight.sees(None, name) for name in item.by)
     ]
     return UploadList(
-        items=[UploadDocument.of(item) for item in mine],
+        items=mine,
         max_bytes=settings.max_upload_bytes,
         days=settings.upload_days,
     )
@@ -135,7 +135,7 @@ def get_uploads(services: AppServices, sight: Sees) -> UploadList:
 @router.get("/{upload}", operation_id="getUpload", responses=responses(404))
 def get_one(upload: UploadId, services: AppServices) -> UploadDocument:
     """One uploaded file, without its content."""
-    return UploadDocument.of(get_upload(services.settings, upload))
+    return UploadDocument.model_validate(get_upload(services.settings, upload))
 
 
 @router.delete("/{upload}", operation_id="deleteUpload", status_code=204, responses=responses(404))

@@ -132,7 +132,7 @@ def get_diff(
     older = versions.version_called(
         store, against, str(versions.get_version(store, version).dataset_id)
     )
-    return VersionDiffDocument.of(diff_versions(store, older, version), limit)
+    return VersionDiffDocument.model_validate(diff_versions(store, older, version).values(limit))
 
 
 @router.post(

@@ -103,12 +103,8 @@ class GroupComparisonDocument(Document):
     @staticmethod
     def of(found: Comparison) -> GroupComparisonDocument:
         """The document of a comparison."""
-        return GroupComparisonDocument.model_construct(
-            groups=[GroupDocument.of(state) for state in found.states],
-            pairs=[AnnotationPairDocument.model_validate(pair) for pair in found.pairs],
-            limits=LimitsDocument.model_validate(found.limits),
-            worst_views=list(found.worst_views),
-        )
+        groups = [GroupDocument.of(state) for state in found.states]
+        return GroupComparisonDocument.model_validate({**vars(found), "groups": groups})
 
 
 class LimitsEdit(BaseModel):
@@ -231,13 +227,12 @@ class CaseDocument(Document):
     @staticmethod
     def of(case: Case) -> CaseDocument:
         """The document of a case."""
-        return CaseDocument.model_construct(
-            group=GroupDocument.of(case.original),
-            batch=case.batch,
-            takes=[CaseTake.model_validate(take) for take in case.takes],
-            comparison=GroupComparisonDocument.of(case.comparison),
-            refused=case.refused,
-            own=case.own,
+        return CaseDocument.model_validate(
+            {
+                **vars(case),
+                "group": GroupDocument.of(case.original),
+                "comparison": GroupComparisonDocument.of(case.comparison),
+            }
         )
 
 

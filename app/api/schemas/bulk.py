@@ -69,27 +69,13 @@ class BulkResult(Document):
     @staticmethod
     def planned(plan: BulkPlan) -> BulkResult:
         """The document of a dry run."""
-        return BulkResult(
-            dry_run=True,
-            matches=plan.matches,
-            would_change=plan.would_change,
-            sample=plan.sample,
-            batch=None,
-            changed=0,
-            refused=plan.refused,
-        )
+        return BulkResult(dry_run=True, batch=None, changed=0, **vars(plan))
 
     @staticmethod
     def done(report: BatchReport) -> BulkResult:
         """The document of what was done."""
         return BulkResult(
-            dry_run=False,
-            matches=None,
-            would_change=None,
-            sample=None,
-            batch=report.batch,
-            changed=report.changed,
-            refused=report.refused,
+            dry_run=False, matches=None, would_change=None, sample=None, **vars(report)
         )
 
 

@@ -9,19 +9,12 @@ from pydantic import AliasPath, BaseModel, ConfigDict, Field
 
 from app.api.schemas.document import Document, ListDocument
 from app.api.schemas.policy import PolicyDocument
+from app.review.datasets.dataset import Dataset
 
 
-class DatasetDocument(Document):
+class DatasetDocument(Document, shows=Dataset):
     """A dataset, its progress and its policy."""
 
-    id: int
-    name: str
-    groups: int
-    solved: int
-    accepted: int
-    rejected: int
-    deferred: int
-    unreviewed: int
     policy: PolicyDocument
     created: datetime
 

@@ -247,15 +247,12 @@ class ComparisonDocument(Document):
         frames = found.frames.frames
         shown = frames[offset : offset + limit]
         more = offset + len(shown) < len(frames)
-        counts = ("field", "shared", "better", "worse", "gained", "lost", "mean_change")
-        return ComparisonDocument(
-            first=found.first,
-            second=found.second,
-            same_truth=found.same_truth,
-            differs=found.differs,
-            numbers=found.numbers,
-            **{name: getattr(found.frames, name) for name in counts},
-            frames=shown,
-            next=str(offset + len(shown)) if more else None,
-            total=len(frames),
+        return ComparisonDocument.model_validate(
+            {
+                **vars(found),
+                **vars(found.frames),
+                "frames": shown,
+                "next": str(offset + len(shown)) if more else None,
+                "total": len(frames),
+            }
         )

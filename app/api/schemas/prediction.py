@@ -3,9 +3,19 @@
 from __future__ import annotations
 
 from datetime import datetime
-from typing import Annotated, Literal
+from operator import attrgetter
+from typing import Annotated, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, StrictBool, StrictInt, model_validator
+from pydantic import (
+    AliasPath,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    StrictBool,
+    StrictInt,
+    model_validator,
+)
 
 from app.api.schemas.document import Document, ListDocument
 from app.review.evaluating.accept import SHOWN, AcceptPlan, AcceptReport, AcceptRequest
@@ -18,7 +28,10 @@ Side = Annotated[int, Field(strict=True, ge=2, le=16_384)]
 Size = tuple[Side, Side]
 ViewId = Annotated[int, Field(strict=True, ge=1, le=2**63 - 1)]
 MAX_VIEWS = 200
-StoredBox = tuple[float, float, float, float]
+StoredBox = Annotated[
+    tuple[float, float, float, float],
+    BeforeValidator(attrgetter("x", "y", "width", "height")),
+]
 """As it was predicted: x, y of the top-left corner, width, height; whatever the file said."""
 
 
@@ -128,16 +141,18 @@ class ViewPrediction(Document):
     score: float
     scored: bool = Field(description="`false`: its set came without scores, each counts as 1.")
 
-    @staticmethod
-    def of(found: PredictionSet, box: PredictedBox) -> ViewPrediction:
+    @classmethod
+    def of(cls, found: PredictionSet, box: PredictedBox) -> Self:
         """The document of a box of a set."""
-        return ViewPrediction(
-            id=box.id,
-            predictions=found.id,
-            name=found.name,
-            box=(box.x, box.y, box.width, box.height),
-            score=box.score,
-            scored=not found.report.get("without_score"),
+        return cls.model_validate(
+            {
+                **vars(box),
+                "view": box.view_id,
+                "predictions": found.id,
+                "name": found.name,
+                "box": box,
+                "scored": not found.report.get("without_score"),
+            }
         )
 
 
@@ -173,14 +188,8 @@ class GroupPredictionsDocument(Document):
     @staticmethod
     def of(found: GroupPredictions) -> GroupPredictionsDocument:
         """The document of a group's predictions."""
-        return GroupPredictionsDocument(
-            sets=found.sets,
-            items=[
-                GroupPrediction(view=box.view_id, **ViewPrediction.of(item, box).model_dump())
-                for item, box in found.boxes
-            ],
-            accepted=found.accepted,
-        )
+        items = [GroupPrediction.of(item, box) for item, box in found.boxes]
+        return GroupPredictionsDocument(sets=found.sets, items=items, accepted=found.accepted)
 
 
 class AcceptBody(BaseModel):
@@ -222,18 +231,18 @@ class AcceptBody(BaseModel):
         return AcceptRequest(self.predictions, self.q, views, self.min_score, self.replace)
 
 
-class AcceptedView(BaseModel):
+class AcceptedView(Document):
     """A view that would get a ball."""
 
-    view: int
-    key: str
-    group: int
-    group_key: str
+    view: int = Field(validation_alias="view_id")
+    key: str = Field(validation_alias="view")
+    group: int = Field(validation_alias="group_id")
+    group_key: str = Field(validation_alias="group")
     box: StoredBox
-    score: float
+    score: float = Field(validation_alias=AliasPath("box", "score"))
 
 
-class AcceptOutcome(BaseModel):
+class AcceptOutcome(Document):
     """What accepting does, or did.
 
     `refused` counts views by reason: `below_score`, `annotated`, `the_same`,
@@ -249,23 +258,12 @@ class AcceptOutcome(BaseModel):
     @staticmethod
     def planned(plan: AcceptPlan) -> AcceptOutcome:
         """The document of a dry run."""
-        sample = [
-            AcceptedView(
-                view=item.view_id,
-                key=item.view,
-                group=item.group_id,
-                group_key=item.group,
-                box=(item.box.x, item.box.y, item.box.width, item.box.height),
-                score=item.box.score,
-            )
-            for item in plan.changes[:SHOWN]
-        ]
         return AcceptOutcome(
             dry_run=True,
             changed=len(plan.changes),
             groups=plan.groups,
             refused=plan.refused,
-            sample=sample,
+            sample=plan.changes[:SHOWN],
         )
 
     @staticmethod

@@ -179,12 +179,11 @@ class LogEntryDocument(Document):
     def of(entry: LogEntry) -> LogEntryDocument:
         """The document of an entry."""
         told = entry.kind in TOLD_KINDS and isinstance(entry.body, dict)
-        values = {name: getattr(entry, name) for name in ("id", "at", "actor", "kind")}
         body = {**entry.body} if told else None
         if body is not None and entry.kind == "comment":
             # Its writer may have deleted it since.
             body.pop("text", None)
-        return LogEntryDocument.model_validate({**values, "body": body})
+        return LogEntryDocument.model_validate({**vars(entry), "body": body})
 
 
 class History(ListDocument[LogEntryDocument]):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Literal
 
 from pydantic import BaseModel, Field
 
@@ -40,23 +40,15 @@ class StationDetail(BaseModel):
     def of(state: StationState) -> StationDetail:
         """The document of a station's state."""
         station = state.station
-        values: dict[str, Any] = {
-            "id": state.id,
-            "dataset": DatasetName(id=state.dataset_id, name=state.dataset),
-            "key": station.key,
-            "shared": station.shared,
-            "width": station.size.width,
-            "height": station.size.height,
-            "calibration": station.calibration,
-            "has_given": station.given is not None,
-            "has_given_covariance": station.given_covariance is not None,
-            "flipped": station.flipped,
-            "lines": lines_document(station.lines),
-            "proposed": [*station.proposed],
-            "groups": len(state.groups),
-            "revision": state.revision,
-            "etag": state.etag,
-            "can_undo": state.can_undo,
-            "can_redo": state.can_redo,
-        }
-        return StationDetail.model_construct(**values)
+        return StationDetail.model_validate(
+            {
+                **vars(station),
+                **vars(state),
+                **vars(station.size),
+                "dataset": DatasetName(id=state.dataset_id, name=state.dataset),
+                "has_given": station.given is not None,
+                "has_given_covariance": station.given_covariance is not None,
+                "lines": lines_document(station.lines),
+                "groups": len(state.groups),
+            }
+        )

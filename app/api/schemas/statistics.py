@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from pydantic import AliasPath, Field
+from typing import Any
+
+from pydantic import Field, model_validator
 
 from app.api.schemas.document import Document
-from app.review.queue.statistics import Series, Share
+from app.review.queue.statistics import Histogram, Measure, Series, Share
 
 
 class SplitSeries(Document, shows=Series):
@@ -14,34 +16,24 @@ class SplitSeries(Document, shows=Series):
     unknown: int = Field(description="Groups that have no such number.")
 
 
-class StatisticsHistogram(Document):
+class StatisticsHistogram(Document, shows=Measure):
     """How one number is spread over the groups that match."""
 
-    name: str = Field(validation_alias=AliasPath("measure", "name"))
-    label: str = Field(validation_alias=AliasPath("measure", "label"))
-    unit: str = Field(validation_alias=AliasPath("measure", "unit"))
-    field: str = Field(
-        validation_alias=AliasPath("measure", "field"), description="Name of the field in queries."
-    )
-    edges: list[float] = Field(
-        validation_alias=AliasPath("measure", "edges"),
-        description="One more than there are bars.",
-    )
-    open_low: bool = Field(
-        validation_alias=AliasPath("measure", "open_low"),
-        description="The first bar also holds what lies below.",
-    )
-    open_high: bool = Field(
-        validation_alias=AliasPath("measure", "open_high"),
-        description="The last bar also holds what lies beyond.",
-    )
+    field: str = Field(description="Name of the field in queries.")
+    edges: list[float] = Field(description="One more than there are bars.")
+    open_low: bool = Field(description="The first bar also holds what lies below.")
+    open_high: bool = Field(description="The last bar also holds what lies beyond.")
     log: bool = Field(
-        validation_alias=AliasPath("measure", "log"),
         description="The bars are equally wide on a logarithmic scale, but the first: it holds 0 "
         "and all that is smaller than the second edge.",
     )
     queries: list[str] = Field(description="For each bar, the query that finds its groups.")
     series: list[SplitSeries]
+
+    @model_validator(mode="before")
+    @classmethod
+    def _with_measure(cls, value: Any) -> Any:
+        return {**vars(value), **vars(value.measure)} if isinstance(value, Histogram) else value
 
 
 class PositionsDocument(Document):

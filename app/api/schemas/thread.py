@@ -91,15 +91,9 @@ class ThreadDocument(Document):
     @classmethod
     def of(cls, thread: StoredThread, actor: str) -> Self:
         """The document of a thread, for whom it is shown to."""
-        values = {name: getattr(thread, name) for name in _SAME}
-        return cls(
-            **values,
-            at=None if thread.x is None or thread.y is None else Spot(x=thread.x, y=thread.y),
-            comments=[CommentDocument.of(comment, actor) for comment in thread.comments],
-        )
-
-
-_SAME = ("id", "view", "created", "resolved", "resolved_by")
+        comments = [CommentDocument.of(comment, actor) for comment in thread.comments]
+        at = None if thread.x is None or thread.y is None else Spot(x=thread.x, y=thread.y)
+        return cls(**{**vars(thread), "at": at, "comments": comments})
 
 
 class ThreadList(ListDocument[ThreadDocument]):

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from datetime import datetime
 
-from pydantic import BaseModel, Field
+from pydantic import Field
 
-from app.api.schemas.document import ListDocument
-from app.store.uploads import Upload
+from app.api.schemas.document import Document, ListDocument
 
 
-class UploadDocument(BaseModel):
+class UploadDocument(Document):
     """An uploaded file."""
 
     id: str = Field(description="Digest of its name and content.")
@@ -19,11 +18,6 @@ class UploadDocument(BaseModel):
     created: datetime
     kept: bool = Field(description="Whether a dataset reads frames from it; it then stays.")
     format: str | None = Field(description="Format that it most likely has.")
-
-    @staticmethod
-    def of(upload: Upload) -> UploadDocument:
-        """The document of an upload."""
-        return UploadDocument.model_validate(vars(upload))
 
 
 class UploadList(ListDocument[UploadDocument]):

@@ -17,7 +17,7 @@ from pydantic import (
 
 from app.api.schemas.document import Document, ListDocument
 from app.api.schemas.policy import PolicyDocument
-from app.review.versions.diff import Move, Passage, Setting, VersionDiff
+from app.review.versions.diff import Move, Passage, Setting
 from app.review.versions.freeze import MAX_LICENCE, MAX_NOTE, FreezeRequest
 from app.review.versions.verify import Difference
 from app.soccer.split import TEST_CAMERAS, Split
@@ -227,8 +227,3 @@ class VersionDiffDocument(BaseModel):
     moved: list[MoveDocument] = Field(description="The farthest first.")
     changed: list[ChangeDocument]
     settings: list[SettingDocument]
-
-    @staticmethod
-    def of(diff: VersionDiff, most: int) -> VersionDiffDocument:
-        """The document of a diff."""
-        return VersionDiffDocument.model_validate(diff.values(most))

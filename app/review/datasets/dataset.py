@@ -38,14 +38,14 @@ class Dataset:
 
     id: int
     name: str
-    created: str
-    policy: Policy
     groups: int
     solved: int
     accepted: int
     rejected: int
     deferred: int
     unreviewed: int
+    policy: Policy
+    created: str
 
 
 @dataclass(frozen=True)
