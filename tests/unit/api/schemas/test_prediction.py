@@ -2,7 +2,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from app.api.schemas.prediction import AcceptOutcome, ViewPrediction
+from app.api.schemas.prediction import AcceptOutcome, GroupPrediction, ViewPrediction
 from app.review.evaluating.accept import Accepted, AcceptPlan
 from app.store.predictions import PredictedBox, PredictionSet
 
@@ -10,6 +10,7 @@ SET = PredictionSet(
     3, 1, "old", "coco", "old.json", "2030-08-17T18:00:00Z", "ann", "0" * 64, 1, 1, 0, 0, {}
 )
 BOX = PredictedBox(7, 3, 31, 1.0, 2.0, 3e9, 4.0, 0.9)
+PLAN = AcceptPlan(SET, (Accepted(31, "7.png", 5, "m/7.png", BOX, None),), {})
 
 
 class TestStoredBox:
@@ -18,5 +19,20 @@ class TestStoredBox:
         assert ViewPrediction.of(SET, replace(BOX, width=-1.0)).box[2] == -1
 
     def test_of_a_dry_run_is_told_however_absurd(self) -> None:
-        plan = AcceptPlan(SET, (Accepted(31, "7.png", 5, "m/7.png", BOX, None),), {})
-        assert AcceptOutcome.planned(plan).sample[0].box == (1.0, 2.0, 3e9, 4.0)
+        assert AcceptOutcome.planned(PLAN).sample[0].box == (1.0, 2.0, 3e9, 4.0)
+
+
+class TestAcceptedView:
+    def test_says_which_view_of_which_group_and_how_sure_its_prediction_is(self) -> None:
+        (shown,) = AcceptOutcome.planned(PLAN).sample
+        assert (shown.view, shown.key, shown.group, shown.group_key) == (31, "7.png", 5, "m/7.png")
+        assert shown.score == 0.9
+
+
+class TestGroupPrediction:
+    def test_is_what_its_view_has_and_says_which_view_that_is(self) -> None:
+        alone, shown = (
+            kind.of(SET, BOX).model_dump() for kind in (ViewPrediction, GroupPrediction)
+        )
+        assert shown == {**alone, "view": 31}
+        assert (alone["id"], alone["predictions"], alone["name"]) == (7, 3, "old")

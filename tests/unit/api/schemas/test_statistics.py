@@ -1,0 +1,25 @@
+"""Histograms travel with the bins of their measure."""
+
+from __future__ import annotations
+
+from app.api.schemas.statistics import StatisticsHistogram
+from app.review.queue.statistics import Histogram, Measure, Series
+
+MEASURE = Measure("jac", "JaC", "", "jac", (0.0, 0.5, 1.0), open_high=False)
+
+
+class TestStatisticsHistogram:
+    def test_has_the_bins_of_its_measure_and_its_own_counts_beside_them(self) -> None:
+        found = Histogram(MEASURE, ("jac<0.5", "jac>=0.5"), (Series("train", (1, 2), 0),))
+        assert StatisticsHistogram.model_validate(found).model_dump() == {
+            "name": "jac",
+            "label": "JaC",
+            "unit": "",
+            "field": "jac",
+            "edges": [0.0, 0.5, 1.0],
+            "open_low": False,
+            "open_high": False,
+            "log": False,
+            "queries": ["jac<0.5", "jac>=0.5"],
+            "series": [{"split": "train", "counts": (1, 2), "unknown": 0}],
+        }
