@@ -25,10 +25,10 @@ from app.api.reply import ASKED, KEPT_HEADERS, Asked
 from app.api.security.access import actor_of
 from app.api.security.bodies import BYTES, VALUE
 from app.api.security.origin import SAFE_METHODS
+from app.canonical import canonical
 from app.errors import BusyError, OverloadedError, ReviewError, StorageError
 from app.review.answers.answers import claim, end_claim, find_first, keep_first
 from app.store.answers import Answer
-from app.store.codecs import canonical
 from app.store.store import Store
 
 log = structlog.get_logger("touchline.api")

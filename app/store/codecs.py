@@ -5,7 +5,6 @@ Floats go through ``repr`` and come back the same bits. Nothing here knows the d
 
 from __future__ import annotations
 
-import json
 import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
@@ -17,6 +16,7 @@ import msgspec
 import numpy as np
 from zlib_ng import zlib_ng
 
+from app.canonical import canonical
 from app.errors import EXAMINE, DamagedError, GeometryError, InputError
 from app.geometry.camera import Camera, camera_covariance
 from app.geometry.lens import BROWN_CONRADY
@@ -34,14 +34,6 @@ Json = Any
 """What ``json`` makes: dict, list, str, int, float, bool or None."""
 _LINES = dict[str, tuple[ImagePoint, ...]]
 _LOOKING = Lock()
-_CANONICAL = json.JSONEncoder(
-    sort_keys=True, separators=(",", ":"), ensure_ascii=False, allow_nan=False
-)
-
-
-def canonical(value: Json) -> str:
-    """The one JSON text of a value: sorted keys, no spaces, no NaN."""
-    return _CANONICAL.encode(value)
 
 
 def parse(text: str | bytes) -> Json:

@@ -8,8 +8,9 @@ from typing import Any
 
 from sqlalchemy import exists, func, insert, select, update
 
+from app.canonical import canonical
 from app.soccer.policy import Policy
-from app.store.codecs import as_written, canonical, parse, policy_from_json, policy_to_json
+from app.store.codecs import as_written, parse, policy_from_json, policy_to_json
 from app.store.models import DatasetModel, GroupModel
 from app.store.session import Session
 from app.store.sight import COPIES

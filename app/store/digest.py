@@ -5,12 +5,12 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Iterable, Mapping
 
+from app.canonical import canonical
 from app.soccer.group import Group, SharedPosition, Station, View
 from app.soccer.pitch import Pitch
 from app.store.codecs import (
     Json,
     ball_to_json,
-    canonical,
     group_head_to_json,
     paint_to_json,
     positions_to_json,

@@ -8,8 +8,9 @@ from typing import Any
 
 from sqlalchemy import delete, insert, select
 
+from app.canonical import canonical
 from app.store.aliases import columns_shown
-from app.store.codecs import Json, canonical, pack, parse, unpack
+from app.store.codecs import Json, pack, parse, unpack
 from app.store.group_rows import next_id
 from app.store.models import DatasetModel
 from app.store.prediction_models import EvaluationFrameModel, EvaluationModel

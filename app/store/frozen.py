@@ -14,12 +14,12 @@ from typing import Any, cast
 from sqlalchemy import Table, insert, select
 from zlib_ng import zlib_ng
 
+from app.canonical import canonical
 from app.soccer.group import Group, Station, View
 from app.soccer.paint_evidence import reading_from_json
 from app.soccer.pitch import Pitch
 from app.store.codecs import (
     Json,
-    canonical,
     group_head_to_json,
     inflate,
     parse,

@@ -9,6 +9,7 @@ from typing import Any
 
 from sqlalchemy import Select, func, insert, select
 
+from app.canonical import canonical
 from app.soccer.group import Group, Station, View
 from app.store import codecs
 from app.store.dialect.statements import larger
@@ -28,12 +29,12 @@ def station_values(station: Station) -> dict[str, Any]:
         "height": station.size.height,
         "flipped": station.flipped,
         "calibration": station.calibration,
-        "lines": codecs.canonical(codecs.lines_to_json(station.lines)),
-        "given": None if given is None else codecs.canonical(given),
+        "lines": canonical(codecs.lines_to_json(station.lines)),
+        "given": None if given is None else canonical(given),
         "picture": None
         if station.picture is None
-        else codecs.canonical(codecs.picture_to_json(station.picture)),
-        "proposed": codecs.canonical([*station.proposed]) if station.proposed else None,
+        else canonical(codecs.picture_to_json(station.picture)),
+        "proposed": canonical([*station.proposed]) if station.proposed else None,
         "digest": station_digest(station),
     }
 
@@ -46,9 +47,9 @@ def view_values(view: View, position: int) -> dict[str, Any]:
         "key": view.key,
         "position": position,
         "included": view.included,
-        "left_out": None if why is None else codecs.canonical(why),
+        "left_out": None if why is None else canonical(why),
         "noise": None if view.noise == 1 else view.noise,
-        "balls": codecs.canonical([codecs.ball_to_json(ball) for ball in view.balls]),
+        "balls": canonical([codecs.ball_to_json(ball) for ball in view.balls]),
         "media_path": None if media is None else media.path,
         "media_member": None if media is None else media.member,
         "media_frame": None if media is None else media.frame,
@@ -59,13 +60,13 @@ def view_values(view: View, position: int) -> dict[str, Any]:
 
 def paint_text(paint: Mapping[str, str]) -> str | None:
     """The column of what was read of a group's pictures, by digest; None where nothing was."""
-    return codecs.canonical(dict(paint)) if paint else None
+    return canonical(dict(paint)) if paint else None
 
 
 def positions_text(group: Group) -> str | None:
     """The column of a group's shared positions; None where it has none."""
     shared = codecs.positions_to_json(group.positions)
-    return codecs.canonical(shared) if shared else None
+    return canonical(shared) if shared else None
 
 
 def head_values(

@@ -9,10 +9,11 @@ from typing import Any
 
 from sqlalchemy import case, delete, func, insert, select, update
 
+from app.canonical import canonical
 from app.finite import finite
 from app.store.aliases import columns_shown
 from app.store.clock import now
-from app.store.codecs import Json, canonical, parse
+from app.store.codecs import Json, parse
 from app.store.dialect.statements import member
 from app.store.group_rows import next_id
 from app.store.job_models import JobModel

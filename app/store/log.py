@@ -10,8 +10,9 @@ from typing import Any, cast
 from sqlalchemy import ColumnElement, Table, bindparam, func, insert, select
 from zlib_ng import zlib_ng
 
+from app.canonical import canonical
 from app.errors import DamagedError
-from app.store.codecs import Json, canonical, unpack
+from app.store.codecs import Json, unpack
 from app.store.dialect.dialect import dialect_in
 from app.store.models import LogModel
 from app.store.session import Session

@@ -7,7 +7,8 @@ from typing import NamedTuple
 
 from sqlalchemy import select, update
 
-from app.store.codecs import Json, as_written, canonical, parse
+from app.canonical import canonical
+from app.store.codecs import Json, as_written, parse
 from app.store.models import DatasetModel
 from app.store.session import Session
 

@@ -7,7 +7,8 @@ from typing import Any
 
 from sqlalchemy import select
 
-from app.store.codecs import Json, canonical, parse
+from app.canonical import canonical
+from app.store.codecs import Json, parse
 from app.store.datasets import dataset_name
 from app.store.session import Session
 from app.store.webhook_models import WebhookModel

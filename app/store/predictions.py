@@ -8,9 +8,10 @@ from typing import Any
 
 from sqlalchemy import ColumnElement, delete, func, insert, select
 
+from app.canonical import canonical
 from app.geometry.camera import Camera
 from app.store.aliases import columns_shown
-from app.store.codecs import Json, as_written, camera_from_json, camera_to_json, canonical, parse
+from app.store.codecs import Json, as_written, camera_from_json, camera_to_json, parse
 from app.store.digest import digest
 from app.store.group_rows import next_id
 from app.store.models import ViewModel

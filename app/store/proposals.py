@@ -13,8 +13,9 @@ from typing import Any, cast
 from sqlalchemy import ColumnElement, Select, Table, and_, case, delete, func, or_, select
 from sqlalchemy.orm import aliased
 
+from app.canonical import canonical
 from app.soccer.annotation import Lines
-from app.store.codecs import as_written, canonical, lines_from_json, lines_to_json, parse
+from app.store.codecs import as_written, lines_from_json, lines_to_json, parse
 from app.store.dialect.statements import insert, items_of, numbers_in
 from app.store.models import (
     DatasetModel,

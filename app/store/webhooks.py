@@ -7,8 +7,8 @@ from typing import Any, cast
 
 from sqlalchemy import ColumnElement, delete, func, select, tuple_, update
 
+from app.canonical import canonical
 from app.store.clock import now
-from app.store.codecs import canonical
 from app.store.dialect.statements import insert
 from app.store.job_models import JobModel
 from app.store.log import DEEDS

@@ -12,6 +12,7 @@ from itertools import count
 from pathlib import Path
 from typing import Any
 
+from app.canonical import canonical
 from app.datasets.file_tree import Limits
 from app.datasets.report import Report
 from app.errors import ConflictError, InputError, NotFoundError
@@ -26,7 +27,7 @@ from app.review.people.deeds import note_deed
 from app.soccer.frames import ImageSize
 from app.store.answers import Keep, keep_nothing
 from app.store.clock import now
-from app.store.codecs import Json, canonical
+from app.store.codecs import Json
 from app.store.predictions import (
     PredictedBox,
     PredictionSet,

@@ -12,6 +12,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 
+from app.canonical import canonical
 from app.datasets.file_tree import Root
 from app.datasets.manifest import Manifest, write_manifest
 from app.datasets.store_output import output_anywhere
@@ -24,7 +25,6 @@ from app.soccer.group import Group
 from app.soccer.solution import SOLVER_VERSION
 from app.store.codecs import (
     Json,
-    canonical,
     group_head_to_json,
     policy_to_json,
     station_to_json,

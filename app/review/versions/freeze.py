@@ -11,6 +11,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from app.canonical import canonical
 from app.datasets.manifest import software_version
 from app.errors import ConflictError, InputError
 from app.progress import TellProgress
@@ -23,7 +24,7 @@ from app.soccer.group import Group
 from app.soccer.solution import SOLVER_VERSION
 from app.soccer.split import Split, Splitter
 from app.store.clock import now
-from app.store.codecs import Json, canonical, pack, policy_to_json
+from app.store.codecs import Json, pack, policy_to_json
 from app.store.frozen import (
     CALIBRATION,
     SOLUTION,

@@ -7,8 +7,9 @@ import json
 from collections.abc import Iterable, Mapping
 from typing import Any
 
+from app.canonical import canonical
 from app.soccer.policy import Policy, digested_values
-from app.store.codecs import Json, canonical
+from app.store.codecs import Json
 
 HASH_FORMAT = 1
 """Of what the hash covers; part of it."""

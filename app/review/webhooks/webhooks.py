@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from app.canonical import canonical
 from app.errors import ConflictError, InputError, NotFoundError
 from app.review.datasets.dataset import dataset_id
 from app.review.people.deeds import note_deed
@@ -13,7 +14,7 @@ from app.review.webhooks.addresses import require_allowed
 from app.review.webhooks.messages import CHOSEN, Kind, ping
 from app.review.webhooks.secrets import new_salt, secret_of
 from app.store.clock import now
-from app.store.codecs import canonical, parse
+from app.store.codecs import parse
 from app.store.datasets import dataset_name
 from app.store.log import newest_entry
 from app.store.session import Session

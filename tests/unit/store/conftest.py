@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 from sqlalchemy import insert
 
+from app.canonical import canonical
 from app.config import Settings
 from app.geometry.camera import Camera
 from app.soccer.annotation import BallAnnotation, Extras, make_lines
@@ -17,7 +18,7 @@ from app.soccer.group import Group, Station, View
 from app.soccer.media import Media
 from app.soccer.pitch import Pitch
 from app.soccer.policy import PAPER
-from app.store.codecs import canonical, policy_to_json
+from app.store.codecs import policy_to_json
 from app.store.group_rows import NewRows
 from app.store.models import DatasetModel
 from app.store.queue import refresh_queue
