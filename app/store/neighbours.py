@@ -1,37 +1,19 @@
-"""Neighbours: the frames just before and after the frame of a view, where they are on disk.
-
-Only names that count time are followed. ``7.png`` and ``8.png`` of SoccerNet are two actions, and
-the images of most datasets are numbered in no order, so their numbers say nothing.
-"""
+"""Neighbours: the frames just before and after the frame of a view, where they are on disk."""
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path, PurePath, PurePosixPath
+from pathlib import Path
 
 import cv2
 
 from app.errors import ImageError, NotFoundError, StorageError
+from app.soccer.frame_number import FARTHEST, numbered
 from app.soccer.media import Media
 from app.store.media import has_member
 from app.store.object_frames import is_stored
 from app.store.video import open_video
-
-FARTHEST = 5
-"""Frames before and after that are looked for."""
-CLIP_FOLDER = "img1"
-"""Holds the frames of one clip in their order (SoccerNet game state, MOT)."""
-_NUMBERED = re.compile(r"(.*?)([0-9]{1,12})", re.DOTALL)
-_LAST_NUMBER = re.compile(r"([0-9]+)[^0-9]*")
-
-
-def counts_time(media: Media, group: str, static: bool) -> bool:
-    """Whether the name of a frame counts time, so that there may be neighbours; opens nothing."""
-    if is_stored(media):
-        return False
-    return media.frame is not None or _numbered(media, group, static) is not None
 
 
 def neighbours(media: Media, group: str, static: bool) -> dict[int, Media]:
@@ -73,10 +55,10 @@ def _video_length(path: Path) -> int:
 
 
 def _of_files(media: Media, group: str, static: bool) -> Iterator[tuple[int, Media]]:
-    numbered = _numbered(media, group, static)
-    if numbered is None:
+    found = numbered(media, group, static)
+    if found is None:
         return
-    name, head, digits = numbered
+    name, head, digits = found
     for offset in _offsets():
         number = int(digits) + offset
         # 100 may follow 099 or 99.
@@ -85,23 +67,6 @@ def _of_files(media: Media, group: str, static: bool) -> Iterator[tuple[int, Med
             if number >= 0 and there is not None:
                 yield offset, there
                 break
-
-
-def _numbered(media: Media, group: str, static: bool) -> tuple[PurePath, str, str] | None:
-    """Name of a frame, what stands before its number, and the number; None: it counts no time."""
-    name = PurePosixPath(media.member) if media.member is not None else PurePath(media.path)
-    numbered = _NUMBERED.fullmatch(name.stem)
-    if numbered is None:
-        return None
-    by_frame = static and _number(group) == int(numbered[2])
-    if not by_frame and name.parent.name != CLIP_FOLDER:
-        return None
-    return name, numbered[1], numbered[2]
-
-
-def _number(group: str) -> int | None:
-    found = _LAST_NUMBER.search(group.rsplit("/", 1)[-1])
-    return int(found[1]) if found else None
 
 
 def _there(media: Media, name: str) -> Media | None:

@@ -41,9 +41,9 @@ from app.review.editing.places import FoundView, find_view
 from app.review.editing.solve_encoded import Solve, solve_encoded
 from app.review.editing.submit import submit_view
 from app.review.editing.view_paint import NO_FRAME_HINT
+from app.soccer.frame_number import FARTHEST
 from app.soccer.media import Media
 from app.store.frames import Frames, Picture
-from app.store.neighbours import FARTHEST
 
 router = APIRouter(prefix="/views", tags=["views"])
 

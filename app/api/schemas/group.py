@@ -13,10 +13,10 @@ from app.api.schemas.document import Document
 from app.api.schemas.policy import PolicyDocument
 from app.api.schemas.solution import SolutionDocument
 from app.review.editing.state import GroupState
+from app.soccer.frame_number import counts_time
 from app.soccer.group import Group, View
 from app.soccer.pitch import Pitch
 from app.soccer.reasons import LeftOut
-from app.store.neighbours import counts_time
 
 State = Literal["unreviewed", "accepted", "rejected", "deferred"]
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from app.soccer.media import Media
-from app.store.neighbours import counts_time, neighbours
+from app.store.neighbours import neighbours
 
 PIXELS = np.full((64, 96, 3), 90, np.uint8)
 
@@ -40,7 +40,6 @@ class TestFiles:
         for name in ("7.png", "7_1.png"):
             media = Media(str(tmp_path / name))
             assert neighbours(media, f"league/season/match/{name}", static=False) == {}
-            assert not counts_time(media, f"league/season/match/{name}", static=False)
 
     def test_images_that_are_numbered_in_no_order_have_none(self, tmp_path) -> None:
         touch(tmp_path, "00041.jpg", "00042.jpg", "00043.jpg")

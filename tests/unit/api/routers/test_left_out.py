@@ -13,9 +13,9 @@ import pytest
 
 from app.review.importing.ingest import ingest
 from app.review.versions.freeze import FreezeRequest, freeze
+from app.soccer.frame_number import FARTHEST
 from app.soccer.group import Group
 from app.soccer.media import Media
-from app.store.neighbours import FARTHEST
 
 API = "/api/v1"
 DATASET = f"{API}/datasets/broadcast"

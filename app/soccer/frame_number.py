@@ -1,0 +1,51 @@
+"""Frame numbers: what the name of a frame says of its time; opens nothing.
+
+Only names that count time are followed. ``7.png`` and ``8.png`` of SoccerNet are two actions, and
+the images of most datasets are numbered in no order, so their numbers say nothing.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import PurePath, PurePosixPath
+
+from app.object_store.address import is_address
+from app.soccer.media import Media
+
+FARTHEST = 5
+"""Frames before and after that are looked for."""
+CLIP_FOLDER = "img1"
+"""Holds the frames of one clip in their order (SoccerNet game state, MOT)."""
+_NUMBERED = re.compile(r"(.*?)([0-9]{1,12})", re.DOTALL)
+_LAST_NUMBER = re.compile(r"([0-9]+)[^0-9]*")
+
+
+def counts_time(media: Media, group: str, static: bool) -> bool:
+    """Whether the name of a frame counts time, so that there may be neighbours.
+
+    Args:
+        media: Where the frame lies; one in an object store has no neighbours, for each of which the
+            store would have to be asked.
+        group: Key of the group, which is the number of its frame for static cameras.
+        static: Whether the camera stands still, so that its files are numbered by frames.
+    """
+    if is_address(media.path):
+        return False
+    return media.frame is not None or numbered(media, group, static) is not None
+
+
+def numbered(media: Media, group: str, static: bool) -> tuple[PurePath, str, str] | None:
+    """Name of a frame, what stands before its number, and the number; None: it counts no time."""
+    name = PurePosixPath(media.member) if media.member is not None else PurePath(media.path)
+    found = _NUMBERED.fullmatch(name.stem)
+    if found is None:
+        return None
+    by_frame = static and _number(group) == int(found[2])
+    if not by_frame and name.parent.name != CLIP_FOLDER:
+        return None
+    return name, found[1], found[2]
+
+
+def _number(group: str) -> int | None:
+    found = _LAST_NUMBER.search(group.rsplit("/", 1)[-1])
+    return int(found[1]) if found else None
