@@ -27,8 +27,7 @@ from app.api.security.bodies import BYTES, VALUE
 from app.api.security.origin import SAFE_METHODS
 from app.canonical import canonical
 from app.errors import BusyError, OverloadedError, ReviewError, StorageError
-from app.review.answers.answers import claim, end_claim, find_first, keep_first
-from app.store.answers import Answer
+from app.review.answers.answers import Answer, claim, end_claim, find_first, keep_first
 from app.store.store import Store
 
 log = structlog.get_logger("touchline.api")

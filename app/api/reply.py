@@ -10,8 +10,9 @@ from fastapi import Depends, Request
 from pydantic import BaseModel
 from starlette.responses import Response
 
-from app.review.answers.answers import keep_with_work
-from app.store.answers import Answer, Kept, SavedProgress, keep_nothing
+from app.review.answers.answers import Answer, keep_with_work
+from app.review.answers.keep import Kept, keep_nothing
+from app.review.answers.saved_progress import SavedProgress
 
 T = TypeVar("T")
 

@@ -2,27 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
-from typing import TypeVar, cast
+from typing import cast
 
 from sqlalchemy import Table, bindparam, delete, or_, select, text
 from zlib_ng import zlib_ng
 
 from app.finite import json_text
 from app.store.clock import now
-from app.store.codecs import Json, inflate, parse
+from app.store.codecs import inflate, parse
 from app.store.dialect.statements import insert
 from app.store.job_models import AnswerModel
 from app.store.session import Session
 
-T = TypeVar("T")
-
 KEPT_HOURS = 24
 """How long an answer is kept; what an edit builds on (If-Match) still stops a later repetition."""
+UNDER_WAY = 102
+"""Status of an answer that is none yet."""
 _FAST = 2
-_UNDER_WAY = 102
 _ANSWER = cast(Table, AnswerModel.__table__)
 
 
@@ -41,45 +39,7 @@ class Answer:
     @property
     def under_way(self) -> bool:
         """Whether it is none yet: the work was begun, and the body says how far it came."""
-        return self.status == _UNDER_WAY
-
-
-@dataclass(frozen=True)
-class SavedProgress:
-    """How far work of several transactions has come that was asked for under a key.
-
-    Saved in each transaction, it lets the same request go on where a stopped server left it.
-    """
-
-    key: str
-    actor: str
-    request_digest: str
-
-    def read(self, session: Session) -> Json | None:
-        """What was saved last; None where the work has not begun."""
-        found = find_answer(session, self.key, self.actor)
-        if found is None or found.body is None or not found.under_way:
-            return None
-        return parse(found.body)
-
-    def save(self, session: Session, value: Json) -> None:
-        """Say how far the work is."""
-        body = json_text(value).encode()
-        keep_answer(
-            session, self.key, self.actor, Answer(self.request_digest, _UNDER_WAY, {}, body)
-        )
-
-
-Kept = Callable[[Session], None]
-"""Writes an answer into a transaction; called as the last in it."""
-Keep = Callable[[T], Kept]
-"""Makes the answer of what work came to, to be kept in the transaction of that work: then the
-same request, sent again, gets it, wherever the server was stopped."""
-
-
-def keep_nothing(_outcome: object) -> Kept:
-    """For work that nobody asked for under a key."""
-    return lambda _session: None
+        return self.status == UNDER_WAY
 
 
 def find_answer(session: Session, key: str, actor: str) -> Answer | None:
@@ -147,5 +107,5 @@ _KEEP = _NEW.on_conflict_do_update(
         for column in _ANSWER.columns
         if not column.primary_key
     },
-    where=or_(_ANSWER.c.at < bindparam("oldest"), _ANSWER.c.status == _UNDER_WAY),
+    where=or_(_ANSWER.c.at < bindparam("oldest"), _ANSWER.c.status == UNDER_WAY),
 ).returning(_ANSWER.c.key)

@@ -9,6 +9,7 @@ from app.errors import ForbiddenError, NotFoundError
 from app.review.agreement.compare import Comparison, compare_states
 from app.review.agreement.limits import read_limits
 from app.review.agreement.weigh import ready_takes, settle
+from app.review.answers.keep import Keep, keep_nothing
 from app.review.datasets.dataset import dataset_id
 from app.review.editing.follow_paint import PaintFollower
 from app.review.editing.state import GroupState
@@ -20,7 +21,6 @@ from app.review.takes.hand_back import hand_back_take
 from app.review.takes.take import Take, TakeView
 from app.soccer.actors import person_of
 from app.store.agreement import OPEN, agreements_of, agreements_on
-from app.store.answers import Keep, keep_nothing
 from app.store.store import Store
 
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import asdict
 
 from app.evaluation.agreement_limits import Limits
+from app.review.answers.keep import Keep, keep_nothing
 from app.review.datasets.dataset import dataset_id
 from app.store.agreement import limits_of, put_limits
-from app.store.answers import Keep, keep_nothing
 from app.store.clock import now
 from app.store.log import Entry, append
 from app.store.session import Session

@@ -12,6 +12,7 @@ from app.errors import ReviewError, StorageError
 from app.evaluation.annotation_distance import GroupDistance
 from app.review.agreement.compare import Comparison, compare_states
 from app.review.agreement.limits import KIND, read_limits
+from app.review.answers.keep import Keep, keep_nothing
 from app.review.editing.follow_paint import PaintFollower
 from app.review.editing.state import GroupState
 from app.review.editing.submit import solved
@@ -29,7 +30,6 @@ from app.store.agreement import (
     settle_rest,
     verdicts_asked,
 )
-from app.store.answers import Keep, keep_nothing
 from app.store.clock import now
 from app.store.codecs import pack
 from app.store.log import Entry, append

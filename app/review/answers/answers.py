@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from app.errors import ConflictError
-from app.store.answers import Answer, Kept, find_answer, keep_answer
+from app.review.answers.keep import Kept
+from app.store.answers import Answer as Answer
+from app.store.answers import find_answer, keep_answer
 from app.store.session import Session
 from app.store.store import Store
 

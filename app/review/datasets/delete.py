@@ -8,11 +8,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from app.errors import ConflictError
+from app.review.answers.keep import Keep, keep_nothing
 from app.review.datasets.dataset import dataset_id, insert_dataset, read_dataset_head
 from app.review.datasets.spare_calibrations import delete_spare_calibrations
 from app.soccer.policy import Policy
 from app.store import removal
-from app.store.answers import Keep, keep_nothing
 from app.store.clock import now
 from app.store.copy_datasets import copies_of
 from app.store.log import Entry, append

@@ -18,11 +18,11 @@ from app.child_pool import ChildPool
 from app.errors import ImageError, NotFoundError
 from app.paint.propose import SEARCH_VERSION
 from app.progress import TellProgress
+from app.review.answers.keep import Keep, keep_nothing
 from app.review.datasets.dataset import DatasetHead, need_dataset, require_matches
 from app.review.datasets.proposal_reading import UNREADABLE, ProposalTask, read_proposal
 from app.review.editing.etags import read_head
 from app.review.editing.view_paint import known_cameras
-from app.store.answers import Keep, keep_nothing
 from app.store.codecs import camera_to_json
 from app.store.digest import digest, station_digest
 from app.store.groups import StoredGroup, read_groups

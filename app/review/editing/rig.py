@@ -11,6 +11,7 @@ from typing import Any
 from app.datasets.report import Report
 from app.datasets.sn_calibration_reader import read_line_files
 from app.errors import ConflictError, InputError
+from app.review.answers.keep import Keep, keep_nothing
 from app.review.datasets.dataset import need_dataset, read_dataset_head
 from app.review.editing.edit import SetStationCamera
 from app.review.editing.stations import (
@@ -29,7 +30,6 @@ from app.soccer.solution import SOLVER_VERSION
 from app.solving.calibrate import calibrate_station
 from app.solving.rig import RigCamera, RigFrame
 from app.solving.rig_proposal import PROPOSAL_VERSION, RigProposal, propose_rig
-from app.store.answers import Keep, keep_nothing
 from app.store.codecs import lines_to_json
 from app.store.digest import digest
 from app.store.groups import read_groups

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import NotRequired, TypedDict, Unpack
 
 from app.errors import ConflictError, NotFoundError
+from app.review.answers.keep import Keep, keep_nothing
 from app.review.editing.codec import station_edit_from_json, step_to_json
 from app.review.editing.edit import SetStationLines, StationEdit, with_station
 from app.review.editing.known import known_calibrations
@@ -22,7 +23,6 @@ from app.review.editing.state import (
 from app.review.editing.undo import next_step, read_station_stacks
 from app.soccer.group import Group, Station
 from app.soccer.solution import Calibration
-from app.store.answers import Keep, keep_nothing
 from app.store.clock import now
 from app.store.codecs import Json
 from app.store.datasets import dataset_name

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from typing import NotRequired, TypedDict, Unpack
 
 from app.errors import ConflictError, NotFoundError, SharedStationError
+from app.review.answers.keep import Keep, keep_nothing
 from app.review.editing.ball_noise import keeping_noise, with_noise
 from app.review.editing.codec import edit_from_json, step_to_json
 from app.review.editing.copies import require_open
@@ -27,7 +28,6 @@ from app.soccer.group import Group
 from app.soccer.policy import Policy
 from app.soccer.solution import Calibration, Solution
 from app.solving.solve import solve
-from app.store.answers import Keep, keep_nothing
 from app.store.clock import now
 from app.store.codecs import Json
 from app.store.group_revisions import next_revision, save_revision

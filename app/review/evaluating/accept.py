@@ -14,6 +14,7 @@ from functools import partial
 from app.errors import ConflictError, InputError, NotFoundError, StaleRevisionError
 from app.evaluation.prediction_run import box_problem
 from app.progress import TellProgress
+from app.review.answers.keep import Keep, Kept, keep_nothing
 from app.review.datasets.dataset import read_dataset_head
 from app.review.editing.edit import SetBall, need_view
 from app.review.editing.etags import require_unchanged, said_of
@@ -24,7 +25,6 @@ from app.review.queue.query import parse_query
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import Box, ImageSize
 from app.soccer.group import View
-from app.store.answers import Keep, Kept, keep_nothing
 from app.store.predictions import PredictedBox, PredictionSet, read_box, read_boxes
 from app.store.session import Session
 from app.store.store import Store

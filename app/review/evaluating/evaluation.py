@@ -17,10 +17,10 @@ from app.evaluation.comparison import (
 from app.evaluation.figure import Figure
 from app.evaluation.result import NUMBERS, FrameResult
 from app.evaluation.table import Table
+from app.review.answers.keep import Keep, keep_nothing
 from app.review.datasets.dataset import read_dataset_head
 from app.review.people.deeds import note_deed
 from app.store import evaluation_frames as frame_rows
-from app.store.answers import Keep, keep_nothing
 from app.store.codecs import Json
 from app.store.evaluation_frames import FrameCondition
 from app.store.evaluations import (

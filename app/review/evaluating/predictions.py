@@ -21,11 +21,11 @@ from app.evaluation.frame_names import FrameNames, NamedFrame
 from app.evaluation.prediction_files import ReadPredictedCameras
 from app.evaluation.prediction_run import ReadPredictions, listed
 from app.geometry.camera import Camera
+from app.review.answers.keep import Keep, keep_nothing
 from app.review.datasets.dataset import read_dataset_head
 from app.review.evaluating.prediction_reader import PredictionFiles, Read, read_files
 from app.review.people.deeds import note_deed
 from app.soccer.frames import ImageSize
-from app.store.answers import Keep, keep_nothing
 from app.store.clock import now
 from app.store.codecs import Json
 from app.store.predictions import (

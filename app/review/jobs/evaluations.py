@@ -5,13 +5,13 @@ from __future__ import annotations
 from dataclasses import asdict
 from typing import Any
 
+from app.review.answers.keep import Keep, keep_nothing
 from app.review.datasets.dataset import get_dataset_head
 from app.review.evaluating.accept import AcceptReport, AcceptRequest, accept, plan_accept
 from app.review.evaluating.evaluation import list_evaluations
 from app.review.evaluating.evaluation_run import EvaluationRequest, check_evaluation, run_evaluation
 from app.review.jobs.job_run import JobProgress, Work
 from app.review.jobs.jobs import Jobs
-from app.store.answers import Keep, keep_nothing
 from app.store.codecs import Json
 from app.store.evaluations import StoredEvaluation
 from app.store.jobs import Job

@@ -10,12 +10,12 @@ from app.datasets.store_output import require_absent
 from app.errors import InputError, NotFoundError
 from app.object_store.address import SCHEME
 from app.object_store.path import StoredPath, target_path
+from app.review.answers.keep import Keep, keep_nothing
 from app.review.datasets.dataset import get_dataset_head
 from app.review.exporting.export import export, require_possible
 from app.review.exporting.folder import ExportFolder
 from app.review.jobs.job_run import JobProgress, Work, counting
 from app.review.jobs.jobs import Jobs
-from app.store.answers import Keep, keep_nothing
 from app.store.codecs import Json
 from app.store.frames import Frames
 from app.store.jobs import EXPORT, Job

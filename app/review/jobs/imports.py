@@ -10,6 +10,7 @@ from app.config import Settings
 from app.datasets.file_tree import Root
 from app.errors import InputError
 from app.progress import TellProgress
+from app.review.answers.keep import Keep, keep_nothing
 from app.review.datasets.dataset import get_dataset_head, require_name
 from app.review.editing.paint import has_pictures
 from app.review.importing.folders import resolve_folder
@@ -21,7 +22,6 @@ from app.review.jobs.paint import PAINT
 from app.review.jobs.solve import request_solve
 from app.soccer.frames import ImageSize
 from app.soccer.policy import POLICIES
-from app.store.answers import Keep, keep_nothing
 from app.store.codecs import Json
 from app.store.datasets import find_dataset
 from app.store.jobs import Job

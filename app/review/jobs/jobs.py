@@ -25,10 +25,10 @@ from app.errors import (
     OverloadedError,
     StorageError,
 )
+from app.review.answers.keep import Keep, keep_nothing
 from app.review.jobs.job_records import JobRecords, need_job
 from app.review.jobs.job_run import JobProgress, JobRun, RunQueue, Work
 from app.review.people.deeds import note_job
-from app.store.answers import Keep, keep_nothing
 from app.store.clock import now
 from app.store.codecs import Json
 from app.store.jobs import (

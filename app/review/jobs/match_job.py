@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Collection
 from dataclasses import dataclass
 
+from app.review.answers.keep import Keep, keep_nothing
 from app.review.datasets.dataset import Dataset, DatasetHead, dataset_id, require_matches
 from app.review.jobs.job_records import need_job
 from app.review.jobs.job_run import JobProgress, Work
 from app.review.jobs.jobs import Jobs
 from app.review.jobs.solve import solve_after
-from app.store.answers import Keep, keep_nothing
 from app.store.clock import now
 from app.store.codecs import Json
 from app.store.jobs import Job

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+from app.review.answers.keep import Keep, keep_nothing
 from app.review.datasets.dataset import dataset_id
 from app.review.editing.ball_noise import give_factors
 from app.review.jobs.jobs import Jobs
 from app.review.jobs.solve import solve_after
 from app.review.policies.noise import Noise, accept_noise
 from app.review.policies.policy import read_policy
-from app.store.answers import Keep, keep_nothing
 from app.store.jobs import Job
 from app.store.session import Session
 from app.store.store import Store

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from app.review.answers.keep import Keep, keep_nothing
 from app.review.datasets.dataset import dataset_id
 from app.review.editing.pictures import apply_pictures, estimate_pictures
 from app.review.jobs.job_run import JobProgress, counting
@@ -11,7 +12,6 @@ from app.review.jobs.jobs import Jobs
 from app.review.jobs.match_job import MatchesAsked, MatchJob
 from app.review.jobs.solve import solve_after
 from app.soccer.picture import PictureGeometry
-from app.store.answers import Keep, keep_nothing
 from app.store.codecs import Json, picture_to_json
 from app.store.jobs import Job
 from app.store.session import Session

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from dataclasses import asdict
 
+from app.review.answers.keep import Keep, keep_nothing
 from app.review.datasets.dataset import dataset_id
 from app.review.editing.proposals import forget_proposals, propose_views
 from app.review.jobs.job_run import JobProgress, counting
 from app.review.jobs.jobs import Jobs
 from app.review.jobs.match_job import MatchesAsked, MatchJob
-from app.store.answers import Keep, keep_nothing
 from app.store.codecs import Json
 from app.store.store import Store
 

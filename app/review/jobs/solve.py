@@ -7,6 +7,7 @@ from contextlib import nullcontext
 from dataclasses import dataclass
 from typing import TypeVar
 
+from app.review.answers.keep import Keep, Kept, keep_nothing
 from app.review.datasets.dataset import get_dataset_head, list_datasets
 from app.review.editing.pitches import (
     DatasetPitches,
@@ -21,7 +22,6 @@ from app.review.policies.policy import PolicyState, apply_policy
 from app.review.yields.store import AT_ONCE, YieldStore
 from app.soccer.pitch import Pitch
 from app.soccer.policy import Policy
-from app.store.answers import Keep, Kept, keep_nothing
 from app.store.codecs import Json
 from app.store.datasets import dataset_name
 from app.store.jobs import Job

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from app.errors import NotFoundError
+from app.review.answers.keep import Keep, keep_nothing
 from app.review.datasets.dataset import get_dataset_head
 from app.review.jobs.job_run import JobProgress, Work
 from app.review.jobs.jobs import Jobs
@@ -12,7 +13,6 @@ from app.review.versions.freeze import FreezeRequest, freeze, plan_freeze
 from app.review.versions.verify import verify_and_keep
 from app.review.versions.version import Version, find_version, get_version
 from app.soccer.split import Split
-from app.store.answers import Keep, keep_nothing
 from app.store.codecs import Json
 from app.store.jobs import Job
 from app.store.store import Store

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from enum import StrEnum
 
+from app.review.answers.keep import Keep, keep_nothing
 from app.review.people.logins import Login, read_roles
 from app.review.people.roles import Role
 from app.soccer.actors import person_of
-from app.store.answers import Keep, keep_nothing
 from app.store.bells import (
     Ring,
     count_unread,

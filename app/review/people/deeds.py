@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from app.store.answers import Kept, keep_nothing
+from app.review.answers.keep import Kept, keep_nothing
 from app.store.clock import now
 from app.store.log import Entry, append
 from app.store.session import Session

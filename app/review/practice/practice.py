@@ -11,6 +11,7 @@ from app.config import Settings
 from app.datasets.match_frames import ARCHIVE
 from app.errors import ConflictError, NotFoundError
 from app.progress import TellProgress, telling
+from app.review.answers.keep import Keep, keep_nothing
 from app.review.datasets.delete import delete_dataset
 from app.review.editing.recompute import solve_dataset
 from app.review.editing.state import GroupState, read_states
@@ -23,7 +24,6 @@ from app.sample.practice import LESSONS, write_practice
 from app.sample.scene import SceneTruth
 from app.sample.truth import TRUTH, read_truth
 from app.soccer.policy import PAPER
-from app.store.answers import Keep, keep_nothing
 from app.store.codecs import Json
 from app.store.datasets import find_dataset
 from app.store.imports import known_groups

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from app.errors import ConflictError, InputError, NotFoundError
+from app.review.answers.keep import Keep, keep_nothing
 from app.review.queue.query import parse_query
-from app.store.answers import Keep, keep_nothing
 from app.store.listing import Listing
 from app.store.saved_views import (
     dataset_saved_views,

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from app.errors import ConflictError
+from app.review.answers.keep import Keep, Kept, keep_nothing
 from app.review.editing.codec import step_to_json
 from app.review.editing.edit import (
     Edit,
@@ -25,7 +26,6 @@ from app.review.editing.submit import current_etag, solved_in, submit
 from app.review.takes.copying import aligned
 from app.review.takes.take import Take, get_take, read_take
 from app.soccer.group import Group, Station
-from app.store.answers import Keep, Kept, keep_nothing
 from app.store.clock import now
 from app.store.group_revisions import refresh_inputs_hashes
 from app.store.groups import StoredGroup

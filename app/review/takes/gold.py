@@ -10,13 +10,13 @@ from typing import Any
 
 from app.datasets.camera_json import camera_from_json
 from app.errors import ConflictError, InputError, NotFoundError
+from app.review.answers.keep import Keep, keep_nothing
 from app.review.datasets.dataset import need_dataset
 from app.review.editing.state import GroupState, read_states
 from app.review.editing.submit import load_solved
 from app.review.takes.copying import aligned
 from app.review.takes.errors import AnnotationError, TrueView, error_of, world_error
 from app.soccer.frames import ImagePoint
-from app.store.answers import Keep, keep_nothing
 from app.store.clock import now
 from app.store.codecs import Json, group_from_json, group_to_json
 from app.store.copy_datasets import is_copy

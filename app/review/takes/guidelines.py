@@ -6,9 +6,9 @@ import hashlib
 from dataclasses import dataclass
 
 from app.errors import ConflictError, InputError, NotFoundError, TooLargeError
+from app.review.answers.keep import Keep, keep_nothing
 from app.review.datasets.dataset import need_dataset
 from app.soccer.media import Media
-from app.store.answers import Keep, keep_nothing
 from app.store.clock import now
 from app.store.frames import Frames
 from app.store.guidelines import (

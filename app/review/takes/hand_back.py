@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from app.errors import ConflictError, InputError
+from app.review.answers.keep import Keep, keep_nothing
 from app.review.editing.state import need_group
 from app.review.people.bell import RingKind, tell
 from app.review.takes.adopt import KIND
 from app.review.takes.handed_back import DID
 from app.review.takes.take import Take, TakeView, read_take, reopen_take, show
 from app.soccer.actors import person_of
-from app.store.answers import Keep, keep_nothing
 from app.store.clock import now
 from app.store.groups import StoredGroup
 from app.store.log import Entry, append

@@ -16,6 +16,7 @@ import numpy as np
 
 from app.datasets.camera_json import camera_to_json
 from app.errors import ConflictError, InputError
+from app.review.answers.keep import Keep, keep_nothing
 from app.review.datasets.dataset import dataset_id
 from app.review.queue.query import MAX_LISTED_LENGTH, parse_query
 from app.review.takes.gold import KIND, TruthSource
@@ -24,7 +25,6 @@ from app.sample.scene import SceneTruth
 from app.sample.truth import TRUTH, read_truth
 from app.soccer.group import Group
 from app.store.agreement import AGREED, DECIDED, states_of
-from app.store.answers import Keep, keep_nothing
 from app.store.clock import now
 from app.store.codecs import Json, group_to_json
 from app.store.copy_datasets import is_copy

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from app.errors import ConflictError, ForbiddenError, NotFoundError
+from app.review.answers.keep import Keep, keep_nothing
 from app.review.datasets.dataset import need_dataset
 from app.review.editing.state import need_group
 from app.review.editing.submit import solved
@@ -17,7 +18,6 @@ from app.review.takes.copying import CopyOrder, copy_group, start_of
 from app.review.takes.handed_back import HandedBack, read_handed_back
 from app.soccer.actors import person_of
 from app.store.agreement import forget_open
-from app.store.answers import Keep, keep_nothing
 from app.store.clock import now
 from app.store.groups import read_groups
 from app.store.session import Session

@@ -11,11 +11,11 @@ from collections.abc import Iterable
 from typing import Any
 
 from app.errors import ConflictError, ForbiddenError, InputError, NotFoundError
+from app.review.answers.keep import Keep, keep_nothing
 from app.review.people.bell import RingKind, tell
 from app.review.people.logins import read_roles
 from app.review.people.roles import Role
 from app.soccer.actors import is_of, person_of
-from app.store.answers import Keep, keep_nothing
 from app.store.clock import now
 from app.store.dataset_roles import members
 from app.store.log import Entry, append

@@ -13,9 +13,10 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from app.errors import ConflictError
+from app.review.answers.keep import Keep, keep_nothing
+from app.review.answers.saved_progress import SavedProgress
 from app.review.queue.query import MAX_LISTED_LENGTH, parse_query
 from app.review.verdicts.verdict import Verdict, check_verdict
-from app.store.answers import Keep, SavedProgress, keep_nothing
 from app.store.batches import (
     BulkVerdict,
     Spans,

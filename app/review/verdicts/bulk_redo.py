@@ -6,10 +6,11 @@ from collections import Counter
 from dataclasses import dataclass
 
 from app.errors import ConflictError
+from app.review.answers.keep import Keep, keep_nothing
+from app.review.answers.saved_progress import SavedProgress
 from app.review.verdicts.bulk import ASKED, BatchRun, Refusal, sort_out
 from app.review.verdicts.bulk_undo import read_batch
 from app.review.verdicts.verdict import check_verdict
-from app.store.answers import Keep, SavedProgress, keep_nothing
 from app.store.batches import BulkVerdict, Spans, update_batch
 from app.store.listing import read_columns
 from app.store.session import Session

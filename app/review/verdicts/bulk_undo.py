@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from app.errors import ConflictError, NotFoundError
+from app.review.answers.keep import Keep, keep_nothing
 from app.review.verdicts.bulk import save_verdicts
-from app.store.answers import Keep, keep_nothing
 from app.store.batches import BulkVerdict, Spans, find_batch, update_batch
 from app.store.clock import now
 from app.store.log import Entry, append

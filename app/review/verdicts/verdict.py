@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from app.errors import InputError
+from app.review.answers.keep import Keep, keep_nothing
 from app.review.editing.copies import require_unsettled
 from app.review.editing.etags import require_said, require_unchanged
 from app.review.editing.state import GroupState
@@ -12,7 +13,6 @@ from app.review.editing.submit import read_solved
 from app.soccer.group import Group
 from app.soccer.reasons import MAX_NOTE, REASONS
 from app.soccer.solution import Solution
-from app.store.answers import Keep, keep_nothing
 from app.store.clock import now
 from app.store.groups import StoredGroup
 from app.store.queue import update_verdict

@@ -10,13 +10,13 @@ from enum import StrEnum
 from typing import Any
 
 from app.errors import ConflictError, InputError, NotFoundError
+from app.review.answers.keep import Keep, keep_nothing
 from app.review.datasets.dataset import dataset_id
 from app.review.people.bell import RingKind, tell
 from app.review.people.members import list_members
 from app.review.people.roles import Action, may
 from app.review.queue.query import MAX_LISTED_LENGTH, parse_query
 from app.soccer.actors import person_of
-from app.store.answers import Keep, keep_nothing
 from app.store.clock import now
 from app.store.listing import Listing
 from app.store.log import Entry, append

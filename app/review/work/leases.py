@@ -11,11 +11,11 @@ from datetime import UTC, datetime, timedelta
 from typing import Any
 
 from app.errors import ConflictError, HeldGroupError, NotFoundError
+from app.review.answers.keep import Keep, keep_nothing
 from app.review.takes.hand_back import checked_reason, note_hand_back
 from app.review.takes.handed_back import HandedBack, read_handed_back
 from app.review.work.batches import WORK, Batch, Here, Part, read_batch
 from app.review.work.own import hand_in_own, next_own, own_of, returned_to, takes_part
-from app.store.answers import Keep, keep_nothing
 from app.store.log import Entry, append
 from app.store.session import Session
 from app.store.store import Store

@@ -7,12 +7,12 @@ from __future__ import annotations
 from collections.abc import Collection
 
 from app.errors import ConflictError
+from app.review.answers.keep import Keep, keep_nothing
 from app.review.takes.adopt import adopt_take
 from app.review.takes.mixing import Terms, begin_next
 from app.review.takes.take import Take, TakeView, hand_in, read_take, reopen
 from app.review.work.batches import Batch, Part
 from app.soccer.actors import person_of
-from app.store.answers import Keep, keep_nothing
 from app.store.clock import now
 from app.store.session import Session
 from app.store.store import Store

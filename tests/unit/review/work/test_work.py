@@ -9,6 +9,7 @@ import pytest
 
 from app.errors import ConflictError, HeldGroupError, InputError, NotFoundError
 from app.review.agreement.weigh import after_hand_in
+from app.review.answers.keep import Kept
 from app.review.editing.replay import replay
 from app.review.editing.submit import load
 from app.review.people.audit import read_audit
@@ -30,7 +31,6 @@ from app.review.work.batches import (
 )
 from app.review.work.leases import LASTS, Lease, Leases, Worker
 from app.review.work.progress import my_work, team_work
-from app.store.answers import Kept
 from app.store.audit import AuditQuery
 from app.store.bells import read_rings
 from app.store.people import person_by_name
