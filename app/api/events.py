@@ -20,6 +20,7 @@ from fastapi.sse import ServerSentEvent
 from app.api.schemas.event import DatasetEvent, GroupEvent, PresenceDocument, WorkEvent
 from app.api.schemas.job import JobDocument
 from app.errors import OverloadedError, StorageError
+from app.review.jobs.job_records import Job
 from app.review.jobs.jobs import Jobs
 from app.review.people.roles import EVERYTHING, Sight
 from app.review.queue.changes import (
@@ -30,7 +31,6 @@ from app.review.queue.changes import (
     read_solved_since,
 )
 from app.review.work.leases import Lease
-from app.store.jobs import OPEN, Job
 from app.store.store import Store
 
 log = structlog.get_logger("touchline.events")
@@ -198,8 +198,7 @@ class Events:
 
     def open_jobs(self, dataset_id: int | None, sight: Sight) -> list[ServerSentEvent]:
         """Jobs that are under way, for whoever begins to listen."""
-        jobs = self._jobs.find(dataset_id=dataset_id, states=OPEN, sight=sight)
-        return [_job_event(job) for job in reversed(jobs)]
+        return [_job_event(job) for job in self._jobs.under_way(dataset_id, sight)]
 
     def close(self) -> None:
         """End every feed, so that the server can stop; may be called twice."""

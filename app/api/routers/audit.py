@@ -17,9 +17,8 @@ from app.api.security.access import login_of
 from app.datasets.csv_text import csv_line
 from app.review.datasets.dataset import dataset_id
 from app.review.people import audit
-from app.review.people.audit import KINDS, AuditEntry, AuditPage, Family
+from app.review.people.audit import KINDS, AuditEntry, AuditPage, AuditQuery, Family
 from app.review.people.roles import EVERYTHING, Sight
-from app.store.audit import AuditQuery
 
 router = APIRouter(prefix="/audit", tags=["users"])
 COLUMNS = tuple(AuditEntryDocument.model_fields)

@@ -32,7 +32,6 @@ from app.evaluation.table import TABLES
 from app.review.evaluating import evaluation as review
 from app.review.jobs.evaluations import request_evaluation
 from app.review.versions.version import version_called
-from app.store.evaluations import StoredEvaluation
 
 router = APIRouter(tags=["evaluations"])
 
@@ -104,7 +103,7 @@ def start_evaluation(
     response_model=EvaluationDocument,
     responses=responses(404),
 )
-def get_evaluation(evaluation: Id, store: AppStore) -> StoredEvaluation:
+def get_evaluation(evaluation: Id, store: AppStore) -> review.StoredEvaluation:
     """One evaluation: what it pins, its tables, and the names of its figures."""
     return review.get_evaluation(store, evaluation)
 

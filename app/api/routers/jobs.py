@@ -12,8 +12,8 @@ from app.api.problem import responses
 from app.api.reply import AskedUnder, Reply, document
 from app.api.schemas.job import JobDocument, JobKind, JobPage, JobState
 from app.review.datasets.dataset import dataset_id
+from app.review.jobs.job_records import Job
 from app.review.people.deeds import record_deed
-from app.store.jobs import Job
 
 router = APIRouter(prefix="/jobs", tags=["jobs"])
 

@@ -32,7 +32,6 @@ from app.review.evaluating.accept import AcceptReport, accept, accept_box, plan_
 from app.review.evaluating.group_predictions import group_predictions
 from app.review.evaluating.prediction_reader import PredictionFiles
 from app.review.jobs.evaluations import request_accept
-from app.store.predictions import PredictionSet
 from app.store.uploads import upload_path
 
 router = APIRouter(tags=["predictions"])
@@ -85,7 +84,7 @@ def add_predictions(
     return reply.of(found)
 
 
-def _added(found: PredictionSet) -> Response:
+def _added(found: review.PredictionSet) -> Response:
     headers = {"Location": f"/api/v1/predictions/{found.id}"}
     return document(PredictionSetDocument.model_validate(found), 201, headers)
 
@@ -132,7 +131,7 @@ def accept_predictions(
     response_model=PredictionSetDocument,
     responses=responses(404),
 )
-def get_predictions(predictions: Id, store: AppStore) -> PredictionSet:
+def get_predictions(predictions: Id, store: AppStore) -> review.PredictionSet:
     """One set of predictions."""
     return review.get_predictions(store, predictions)
 

@@ -18,7 +18,6 @@ from app.api.schemas.thread import (
     ThreadList,
 )
 from app.review.talk import comments
-from app.store.threads import StoredThread
 
 router = APIRouter(prefix="/groups/{group}", tags=["comments"])
 
@@ -125,5 +124,5 @@ def delete_comment(
     return reply.of(None)
 
 
-def _told(thread: StoredThread, *, actor: str, status: int = 200) -> Response:
+def _told(thread: comments.StoredThread, *, actor: str, status: int = 200) -> Response:
     return document(ThreadDocument.of(thread, actor), status)

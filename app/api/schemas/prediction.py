@@ -20,8 +20,8 @@ from pydantic import (
 from app.api.schemas.document import Document, ListDocument
 from app.review.evaluating.accept import SHOWN, AcceptPlan, AcceptReport, AcceptRequest
 from app.review.evaluating.group_predictions import GroupPredictions
+from app.review.evaluating.predictions import PredictedBox, PredictionSet
 from app.soccer.frames import ImageSize
-from app.store.predictions import PredictedBox, PredictionSet
 
 Upload = Annotated[str, Field(min_length=1, max_length=64, description="Id of an upload.")]
 Side = Annotated[int, Field(strict=True, ge=2, le=16_384)]

@@ -8,7 +8,7 @@ from pydantic import BaseModel, ConfigDict, Field, StrictBool
 
 from app.api.schemas.annotation import LineDocuments, lines_document
 from app.api.schemas.document import Document, ListDocument
-from app.store.proposals import Proposal
+from app.review.editing.proposals import Proposal
 
 
 class MatchProposalsDocument(Document):

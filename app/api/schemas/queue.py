@@ -10,12 +10,11 @@ from pydantic import Field
 from app.api.schemas.document import Document, ListDocument
 from app.api.schemas.group import State, image_address
 from app.api.schemas.solution import FailingGate, FindingDocument, FixDocument, OfferDocument
-from app.review.editing.past import STATION_EDITS
+from app.review.editing.past import STATION_EDITS, LogEntry
 from app.review.queue.findings import GroupFindings
 from app.review.queue.listing import GroupRow as QueueRow
 from app.review.queue.listing import Neighbours as QueueNeighbours
 from app.soccer.finding import Finding
-from app.store.log import LogEntry
 
 THUMBNAIL_WIDTH = 208
 TOLD_KINDS = frozenset(STATION_EDITS) | frozenset(

@@ -8,9 +8,8 @@ from typing import Annotated, Self
 from pydantic import BaseModel, ConfigDict, Field
 
 from app.api.schemas.document import Document, ListDocument
-from app.review.talk.comments import LONGEST
+from app.review.talk.comments import LONGEST, StoredComment, StoredThread
 from app.soccer.actors import is_of, person_of
-from app.store.threads import StoredComment, StoredThread
 
 Text = Annotated[str, Field(min_length=1, max_length=LONGEST, description="Plain text.")]
 _PIXEL = 100_000.0

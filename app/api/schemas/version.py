@@ -20,8 +20,8 @@ from app.api.schemas.policy import PolicyDocument
 from app.review.versions.diff import Move, Passage, Setting
 from app.review.versions.freeze import MAX_LICENCE, MAX_NOTE, FreezeRequest
 from app.review.versions.verify import Difference
+from app.review.versions.version import Verification
 from app.soccer.split import TEST_CAMERAS, Split
-from app.store.verifications import Verification
 
 Point = Annotated[list[float], Field(min_length=3, max_length=3)]
 SHOWN_DIFFERENCES = 40

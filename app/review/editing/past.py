@@ -14,7 +14,8 @@ from app.soccer.group import Group, View
 from app.soccer.pitch import Pitch
 from app.store.aliases import shown_entries
 from app.store.groups import StoredGroup
-from app.store.log import LogEntry, group_entries, station_entries
+from app.store.log import LogEntry as LogEntry
+from app.store.log import group_entries, station_entries
 from app.store.session import Session
 from app.store.store import Store
 

@@ -28,7 +28,6 @@ from app.store.digest import digest, station_digest
 from app.store.groups import StoredGroup, read_groups
 from app.store.proposals import (
     MatchProposals,
-    Proposal,
     delete_proposals,
     group_proposals,
     match_proposals,
@@ -36,6 +35,7 @@ from app.store.proposals import (
     save_proposals,
     views_to_look_at,
 )
+from app.store.proposals import Proposal as Proposal
 from app.store.store import Store
 
 ALLOWANCE = Allowance(memory=2 * 2**30, processor=120.0, silence=240.0)

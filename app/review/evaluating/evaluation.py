@@ -23,8 +23,8 @@ from app.review.people.deeds import note_deed
 from app.store import evaluation_frames as frame_rows
 from app.store.codecs import Json
 from app.store.evaluation_frames import FrameCondition
+from app.store.evaluations import StoredEvaluation as StoredEvaluation
 from app.store.evaluations import (
-    StoredEvaluation,
     dataset_evaluations,
     delete_evaluation,
     find_evaluation,

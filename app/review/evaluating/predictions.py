@@ -28,9 +28,9 @@ from app.review.people.deeds import note_deed
 from app.soccer.frames import ImageSize
 from app.store.clock import now
 from app.store.codecs import Json
+from app.store.predictions import PredictedBox as PredictedBox
+from app.store.predictions import PredictionSet as PredictionSet
 from app.store.predictions import (
-    PredictedBox,
-    PredictionSet,
     dataset_prediction_sets,
     delete_prediction_set,
     has_prediction_set,

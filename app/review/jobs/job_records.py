@@ -11,17 +11,9 @@ from app.errors import ConflictError, NotFoundError, StorageError
 from app.review.jobs.job_run import JobRun
 from app.review.people.bell import RingKind, tell
 from app.soccer.actors import person_of
-from app.store.jobs import (
-    DONE,
-    FAILED,
-    OPEN,
-    Job,
-    delete_job,
-    job_ids,
-    read_job,
-    read_jobs,
-    update_job,
-)
+from app.store.jobs import DONE as DONE
+from app.store.jobs import FAILED, OPEN, delete_job, job_ids, read_job, read_jobs, update_job
+from app.store.jobs import Job as Job
 from app.store.session import Session
 from app.store.sight import EVERYTHING, Sight
 from app.store.store import Store
@@ -76,6 +68,10 @@ class JobRecords:
                 limit=limit,
                 sight=sight,
             )
+
+    def under_way(self, dataset_id: int | None, sight: Sight) -> list[Job]:
+        """Jobs that somebody sees and that wait or run, the oldest first."""
+        return self.find(dataset_id=dataset_id, states=OPEN, sight=sight)[::-1]
 
     def every(self, *, dataset_id: int, kind: str) -> list[int]:
         """Ids of all jobs of a kind in a dataset, however many there are."""

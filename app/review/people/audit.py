@@ -9,7 +9,8 @@ from typing import Any
 
 from app.errors import NotFoundError
 from app.review.people.roles import Sight
-from app.store.audit import AuditQuery, AuditRow, audit_rows
+from app.store.audit import AuditQuery as AuditQuery
+from app.store.audit import AuditRow, audit_rows
 from app.store.store import Store
 from app.store.threads import find_group
 

@@ -23,8 +23,6 @@ from app.store.people import person_by_name
 from app.store.session import Session
 from app.store.store import Store
 from app.store.threads import (
-    StoredComment,
-    StoredThread,
     ThreadGroup,
     change_comment,
     delete_thread,
@@ -35,6 +33,8 @@ from app.store.threads import (
     set_mentions,
     set_resolved,
 )
+from app.store.threads import StoredComment as StoredComment
+from app.store.threads import StoredThread as StoredThread
 
 COMMENT = "comment"
 """Kind of the log's entries about comments."""

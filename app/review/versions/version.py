@@ -20,7 +20,8 @@ from app.store.frozen import CALIBRATION, json_of, named_texts, read_frozen, tha
 from app.store.session import Session
 from app.store.solutions import decode_camera, decode_solution
 from app.store.store import Store
-from app.store.verifications import Verification, read_verifications
+from app.store.verifications import Verification as Verification
+from app.store.verifications import read_verifications
 from app.store.versions import VersionGroup, all_versions, dataset_versions, version_row
 
 

@@ -23,6 +23,7 @@ from app.review.importing.ingest import ensure_dataset
 from app.review.jobs import jobs as module
 from app.review.jobs.job_run import JobProgress
 from app.review.jobs.jobs import Jobs
+from app.review.people.roles import EVERYTHING, Sight
 from app.store.codecs import Json
 from app.store.jobs import Job, NewJob, insert_job
 from app.store.session import Session
@@ -422,3 +423,20 @@ class TestFind:
         assert [job.id for job in jobs.find(before=made[1])] == [made[0]]
         assert [job.id for job in jobs.find(kinds=["export"])] == [last.id]
         assert jobs.find(states=["failed"]) == []
+
+
+class TestUnderWay:
+    def test_gives_the_oldest_first_of_those_that_are_not_over(
+        self, jobs: Jobs, store: Store
+    ) -> None:
+        one, other = (ensure_dataset(store, name, "ann") for name in ("one", "other"))
+        jobs.wait(submit(jobs, lambda _: None, dataset_id=one).id, SECONDS)
+        held = threading.Event()
+        try:
+            made = [submit(jobs, lambda _: held.wait(SECONDS), dataset_id=one).id for _ in "ab"]
+            last = submit(jobs, lambda _: None, dataset_id=other).id
+            assert [job.id for job in jobs.under_way(None, EVERYTHING)] == [*made, last]
+            assert [job.id for job in jobs.under_way(one, EVERYTHING)] == made
+            assert jobs.under_way(None, Sight(all_but=False)) == []
+        finally:
+            held.set()
