@@ -30,9 +30,8 @@ from app.review.editing.places import find_view
 from app.review.evaluating import predictions as review
 from app.review.evaluating.accept import AcceptReport, accept, accept_box, plan_accept
 from app.review.evaluating.group_predictions import group_predictions
-from app.review.evaluating.prediction_reader import PredictionFiles
+from app.review.evaluating.prediction_reader import PredictionFiles, uploaded_files
 from app.review.jobs.evaluations import request_accept
-from app.store.uploads import upload_path
 
 router = APIRouter(tags=["predictions"])
 
@@ -196,18 +195,12 @@ def accept_prediction(
 
 
 def _files(settings: Settings, request: PredictionRequest) -> PredictionFiles:
-    paths = {
-        name: None if upload is None else upload_path(settings, upload)
-        for name, upload in (
-            ("path", request.upload),
-            ("images", request.images_upload),
-            ("cameras", request.cameras_upload),
-        )
-    }
-    return PredictionFiles(
-        **paths,
+    how = PredictionFiles(
+        None,
         format=request.format,
         category=request.category,
         size=size_of(request.size),
         cameras_size=size_of(request.cameras_size),
     )
+    uploads = (request.upload, request.images_upload, request.cameras_upload)
+    return uploaded_files(settings, how, *uploads)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable
-from functools import partial
 from typing import Annotated, Any, TypeVar
 
 from anyio import CancelScope, CapacityLimiter, to_thread
@@ -15,15 +14,15 @@ from starlette.requests import ClientDisconnect
 from app.api.deps import Actor, AppServices, Sees, Services
 from app.api.problem import responses
 from app.api.schemas.upload import UploadDocument, UploadList
-from app.datasets.guess_format import guess_format
 from app.errors import InputError, OverloadedError
-from app.store.uploads import (
+from app.review.importing.receiving import (
     Upload,
     UploadWriter,
-    delete_upload,
-    get_upload,
-    list_uploads,
-    require_size,
+    begin_upload,
+    delete_own,
+    find_upload,
+    finish_upload,
+    own_uploads,
 )
 
 router = APIRouter(prefix="/uploads", tags=["imports"])
@@ -67,9 +66,6 @@ async def upload_file(
     request: Request, services: AppServices, actor: Actor, name: FileName, response: Response
 ) -> UploadDocument:
     """Take a file, to import it or its predictions; the same file again is the same upload."""
-    declared = request.headers.get("content-length", "")
-    if declared.isascii() and declared.isdigit() and len(declared) < 19:
-        require_size(services.settings, int(declared))
     upload = await _receive(request, services, name, actor)
     response.headers["Location"] = f"/api/v1/uploads/{upload.id}"
     return UploadDocument.model_validate(upload)
@@ -77,7 +73,7 @@ async def upload_file(
 
 async def _receive(request: Request, services: Services, name: str, actor: str) -> Upload:
     """Write what comes, off the event loop; nothing stays of what does not come whole."""
-    writer = await _on_disk(UploadWriter, services.settings, name)
+    writer = await _on_disk(begin_upload, services.settings, name, _declared(request))
     writing = asyncio.ensure_future(_write(request, writer))
     try:
         while not writing.done():
@@ -85,7 +81,7 @@ async def _receive(request: Request, services: Services, name: str, actor: str) 
             if services.stopping.is_set():
                 raise OverloadedError("the server stops", hint="Send the file again in a while.")
         writing.result()
-        return await _on_disk(partial(writer.finish, guess_format, by=actor))
+        return await _on_disk(finish_upload, writer, actor)
     except BaseException as error:
         with CancelScope(shield=True):
             writing.cancel()
@@ -94,6 +90,13 @@ async def _receive(request: Request, services: Services, name: str, actor: str) 
         if isinstance(error, ClientDisconnect):
             raise InputError("the upload was cut off") from None
         raise
+
+
+def _declared(request: Request) -> int:
+    """How many bytes a request says that it has; 0: it says nothing that can be read."""
+    declared = request.headers.get("content-length", "")
+    known = declared.isascii() and declared.isdigit() and len(declared) < 19
+    return int(declared) if known else 0
 
 
 async def _write(request: Request, writer: UploadWriter) -> None:
@@ -120,13 +123,8 @@ async def _on_disk(work: Callable[..., T], *arguments: Any) -> T:
 def get_uploads(services: AppServices, sight: Sees) -> UploadList:
     """Every file of one's own that is still here; an admin is shown everybody's."""
     settings = services.settings
-    mine = [
-        item
-        for item in list_uploads(settings)
-        if sight.sees(None) or any(sight.sees(None, name) for name in item.by)
-    ]
     return UploadList(
-        items=mine,
+        items=own_uploads(settings, sight),
         max_bytes=settings.max_upload_bytes,
         days=settings.upload_days,
     )
@@ -135,7 +133,7 @@ def get_uploads(services: AppServices, sight: Sees) -> UploadList:
 @router.get("/{upload}", operation_id="getUpload", responses=responses(404))
 def get_one(upload: UploadId, services: AppServices) -> UploadDocument:
     """One uploaded file, without its content."""
-    return UploadDocument.model_validate(get_upload(services.settings, upload))
+    return UploadDocument.model_validate(find_upload(services.settings, upload))
 
 
 @router.delete("/{upload}", operation_id="deleteUpload", status_code=204, responses=responses(404))
@@ -144,4 +142,4 @@ def delete_one(upload: UploadId, services: AppServices, sight: Sees) -> None:
 
     Where others have sent the same file, it stays with them; an admin deletes it for all.
     """
-    delete_upload(services.settings, upload, partial(sight.sees, None))
+    delete_own(services.settings, upload, sight)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 from anyio import to_thread
@@ -16,7 +17,6 @@ from app.api.schemas.annotation import points_of
 from app.api.schemas.view_paint import PaintDocument, PaintRequest, ProposalDocument
 from app.child_pool import PoolTask
 from app.review.editing.view_paint import PaintQuestion, paint_question, proposal_question
-from app.store.frames import Frames
 
 router = APIRouter(prefix="/views", tags=["views"])
 
@@ -36,7 +36,7 @@ async def read_paint(
     question = await to_thread.run_sync(
         paint_question, services.store, view, points_of(wanted.lines)
     )
-    found = await _answer(request, services.frames, question, PaintQuestion.ask_paint)
+    found = await _answer(request, question, partial(question.ask_paint, services.frames))
     return Response(status_code=CLIENT_GONE) if found is None else PaintDocument.of(found)
 
 
@@ -55,16 +55,11 @@ async def propose_lines(
     """
     lines = {} if wanted is None else points_of(wanted.lines)
     question = await to_thread.run_sync(proposal_question, services.store, view, lines)
-    found = await _answer(request, services.frames, question, PaintQuestion.ask_proposal)
+    found = await _answer(request, question, partial(question.ask_proposal, services.frames))
     return Response(status_code=CLIENT_GONE) if found is None else ProposalDocument.of(found)
 
 
-async def _answer(
-    request: Request,
-    frames: Frames,
-    question: PaintQuestion,
-    ask: Callable[[PaintQuestion, Frames], PoolTask],
-) -> Any:
+async def _answer(request: Request, question: PaintQuestion, ask: Callable[[], PoolTask]) -> Any:
     """What was found, or None where nobody waits for it any more."""
     with told_with_view(question.view.key):
-        return await while_wanted(request, ask(question, frames))
+        return await while_wanted(request, ask())

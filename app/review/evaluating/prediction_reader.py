@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from app.child import Allowance, ChildEnded
@@ -20,6 +20,7 @@ from app.evaluation.prediction_files import (
 )
 from app.evaluation.prediction_run import ReadPredictions
 from app.soccer.frames import ImageSize
+from app.store.uploads import upload_path
 
 SECONDS, SILENCE = 120.0, 300.0
 """Of processor time, and by the clock, for one set: five million boxes take less."""
@@ -52,6 +53,24 @@ class PredictionFiles:
     category: int | None = None
     size: ImageSize | None = None
     cameras_size: ImageSize | None = None
+
+
+def uploaded_files(
+    settings: Settings,
+    how: PredictionFiles,
+    path: str | None,
+    images: str | None,
+    cameras: str | None,
+) -> PredictionFiles:
+    """Files that were uploaded, by the ids of their uploads, to be read as others would be.
+
+    Raises:
+        NotFoundError: An upload is not there, or has expired.
+    """
+    found = [
+        None if named is None else upload_path(settings, named) for named in (path, images, cameras)
+    ]
+    return replace(how, path=found[0], images=found[1], cameras=found[2])
 
 
 Found = tuple[ReadPredictions, ReadPredictedCameras]
