@@ -9,7 +9,6 @@ from pathlib import Path
 from anyio.to_thread import current_default_thread_limiter
 from fastapi import Depends, FastAPI
 
-from app.api.deps import Services
 from app.api.errors import install_handlers
 from app.api.idempotency import Idempotency
 from app.api.metrics import install_metrics
@@ -72,6 +71,7 @@ from app.api.security.headers import SecurityHeaders
 from app.api.security.lanes import THREADS, Doors, Lanes
 from app.api.security.origin import KnownHosts, SameOrigin
 from app.api.security.requests import HeadAsGet, OneLength, OneRange
+from app.api.services import Services
 from app.api.site import STATIC, Site
 from app.api.team import Team, allowed_hosts
 from app.api.unknown_names import refuse_unknown_parameters

@@ -13,10 +13,10 @@ from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metri
 from prometheus_client.registry import Collector
 from prometheus_fastapi_instrumentator.middleware import PrometheusInstrumentatorMiddleware
 
-from app.api.deps import Services
 from app.api.events import Counts
 from app.api.pages import ELSEWHERE
 from app.api.security.lanes import Doors
+from app.api.services import Services
 from app.child_figures import FIGURES
 from app.errors import StorageError
 from app.review.jobs.vitals import Home, read_home

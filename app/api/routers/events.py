@@ -9,11 +9,12 @@ from typing import Annotated
 from fastapi import APIRouter, Depends, Header, Query, Request
 from fastapi.sse import EventSourceResponse, ServerSentEvent
 
-from app.api.deps import AppServices, Sees, Services, get_services
+from app.api.deps import AppServices, Sees, get_services
 from app.api.events import Feed, hello
 from app.api.problem import Responses, responses
 from app.api.schemas.event import EVENTS
 from app.api.security.requests import is_head
+from app.api.services import Services
 from app.review.datasets.dataset import dataset_id
 
 _MOMENT = re.compile(r"(\d{1,18})-(\d{1,18})", re.ASCII)

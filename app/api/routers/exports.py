@@ -10,7 +10,7 @@ from fastapi import APIRouter, Depends, Path, Request, Response
 from starlette.responses import FileResponse
 
 from app.api.cursor import parse_cursor
-from app.api.deps import Actor, AppServices, Sees, Services
+from app.api.deps import Actor, AppServices, Sees
 from app.api.jobs import ACCEPTED, job_address
 from app.api.problem import Responses, responses
 from app.api.reply import AskedUnder, Reply, document, nothing
@@ -22,6 +22,7 @@ from app.api.schemas.export import (
     ExportRequest,
 )
 from app.api.schemas.job import JobDocument
+from app.api.services import Services
 from app.api.stored_file import stored_file
 from app.errors import ConflictError, NotFoundError
 from app.review.datasets.dataset import dataset_id

@@ -19,7 +19,6 @@ from app.api.deps import (
     Id,
     IfMatch,
     QueryText,
-    Services,
     etag_matches,
 )
 from app.api.problem import Responses, responses
@@ -38,6 +37,7 @@ from app.api.schemas.queue import (
 from app.api.schemas.solution import SolutionDocument
 from app.api.schemas.verdict import VerdictEdit
 from app.api.security.access import login_of
+from app.api.services import Services
 from app.errors import NotFoundError
 from app.review.agreement.weigh import after_hand_in
 from app.review.datasets.dataset import dataset_id

@@ -11,9 +11,10 @@ from anyio.lowlevel import RunVar
 from fastapi import APIRouter, Path, Query, Request, Response
 from starlette.requests import ClientDisconnect
 
-from app.api.deps import Actor, AppServices, Sees, Services
+from app.api.deps import Actor, AppServices, Sees
 from app.api.problem import responses
 from app.api.schemas.upload import UploadDocument, UploadList
+from app.api.services import Services
 from app.errors import InputError, OverloadedError
 from app.review.importing.receiving import (
     Upload,

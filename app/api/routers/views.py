@@ -11,14 +11,7 @@ from typing import Annotated
 from anyio import to_thread
 from fastapi import APIRouter, Body, Query, Request, Response
 
-from app.api.deps import (
-    Actor,
-    AppServices,
-    Id,
-    IfMatch,
-    Services,
-    etag_matches,
-)
+from app.api.deps import Actor, AppServices, Id, IfMatch, etag_matches
 from app.api.pool_answer import while_wanted
 from app.api.problem import Responses, responses
 from app.api.reply import Asked, AskedUnder
@@ -27,6 +20,7 @@ from app.api.schemas.annotation import BallEdit, LinesEdit
 from app.api.schemas.group import GroupDocument
 from app.api.schemas.view import NeighbourList, ViewEdit, frames_away
 from app.api.security.lanes import is_large
+from app.api.services import Services
 from app.child import ChildEnded
 from app.errors import ImageError, NotFoundError, StorageError, TooLargeError
 from app.review.editing.edit import (

@@ -7,7 +7,7 @@ from typing import Annotated
 
 from fastapi import APIRouter, Depends, Request, Response
 
-from app.api.deps import Actor, AppServices, AppStore, DatasetPath, Id, Sees, Services
+from app.api.deps import Actor, AppServices, AppStore, DatasetPath, Id, Sees
 from app.api.problem import responses
 from app.api.reply import AskedUnder, Reply, document, nothing
 from app.api.schemas.take import HandBack
@@ -24,6 +24,7 @@ from app.api.schemas.work import (
     WorkBatchList,
 )
 from app.api.security.access import login_of
+from app.api.services import Services
 from app.review.agreement.weigh import after_hand_in
 from app.review.people.logins import Login
 from app.review.people.roles import Action, may

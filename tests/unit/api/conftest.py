@@ -15,10 +15,10 @@ from fastapi import FastAPI
 from starlette.types import ASGIApp
 
 from app.api.application import create_app
-from app.api.deps import Services
 from app.api.errors import install_handlers
 from app.api.pages import install_pages
 from app.api.security.headers import SecurityHeaders
+from app.api.services import Services
 from app.api.site import Site
 from app.config import Settings
 from app.geometry.camera import Camera

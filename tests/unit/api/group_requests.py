@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from app.api.deps import Services
+from app.api.services import Services
 from app.review.people.people import invite
 from app.review.people.roles import Role
 from app.review.takes.take import begin_take, hand_in

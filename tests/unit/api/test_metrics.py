@@ -20,10 +20,10 @@ from starlette.requests import Request
 from starlette.testclient import TestClient
 
 from app.api import metrics
-from app.api.deps import Services
 from app.api.large_edits import LargeEdits
 from app.api.previews import Previews
 from app.api.security.lanes import EDITS, LANES
+from app.api.services import Services
 from app.child import ChildEnded
 from app.child_figures import KINDS
 from app.child_pool import ChildPool

@@ -10,7 +10,7 @@ import pytest
 from sqlalchemy import select
 from structlog.testing import capture_logs
 
-from app.api.deps import Services
+from app.api.services import Services
 from app.store.job_models import AnswerModel
 from app.store.session import Session
 from app.store.store import Store

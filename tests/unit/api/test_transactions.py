@@ -25,7 +25,7 @@ def transactions(source: str) -> list[int]:
         for call in opened
         if isinstance(call, ast.Call)
         and isinstance(call.func, ast.Attribute)
-        and call.func.attr in ("read", "glance", "write")
+        and call.func.attr in ("read", "glance", "peek", "write")
     ]
 
 
@@ -34,5 +34,6 @@ def test_no_route_opens_a_transaction(path: Path) -> None:
     assert transactions(path.read_text()) == []
 
 
-def test_the_search_finds_a_transaction_that_is_opened() -> None:
-    assert transactions("with store.read() as session:\n    ...") == [1]
+@pytest.mark.parametrize("way", ["read", "glance", "peek", "write"])
+def test_the_search_finds_a_transaction_that_is_opened(way: str) -> None:
+    assert transactions(f"with store.{way}() as session:\n    ...") == [1]

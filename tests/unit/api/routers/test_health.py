@@ -16,7 +16,7 @@ from fastapi import FastAPI
 from starlette.testclient import TestClient
 from structlog.testing import capture_logs
 
-from app.api.deps import Services
+from app.api.services import Services
 from app.config import Settings
 
 API = "/api/v1"

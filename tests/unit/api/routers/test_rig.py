@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from app.api.deps import Services
+from app.api.services import Services
 from app.review.importing.ingest import ingest
 from tests.rigs import groups
 

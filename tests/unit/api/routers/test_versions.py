@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from app.api.deps import Services
+from app.api.services import Services
 from app.review.jobs.jobs import Jobs
 from app.review.jobs.versions import request_freeze, resume_versions
 from app.review.versions.freeze import FreezeRequest, freeze
