@@ -1,0 +1,220 @@
+"""Exports into object storage, by the review floor and by a server that shows what lies there."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import time
+import zipfile
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+
+from app.config import Settings
+from app.errors import InputError, NotFoundError, StorageError
+from app.object_store.path import find_path, target_path
+from app.object_store.store import open_store
+from app.review.exporting.export import export
+from app.review.importing.sources import Source, import_source
+from app.store.store import Store
+from tests.e2e.service import serving
+from tests.moto_server import Door, store_settings, stored_settings
+
+
+@pytest.fixture(scope="session")
+def imported(
+    _server: Door, filled_store: str, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[Store]:
+    """A database with the dataset of the store."""
+    settings = stored_settings(tmp_path_factory.mktemp("imported"), _server)
+    with contextlib.closing(Store.open(settings)) as store:
+        source = Source("soccernet-v3", find_path(settings, filled_store))
+        done = import_source(store, "league", source, settings)
+        assert done.complete
+        again = import_source(store, "league", source, settings)
+        assert again.result.unchanged == done.result.new == 4
+        yield store
+
+
+class TestExports:
+    def test_a_zip_appears_when_it_is_complete_with_the_frames_of_the_store(
+        self, imported: Store, door: Door, tmp_path: Path
+    ) -> None:
+        settings = imported.settings
+        out = target_path(settings, "s3://frames/out/league.zip")
+        export(imported, "league", "coco", out, everything=True, images="copy")
+        local = export(
+            imported, "league", "coco", tmp_path / "l.zip", everything=True, images="copy"
+        )
+        data, _ = out.store.read_whole(out.key, 2**30)
+        (tmp_path / "s.zip").write_bytes(data)
+        with zipfile.ZipFile(tmp_path / "s.zip") as there, zipfile.ZipFile(local.out) as here:  # type: ignore[arg-type]
+            assert there.testzip() is None
+            assert {n: there.read(n) for n in there.namelist()} == {
+                n: here.read(n) for n in here.namelist()
+            }
+            assert any(name.endswith(".png") for name in there.namelist())
+        assert not [*settings.exports.glob(".*")]
+
+    def test_an_upload_that_breaks_off_leaves_the_earlier_export(
+        self, settings: Settings, imported: Store, door: Door
+    ) -> None:
+        out = target_path(settings, "s3://frames/out/twice.zip")
+        export(imported, "league", "parquet", out, everything=True)
+        before = out.store.head(out.key)
+        with pytest.raises(RuntimeError), out.store.writing(out.key, "application/zip") as file:
+            file.write(b"half of it")
+            raise RuntimeError
+        assert out.store.head(out.key) == before
+        door.writes_fail_after = 0
+        with pytest.raises(StorageError, match="refuses the keys"):
+            export(imported, "league", "soccernet-v3", out, everything=True, images="copy")
+        door.reset()
+        assert out.store.head(out.key) == before
+        export(imported, "league", "soccernet-v3", out, everything=True)
+        assert out.store.head(out.key) != before
+
+    def test_the_manifest_of_a_folder_comes_last_and_goes_first(
+        self, settings: Settings, imported: Store, door: Door
+    ) -> None:
+        out = target_path(settings, "s3://frames/out/folder")
+        export(imported, "league", "soccernet-v3", out, everything=True, images="copy")
+        written = [line.rsplit("/", 1)[-1] for line in door.asked if line.startswith("PUT")]
+        assert written[-1] == "manifest.json"
+        first = {item.key for item in out.store.below(out.key)}
+        export(imported, "league", "soccernet-v3", out, everything=True)
+        second = {item.key for item in out.store.below(out.key)}
+        assert second < first and f"{out.key}/manifest.json" in second
+        door.reset()
+        door.writes_fail_after = 1
+        with pytest.raises(StorageError):
+            export(imported, "league", "soccernet-v3", out, everything=True)
+        door.reset()
+        with pytest.raises(NotFoundError):
+            out.store.head(f"{out.key}/manifest.json")
+
+    def test_what_is_not_an_earlier_export_stays(self, settings: Settings, imported: Store) -> None:
+        for key in ("own.zip", "own/notes.txt"):
+            open_store(settings, "frames").put(key, b"somebody's own")
+        for name in ("own.zip", "own", ""):
+            with pytest.raises(InputError, match=r"no earlier export|name a folder"):
+                export(
+                    imported,
+                    "league",
+                    "parquet",
+                    target_path(settings, f"s3://frames/{name}"),
+                    everything=True,
+                )
+        assert open_store(settings, "frames").read_whole("own.zip", 99)[0] == b"somebody's own"
+
+    def test_a_store_that_is_only_read_from_takes_no_export(
+        self, imported: Store, door: Door, tmp_path: Path
+    ) -> None:
+        closed = stored_settings(tmp_path / "closed", door, exports=False)
+        with pytest.raises(InputError, match="only read from"):
+            export(
+                imported,
+                "league",
+                "parquet",
+                target_path(closed, "s3://frames/x.zip"),
+                everything=True,
+            )
+
+
+class TestServer:
+    def test_a_dataset_of_a_store_is_imported_shown_and_exported_there(
+        self, door: Door, filled_store: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        stores = {"frames": _as_json(door), "signing": _as_json(door, delivery="signed")}
+        monkeypatch.setenv("TOUCHLINE_STORES", json.dumps(stores))
+        home = tmp_path / "home"
+        home.mkdir(mode=0o700)
+        with (
+            serving(home) as address,
+            httpx.Client(base_url=f"{address}/api/v1") as ask,
+        ):
+            self._imports(ask, filled_store)
+            views = self._views(ask)
+            self._shows(ask, door, views)
+            self._exports(ask, door)
+
+    def _imports(self, ask: httpx.Client, address: str) -> None:
+        listed = ask.get("/imports/folders", params={"path": "s3://frames"}).json()
+        assert {"path": address, "name": "league", "folder": True} in listed["items"]
+        refused = {"s3://nowhere/x": 404, "s3://frames/../x": 400, "http://127.0.0.1/x": 400}
+        for wrong, status in refused.items():
+            body = {"dataset": "l", "format": "soccernet-v3", "source": {"folder": wrong}}
+            assert ask.post("/imports", json=body).status_code == status, wrong
+        body = {"dataset": "league", "format": "soccernet-v3", "source": {"folder": address}}
+        body |= {"policy": "paper"}
+        job = finished(ask, ask.post("/imports", json=body))
+        assert (job["state"], job["result"]["new"]) == ("done", 4), job
+
+    def _views(self, ask: httpx.Client) -> list[str]:
+        groups = ask.get("/groups", params={"dataset": "league"}).json()["items"]
+        document = ask.get(f"/groups/{groups[0]['id']}").json()
+        return [view["image"] for view in document["views"]]
+
+    def _shows(self, ask: httpx.Client, door: Door, views: list[str]) -> None:
+        root = str(ask.base_url).partition("/api/")[0]
+        door.mode = "hangs"
+        with ThreadPoolExecutor(4) as people:
+            late = [people.submit(httpx.get, f"{root}{view}", timeout=60) for view in views]
+            # Whoever asks for something else is not kept waiting for the store.
+            assert httpx.get(f"{root}/api/v1/datasets", timeout=60).status_code == 200
+        for answer in late:
+            assert answer.result().status_code == 503, answer.result().text
+            assert "does not answer in time" in answer.result().json()["detail"]
+        door.mode = "open"
+        for view in views:
+            whole = httpx.get(f"{root}{view}", timeout=60)
+            assert (whole.status_code, whole.headers["content-type"]) == (200, "image/png")
+
+    def _exports(self, ask: httpx.Client, door: Door) -> None:
+        asked = {"dataset": "league", "format": "soccernet-v3", "all": True}
+        for wrong, status in (
+            ("s3://frames/a/folder", 400),
+            ("s3://nowhere/a.zip", 404),
+            ("s3://frames/../a.zip", 400),
+        ):
+            refused = ask.post("/exports", json={**asked, "to": wrong})
+            assert refused.status_code == status, wrong
+        to = "s3://frames/rest/league.zip"
+        job = finished(ask, ask.post("/exports", json={**asked, "to": to}))
+        assert job["state"] == "done", job
+        content = f"/exports/{job['id']}/content"
+        whole = ask.get(content)
+        assert whole.status_code == 200 and whole.content[:2] == b"PK"
+        assert int(whole.headers["content-length"]) == len(whole.content)
+        part = ask.get(content, headers={"Range": "bytes=2-9"})
+        assert (part.status_code, part.content) == (206, whole.content[2:10])
+        tail = ask.get(content, headers={"Range": "bytes=-5"})
+        assert tail.content == whole.content[-5:]
+        assert ask.get(content, headers={"Range": "bytes=999999999-"}).status_code == 416
+        same = ask.get(content, headers={"If-None-Match": whole.headers["etag"]})
+        assert same.status_code == 304
+        assert ask.post("/exports", json={**asked, "to": to}).status_code == 400
+        job = finished(ask, ask.post("/exports", json={**asked, "to": "s3://signing/rest/s.zip"}))
+        sent = ask.get(f"/exports/{job['id']}/content")
+        assert sent.status_code == 307 and sent.headers["cache-control"] == "no-store"
+        assert "X-Amz-Expires=60" in sent.headers["location"]
+        assert httpx.get(sent.headers["location"]).content[:2] == b"PK"
+
+
+def finished(ask: httpx.Client, answer: httpx.Response) -> dict[str, Any]:
+    """The job of an answer, once it is over."""
+    assert answer.status_code == 202, answer.text
+    job: dict[str, Any] = answer.json()
+    while job["state"] in ("waiting", "running"):
+        time.sleep(0.1)
+        job = ask.get(f"/jobs/{job['id']}").json()
+    return job
+
+
+def _as_json(door: Door, **more: object) -> dict[str, object]:
+    found = store_settings(door, **more).model_dump(mode="json", exclude_none=True)
+    return {**found, "key": "tests", "secret": "of-tests"}
