@@ -45,7 +45,7 @@ PLAIN_WORDS = """
     candidate drawn proposal propose scoring search straight
     3d accept action actions address adjust adjustments advice ahead anchor annotate answers app
     application archives arrays arrival ask axis backup bar bars batches best binned bodies
-    bundle body boxes bulk button buttons cache calibrate canvas caption card cards cell changes chart
+    bundle body boxes bulk button buttons cache calibrate canonical canvas caption card cards cell changes chart
     child chip chooser class cli client clock codec codecs colours command comparison completion
     conditions config confirm connections contact copy cross csv cursor curve damped delete deps details
     detect diagram dialog diff doctor document documents drags drawing durable editor empty
@@ -53,14 +53,14 @@ PLAIN_WORDS = """
     exports facets facts fan faults fields figure figures files finite first fixes fixture
     folder folders follow form format formats frozen gathered gestures glossary grass grid guess guide header
     headers heads health heat help histograms history hit home hooks idempotency identity if image images
-    import imports in info init insight items jaccard json judged key keys known konva last latest lazy
+    import imports in info init insight items jaccard json judged keep key keys known konva last latest lazy
     least leftovers legend lens lesson lessons letter licence list listing live locks look loupe
     kernels profile trace
     main map markdown marks match matches matrix membership menu merge metrics migrate mini missing
     model models modules name names navigation neighbours nested notice nudge numbers object
     observability onnx open openapi opened options order origin orphans output overlap page pages
     paint palette parquet parse patch pen pins pitch pitches pixel place places plain png pointer
-    policies pool popover pose position preview problem progress projection props query rail reader reasons
+    policies pool popover pose position preview problem progress projection props query rail reader reasons receiving
     recompute record remedies removal render reply report requests resect resource restore result
     revert reviewers rotation router row rows run runs sample save scale scene scene3d scenes score
     scoreboard sending server service session sets shadows sheet singular site smallest solve
