@@ -62,15 +62,21 @@ def uploaded_files(
     images: str | None,
     cameras: str | None,
 ) -> PredictionFiles:
-    """Files that were uploaded, by the ids of their uploads, to be read as others would be.
+    """Uploaded files of predictions.
+
+    Args:
+        settings: Where uploads lie.
+        how: How to read them.
+        path: Id of the upload, or None; ``images`` and ``cameras`` likewise.
 
     Raises:
         NotFoundError: An upload is not there, or has expired.
     """
-    found = [
-        None if named is None else upload_path(settings, named) for named in (path, images, cameras)
-    ]
-    return replace(how, path=found[0], images=found[1], cameras=found[2])
+
+    def place(upload: str | None) -> Path | None:
+        return None if upload is None else upload_path(settings, upload)
+
+    return replace(how, path=place(path), images=place(images), cameras=place(cameras))
 
 
 Found = tuple[ReadPredictions, ReadPredictedCameras]

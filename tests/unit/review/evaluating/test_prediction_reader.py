@@ -10,11 +10,17 @@ import pytest
 
 from app.config import Settings
 from app.datasets.file_tree import Limits
-from app.errors import DatasetFormatError, OverloadedError, TooLargeError
+from app.errors import DatasetFormatError, NotFoundError, OverloadedError, TooLargeError
 from app.evaluation.frame_names import FrameNames, NamedFrame
 from app.review.evaluating import prediction_reader
-from app.review.evaluating.prediction_reader import PredictionFiles, PredictionReader, read_files
+from app.review.evaluating.prediction_reader import (
+    PredictionFiles,
+    PredictionReader,
+    read_files,
+    uploaded_files,
+)
 from app.soccer.frames import ImageSize
+from app.store.uploads import UploadWriter
 
 NAMES = FrameNames.of([NamedFrame(1, "demo/7", "7.png", "demo", ImageSize(1280, 720))])
 
@@ -35,6 +41,25 @@ def reader_of() -> Iterator[Callable[..., PredictionReader]]:
 def written(path: Path, content: bytes) -> PredictionFiles:
     path.write_bytes(content)
     return PredictionFiles(path)
+
+
+class TestUploadedFiles:
+    def test_each_upload_is_found_and_how_they_are_read_stays(self, tmp_path: Path) -> None:
+        settings = Settings(home=tmp_path / "home")
+
+        def sent(name: str) -> str:
+            writer = UploadWriter(settings, name)
+            writer.write(name.encode())
+            return writer.finish().id
+
+        names = ("boxes.csv", "images.json", "cameras.zip")
+        how = PredictionFiles(None, "csv", category=3)
+        found = uploaded_files(settings, how, *map(sent, names))
+        assert [found.path.name, found.images.name, found.cameras.name] == [*names]
+        assert (found.format, found.category) == ("csv", 3)
+        assert uploaded_files(settings, how, None, None, None) == how
+        with pytest.raises(NotFoundError):
+            uploaded_files(settings, how, "0" * 32, None, None)
 
 
 class TestPredictionReader:
