@@ -13,7 +13,7 @@ from app.api.schemas.group import GroupDocument
 from app.evaluation.agreement_limits import Disagreement, Spread
 from app.evaluation.annotation_distance import Ball3DDistance, LineDistance, ViewDistance
 from app.review.agreement.adjudicate import Case, Waiting
-from app.review.agreement.compare import Comparison, Pair
+from app.review.agreement.compare import AnnotationPair, Comparison
 from app.review.agreement.summary import GroupAgreement, PeopleAgreement
 
 Side = Literal["a", "b"]
@@ -85,7 +85,7 @@ class DisagreementDocument(Document, shows=Disagreement):
     sentence: str = Field(description="For people; a and b stand for the two.")
 
 
-class AnnotationPairDocument(Document, shows=Pair):
+class AnnotationPairDocument(Document, shows=AnnotationPair):
     """Two of the annotations, by their places in `groups`, from 0."""
 
     distance: GroupDistanceDocument

@@ -12,7 +12,7 @@ from app.api.schemas.version import VersionId
 from app.evaluation.comparison import Difference
 from app.evaluation.figure import Axis, Mark
 from app.evaluation.result import FrameResult
-from app.evaluation.table import Cell, Column, Frames, Row
+from app.evaluation.table import Cell, Column, FrameRange, Row
 from app.review.evaluating.evaluation import Comparison, read_tables
 from app.review.evaluating.evaluation_run import EvaluationRequest
 
@@ -68,7 +68,7 @@ class ColumnDocument(Document, shows=Column):
     """What a column holds; `better` is `higher`, `lower` or empty."""
 
 
-class FramesLink(Document, shows=Frames):
+class FramesLink(Document, shows=FrameRange):
     """The frames behind a number, as parameters of `/evaluations/{id}/frames`."""
 
 

@@ -22,6 +22,8 @@ from app.store.log import Entry, append
 from app.store.people import person_by_name
 from app.store.session import Session
 from app.store.store import Store
+from app.store.threads import StoredComment as StoredComment
+from app.store.threads import StoredThread as StoredThread
 from app.store.threads import (
     ThreadGroup,
     change_comment,
@@ -33,8 +35,6 @@ from app.store.threads import (
     set_mentions,
     set_resolved,
 )
-from app.store.threads import StoredComment as StoredComment
-from app.store.threads import StoredThread as StoredThread
 
 COMMENT = "comment"
 """Kind of the log's entries about comments."""
