@@ -7,6 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
+from app.commands.batch_fields import SHOWN
 from app.commands.opened import opened_store
 from app.commands.options import Json, acting
 from app.commands.server import connected, given_server
@@ -16,27 +17,6 @@ commands = typer.Typer(help="Groups that are given out to people.", no_args_is_h
 
 Dataset = Annotated[str, typer.Argument(help="Name or id of the dataset.")]
 Number = Annotated[int, typer.Argument(help="Number of the batch.", min=1)]
-SHOWN = (
-    "id",
-    "dataset",
-    "name",
-    "state",
-    "groups",
-    "waiting",
-    "handed_in",
-    "settled",
-    "due",
-    "annotators",
-    "reviewers",
-    "query",
-    "sort",
-    "verdicts",
-    "blind",
-    "created",
-    "created_by",
-    "last",
-)
-"""What of a batch is printed, in this order."""
 
 
 @commands.command("list")

@@ -12,6 +12,7 @@ from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from app.commands.batch_fields import SHOWN
 from app.errors import InputError, NotFoundError
 from app.finite import json_text
 from app.object_store.address import is_address
@@ -189,8 +190,6 @@ def change_gold(client: Client, number: int, gold_every: int | None) -> dict[str
 
 
 def _batch(item: Mapping[str, Any]) -> dict[str, Any]:
-    from app.commands.batches import SHOWN
-
     last = None if item["last"] is None else _time(item["last"])
     own = {"query": item["q"], "created": _time(item["created"]), "last": last}
     return {name: {**item, **own}[name] for name in SHOWN}
