@@ -9,7 +9,8 @@ from typing import Any
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "fixes.md"
 TEXT = """
 What the browser's buttons do, as requests. Findings (`views[].findings`, `GET /findings`) and remedies (`GET /groups/{id}/remedies`) say in
-`fix.action`, or `edit.action`, what they propose, and in `offers` hold the edit that does it. Every request below takes `If-Match` with the
+`fix.action`, or `edit.action`, what they propose, and in `offers` hold the edit that does it, or in `guide` say where a person has to look or draw.
+Buttons and pictures are made of `offers`, `guide` and their captions alone: nobody needs to know the actions. Every request below takes `If-Match` with the
 **group's** ETag and answers the whole group, solved; `POST /groups/{id}/undo` takes it back. A static camera's lines belong to its station:
 `PATCH /stations/{id}/lines?group={id}` with the station's ETag.
 """.strip()
@@ -47,7 +48,7 @@ BY_HAND = {
 FINDINGS: dict[str, tuple[tuple[str, ...], str]] = {
     "wrong_label": (("relabel", "drop_marking"), ""),
     "sides_swapped": (("swap_sides",), ""),
-    "visible_not_annotated": ((), "draw the marking: `PATCH /views/{id}/lines`"),
+    "visible_not_annotated": ((), "draw the marking that `guide` names: `PATCH /views/{id}/lines`"),
     "bad_point": (("drop_point",), ""),
     "under_constrained": ((), "draw more markings: `PATCH /views/{id}/lines`"),
     "paint_disagrees": (
@@ -62,7 +63,10 @@ FINDINGS: dict[str, tuple[tuple[str, ...], str]] = {
     "view_disagrees": (("exclude_view",), "or correct its ball: `PATCH /views/{id}/ball`"),
     "views_contradict": (("exclude_view",), ""),
     "not_synchronous": ((), "correct a ball, or reject: `PUT /groups/{id}/verdict`"),
-    "ball_size": ((), "correct the box: `PATCH /views/{id}/ball`"),
+    "ball_size": (
+        (),
+        "`offers` has a box of the right size; if it is not the ball, correct it: `PATCH /views/{id}/ball`",
+    ),
     "low_parallax": ((), "nothing mends it; reject, or ask for more: `PUT /datasets/{id}/policy`"),
     "high_uncertainty": ((), "the same"),
     "implausible_ball": ((), "correct a ball or its lines"),

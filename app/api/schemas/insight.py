@@ -7,7 +7,7 @@ from typing import Any
 from pydantic import Field, model_validator
 
 from app.api.schemas.document import Document, ListDocument
-from app.api.schemas.solution import XY, FixDocument, Jac, OfferDocument
+from app.api.schemas.solution import XY, FixDocument, GuideDocument, Jac, OfferDocument
 from app.review.editing.influence import Influence
 from app.review.editing.remedies import Remedy
 
@@ -29,6 +29,9 @@ class RemedyDocument(Document):
     edit: RemedyEdit
     offers: list[OfferDocument] = Field(
         description="Edits that carry it out; none where a person has to look or draw."
+    )
+    guide: GuideDocument | None = Field(
+        description="Where that person is led; null where edits are offered."
     )
     value: float | None = Field(description="The gate's value after the edit.")
     passes: bool = Field(description="Whether the whole group would pass after the edit.")

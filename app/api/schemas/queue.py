@@ -9,7 +9,13 @@ from pydantic import Field
 
 from app.api.schemas.document import Document, ListDocument
 from app.api.schemas.group import State, image_address
-from app.api.schemas.solution import FailingGate, FindingDocument, FixDocument, OfferDocument
+from app.api.schemas.solution import (
+    FailingGate,
+    FindingDocument,
+    FixDocument,
+    GuideDocument,
+    OfferDocument,
+)
 from app.review.editing.past import STATION_EDITS, LogEntry
 from app.review.queue.findings import GroupFindings
 from app.review.queue.listing import GroupRow as QueueRow
@@ -146,7 +152,11 @@ class FindingRow(Document):
     confidence: float | None
     sentence: str
     fix: FixDocument | None
-    offers: list[OfferDocument] = Field(description="Edits that carry the fix out.")
+    offers: list[OfferDocument] = Field(description="Edits that mend it.")
+    guide: GuideDocument | None = Field(
+        description="Where a person is led who has to look or draw; null where edits are offered, "
+        "or nothing."
+    )
 
     @staticmethod
     def of(found: GroupFindings, finding: Finding) -> FindingRow:

@@ -14,7 +14,7 @@ from app.datasets.camera_json import camera_to_json
 from app.geometry.camera import Camera
 from app.geometry.lens import BROWN_CONRADY
 from app.review.editing.codec import edit_to_json
-from app.review.editing.fixes import offers
+from app.review.editing.fixes import guide_of_finding, offers_of_finding
 from app.soccer.camera_sigma import CameraSigma, camera_sigma
 from app.soccer.finding import Finding, Fix
 from app.soccer.frames import Box, ImageSize
@@ -299,6 +299,25 @@ class OfferDocument(Document):
         description="As the history writes edits: `set_lines`, `set_balls`, "
         "`set_picture` or `include_view`."
     )
+    caption: str = Field(
+        description="Words beside the marking or the point that it changes in the picture, or over "
+        "the whole view; empty: none."
+    )
+
+
+class GuideDocument(Document):
+    """Where a person is led who has to look or draw: what no edit can do for them."""
+
+    label: str = Field(description="What a button for it says.")
+    caption: str = Field(description="Words beside the place in the picture; empty: none.")
+    draws: str | None = Field(description="The marking to draw; null: none.")
+    looks: XY | None = Field(
+        description="Where the ball would have to be, pixels; null: there is no place to look at."
+    )
+    reads: bool = Field(
+        description="Whether the picture is to be read again, with those of its match: "
+        "`POST /datasets/{id}/paint`."
+    )
 
 
 class FindingDocument(Document, shows=Finding):
@@ -306,8 +325,12 @@ class FindingDocument(Document, shows=Finding):
 
     fix: FixDocument | None
     offers: list[OfferDocument] = Field(
-        description="Edits that carry the fix out: none when only a person can, several to choose "
-        "from."
+        description="Edits that mend it, as its fix proposes or without one: none when only a person "
+        "can, several to choose from."
+    )
+    guide: GuideDocument | None = Field(
+        description="Where a person is led who has to look or draw; null where edits are offered, "
+        "or nothing."
     )
 
     @model_validator(mode="before")
@@ -315,7 +338,8 @@ class FindingDocument(Document, shows=Finding):
     def _with_offers(cls, value: Any, info: ValidationInfo) -> Any:
         group: Any = info.context
         if isinstance(value, Finding):
-            return {**vars(value), "offers": offers(group, value.fix)}
+            found = {"offers": offers_of_finding(group, value), "guide": guide_of_finding(value)}
+            return {**vars(value), **found}
         return value
 
 

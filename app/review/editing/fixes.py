@@ -1,4 +1,4 @@
-"""Fixes: what a finding or a remedy proposes, as the edit that carries it out and in words."""
+"""Fixes: what a finding or a remedy proposes, as edits that carry it out or as a guide to the place, and in words."""
 
 from __future__ import annotations
 
@@ -7,19 +7,40 @@ from dataclasses import dataclass, replace
 
 from app.review.editing.edit import Edit, IncludeView, SetBall, SetLines, SetPicture
 from app.soccer.annotation import BallAnnotation
-from app.soccer.finding import Fix
-from app.soccer.frames import ImagePoint
+from app.soccer.finding import Finding, Fix
+from app.soccer.frames import Box, ImagePoint
 from app.soccer.group import Group, View
 from app.soccer.picture import OPEN
 from app.soccer.pitch import twin_marking
+from app.solving.paint_findings import READ_PAINT
 
 
 @dataclass(frozen=True)
 class Offer:
-    """An edit that carries a fix out, and the words on its button."""
+    """An edit that carries a fix out, the words on its button and those beside what it changes."""
 
     label: str
     edit: Edit
+    caption: str = ""
+
+
+@dataclass(frozen=True)
+class Guide:
+    """Where a person is led who has to look or draw: what no edit can do for them.
+
+    Attributes:
+        label: On its button.
+        caption: Words beside the place in the picture.
+        draws: The marking to draw.
+        looks: Where the ball would have to be, pixels of the annotated size.
+        reads: Whether the picture is to be read again, with those of its match.
+    """
+
+    label: str
+    caption: str = ""
+    draws: str | None = None
+    looks: ImagePoint | None = None
+    reads: bool = False
 
 
 def offers(group: Group, fix: Fix | None, point: ImagePoint | None = None) -> tuple[Offer, ...]:
@@ -35,7 +56,39 @@ def offers(group: Group, fix: Fix | None, point: ImagePoint | None = None) -> tu
         return ()
     action = _ACTIONS[fix.action]
     found = ((one, action.edit(view, one, point)) for one in _choices(view, fix))
-    return tuple(Offer(_words(action.label, one), edit) for one, edit in found if edit)
+    return tuple(
+        Offer(_words(action.label, one), edit, _words(action.caption, one))
+        for one, edit in found
+        if edit
+    )
+
+
+def guide(fix: Fix | None, point: ImagePoint | None = None) -> Guide | None:
+    """Where a fix leads a person; None where an edit carries it out.
+
+    Args:
+        fix: What to do; None: nothing is proposed.
+        point: Where ``look_ball`` would see the ball, pixels of the annotated size.
+    """
+    if fix is None or fix.action not in _GUIDES:
+        return None
+    action = _ACTIONS[fix.action]
+    reads = fix.action == READ_PAINT
+    return Guide(action.label, action.caption, fix.marking, point, reads)
+
+
+def offers_of_finding(group: Group, finding: Finding) -> tuple[Offer, ...]:
+    """The edits that mend what a finding says: those of its fix, or its ball's box fitted."""
+    if finding.kind == "ball_size":
+        return _fitted(group, finding)
+    return offers(group, finding.fix)
+
+
+def guide_of_finding(finding: Finding) -> Guide | None:
+    """Where a finding leads a person; None where it offers edits, or nothing."""
+    if finding.kind == "visible_not_annotated":
+        return guide(Fix("draw_marking", finding.view, finding.marking))
+    return guide(finding.fix)
 
 
 def edit_of_fix(group: Group, fix: Fix, point: ImagePoint | None = None) -> Edit | None:
@@ -62,6 +115,16 @@ def ball_at(view: str, ball: BallAnnotation, point: ImagePoint) -> SetBall:
     box = ball.box
     moved = replace(box, x=point.x - box.width / 2, y=point.y - box.height / 2)
     return SetBall(view, replace(ball, box=moved))
+
+
+def _fitted(group: Group, finding: Finding) -> tuple[Offer, ...]:
+    """A box as large as the ball looks at its distance; the number is how many times as large it is now."""
+    view = None if finding.view is None else group.view(finding.view)
+    ball = None if view is None else view.ball
+    if view is None or ball is None or ball.box is None or not finding.number:
+        return ()
+    box = Box.square(ball.box.center, ball.box.diameter / finding.number)
+    return (Offer("Fit the box", SetBall(view.key, replace(ball, box=box))),)
 
 
 def _words(text: str, fix: Fix, **more: str | float) -> str:
@@ -140,44 +203,70 @@ class _Action:
 
     Attributes:
         sentence: What would have to be so; empty where whoever proposes it says more.
-        label: On the button of its edit.
+        label: On its button.
+        caption: Beside what it is about in the picture.
         edit: Makes the edit of a view; None where the fix does not fit it.
     """
 
     rank: int
     sentence: str = ""
     label: str = ""
+    caption: str = ""
     edit: Callable[[View, Fix, ImagePoint | None], Edit | None] = _nothing
 
 
 _ACTIONS = {
     "relabel": _Action(
-        0, "{marking} in {letter} was relabelled as {to}", "Relabel as {to}", _relabel
+        0,
+        "{marking} in {letter} was relabelled as {to}",
+        "Relabel as {to}",
+        "{marking} → {to}",
+        _relabel,
     ),
     "swap_sides": _Action(
-        0, "left and right were swapped in {letter}", "Swap left and right", _swap_sides
+        0,
+        "left and right were swapped in {letter}",
+        "Swap left and right",
+        "Left and right swapped?",
+        _swap_sides,
     ),
     "pick_ball": _Action(
-        0, "ball {number} was the one in play in {letter}", "Keep ball {number}", _pick_ball
+        0, "ball {number} was the one in play in {letter}", "Keep ball {number}", edit=_pick_ball
     ),
     "free_picture": _Action(
-        1, "the picture of {letter} was stretched or cropped", "Solve it so", _free_picture
+        1, "the picture of {letter} was stretched or cropped", "Solve it so", edit=_free_picture
     ),
     "move_point": _Action(
         1,
         "point {number} of {marking} in {letter} moved {px:.1f} px",
         "Move the point",
+        "point {number} of {marking}",
         _move_point,
     ),
     "look_ball": _Action(
-        1, "the ball of {letter} was really {px:.1f} px away, on the ray of the other view"
+        1,
+        "the ball of {letter} was really {px:.1f} px away, on the ray of the other view",
+        "Show the place",
+        "is the ball here?",
     ),
-    "draw_marking": _Action(2),
-    "read_paint": _Action(1),
-    "include_view": _Action(2, "{letter} was used again", "Use it again", _include),
+    "draw_marking": _Action(2, label="Draw it"),
+    READ_PAINT: _Action(1, label="Read its paint"),
+    "include_view": _Action(2, "{letter} was used again", "Use it again", edit=_include),
     "drop_point": _Action(
-        3, "point {number} of {marking} in {letter} was dropped", "Drop the point", _drop_point
+        3,
+        "point {number} of {marking} in {letter} was dropped",
+        "Drop the point",
+        "point {number} of {marking}",
+        _drop_point,
     ),
-    "drop_marking": _Action(4, "{marking} in {letter} was dropped", "Drop the line", _drop_marking),
-    "exclude_view": _Action(5, "{letter} was left out", "Leave it out", _include),
+    "drop_marking": _Action(
+        4,
+        "{marking} in {letter} was dropped",
+        "Drop the line",
+        "{marking}: fits nothing",
+        _drop_marking,
+    ),
+    "exclude_view": _Action(5, "{letter} was left out", "Leave it out", edit=_include),
 }
+_GUIDES = frozenset(name for name, action in _ACTIONS.items() if action.edit is _nothing)
+"""Actions that no edit carries out."""

@@ -10,7 +10,16 @@ import numpy as np
 
 from app.geometry.arrays import FloatArray
 from app.review.editing.edit import Edit, SetLines
-from app.review.editing.fixes import Offer, ball_at, edit_of_fix, offers, rank, sentence
+from app.review.editing.fixes import (
+    Guide,
+    Offer,
+    ball_at,
+    edit_of_fix,
+    guide,
+    offers,
+    rank,
+    sentence,
+)
 from app.soccer.finding import Fix
 from app.soccer.frames import ImagePoint
 from app.soccer.group import Group, View
@@ -58,6 +67,7 @@ class Remedy:
         point: Where ``move_point`` puts its point and ``look_ball`` would see the ball, pixels;
             None for other actions.
         offers: The edits that carry it out; none where only a person can.
+        guide: Where that person is led.
         value: What the gate would measure.
         passes: Whether the whole group would pass.
     """
@@ -68,6 +78,7 @@ class Remedy:
     fix: Fix
     point: ImagePoint | None
     offers: tuple[Offer, ...]
+    guide: Guide | None
     value: float | None
     passes: bool
 
@@ -126,6 +137,7 @@ def _try(
         fix=idea.fix,
         point=idea.point,
         offers=offers(group, idea.fix, idea.point),
+        guide=guide(idea.fix, idea.point),
         value=gate.value,
         passes=then.passes,
     )

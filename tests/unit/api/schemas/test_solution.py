@@ -121,11 +121,21 @@ class TestSolutionDocument:
         document = SolutionDocument.of(replace(solution, findings=(found,)), group).findings[0]
         edit = {"edit": "set_lines", "view": view.key, "lines": {marking: None}}
         assert [offer.model_dump() for offer in document.offers] == [
-            {"label": "Drop the line", "edit": edit}
+            {"label": "Drop the line", "edit": edit, "caption": f"{marking}: fits nothing"}
         ]
         assert edit_from_json(edit).apply(group).view(view.key).station.lines.keys() == (
             view.station.lines.keys() - {marking}
         )
+
+    def test_a_finding_that_no_edit_mends_says_where_to_draw(
+        self, solution: Solution, group: Group
+    ) -> None:
+        found = Finding("visible_not_annotated", "?", group.views[0].key, "Middle line")
+        document = SolutionDocument.of(replace(solution, findings=(found,)), group).findings[0]
+        led = {"label": "Draw it", "caption": "", "looks": None, "reads": False}
+        assert document.offers == []
+        assert document.guide is not None
+        assert document.guide.model_dump() == {**led, "draws": "Middle line"}
 
     def test_a_finding_that_only_a_person_can_mend_offers_nothing(
         self, solution: Solution, group: Group
@@ -133,3 +143,4 @@ class TestSolutionDocument:
         found = Finding("low_parallax", "?")
         document = SolutionDocument.of(replace(solution, findings=(found,)), group)
         assert document.findings[0].offers == []
+        assert document.findings[0].guide is None

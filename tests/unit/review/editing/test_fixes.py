@@ -2,10 +2,19 @@ from dataclasses import replace
 
 import pytest
 
-from app.review.editing.fixes import edit_of_fix, offers, rank, sentence
+from app.review.editing.fixes import (
+    Guide,
+    edit_of_fix,
+    guide,
+    guide_of_finding,
+    offers,
+    offers_of_finding,
+    rank,
+    sentence,
+)
 from app.soccer.annotation import BallAnnotation
-from app.soccer.finding import Fix
-from app.soccer.frames import ImagePoint
+from app.soccer.finding import Finding, Fix
+from app.soccer.frames import Box, ImagePoint
 from tests.unit.solving.conftest import BEHIND_GOAL, MAIN, group, view
 
 BALL = (36.0, 3.0, -0.5)
@@ -76,6 +85,19 @@ class TestOffers:
         (offer,) = offers(GROUP, fix)
         assert (offer.label, offer.edit) == (label, edit_of_fix(GROUP, fix))
 
+    @pytest.mark.parametrize(
+        ("fix", "caption"),
+        [
+            (Fix("relabel", "a", MARKING, to="Side line top"), f"{MARKING} → Side line top"),
+            (Fix("swap_sides", "a"), "Left and right swapped?"),
+            (Fix("drop_point", "a", MARKING, index=0), f"point 1 of {MARKING}"),
+            (Fix("drop_marking", "a", MARKING), f"{MARKING}: fits nothing"),
+            (Fix("exclude_view", "a"), ""),
+        ],
+    )
+    def test_say_what_stands_beside_the_change_in_the_picture(self, fix, caption):
+        assert [offer.caption for offer in offers(GROUP, fix)] == [caption]
+
     def test_of_several_balls_each_that_is_seen_can_be_kept(self):
         first = GROUP.views[0]
         hidden, other = BallAnnotation(out_of_view=True), BallAnnotation(point=ImagePoint(5, 6))
@@ -90,6 +112,55 @@ class TestOffers:
 
     def test_a_finding_without_a_fix_offers_no_edit(self):
         assert offers(GROUP, None) == offers(GROUP, Fix("swap_sides")) == ()
+
+
+class TestGuide:
+    def test_says_which_marking_to_draw(self):
+        assert guide(Fix("draw_marking", "a", MARKING)) == Guide("Draw it", draws=MARKING)
+
+    def test_says_where_to_look_for_the_ball(self):
+        place = ImagePoint(5.0, 6.0)
+        found = guide(Fix("look_ball", "a", to="b"), place)
+        assert found == Guide("Show the place", "is the ball here?", looks=place)
+
+    def test_says_that_the_picture_is_to_be_read(self):
+        assert guide(Fix("read_paint", "a")) == Guide("Read its paint", reads=True)
+
+    def test_where_an_edit_mends_nobody_is_led_anywhere(self):
+        assert guide(Fix("swap_sides", "a")) is None
+        assert guide(None) is None
+
+
+class TestOffersOfFinding:
+    def test_a_ball_of_odd_size_gets_the_box_that_it_has_at_its_distance(self):
+        first = GROUP.views[0]
+        large = replace(first.ball, point=None, box=Box(10.0, 20.0, 34.0, 30.0))
+        found = Finding("ball_size", "", "a", number=4.0)
+        (offer,) = offers_of_finding(GROUP.with_view(replace(first, balls=(large,))), found)
+        assert (offer.label, offer.edit.ball.box) == ("Fit the box", Box(23.0, 31.0, 8.0, 8.0))
+
+    def test_a_ball_without_a_box_has_none_to_fit(self):
+        first = GROUP.views[0]
+        alone = BallAnnotation(point=ImagePoint(5.0, 6.0))
+        group = GROUP.with_view(replace(first, balls=(alone,)))
+        assert offers_of_finding(group, Finding("ball_size", "", "a", number=4.0)) == ()
+
+    def test_any_other_offers_what_its_fix_offers(self):
+        fix = Fix("swap_sides", "a")
+        assert offers_of_finding(GROUP, Finding("sides_swapped", "", "a", fix=fix)) == offers(
+            GROUP, fix
+        )
+
+
+class TestGuideOfFinding:
+    def test_a_visible_marking_that_nobody_drew_is_to_be_drawn(self):
+        found = Finding("visible_not_annotated", "", "a", MARKING)
+        assert guide_of_finding(found) == guide(Fix("draw_marking", "a", MARKING))
+
+    def test_any_other_leads_where_its_fix_leads(self):
+        found = Finding("no_paint", "", "a", fix=Fix("read_paint", "a"))
+        assert guide_of_finding(found) == guide(found.fix)
+        assert guide_of_finding(Finding("low_parallax", "")) is None
 
 
 class TestSentence:
