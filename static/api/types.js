@@ -181,7 +181,15 @@
  *   | {edit: 'set_picture', view: string, picture: PictureJson | null}
  *   | {edit: 'include_view', view: string, included: boolean}} EditJson   as the history writes edits
  */
-/** @typedef {{label: string, edit: EditJson}} OfferJson   label: of its button */
+/** @typedef {{label: string, edit: EditJson, caption: string}} OfferJson   label: of its button; caption: beside what it changes in the picture */
+/**
+ * @typedef {object} GuideJson where a person is led who has to look or draw
+ * @property {string} label of its button
+ * @property {string} caption words beside the place
+ * @property {string | null} draws the marking to draw
+ * @property {PairJson | null} looks where the ball would have to be, image pixels
+ * @property {boolean} reads whether the pictures of the match are to be read again
+ */
 
 /**
  * @typedef {object} FindingJson
@@ -194,7 +202,8 @@
  * @property {number | null} threshold
  * @property {number | null} confidence
  * @property {FixJson | null} fix
- * @property {OfferJson[]} offers edits that carry the fix out
+ * @property {OfferJson[]} offers edits that mend it
+ * @property {GuideJson | null} guide where no edit does
  */
 
 /**

@@ -105,7 +105,7 @@ export function scoreText({ score, scored }) {
 	return scored ? score.toFixed(2) : 'no score';
 }
 
-/** A marking where there is little room: every word that tells it from others. @param {string} marking */
-export function shortMarking(marking) {
-	return marking.replace(' rect.', '');
+/** A marking, or words with markings, where there is little room: every word that tells it from others. @param {string} text */
+export function shortMarking(text) {
+	return text.replaceAll(' rect.', '');
 }

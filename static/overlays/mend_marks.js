@@ -6,7 +6,8 @@ import { colours } from '../lib/colours.js';
 import { shortMarking } from '../lib/format.js';
 import { label, strokeLine, widthOf } from './pen.js';
 
-/** @import {FixJson} from '../api/types.js' */
+/** @import {PairJson} from '../api/types.js' */
+/** @import {Mend} from '../state/mends.js' */
 /** @import {Scene} from './scene.js' */
 
 const RING = 11;
@@ -16,11 +17,13 @@ const ROOMY = 330;
 /** @param {CanvasRenderingContext2D} context @param {Scene} scene */
 export function drawMendMarks(context, scene) {
 	const { meant } = scene;
-	if (!meant) return;
-	if (meant.action === 'swap_sides') plate(context, 'Left and right swapped?');
-	else if (meant.action === 'look_ball' && meant.point) look(context, scene, meant.point);
-	else if (meant.action === 'relabel' || meant.action === 'drop_marking') marking(context, scene, meant);
-	else if (meant.action === 'move_point' || meant.action === 'drop_point') point(context, scene, meant);
+	// Nothing is pointed out that has no words: undrawn lines and missing balls stand there already.
+	if (!meant?.caption) return;
+	const { marking, caption, guide } = meant;
+	if (guide?.looks) look(context, scene, guide.looks, caption);
+	else if (marking && typeof meant.index === 'number') point(context, scene, meant);
+	else if (marking) line(context, scene, marking, caption);
+	else plate(context, caption);
 }
 
 /** Words about the whole view. @param {CanvasRenderingContext2D} context @param {string} text */
@@ -43,25 +46,23 @@ function ring(context, { x, y }, dash = []) {
 	context.setLineDash([]);
 }
 
-/** @param {CanvasRenderingContext2D} context @param {Scene} scene @param {[number, number]} to */
-function look(context, { viewport }, [x, y]) {
+/** @param {CanvasRenderingContext2D} context @param {Scene} scene @param {PairJson} to @param {string} caption */
+function look(context, { viewport }, [x, y], caption) {
 	const at = toScreen(viewport, { x, y });
 	ring(context, at, [4, 3]);
-	label(context, 'is the ball here?', { x: at.x + RING + 8, y: at.y - RING - 4 }, colours.value.selected);
+	label(context, caption, { x: at.x + RING + 8, y: at.y - RING - 4 }, colours.value.selected);
 }
 
-/** @param {CanvasRenderingContext2D} context @param {Scene} scene @param {FixJson} meant */
-function marking(context, { picture, viewport }, meant) {
-	const points = picture.view.lines[meant.marking ?? ''] ?? [];
+/** @param {CanvasRenderingContext2D} context @param {Scene} scene @param {string} marking @param {string} caption */
+function line(context, { picture, viewport }, marking, caption) {
+	const points = picture.view.lines[marking] ?? [];
 	if (points.length === 0) return;
 	strokeLine(context, viewport, points, { colour: colours.value.selected, width: 3, halo: true });
 	const at = toScreen(viewport, points[Math.floor(points.length / 2)]);
-	const name = shortMarking(meant.marking ?? '');
-	const text = meant.action === 'relabel' && meant.to ? `${name} → ${shortMarking(meant.to)}` : `${name}: fits nothing`;
-	if (widthOf(context) >= ROOMY) label(context, text, { x: at.x + 14, y: at.y - 16 }, colours.value.selected);
+	beside(context, caption, { x: at.x + 14, y: at.y - 16 });
 }
 
-/** @param {CanvasRenderingContext2D} context @param {Scene} scene @param {FixJson} meant */
+/** @param {CanvasRenderingContext2D} context @param {Scene} scene @param {Mend} meant */
 function point(context, { picture, viewport }, meant) {
 	const fit = picture.markings.find((one) => one.marking === meant.marking);
 	const found = fit?.points[meant.index ?? -1];
@@ -70,6 +71,10 @@ function point(context, { picture, viewport }, meant) {
 	const to = meant.point ? { x: meant.point[0], y: meant.point[1] } : found.nearest;
 	if (to) strokeLine(context, viewport, [found.point, to], { colour: colours.value.selected, width: 2, dash: [4, 3], halo: true });
 	ring(context, at);
-	const text = `point ${(meant.index ?? 0) + 1} of ${shortMarking(meant.marking ?? '')}`;
-	if (widthOf(context) >= ROOMY) label(context, text, { x: at.x + RING + 8, y: at.y - RING - 4 }, colours.value.selected);
+	beside(context, meant.caption, { x: at.x + RING + 8, y: at.y - RING - 4 });
+}
+
+/** Words beside a place, where there is room. @param {CanvasRenderingContext2D} context @param {string} caption @param {{x: number, y: number}} at */
+function beside(context, caption, at) {
+	if (widthOf(context) >= ROOMY) label(context, shortMarking(caption), at, colours.value.selected);
 }

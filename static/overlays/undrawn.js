@@ -21,7 +21,7 @@ const ROOMY = 420;
 export function drawUndrawn(context, { picture, viewport, meant, draws }) {
 	for (const { marking, points, polyline } of picture.markings) {
 		if (points.length > 0 || polyline.length < 2) continue;
-		const named = meant?.action === 'draw_marking' && meant.marking === marking;
+		const named = meant?.guide?.draws === marking;
 		// White on black is seen on everything; the gaps let the paint through.
 		const pieces = piecesOf(polyline, picture.view);
 		strokeLines(context, viewport, pieces, { colour: colours.value.ink, width: named ? 5 : 3.5, dash: [2, 7], halo: false });

@@ -4,12 +4,12 @@
 import { previewBall } from '../geometry/preview.js';
 import { toImage } from '../geometry/viewport.js';
 import { addPoint, markingAt } from './line_edits.js';
-import { expectedDiameter, newBall } from './ball_edits.js';
+import { expectedDiameter, newBall, placeBall } from './ball_edits.js';
 import { chosenPlace, dropCross, setCross } from './drawing_cross.js';
 import { applyEdit } from './edits.js';
 import { group, solution, submit } from './group.js';
 import { announce } from './notice.js';
-import { drawing, focused, pointerPlace, selected } from './workspace.js';
+import { drawing, focused, focusView, pointerPlace, selected } from './workspace.js';
 
 /** @import {GroupDocument, PointJson, ViewJson} from '../api/types.js' */
 /** @import {ScreenPoint, Viewport} from '../geometry/viewport.js' */
@@ -41,6 +41,17 @@ export function startBall(view, at) {
 	drawing.value = { view: view.key, what: 'ball', marking: '' };
 	setCross(view, at ?? likelyPlace(view));
 	announce(`Click where the ball is. ${BY_KEYS}`);
+}
+
+/** Put the ball where the other views see it. @param {ViewJson} view @returns {boolean} whether that is known */
+export function placeExpected(view) {
+	const expected = solution.value?.views.find((one) => one.view === view.key)?.expected;
+	if (!expected) return false;
+	submit(placeBall(view, expected));
+	focusView(view.letter);
+	selected.value = { kind: 'ball', view: view.key };
+	announce(`Ball of ${view.letter} placed where the other views see it. It confirms nothing until you move it.`);
+	return true;
 }
 
 /** Draw a marking of a view. @param {ViewJson} view @param {string} marking */

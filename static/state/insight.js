@@ -11,7 +11,7 @@ import { ApiError } from '../api/problem.js';
 import { groupDocument, isPreview } from './group.js';
 import { focused } from './workspace.js';
 
-/** @import {FixJson, GroupDocument, OfferJson} from '../api/types.js' */
+/** @import {FixJson, GroupDocument, GuideJson, OfferJson} from '../api/types.js' */
 
 /**
  * @typedef {object} Remedy
@@ -20,6 +20,7 @@ import { focused } from './workspace.js';
  * @property {string} sentence
  * @property {FixJson} edit what it is about
  * @property {OfferJson[]} offers edits that carry it out; none where a person has to look or draw
+ * @property {GuideJson | null} guide where that person is led
  * @property {number | null} value of the gate with the edit
  * @property {boolean} passes whether the whole group would pass
  */

@@ -1,10 +1,11 @@
 // @ts-check
-/** What would mend the group on screen, the likeliest first: proposed lines, findings with a fix, missing balls and lines, remedies. */
+/** What would mend the group on screen, the likeliest first: proposed lines, findings, missing balls, remedies. */
 
 import { computed, effect, signal, untracked } from '@preact/signals';
 
 import { plural } from '../lib/format.js';
 import { findingTitle } from './advice.js';
+import { placeExpected } from './drawing.js';
 import { editOf } from './edits.js';
 import { group, groupDocument, solution } from './group.js';
 import { remedies } from './insight.js';
@@ -13,47 +14,37 @@ import { fitPanel, returnLent } from './viewports.js';
 import { focused } from './workspace.js';
 
 /** @import {ViewProposalJson} from '../api/proposals.js' */
-/** @import {FindingJson, FixJson, GroupDocument, OfferJson, SolutionJson, ViewJson} from '../api/types.js' */
+/** @import {FindingJson, GroupDocument, GuideJson, OfferJson, PairJson, SolutionJson, ViewJson} from '../api/types.js' */
 /** @import {Edit} from './edits.js' */
 /** @import {Remedy} from './insight.js' */
 
 /**
- * @typedef {object} Mend one thing that a person can do about a group
- * @property {FixJson} fix what it is about; beside the server's actions `place_ball`, `draw_ball`, `resize_ball` and `accept_proposal`
- * @property {Edit | null} edit null: it leads the person to the place and leaves the drawing to them
- * @property {string | null} title null: that of the gate that fails
- * @property {string} sentence
+ * @typedef {object} Way how something is mended: by an edit, by leading the person to the place, or by what is known here alone
  * @property {string} label of its button
- * @property {boolean} passes whether the solver found that the group would pass
+ * @property {string} caption words beside the place in the picture
+ * @property {Edit | null} [edit]
+ * @property {Partial<GuideJson> & {ball?: boolean}} [guide] ball: the ball is to be drawn
+ * @property {(view: ViewJson) => void} [run]
+ */
+/**
+ * @typedef {object} About what a mend speaks about
+ * @property {string | null} view
+ * @property {string | null} [marking]
+ * @property {number | null} [index] of a point of the marking
+ * @property {PairJson | null} [point] where that point would have to stand, image pixels
+ */
+/**
+ * @typedef {Way & About & {title: string | null, sentence: string, passes: boolean}} Mend one thing that a person can do about a group;
+ *   title null: that of the gate that fails; passes: whether the solver found that the group would pass
  */
 
 /** Which of them the card shows. */
 const chosen = signal(0);
 
-/** Buttons of what leads a person to the place. */
-const GUIDES = /** @type {Record<string, string>} */ ({
-	draw_marking: 'Draw it', look_ball: 'Show the place', place_ball: 'Place it there', draw_ball: 'Draw it', resize_ball: 'Fit the box', read_paint: 'Read its paint',
-	accept_proposal: 'Accept the lines',
-});
-
-/** @typedef {Pick<Mend, 'fix' | 'edit' | 'label'>} Way */
-
-/** @param {string} action @param {string | null} view @param {Partial<FixJson>} [more] @returns {Way} */
-function guide(action, view, more = {}) {
-	return { fix: { action, view, marking: null, to: null, index: null, ...more }, edit: null, label: GUIDES[action] };
-}
-
-/** @param {FixJson} fix @param {OfferJson[]} offers @returns {Way[]} */
-function offered(fix, offers) {
-	return offers.map(({ label, edit }) => ({ fix, edit: editOf(edit), label }));
-}
-
-/** @param {FindingJson} finding @returns {Way[]} */
-function waysOf({ kind, view, marking, fix, offers }) {
-	if (kind === 'visible_not_annotated') return [guide('draw_marking', view, { marking })];
-	if (kind === 'ball_size') return [guide('resize_ball', view)];
-	if (fix?.action === 'read_paint') return [guide('read_paint', view)];
-	return fix ? offered(fix, offers) : [];
+/** @param {{offers: OfferJson[], guide: GuideJson | null}} told @returns {Way[]} */
+function waysOf({ offers, guide }) {
+	const edits = offers.map(({ label, caption, edit }) => ({ label, caption, edit: editOf(edit) }));
+	return guide ? [...edits, { label: guide.label, caption: guide.caption, guide }] : edits;
 }
 
 /** Gates that one more view with a ball may meet. */
@@ -78,7 +69,8 @@ function missingBalls(shown, solved) {
 		if (solved.ball ? !(place && inPicture(view, place)) : solved.passes) return [];
 		const why = NEEDS_A_PAIR.has(solved.first_failing?.gate ?? '') ? ` With it ${view.letter} may make the pair that is missing.` : '';
 		return [{
-			...(place ? guide('place_ball', view.key, { point: place }) : guide('draw_ball', view.key)),
+			view: view.key, caption: '',
+			...(place ? { label: 'Place it there', run: placeExpected } : { label: 'Draw it', guide: { ball: true } }),
 			title: `No ball is drawn in ${view.letter}`, passes: false,
 			sentence: (place ? 'A green cross marks where the other views see it. If it is not visible there, press O.'
 				: 'The dotted line is the ray of another view: the ball lies on it. If it is not visible, press O.') + why,
@@ -93,22 +85,35 @@ function proposedLines(shown, proposed) {
 		if (item?.outcome !== 'proposed') return [];
 		const drawn = Object.keys(view.lines).length && !item.sentence ? ' What is drawn stays.' : '';
 		return [{
-			...guide('accept_proposal', view.key), passes: false,
+			view: view.key, label: 'Accept the lines', caption: '', passes: false,
+			run: (at) => import('./proposals.js').then(({ acceptProposal }) => acceptProposal(at)),
 			title: `${plural(Object.keys(item.lines).length, 'line')} ${Object.keys(item.lines).length === 1 ? 'is' : 'are'} proposed for ${view.letter}`,
 			sentence: [`Violet and dashed, read from its paint: ${scoreWords(item)}.${drawn}`, item.sentence].filter(Boolean).join(' '),
 		}];
 	});
 }
 
-/** @param {Remedy} remedy @returns {Mend[]} */
-function ofRemedy({ edit: fix, offers, sentence, passes }) {
-	const ways = fix.action in GUIDES ? [guide(fix.action, fix.view, fix)] : offered(fix, offers);
-	return ways.map((way) => ({ ...way, title: null, sentence: `${passes ? 'It would pass' : 'It would come closer'} if ${sentence}.`, passes }));
+/** @param {About} of @returns {About} */
+function aboutOf({ view, marking = null, index = null, point = null }) {
+	return { view, marking, index, point };
 }
 
-/** @param {FixJson} a @param {FixJson} b */
+/** @param {GroupDocument} shown @param {FindingJson} finding @returns {Mend[]} */
+function ofFinding(shown, finding) {
+	const told = { title: findingTitle(shown, finding), sentence: finding.sentence, passes: false };
+	return waysOf(finding).map((way) => ({ ...aboutOf(finding.fix ?? finding), ...way, ...told }));
+}
+
+/** @param {Remedy} remedy @returns {Mend[]} */
+function ofRemedy(remedy) {
+	const { edit: fix, sentence, passes } = remedy;
+	const told = { title: null, sentence: `${passes ? 'It would pass' : 'It would come closer'} if ${sentence}.`, passes };
+	return waysOf(remedy).map((way) => ({ ...aboutOf(fix), ...way, ...told }));
+}
+
+/** Whether two are the same button about the same thing. @param {Mend} a @param {Mend} b */
 function isSame(a, b) {
-	return a.action === b.action && a.view === b.view && a.marking === b.marking && a.index === b.index;
+	return a.label === b.label && a.view === b.view && a.marking === b.marking && a.index === b.index;
 }
 
 /**
@@ -125,12 +130,11 @@ function mendsOf(shown, solved, helping, proposed) {
 	if (!solved) return lines;
 	const missing = missingBalls(shown, solved);
 	const short = solved.first_failing?.gate === 'ball';
-	const found = solved.findings.flatMap((finding) => waysOf(finding).map((way) => ({
-		...way, title: findingTitle(shown, finding), sentence: finding.sentence,
-		passes: helping.some((remedy) => remedy.passes && isSame(remedy.edit, way.fix)),
-	})));
+	const tried = helping.flatMap(ofRemedy);
+	const found = solved.findings.flatMap((finding) => ofFinding(shown, finding))
+		.map((mend) => ({ ...mend, passes: tried.some((remedy) => remedy.passes && isSame(remedy, mend)) }));
 	const known = short ? [...missing, ...found] : [...found, ...missing];
-	const more = helping.flatMap(ofRemedy).filter(({ fix }) => !known.some((mend) => isSame(mend.fix, fix)));
+	const more = tried.filter((remedy) => !known.some((mend) => isSame(remedy, mend)));
 	return [...lines, ...known, ...more];
 }
 
@@ -158,7 +162,7 @@ export const toldFinding = computed(() => {
 	const findings = solution.value?.findings ?? [];
 	const meant = mend.value;
 	if (!meant?.title) return findings[0] ?? null;
-	return findings.find(({ sentence, view }) => sentence === meant.sentence && view === meant.fix.view) ?? null;
+	return findings.find(({ sentence, view }) => sentence === meant.sentence && view === meant.view) ?? null;
 });
 
 /** Show another one. @param {number} step */
@@ -184,7 +188,7 @@ export function startMends() {
 /** Keys speak about the view that the card speaks about, and it is seen whole, whatever was looked at before. */
 function focusMeant() {
 	returnLent();
-	const meant = group.value?.views.find(({ key }) => key === mends.value[mendIndex.value]?.fix.view);
+	const meant = group.value?.views.find(({ key }) => key === mends.value[mendIndex.value]?.view);
 	if (!meant) return;
 	focused.value = meant.letter;
 	fitPanel(meant.letter);

@@ -17,7 +17,7 @@ function Finding({ group, finding }) {
 	const view = group.views.find((candidate) => candidate.key === finding.view);
 	const sure = finding.confidence === null ? '' : ` (${Math.round(finding.confidence * 100)} % sure)`;
 	const title = findingTitle(group, finding);
-	const offered = mends.value.filter((mend) => mend.sentence === finding.sentence && mend.fix.view === finding.view);
+	const offered = mends.value.filter((mend) => mend.sentence === finding.sentence && mend.view === finding.view);
 	return html`
 		<li class="finding" data-kind=${finding.kind}>
 			<p>

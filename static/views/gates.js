@@ -9,7 +9,7 @@ import { focusView, gatesOpen, selected } from '../state/workspace.js';
 import { gateLabel, gateMargin } from './gate_names.js';
 import { carryOut } from './mend_actions.js';
 
-/** @import {FixJson, GateJson, GroupDocument, SolutionJson} from '../api/types.js' */
+/** @import {GateJson, GroupDocument, SolutionJson} from '../api/types.js' */
 /** @import {Mend} from '../state/mends.js' */
 
 /** More remedies than these nobody reads. */
@@ -39,22 +39,20 @@ function stateOf(group, gate, before) {
 	return { state: 'failed', glyph: '✗', word: 'failed' };
 }
 
-/** Show what a mend speaks about. @param {GroupDocument} group @param {FixJson} fix */
-function show(group, fix) {
-	const view = group.views.find(({ key }) => key === fix.view);
+/** Show what a mend speaks about. @param {GroupDocument} group @param {Mend} mend */
+function show(group, { view: key, marking, index, guide }) {
+	const view = group.views.find((one) => one.key === key);
 	if (!view) return;
 	focusView(view.letter);
-	if (fix.action === 'look_ball') selected.value = { kind: 'ball', view: view.key };
-	else if (fix.marking && view.lines[fix.marking]) {
-		selected.value = { kind: 'point', view: view.key, marking: fix.marking, index: fix.index ?? 0 };
-	}
+	if (guide?.looks) selected.value = { kind: 'ball', view: view.key };
+	else if (marking && view.lines[marking]) selected.value = { kind: 'point', view: view.key, marking, index: index ?? 0 };
 }
 
 /** @param {{group: GroupDocument, remedy: Mend}} props */
 function RemedyRow({ group, remedy }) {
 	return html`
 		<li class="remedy" data-passes=${remedy.passes}>
-			<button class="remedy__sentence" type="button" title="Show what this is about" onClick=${() => show(group, remedy.fix)}>${remedy.sentence}</button>
+			<button class="remedy__sentence" type="button" title="Show what this is about" onClick=${() => show(group, remedy)}>${remedy.sentence}</button>
 			<button data-needs="annotate" class="button button--fix" type="button" onClick=${() => carryOut(remedy)}>${remedy.label}</button>
 		</li>
 	`;

@@ -135,7 +135,7 @@ export function ImagePanel({ picture, area, sizes }) {
 	useLayoutEffect(() => stage.current?.show(frame.image), [frame.image]);
 	// Where nobody has drawn the ball, the other views' rays say where to look.
 	const rays = draft.value?.kind === 'ball' || selected.value?.kind === 'ball' || view.balls.length === 0;
-	const meant = mend.value?.fix.view === view.key && !draft.value ? mend.value.fix : null;
+	const meant = mend.value?.view === view.key && !draft.value ? mend.value : null;
 	const draws = drawing.value?.view === view.key && drawing.value.what !== 'ask';
 	const scene = useMemo(() => ({
 		picture, viewport, rays, selected: selected.value, hidden: overlaysHidden.value || instant !== null,

@@ -1,11 +1,8 @@
 // @ts-check
 /** Carrying out what mends a group: the edit itself, or leading the person to the place where to draw. */
 
-import { squareBox } from '../geometry/ball.js';
 import { framePoints } from '../geometry/frame_points.js';
-import { ballCenter, ballOf } from '../geometry/preview.js';
 import { raysInto } from '../overlays/scene.js';
-import { placeBall } from '../state/ball_edits.js';
 import { startBall, startMarking } from '../state/drawing.js';
 import { group, pending, solution, submit } from '../state/group.js';
 import { mend } from '../state/mends.js';
@@ -13,7 +10,7 @@ import { announce } from '../state/notice.js';
 import { zoomTo } from '../state/viewports.js';
 import { focusView, selected } from '../state/workspace.js';
 
-/** @import {ViewJson} from '../api/types.js' */
+/** @import {GroupDocument, PairJson, ViewJson} from '../api/types.js' */
 /** @import {ImagePoint} from '../geometry/viewport.js' */
 /** @import {Edit} from '../state/edits.js' */
 /** @import {Mend} from '../state/mends.js' */
@@ -44,18 +41,6 @@ function showPlace(view, points, most = BALL_SCALE) {
 	});
 }
 
-/** Put the ball where the other views see it. @param {ViewJson} view @returns {boolean} whether that is known */
-export function placeExpected(view) {
-	const expected = solution.value?.views.find((one) => one.view === view.key)?.expected;
-	const edit = expected ? placeBall(view, expected) : null;
-	if (!edit) return false;
-	submit(edit);
-	focusView(view.letter);
-	selected.value = { kind: 'ball', view: view.key };
-	announce(`Ball of ${view.letter} placed where the other views see it. It confirms nothing until you move it.`);
-	return true;
-}
-
 /** @param {ViewJson} view @param {string} marking */
 function drawMissing(view, marking) {
 	const fit = solution.value?.views.find((one) => one.view === view.key)?.calibration.markings.find((one) => one.marking === marking);
@@ -63,13 +48,18 @@ function drawMissing(view, marking) {
 	showPlace(view, (fit?.polyline ?? []).map(([x, y]) => ({ x, y })), LINE_SCALE);
 }
 
-/** Give the box of a ball the size that it has at its distance. @param {ViewJson} view */
-function fitBox(view) {
-	const ball = ballOf(view);
-	const diameter = solution.value?.views.find((one) => one.view === view.key)?.ball?.optimized_diameter_px;
-	const center = ball && ballCenter(ball);
-	if (!ball?.box || !center || !diameter) return;
-	submit({ kind: 'ball', view: view.key, ball: { ...ball, box: squareBox(center, diameter) } });
+/** @param {GroupDocument} shown @param {ViewJson} view */
+function drawBall(shown, view) {
+	const along = raysInto(shown, solution.value, view, LIKELY_HEIGHT).filter(({ x, y }) => x >= 0 && y >= 0 && x < view.width && y < view.height);
+	startBall(view, along[Math.floor(along.length / 2)]);
+	showPlace(view, along);
+}
+
+/** @param {ViewJson} view @param {PairJson} place */
+function lookThere(view, [x, y]) {
+	showPlace(view, [{ x, y }]);
+	selected.value = { kind: 'ball', view: view.key };
+	announce('The ring is where the ball would have to be. If you see the ball there, move its box.');
 }
 
 /** An edit of the server builds on what it has: not on a change of the same lines or ball that is still on its way. @param {Edit} edit */
@@ -79,28 +69,23 @@ function submitOffered(edit) {
 	else submit(edit);
 }
 
+/** @param {GroupDocument} shown @param {ViewJson} view @param {NonNullable<Mend['guide']>} guide */
+function lead(shown, view, { ball, draws, looks, reads }) {
+	if (ball) drawBall(shown, view);
+	if (draws) drawMissing(view, draws);
+	if (looks) lookThere(view, looks);
+	if (reads) import('../state/paint_reading.js').then(({ readAgain }) => readAgain(shown));
+}
+
 /** @param {Mend} wanted */
-export function carryOut({ fix, edit }) {
+export function carryOut({ view: key, edit, guide, run }) {
 	const shown = group.value;
-	const view = shown?.views.find(({ key }) => key === fix.view);
+	const view = shown?.views.find((one) => one.key === key);
 	if (!shown || !view) return;
 	focusView(view.letter);
 	if (edit) submitOffered(edit);
-	else if (fix.action === 'place_ball') placeExpected(view);
-	else if (fix.action === 'draw_ball') {
-		const along = raysInto(shown, solution.value, view, LIKELY_HEIGHT).filter(({ x, y }) => x >= 0 && y >= 0 && x < view.width && y < view.height);
-		startBall(view, along[Math.floor(along.length / 2)]);
-		showPlace(view, along);
-	}
-	else if (fix.action === 'draw_marking' && fix.marking) drawMissing(view, fix.marking);
-	else if (fix.action === 'resize_ball') fitBox(view);
-	else if (fix.action === 'read_paint') import('../state/paint_reading.js').then(({ readAgain }) => readAgain(shown));
-	else if (fix.action === 'accept_proposal') import('../state/proposals.js').then(({ acceptProposal }) => acceptProposal(view));
-	else if (fix.action === 'look_ball' && fix.point) {
-		showPlace(view, [{ x: fix.point[0], y: fix.point[1] }]);
-		selected.value = { kind: 'ball', view: view.key };
-		announce('The ring is where the ball would have to be. If you see the ball there, move its box.');
-	}
+	if (guide) lead(shown, view, guide);
+	run?.(view);
 }
 
 /** Carry out what the card shows. */

@@ -2,6 +2,7 @@ import assert from 'node:assert/strict';
 import { describe, it } from 'node:test';
 
 import { groupDocument } from '../../static/state/group.js';
+import { remedies } from '../../static/state/insight.js';
 import { isHeld, mend, mends } from '../../static/state/mends.js';
 import { openProposals, settledState, stateOf } from '../../static/state/proposal_lines.js';
 
@@ -18,7 +19,7 @@ function show(lines, etag) {
 	groupDocument.value = { id: 7, etag, views, solution: own };
 }
 
-const offered = () => mend.value?.fix.action;
+const offered = () => mend.value?.label;
 
 describe('what the card offers', () => {
 	it('waits until it is known whether lines are proposed, and never changes after that', () => {
@@ -27,18 +28,48 @@ describe('what the card offers', () => {
 		assert.ok(mends.value.length > 0);
 		openProposals.value = new Map([['A', proposal]]);
 		settledState.value = stateOf(groupDocument.value);
-		assert.equal(offered(), 'accept_proposal');
+		assert.equal(offered(), 'Accept the lines');
 		// The same group after an edit: what is proposed stands there until the answer comes.
 		show({}, 'b');
-		assert.equal(offered(), 'accept_proposal');
+		assert.equal(offered(), 'Accept the lines');
 		openProposals.value = new Map();
 		assert.equal(mend.value, null);
 		settledState.value = stateOf(groupDocument.value);
-		assert.equal(offered(), 'draw_ball');
+		assert.equal(offered(), 'Draw it');
 	});
 
 	it('waits for nothing where every view has a camera', () => {
 		show(LINES, 'c');
-		assert.deepEqual([isHeld.value, offered()], [false, 'draw_ball']);
+		assert.deepEqual([isHeld.value, offered()], [false, 'Draw it']);
+	});
+});
+
+describe('a kind of fix that nobody here has heard of', () => {
+	const fix = { action: 'unheard_of', view: 'A', marking: 'Middle line', to: null, index: 1 };
+	const edit = { edit: 'set_lines', view: 'A', lines: { 'Middle line': [[5, 6]] } };
+	const guide = { label: 'Go there', caption: 'here', draws: null, looks: [7, 8], reads: false };
+	const finding = { kind: 'new', sentence: 'Look.', view: 'A', marking: null, fix, offers: [{ label: 'Do it', caption: 'this', edit }], guide: null };
+
+	/** What is offered for some findings and remedies. @param {object[]} findings @param {object[]} items */
+	const offers = (findings, items) => {
+		show(LINES, 'd');
+		groupDocument.value = { ...groupDocument.value, solution: { ...groupDocument.value.solution, first_failing: null, passes: true, findings } };
+		remedies.value = { key: 'remedies 7 d', items };
+		return mends.value;
+	};
+
+	it('is carried out and pointed at as the server says', () => {
+		const [found] = offers([finding], []);
+		assert.deepEqual([found.label, found.caption, found.marking, found.index], ['Do it', 'this', 'Middle line', 1]);
+		assert.deepEqual(found.edit, { kind: 'lines', view: 'A', lines: { 'Middle line': [{ x: 5, y: 6 }] } });
+		const [led] = offers([{ ...finding, fix: null, offers: [], guide }], []);
+		assert.deepEqual([led.label, led.caption, led.guide, led.edit], ['Go there', 'here', guide, undefined]);
+	});
+
+	it('is listed once where finding and remedy propose the same', () => {
+		const remedy = { edit: fix, offers: finding.offers, guide: null, sentence: 'so', passes: true };
+		assert.deepEqual(offers([finding], [remedy]).map(({ title, passes }) => [title, passes]), [['New', true]]);
+		const other = { ...remedy, edit: { ...fix, index: 0 } };
+		assert.deepEqual(offers([finding], [other]).map(({ title, passes }) => [title, passes]), [['New', false], [null, true]]);
 	});
 });
