@@ -12,9 +12,8 @@ import { draft, propose, submit, withdraw } from '../state/group.js';
 /** @import {BallJson, BoxJson, ViewJson} from '../api/types.js' */
 /** @import {ImagePoint} from '../geometry/viewport.js' */
 /** @import {Edit} from '../state/edits.js' */
+/** @import {Drag} from './gesture.js' */
 /** @import {Hit} from './hit.js' */
-
-/** @typedef {{move: (to: ImagePoint) => void, end: () => void, cancel: () => void}} Drag */
 
 const SMALLEST = 2;
 
@@ -36,7 +35,7 @@ export function dragOf(view, hit, from) {
 function drag(edit) {
 	return {
 		move: (to) => propose(edit(to)),
-		end: () => { if (draft.value) submit(draft.value); },
+		end: (moved) => { if (moved && draft.value) submit(draft.value); },
 		cancel: withdraw,
 	};
 }
