@@ -2,28 +2,19 @@
 /** Groups as the server last gave them, and those that come next. */
 
 import { getGroup } from '../api/client.js';
+import { Kept } from '../lib/kept.js';
 import { loadImage } from './images.js';
 
 /** @import {GroupDocument} from '../api/types.js' */
 
-const KEPT = 24;
-
-/** @type {Map<number, GroupDocument>} */
-const documents = new Map();
+/** @type {Kept<number, GroupDocument>} */
+const documents = new Kept(24);
 /** @type {Map<number, Promise<GroupDocument>>} */
 const loading = new Map();
 
 /** @param {number} id @returns {GroupDocument | undefined} */
 export function known(id) {
 	return documents.get(id);
-}
-
-/** @param {GroupDocument} document */
-function remember(document) {
-	documents.delete(document.id);
-	documents.set(document.id, document);
-	const oldest = documents.keys().next().value;
-	if (documents.size > KEPT && oldest !== undefined) documents.delete(oldest);
 }
 
 /** Groups of which something was told while they are read: the answer may be older than that. @type {Set<number>} */
@@ -51,7 +42,7 @@ const answers = new Map();
 /** Remember what the server answered to a write. @param {GroupDocument} document */
 export function rememberAnswer(document) {
 	answers.set(document.id, (answers.get(document.id) ?? 0) + 1);
-	remember(document);
+	documents.set(document.id, document);
 }
 
 /** @param {number} id @returns {Promise<GroupDocument>} */
@@ -71,7 +62,7 @@ async function read(id) {
 	const newer = answers.get(id) === before ? undefined : known(id);
 	if (newer) return newer;
 	if (outdated.has(id)) return read(id);
-	remember(document);
+	documents.set(document.id, document);
 	return document;
 }
 

@@ -3,6 +3,7 @@
 
 import { useLayoutEffect, useState } from 'preact/hooks';
 
+import { Kept } from '../lib/kept.js';
 import { decoded, loadImage } from './images.js';
 
 /** @import {ViewJson} from '../api/types.js' */
@@ -10,8 +11,8 @@ import { decoded, loadImage } from './images.js';
 /** Frames whose pixels are kept: a large group's. Each takes four bytes a pixel. */
 const KEPT = 8;
 
-/** @type {Map<ImageBitmap, ImageData>} */
-const pixels = new Map();
+/** @type {Kept<ImageBitmap, ImageData>} */
+const pixels = new Kept(KEPT);
 
 /**
  * The frames of some views, by view key; those that are not there yet are missing.
@@ -90,7 +91,5 @@ function pixelsOf(frame) {
 	context.drawImage(frame, 0, 0);
 	const data = context.getImageData(0, 0, canvas.width, canvas.height);
 	pixels.set(frame, data);
-	const oldest = pixels.keys().next().value;
-	if (pixels.size > KEPT && oldest) pixels.delete(oldest);
 	return data;
 }

@@ -2,11 +2,12 @@
 /** Frames as decoded images, the last few kept. */
 
 import { getFrame } from '../api/client.js';
+import { Kept } from '../lib/kept.js';
 
-const KEPT = 32;
-
-/** @type {Map<string, Promise<ImageBitmap>>} */
-const images = new Map();
+/** @type {Kept<string, Promise<ImageBitmap>>} */
+const images = new Kept(32);
+/** Those that are decoded. @type {WeakMap<Promise<ImageBitmap>, ImageBitmap>} */
+const ready = new WeakMap();
 
 /**
  * The image at an address; loading it again costs nothing as long as it is kept.
@@ -17,23 +18,15 @@ const images = new Map();
 export function loadImage(url) {
 	const kept = images.get(url);
 	const loading = kept ?? decode(url);
-	images.delete(url);
 	images.set(url, loading);
-	const oldest = images.keys().next().value;
-	if (images.size > KEPT && oldest !== undefined) {
-		images.delete(oldest);
-		ready.delete(oldest);
-	}
-	if (!kept) loading.catch(() => images.delete(url));
+	if (!kept) loading.then((image) => ready.set(loading, image), () => images.delete(url));
 	return loading;
 }
 
-/** Those that are decoded. @type {Map<string, ImageBitmap>} */
-const ready = new Map();
-
 /** The image at an address, if it can be drawn now. @param {string | null} url @returns {ImageBitmap | null} */
 export function decoded(url) {
-	return (url && ready.get(url)) || null;
+	const loading = url && images.get(url);
+	return (loading && ready.get(loading)) || null;
 }
 
 /**
@@ -42,7 +35,5 @@ export function decoded(url) {
  * @param {string} url
  */
 async function decode(url) {
-	const image = await createImageBitmap(await getFrame(url));
-	if (images.has(url)) ready.set(url, image);
-	return image;
+	return createImageBitmap(await getFrame(url));
 }

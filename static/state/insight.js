@@ -8,6 +8,7 @@ import { effect, signal, untracked } from '@preact/signals';
 
 import { request } from '../api/client.js';
 import { ApiError } from '../api/problem.js';
+import { Kept } from '../lib/kept.js';
 import { groupDocument, isPreview } from './group.js';
 import { focused } from './workspace.js';
 
@@ -39,15 +40,14 @@ export const isSearching = signal(false);
 
 /** People who go through easy groups stay shorter than this. */
 const STAY = 350;
-const KEPT = 40;
 
 /** What would make the group on screen pass; null until it is known. */
 export const remedies = signal(/** @type {Known<Remedy> | null} */ (null));
 /** How much each marking of the focused view matters; null until it is known. */
 export const influence = signal(/** @type {Known<Influence> | null} */ (null));
 
-/** @type {Map<string, Known<any>>} */
-const kept = new Map();
+/** @type {Kept<string, Known<any>>} */
+const kept = new Kept(40);
 /** Addresses that this server does not have. @type {Set<string>} */
 const absent = new Set();
 
@@ -61,8 +61,6 @@ async function ask(what, path, key, signal) {
 	try {
 		const found = { key, items: (await request(path, { signal })).items };
 		kept.set(key, found);
-		const oldest = kept.keys().next().value;
-		if (kept.size > KEPT && oldest !== undefined) kept.delete(oldest);
 		return found;
 	} catch (error) {
 		if (signal.aborted) return null;

@@ -8,7 +8,7 @@ import { ApiError } from '../api/problem.js';
 import { address, navigate, page, param } from '../lib/router.js';
 import { stored } from '../lib/storage.js';
 import { prefetch } from './documents.js';
-import { settle } from './group.js';
+import { groupDocument, open, settle } from './group.js';
 import { announce, complain, dismiss } from './notice.js';
 
 /** @import {Neighbours} from '../api/types.js' */
@@ -31,6 +31,13 @@ export const lastGroup = stored('last-group', 0);
 /** @param {number} id @param {string} [q] */
 export function reviewAddress(id, q = query.value) {
 	return address(`/review/${id}`, { q });
+}
+
+/** Go back to a group, wherever the person is. @param {number} id @returns {Promise<boolean>} whether it is on screen */
+export async function returnTo(id) {
+	navigate(reviewAddress(id));
+	if (groupDocument.value?.id !== id) await open(id);
+	return groupDocument.value?.id === id;
 }
 
 /** The history of a group. @param {number} id */

@@ -9,6 +9,7 @@ import { computed, effect, signal, untracked } from '@preact/signals';
 import { getGroupPredictions } from '../api/evaluations.js';
 import { ApiError } from '../api/problem.js';
 import { plural } from '../lib/format.js';
+import { Kept } from '../lib/kept.js';
 import { page } from '../lib/router.js';
 import { stored } from '../lib/storage.js';
 import { group, groupDocument, submit } from './group.js';
@@ -22,21 +23,20 @@ import { boxes, focused, overlaysHidden, selected } from './workspace.js';
 /** @import {Mark, ViewMarks} from './prediction_marks.js' */
 
 /** @typedef {{group: number, sets: string[], set: string, views: Map<string, ViewMarks>}} Predicted */
-/** @typedef {{at: number, balls: string, found: GroupPredictionsJson}} Kept */
+/** @typedef {{at: number, balls: string, found: GroupPredictionsJson}} Answer */
 
 /** How long a group stands before it is asked about, ms. */
 const PAUSE = 120;
 /** How long an answer is believed without another look, ms. */
 const FRESH = 30_000;
-const MOST_KEPT = 48;
 
 /** Name of the set that is shown, or `EVERY_SET`; "": the newest. */
 export const shownSet = stored('prediction-set', '');
 /** Less sure predictions are dotted, and taken only when somebody points at them. */
 export const leastScore = stored('prediction-score', 0.25);
 
-/** @type {Map<number, Kept>} */
-const kept = new Map();
+/** @type {Kept<number, Answer>} */
+const kept = new Kept(48);
 /** Datasets without predictions, and since when that is known. @type {Map<number, number>} */
 const without = new Map();
 const answered = signal(/** @type {{group: number, found: GroupPredictionsJson} | null} */ (null));
@@ -124,9 +124,7 @@ async function ask(at, abort) {
 		const found = await getGroupPredictions(at.id, abort);
 		if (abort.aborted) return;
 		if (found.sets === 0) without.set(at.dataset.id, performance.now());
-		kept.delete(at.id);
 		kept.set(at.id, { at: performance.now(), balls: ballsOf(at), found });
-		if (kept.size > MOST_KEPT) kept.delete(/** @type {number} */ (kept.keys().next().value));
 		if (groupDocument.value?.id === at.id) answered.value = { group: at.id, found };
 	} catch (error) {
 		// Another group came, or the server is away: the group can be reviewed without.

@@ -3,6 +3,7 @@
 
 import { readPaint } from '../api/paint.js';
 import { ApiError } from '../api/problem.js';
+import { Kept } from '../lib/kept.js';
 import { complain } from './notice.js';
 
 /** @import {GroupDocument, ViewJson} from '../api/types.js' */
@@ -10,9 +11,8 @@ import { complain } from './notice.js';
 
 /** @typedef {ReadonlyMap<string, PaintJson>} KnownPaint by key of the view */
 
-const KEPT = 60;
-/** @type {Map<string, PaintJson>} */
-const kept = new Map();
+/** @type {Kept<string, PaintJson>} */
+const kept = new Kept(60);
 
 /** @param {GroupDocument} group @param {ViewJson} view */
 function keyOf(group, view) {
@@ -35,8 +35,6 @@ export async function readAllPaint(group, signal, tell) {
 		if (signal.aborted) return;
 		if (!found) continue;
 		kept.set(key, found);
-		const oldest = kept.keys().next().value;
-		if (kept.size > KEPT && oldest !== undefined) kept.delete(oldest);
 		known.set(view.key, found);
 		tell(new Map(known));
 	}

@@ -6,7 +6,7 @@ import { computed } from '@preact/signals';
 import { navigate, page } from '../lib/router.js';
 import { groupDocument, lastStation, open, pending, submitTurn } from './group.js';
 import { actions, didAgain, forget, forgetEdit, nextBack, tookBack, undone } from './last_action.js';
-import { reviewAddress } from './navigation.js';
+import { returnTo, reviewAddress } from './navigation.js';
 import { announce, complain } from './notice.js';
 import { discard, outbox } from './outbox.js';
 import { isAway, wake } from './sending.js';
@@ -77,10 +77,8 @@ function undoHere() {
 
 /** Return to a group and undo its last edit. @param {EditDone} action */
 async function undoThere(action) {
-	navigate(reviewAddress(action.group));
-	if (groupDocument.value?.id !== action.group) await open(action.group);
-	if (groupDocument.value?.id !== action.group) return;
-	if (groupDocument.value.can_undo) undoHere();
+	if (!(await returnTo(action.group))) return;
+	if (groupDocument.value?.can_undo) undoHere();
 	else forget(action);
 }
 

@@ -6,10 +6,10 @@ import { signal } from '@preact/signals';
 import { navigate } from '../lib/router.js';
 import { doubt } from './advice.js';
 import { conflict } from './conflict.js';
-import { group, groupDocument, onRefused, open, settle, submit, submitVerdict } from './group.js';
+import { group, groupDocument, onRefused, settle, submit, submitVerdict } from './group.js';
 import { frozen } from './hand_back.js';
 import { actions, did, didAgain, forget, tookBack } from './last_action.js';
-import { batchId, currentId, goNext, query, queueAddress, reviewAddress } from './navigation.js';
+import { batchId, currentId, goNext, query, queueAddress, returnTo, reviewAddress } from './navigation.js';
 import { isMoving, nextOfBatch } from './leases.js';
 import { announce, complain, inform } from './notice.js';
 import { reasonText } from './reasons.js';
@@ -160,11 +160,8 @@ export function addNote(text) {
 /** Take a verdict of this window back, and return to its group. @param {VerdictDone} action */
 export async function takeVerdictBack(action) {
 	forget(action);
-	navigate(reviewAddress(action.group));
-	if (groupDocument.value?.id !== action.group) await open(action.group);
-	const present = group.value;
-	if (present?.id !== action.group) return;
-	const { state, reason } = present.verdict;
+	if (!(await returnTo(action.group)) || !group.value) return;
+	const { state, reason } = group.value.verdict;
 	if (state !== action.given.state || reason !== action.given.reason) {
 		complain(`Group ${action.number} was judged again since; that verdict stays.`);
 		return;
@@ -176,9 +173,7 @@ export async function takeVerdictBack(action) {
 
 /** Give a verdict again that was taken back, on its group. @param {VerdictDone} action */
 export async function giveVerdictAgain(action) {
-	navigate(reviewAddress(action.group));
-	if (groupDocument.value?.id !== action.group) await open(action.group);
-	if (groupDocument.value?.id !== action.group) return;
+	if (!(await returnTo(action.group))) return;
 	didAgain();
 	submitVerdict(action.given);
 	announce(`Group ${action.number} ${action.given.state} again.`);
