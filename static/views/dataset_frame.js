@@ -8,7 +8,7 @@ import { pageDataset } from '../lib/router.js';
 import { dataset, datasets, failure, loadDatasets, useDataset } from '../state/datasets.js';
 import { Loading, PageFrame, Trouble } from './page_frame.js';
 
-/** @import {ComponentChildren} from 'preact' */
+/** @import {ComponentChildren, ComponentType} from 'preact' */
 /** @import {DatasetJson} from '../api/types.js' */
 
 /**
@@ -36,6 +36,20 @@ export function DatasetFrame({ current, title, where, actions, children }) {
 				</section>` : null}
 			${!one && !missing && !failure.value ? html`<${Loading} what="the dataset" />` : null}
 			${one ? children(one) : null}
+		<//>
+	`;
+}
+
+/**
+ * A page that shows one dataset, anew for another one.
+ *
+ * @param {string} current @param {string} title
+ * @param {ComponentType<{one: DatasetJson}>} Content
+ */
+export function datasetPage(current, title, Content) {
+	return () => html`
+		<${DatasetFrame} current=${current} title=${title}>
+			${(/** @type {DatasetJson} */ one) => html`<${Content} key=${one.id} one=${one} />`}
 		<//>
 	`;
 }

@@ -11,7 +11,7 @@ import { useResource } from '../lib/resource.js';
 import { address, navigate, pageDataset, param } from '../lib/router.js';
 import { queueAddress } from '../state/navigation.js';
 import { pageAddress } from './dataset_menu.js';
-import { DatasetFrame } from './dataset_frame.js';
+import { datasetPage } from './dataset_frame.js';
 import { GoldCard } from './gold_card.js';
 import { GuidelinesCard } from './guidelines_card.js';
 import { HeatMap } from './heat_map.js';
@@ -116,10 +116,4 @@ function StatisticsOf({ one }) {
 	`;
 }
 
-export function StatisticsPage() {
-	return html`
-		<${DatasetFrame} current="statistics" title="Statistics">
-			${(/** @type {DatasetJson} */ one) => html`<${StatisticsOf} key=${one.id} one=${one} />`}
-		<//>
-	`;
-}
+export const StatisticsPage = datasetPage('statistics', 'Statistics', StatisticsOf);

@@ -9,7 +9,7 @@ import { getVersions, manifestAddress, verifyVersion } from '../api/versions.js'
 import { count, plural } from '../lib/format.js';
 import { useResource } from '../lib/resource.js';
 import { follow } from '../state/jobs.js';
-import { DatasetFrame } from './dataset_frame.js';
+import { datasetPage } from './dataset_frame.js';
 import { ExportDialog } from './export_dialog.js';
 import { FreezeDialog } from './freeze_dialog.js';
 import { Loading, Trouble } from './page_frame.js';
@@ -130,10 +130,4 @@ function VersionsOf({ one }) {
 	`;
 }
 
-export function VersionsPage() {
-	return html`
-		<${DatasetFrame} current="versions" title="Versions">
-			${(/** @type {DatasetJson} */ one) => html`<${VersionsOf} key=${one.id} one=${one} />`}
-		<//>
-	`;
-}
+export const VersionsPage = datasetPage('versions', 'Versions', VersionsOf);

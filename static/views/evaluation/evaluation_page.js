@@ -8,7 +8,7 @@ import { getVersions } from '../../api/versions.js';
 import { useResource } from '../../lib/resource.js';
 import { address, navigate, param } from '../../lib/router.js';
 import { pageAddress } from '../dataset_menu.js';
-import { DatasetFrame } from '../dataset_frame.js';
+import { datasetPage } from '../dataset_frame.js';
 import { Loading, Trouble } from '../page_frame.js';
 import { PredictionSets } from './prediction_sets.js';
 import { RunDetails } from './run_details.js';
@@ -50,10 +50,4 @@ function EvaluationOf({ one }) {
 	`;
 }
 
-export function EvaluationPage() {
-	return html`
-		<${DatasetFrame} current="evaluation" title="Evaluation">
-			${(/** @type {DatasetJson} */ one) => html`<${EvaluationOf} key=${one.id} one=${one} />`}
-		<//>
-	`;
-}
+export const EvaluationPage = datasetPage('evaluation', 'Evaluation', EvaluationOf);
