@@ -3,6 +3,7 @@
 
 import { html } from 'htm/preact';
 
+import { withValue } from '../lib/field.js';
 import { adjust, adjustmentOf, RANGE, resetAdjustment } from '../state/adjustments.js';
 
 /** @param {{letter: string, name: 'brightness' | 'contrast', label: string}} props */
@@ -13,7 +14,7 @@ function Slider({ letter, name, label }) {
 			<span>${label}</span>
 			<input
 				type="range" min=${RANGE.min} max=${RANGE.max} step=${RANGE.step} value=${value}
-				onInput=${(/** @type {InputEvent} */ event) => adjust(letter, { [name]: Number(/** @type {HTMLInputElement} */ (event.target).value) })}
+				onInput=${withValue((text) => adjust(letter, { [name]: Number(text) }))}
 			/>
 			<output>${Math.round(100 * value)} %</output>
 		</label>

@@ -6,6 +6,7 @@ import { useState } from 'preact/hooks';
 
 import { sentenceOf } from '../api/problem.js';
 import { postVerdicts, previewVerdicts } from '../api/queue.js';
+import { withValue } from '../lib/field.js';
 import { count, plural, words } from '../lib/format.js';
 import { useResource } from '../lib/resource.js';
 import { reviewAddress } from '../state/navigation.js';
@@ -53,7 +54,6 @@ function Outcome({ preview, q }) {
 
 /** @param {{ask: Omit<BulkRequest, 'q'>, change: (values: Partial<BulkRequest>) => void}} props */
 function Fields({ ask, change }) {
-	const value = (/** @type {Event} */ event) => /** @type {HTMLInputElement} */ (event.target).value;
 	const notes = /** @type {{[state: string]: string}} */ ({
 		accepted: 'Note, needed to accept groups that fail a gate or have no picture', rejected: 'Note', deferred: 'Note', unreviewed: 'Note',
 	});
@@ -69,13 +69,13 @@ function Fields({ ask, change }) {
 		${ask.state === 'rejected' ? html`
 			<div class="form__row">
 				<label for="bulk-reason">Reason</label>
-				<select class="field" id="bulk-reason" value=${ask.reason} onChange=${(/** @type {Event} */ event) => change({ reason: value(event) })}>
+				<select class="field" id="bulk-reason" value=${ask.reason} onChange=${withValue((reason) => change({ reason }))}>
 					${REASONS.map(({ name, label }) => html`<option key=${name} value=${name}>${label.replace('…', '')}</option>`)}
 				</select>
 			</div>` : null}
 		<div class="form__row">
 			<label for="bulk-note">${notes[ask.state]}</label>
-			<input class="field" id="bulk-note" maxlength="500" autocomplete="off" defaultValue="" onInput=${(/** @type {Event} */ event) => change({ note: value(event).trim() || null })} />
+			<input class="field" id="bulk-note" maxlength="500" autocomplete="off" defaultValue="" onInput=${withValue((note) => change({ note: note.trim() || null }))} />
 		</div>
 	`;
 }

@@ -6,6 +6,7 @@ import { useEffect, useLayoutEffect, useMemo, useRef, useState } from 'preact/ho
 
 import { plainMarking } from '../geometry/marking_words.js';
 import { pitchMarkings } from '../geometry/pitch.js';
+import { withValue } from '../lib/field.js';
 import { chooseDrawing, endDrawing } from '../state/drawing.js';
 import { drawing } from '../state/workspace.js';
 
@@ -59,7 +60,7 @@ export function ClassChooser({ picture }) {
 				id=${`draw-${letter}`} class="field chooser__field" ref=${field} value=${text} autocomplete="off" spellcheck=${false}
 				placeholder="Draw what?" role="combobox" aria-expanded="true" aria-controls=${`draw-list-${letter}`}
 				aria-activedescendant=${found[active] ? `draw-${letter}-${active}` : undefined}
-				onInput=${(/** @type {InputEvent} */ event) => { setText(/** @type {HTMLInputElement} */ (event.target).value); setAt(0); }}
+				onInput=${withValue((typed) => { setText(typed); setAt(0); })}
 				onBlur=${(/** @type {FocusEvent} */ event) => {
 					const { currentTarget, relatedTarget } = event;
 					const inside = /** @type {HTMLElement} */ (currentTarget).parentElement?.contains(/** @type {Node | null} */ (relatedTarget));

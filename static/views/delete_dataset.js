@@ -6,6 +6,7 @@ import { useState } from 'preact/hooks';
 
 import { deleteDataset, previewDeletion } from '../api/datasets.js';
 import { useAttempt } from '../lib/attempt.js';
+import { withValue } from '../lib/field.js';
 import { count, words } from '../lib/format.js';
 import { useResource } from '../lib/resource.js';
 import { loadDatasets } from '../state/datasets.js';
@@ -44,7 +45,7 @@ export function DeleteDataset({ one, onClose }) {
 				<label for="delete-name">Type <strong>${one.name}</strong> to go on</label>
 				<input
 					class="field" id="delete-name" autocomplete="off" spellcheck=${false} value=${typed}
-					onInput=${(/** @type {InputEvent} */ event) => setTyped(/** @type {HTMLInputElement} */ (event.target).value)}
+					onInput=${withValue(setTyped)}
 				/>
 			</div>
 			${error ? html`<${FormError} error=${error} />` : null}

@@ -4,6 +4,8 @@
 import { html } from 'htm/preact';
 import { useEffect, useRef } from 'preact/hooks';
 
+import { withForm } from '../lib/field.js';
+
 /** @import {ComponentChildren} from 'preact' */
 
 /**
@@ -19,14 +21,9 @@ export function FormDialog({ title, onClose, onSubmit, buttons, wide = false, ch
 		// The first thing that is asked, not the way out.
 		/** @type {HTMLElement | null | undefined} */ (dialog.current?.querySelector('input:checked, input:not([type="radio"]), select, textarea'))?.focus();
 	}, []);
-	/** @param {SubmitEvent} event */
-	function send(event) {
-		event.preventDefault();
-		onSubmit(new FormData(/** @type {HTMLFormElement} */ (event.currentTarget)));
-	}
 	return html`
 		<dialog class=${wide ? 'dialog dialog--wide' : 'dialog'} ref=${dialog} aria-labelledby="dialog-title" onClose=${onClose}>
-			<form class="form" onSubmit=${send}>
+			<form class="form" onSubmit=${withForm(onSubmit)}>
 				<header class="dialog__header">
 					<h2 id="dialog-title">${title}</h2>
 					<button class="button" type="button" onClick=${() => dialog.current?.close()}>Close <kbd>Esc</kbd></button>

@@ -4,6 +4,7 @@
 import { html } from 'htm/preact';
 import { useEffect, useRef, useState } from 'preact/hooks';
 
+import { withForm } from '../lib/field.js';
 import { count, words } from '../lib/format.js';
 import { dataset, loadDatasets } from '../state/datasets.js';
 import { download, FORMATS, makeExport } from '../state/exports.js';
@@ -65,11 +66,9 @@ export function ExportDialog({ one, version = null, onClose }) {
 		loadDatasets();
 		return () => closed.current.abort();
 	}, []);
-	/** @param {SubmitEvent} event */
-	async function send(event) {
-		event.preventDefault();
+	/** @param {FormData} form */
+	async function send(form) {
 		if (state.busy) return;
-		const form = new FormData(/** @type {HTMLFormElement} */ (event.currentTarget));
 		setState({ busy: true, job: null, made: null, error: null });
 		try {
 			const made = await makeExport({
@@ -92,7 +91,7 @@ export function ExportDialog({ one, version = null, onClose }) {
 	}
 	return html`
 		<dialog class="dialog" ref=${dialog} aria-labelledby="export-title" onClose=${onClose}>
-			<form onSubmit=${send}>
+			<form onSubmit=${withForm(send)}>
 				<header class="dialog__header">
 					<h2 id="export-title">Export ${one.name}${version ? `, version ${version.name}` : ''}</h2>
 					<button class="button" type="button" onClick=${() => dialog.current?.close()}>Close <kbd>Esc</kbd></button>

@@ -6,6 +6,7 @@ import { useState } from 'preact/hooks';
 
 import { sentenceOf } from '../api/problem.js';
 import { postVersion, previewFreeze } from '../api/versions.js';
+import { withValue } from '../lib/field.js';
 import { count, words } from '../lib/format.js';
 import { useResource } from '../lib/resource.js';
 import { follow } from '../state/jobs.js';
@@ -22,9 +23,6 @@ function freeName(taken) {
 	while (taken.includes(`v${number}`)) number += 1;
 	return `v${number}`;
 }
-
-/** @param {Event} event */
-const valueOf = (event) => /** @type {HTMLInputElement} */ (event.target).value;
 
 const GROUPS = /** @type {{name: FreezeRequest['groups'], label: string, note: string}[]} */ ([
 	{ name: 'accepted', label: 'Accepted', note: 'by people; against a gate only with a reason' },
@@ -49,11 +47,11 @@ function SplitFields({ split, change }) {
 		</fieldset>
 		${split.kind === 'match' ? html`
 			<div class="form__columns">
-				<div class="form__row"><label for="split-seed">Seed</label><input class="field" id="split-seed" type="number" step="1" min="0" value=${split.seed} onChange=${(/** @type {Event} */ event) => change({ ...split, seed: Math.trunc(Number(valueOf(event))) })} /></div>
-				<div class="form__row"><label for="split-share">Share of matches for testing</label><input class="field" id="split-share" type="number" step="0.05" min="0.01" max="0.99" value=${split.test_share} onChange=${(/** @type {Event} */ event) => change({ ...split, test_share: Number(valueOf(event)) })} /></div>
+				<div class="form__row"><label for="split-seed">Seed</label><input class="field" id="split-seed" type="number" step="1" min="0" value=${split.seed} onChange=${withValue((text) => change({ ...split, seed: Math.trunc(Number(text)) }))} /></div>
+				<div class="form__row"><label for="split-share">Share of matches for testing</label><input class="field" id="split-share" type="number" step="0.05" min="0.01" max="0.99" value=${split.test_share} onChange=${withValue((text) => change({ ...split, test_share: Number(text) }))} /></div>
 			</div>` : null}
 		${split.kind === 'camera' ? html`
-			<div class="form__row"><label for="split-cameras">Test cameras</label><input class="field" id="split-cameras" value=${(split.test_cameras ?? []).join(' ')} onChange=${(/** @type {Event} */ event) => change({ ...split, test_cameras: valueOf(event).split(/[\s,]+/).filter(Boolean) })} /><small>Keys of views, for example cam1 cam2</small></div>` : null}
+			<div class="form__row"><label for="split-cameras">Test cameras</label><input class="field" id="split-cameras" value=${(split.test_cameras ?? []).join(' ')} onChange=${withValue((text) => change({ ...split, test_cameras: text.split(/[\s,]+/).filter(Boolean) }))} /><small>Keys of views, for example cam1 cam2</small></div>` : null}
 	`;
 }
 
@@ -79,8 +77,8 @@ function Plan({ plan }) {
 function FreezeFields({ ask, change }) {
 	return html`
 		<div class="form__columns">
-			<div class="form__row"><label for="freeze-name">Name</label><input class="field" id="freeze-name" maxlength="100" autocomplete="off" value=${ask.name} onInput=${(/** @type {Event} */ event) => change({ name: valueOf(event) })} /></div>
-			<div class="form__row"><label for="freeze-note">Note</label><input class="field" id="freeze-note" maxlength="2000" autocomplete="off" value=${ask.note} onInput=${(/** @type {Event} */ event) => change({ note: valueOf(event) })} /></div>
+			<div class="form__row"><label for="freeze-name">Name</label><input class="field" id="freeze-name" maxlength="100" autocomplete="off" value=${ask.name} onInput=${withValue((name) => change({ name }))} /></div>
+			<div class="form__row"><label for="freeze-note">Note</label><input class="field" id="freeze-note" maxlength="2000" autocomplete="off" value=${ask.note} onInput=${withValue((note) => change({ note }))} /></div>
 		</div>
 		<fieldset class="choice choice--row">
 			<legend>Groups</legend>
@@ -93,7 +91,7 @@ function FreezeFields({ ask, change }) {
 		<${SplitFields} split=${ask.split} change=${(/** @type {SplitRequest} */ split) => change({ split })} />
 		<div class="form__row">
 			<label for="freeze-licence">Licence</label>
-			<textarea class="field" id="freeze-licence" rows="3" value=${ask.licence} onInput=${(/** @type {Event} */ event) => change({ licence: valueOf(event) })}></textarea>
+			<textarea class="field" id="freeze-licence" rows="3" value=${ask.licence} onInput=${withValue((licence) => change({ licence }))}></textarea>
 			<small>Left empty: the terms of the sources.</small>
 		</div>
 	`;

@@ -5,6 +5,7 @@ import { html } from 'htm/preact';
 
 import { deleteGold, getGold, putGold } from '../api/takes.js';
 import { useAttempt } from '../lib/attempt.js';
+import { withValue } from '../lib/field.js';
 import { plural } from '../lib/format.js';
 import { useResource } from '../lib/resource.js';
 import { reviewAddress } from '../state/navigation.js';
@@ -60,7 +61,7 @@ function GoldRow({ one, change, drop }) {
 	return html`
 		<tr>
 			<th scope="row"><a href=${reviewAddress(one.group)}>${one.label}</a></th>
-			<td><select class="field" aria-label=${`What annotators of ${one.label} begin with`} value=${one.start} onChange=${(/** @type {Event} */ event) => change(/** @type {HTMLSelectElement} */ (event.currentTarget).value)}>
+			<td><select class="field" aria-label=${`What annotators of ${one.label} begin with`} value=${one.start} onChange=${withValue(change)}>
 				${STARTS.map(([name, words]) => html`<option key=${name} value=${name}>${words}</option>`)}
 			</select></td>
 			<td>${FROM[one.source]}</td>

@@ -4,6 +4,7 @@
 import { html } from 'htm/preact';
 import { useState } from 'preact/hooks';
 
+import { withValue } from '../lib/field.js';
 import { plural } from '../lib/format.js';
 import { rangeOf, withField } from '../state/query.js';
 import { summary } from '../state/queue.js';
@@ -46,15 +47,14 @@ function Ends({ column, data, bins, choose }) {
 	const most = data.counts.length - 1;
 	/** @param {number} at @param {boolean} upper */
 	const said = (at, upper) => `${short(data.edges[at + (upper ? 1 : 0)])}${upper && at === most && data.open_high ? ' and more' : ''}`;
-	const value = (/** @type {Event} */ event) => Number(/** @type {HTMLInputElement} */ (event.target).value);
 	return html`
 		<input
 			class="histogram__end" type="range" min="0" max=${most} step="1" value=${bins[0]} aria-label=${`${column.label} from`}
-			aria-valuetext=${said(bins[0], false)} onChange=${(/** @type {Event} */ event) => choose(Math.min(value(event), bins[1]), bins[1])}
+			aria-valuetext=${said(bins[0], false)} onChange=${withValue((text) => choose(Math.min(Number(text), bins[1]), bins[1]))}
 		/>
 		<input
 			class="histogram__end" type="range" min="0" max=${most} step="1" value=${bins[1]} aria-label=${`${column.label} to`}
-			aria-valuetext=${said(bins[1], true)} onChange=${(/** @type {Event} */ event) => choose(bins[0], Math.max(value(event), bins[0]))}
+			aria-valuetext=${said(bins[1], true)} onChange=${withValue((text) => choose(bins[0], Math.max(Number(text), bins[0])))}
 		/>
 	`;
 }

@@ -6,6 +6,7 @@ import { useEffect, useState } from 'preact/hooks';
 
 import { postImport } from '../api/imports.js';
 import { sentenceOf } from '../api/problem.js';
+import { withValue } from '../lib/field.js';
 import { param } from '../lib/router.js';
 import { datasets, loadDatasets } from '../state/datasets.js';
 import { IMPORT_FORMATS, optionValue } from '../state/import_formats.js';
@@ -29,8 +30,6 @@ const POLICIES = [
 	{ name: 'strict', label: 'strict: as paper, with rays 5° apart and σ below 0.5 m' },
 ];
 
-const valueOf = (/** @type {Event} */ event) => /** @type {HTMLInputElement} */ (event.target).value;
-
 /** @param {{option: FormatOption, change: (value: any) => void}} props */
 function OptionField({ option, change }) {
 	const id = `option-${option.name}`;
@@ -38,7 +37,7 @@ function OptionField({ option, change }) {
 		return html`
 			<div class="form__row">
 				<label for=${id}>${option.label}</label>
-				<select class="field" id=${id} onChange=${(/** @type {Event} */ event) => change(valueOf(event))}>
+				<select class="field" id=${id} onChange=${withValue(change)}>
 					<option value="given">the given camera counts</option><option value="lines">the lines count</option>
 				</select>
 			</div>
@@ -47,7 +46,7 @@ function OptionField({ option, change }) {
 	return html`
 		<div class="form__row">
 			<label for=${id}>${option.label}</label>
-			<input class="field" id=${id} autocomplete="off" onInput=${(/** @type {Event} */ event) => change(optionValue(option, valueOf(event)))} />
+			<input class="field" id=${id} autocomplete="off" onInput=${withValue((text) => change(optionValue(option, text)))} />
 			<small>${option.hint}</small>
 		</div>
 	`;
@@ -60,7 +59,7 @@ function LinesField({ source, change }) {
 		return html`
 			<div class="form__row">
 				<label for="import-lines">${label}</label>
-				<input class="field" id="import-lines" autocomplete="off" onInput=${(/** @type {Event} */ event) => change(valueOf(event).trim() ? { folder: valueOf(event).trim() } : undefined)} />
+				<input class="field" id="import-lines" autocomplete="off" onInput=${withValue((text) => change(text.trim() ? { folder: text.trim() } : undefined))} />
 				<small>another folder that the operator allowed</small>
 			</div>
 		`;
@@ -73,7 +72,7 @@ function PolicyField({ kept, change }) {
 	return html`
 		<div class="form__row">
 			<label for="import-policy">Policy</label>
-			<select class="field" id="import-policy" disabled=${kept} title=${kept ? 'The dataset is there and keeps its policy' : ''} onChange=${(/** @type {Event} */ event) => change(valueOf(event))}>
+			<select class="field" id="import-policy" disabled=${kept} title=${kept ? 'The dataset is there and keeps its policy' : ''} onChange=${withValue(change)}>
 				${POLICIES.map(({ name, label }) => html`<option key=${name} value=${name}>${label}</option>`)}
 			</select>
 			<small>${kept ? 'This dataset is there and keeps its policy; it is changed on the page Policy.' : 'The thresholds of the new dataset, and whether cameras come from the paint of its pictures. It can be changed later.'}</small>
@@ -154,7 +153,7 @@ export function ImportPage() {
 					<form class="form" onSubmit=${submit}>
 						<div class="form__row">
 							<label for="import-dataset">Dataset</label>
-							<input class="field" id="import-dataset" list="known-datasets" maxlength="100" autocomplete="off" value=${dataset} onInput=${(/** @type {Event} */ event) => setDataset(valueOf(event))} />
+							<input class="field" id="import-dataset" list="known-datasets" maxlength="100" autocomplete="off" value=${dataset} onInput=${withValue(setDataset)} />
 							<datalist id="known-datasets">${(datasets.value ?? []).map((one) => html`<option key=${one.id} value=${one.name}></option>`)}</datalist>
 							<small>A new name makes a new dataset. An import into an existing one brings what its files have changed; what people edited stays.</small>
 						</div>

@@ -7,6 +7,7 @@ import { useEffect, useState } from 'preact/hooks';
 import { lookAtLink, postLink } from '../api/people.js';
 import { ApiError } from '../api/problem.js';
 import { beginSignOn } from '../api/sign_on.js';
+import { withValue } from '../lib/field.js';
 import { navigate } from '../lib/router.js';
 import { ways } from '../state/me.js';
 import { FormError } from './form_error.js';
@@ -27,7 +28,7 @@ function Ways({ meant, token }) {
 	const { password, sign_on: provider } = ways.value;
 	const said = meant.name === null ? { name } : {};
 	return html`
-		${meant.name === null ? html`<div class="form"><div class="form__row"><label for="join-name">Name</label><input class="field" id="join-name" name="name" required maxlength="40" autocomplete="username" autocapitalize="none" spellcheck=${false} value=${name} onInput=${(/** @type {Event} */ event) => setName(/** @type {HTMLInputElement} */ (event.currentTarget).value)} /><small>Small letters and digits; history and verdicts will name you so.</small></div></div>` : null}
+		${meant.name === null ? html`<div class="form"><div class="form__row"><label for="join-name">Name</label><input class="field" id="join-name" name="name" required maxlength="40" autocomplete="username" autocapitalize="none" spellcheck=${false} value=${name} onInput=${withValue(setName)} /><small>Small letters and digits; history and verdicts will name you so.</small></div></div>` : null}
 		${provider ? html`<${SignOnButton} primary=${!password} begin=${() => beginSignOn({ link: token, ...said })}>Come in with ${provider}<//>` : null}
 		${provider && password ? html`<p class="login__or">or choose a password of this server</p>` : null}
 		${password ? html`<${JoinForm} meant=${meant} token=${token} said=${said} />` : null}

@@ -8,6 +8,7 @@ import { enterWithPasskey, passkeysWork } from '../api/passkeys.js';
 import { postSession } from '../api/people.js';
 import { ApiError } from '../api/problem.js';
 import { beginSignOn } from '../api/sign_on.js';
+import { withForm } from '../lib/field.js';
 import { outbox } from '../state/outbox.js';
 import { me, ways, welcome } from '../state/me.js';
 import { plural } from '../lib/format.js';
@@ -20,18 +21,16 @@ import { SignOnButton } from './sign_on_button.js';
  * A form whose answer is a session.
  *
  * @param {(form: FormData) => Promise<SessionJson>} ask
- * @returns {{error: ApiError | null, busy: boolean, send: (event: SubmitEvent) => Promise<void>}}
+ * @returns {{error: ApiError | null, busy: boolean, send: (event: Event) => void}}
  */
 export function useSessionForm(ask) {
 	const [error, setError] = useState(/** @type {ApiError | null} */ (null));
 	const [busy, setBusy] = useState(false);
-	/** @param {SubmitEvent} event */
-	async function send(event) {
-		event.preventDefault();
-		const form = /** @type {HTMLFormElement} */ (event.currentTarget);
+	/** @param {FormData} said @param {HTMLFormElement} form */
+	async function send(said, form) {
 		setBusy(true);
 		try {
-			welcome(await ask(new FormData(form)));
+			welcome(await ask(said));
 			setError(null);
 		} catch (problem) {
 			if (!(problem instanceof ApiError)) throw problem;
@@ -42,7 +41,7 @@ export function useSessionForm(ask) {
 			setBusy(false);
 		}
 	}
-	return { error, busy, send };
+	return { error, busy, send: withForm(send) };
 }
 
 /** What has just appeared is typed into next. @param {HTMLInputElement | null} field */

@@ -5,6 +5,7 @@ import { html } from 'htm/preact';
 
 import { getMembers, putMember } from '../api/people.js';
 import { useAttempt } from '../lib/attempt.js';
+import { withValue } from '../lib/field.js';
 import { useResource } from '../lib/resource.js';
 import { isTeam, myName } from '../state/me.js';
 import { whyNot } from '../state/rights.js';
@@ -24,7 +25,7 @@ function MemberRow({ one, give }) {
 		<tr>
 			<th scope="row">${one.name}${mine ? ' (you)' : ''}</th>
 			<td>
-				<select class="field" aria-label=${`Role of ${one.name} here`} value=${one.single ?? ''} disabled=${why !== undefined} title=${why} onChange=${(/** @type {Event} */ event) => give(/** @type {Role} */ (/** @type {HTMLSelectElement} */ (event.currentTarget).value) || null)}>
+				<select class="field" aria-label=${`Role of ${one.name} here`} value=${one.single ?? ''} disabled=${why !== undefined} title=${why} onChange=${withValue((role) => give(/** @type {Role} */ (role) || null))}>
 					<option value="">${one.everywhere}, as in all datasets</option>
 					${ROLES_HERE.map((role) => html`<option key=${role} value=${role}>${role}${role === 'none' ? ': does not see it' : ' here'}</option>`)}
 				</select>

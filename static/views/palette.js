@@ -4,6 +4,7 @@
 import { html } from 'htm/preact';
 import { useEffect, useLayoutEffect, useMemo, useRef, useState } from 'preact/hooks';
 
+import { withValue } from '../lib/field.js';
 import { plural } from '../lib/format.js';
 import { latest } from '../lib/latest.js';
 import { navigate, page } from '../lib/router.js';
@@ -129,11 +130,11 @@ export function Palette() {
 				placeholder="Page, dataset, group or action" autocomplete="off" spellcheck=${false}
 				aria-expanded="true" aria-controls="palette-list" aria-activedescendant=${items[at]?.id}
 				value=${text} onKeyDown=${key}
-				onInput=${(/** @type {InputEvent} */ event) => {
-					setText(/** @type {HTMLInputElement} */ (event.target).value);
+				onInput=${withValue((typed) => {
+					setText(typed);
 					setPlace(0);
 					setChosen(false);
-				}}
+				})}
 			/>
 			<${Choices} items=${items} active=${items[at]?.id ?? ''} choose=${choose} />
 			${items.length === 0 ? html`<p class="empty-note" role="status">Nothing is called that.</p>` : null}

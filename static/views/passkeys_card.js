@@ -7,6 +7,7 @@ import { useEffect, useState } from 'preact/hooks';
 import { deletePasskey, getPasskeys, makePasskey, passkeysWork } from '../api/passkeys.js';
 import { ApiError } from '../api/problem.js';
 import { useAttempt } from '../lib/attempt.js';
+import { withForm } from '../lib/field.js';
 import { askWhoIsThere } from '../state/me.js';
 import { FormError } from './form_error.js';
 import { proof } from './proof.js';
@@ -54,13 +55,9 @@ function Table({ items, leave }) {
 
 /** @param {{make: (name: string, password: string) => Promise<boolean>, error: ApiError | null, busy: boolean}} props */
 function NewPasskey({ make, error, busy }) {
-	/** @param {SubmitEvent} event */
-	async function send(event) {
-		event.preventDefault();
-		const form = /** @type {HTMLFormElement} */ (event.currentTarget);
-		const said = new FormData(form);
+	const send = withForm(async (said, form) => {
 		if (!busy && await make(String(said.get('name')).trim(), String(said.get('password')))) form.reset();
-	}
+	});
 	return html`
 		<form class="form passkeys__form" onSubmit=${send}>
 			<div class="form__row"><label for="passkey-name">Name of the passkey</label><input class="field" id="passkey-name" name="name" required maxlength="40" autocomplete="off" placeholder="phone" /></div>

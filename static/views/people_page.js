@@ -9,6 +9,7 @@ import { ApiError } from '../api/problem.js';
 import { deleteIdentityOf } from '../api/sign_on.js';
 import { endToken, getTokens } from '../api/tokens.js';
 import { useAttempt } from '../lib/attempt.js';
+import { withForm, withTick, withValue } from '../lib/field.js';
 import { plural } from '../lib/format.js';
 import { useResource } from '../lib/resource.js';
 import { datasets } from '../state/datasets.js';
@@ -59,7 +60,7 @@ function FactorRule({ act }) {
 	if (on === null) return null;
 	return html`
 		<p class="people__rule"><label class="form__check">
-			<input type="checkbox" checked=${on} onChange=${(/** @type {Event} */ event) => act(putTeam(/** @type {HTMLInputElement} */ (event.currentTarget).checked).then(told))} />
+			<input type="checkbox" checked=${on} onChange=${withTick((ticked) => act(putTeam(ticked).then(told)))} />
 			<span>Everybody needs a second factor: who has none makes one before anything else</span>
 		</label></p>
 	`;
@@ -81,13 +82,9 @@ function TokensCard({ of, act, close }) {
 
 /** @param {{invite: (name: string, role: Role) => Promise<boolean>, error: ApiError | null}} props */
 function InviteCard({ invite, error }) {
-	/** @param {SubmitEvent} event */
-	async function send(event) {
-		event.preventDefault();
-		const form = /** @type {HTMLFormElement} */ (event.currentTarget);
-		const said = new FormData(form);
+	const send = withForm(async (said, form) => {
 		if (await invite(String(said.get('name')), /** @type {Role} */ (said.get('role')))) form.reset();
-	}
+	});
 	return html`
 		<section class="card" aria-labelledby="people-invite">
 			<h2 id="people-invite">Invite somebody</h2>
@@ -111,7 +108,7 @@ function PersonRow({ one, change, link, tokens, factor, unlink }) {
 		<tr>
 			<th scope="row">${one.name}${mine ? ' (you)' : ''}<small>invited by ${one.created_by}</small>${one.datasets.length ? html`<small>${one.datasets.map(({ dataset, role }) => `${role} in ${dataset}`).join(', ')}</small>` : null}</th>
 			<td>
-				<select class="field" aria-label=${`Role of ${one.name}`} value=${one.role} disabled=${mine} title=${why} onChange=${(/** @type {Event} */ event) => change({ role: /** @type {Role} */ (/** @type {HTMLSelectElement} */ (event.currentTarget).value) })}>
+				<select class="field" aria-label=${`Role of ${one.name}`} value=${one.role} disabled=${mine} title=${why} onChange=${withValue((role) => change({ role: /** @type {Role} */ (role) }))}>
 					${ROLES.map(({ name }) => html`<option key=${name} value=${name}>${name}</option>`)}
 				</select>
 			</td>
@@ -154,7 +151,7 @@ function InOneDataset() {
 			<h2 id="people-datasets">In one dataset</h2>
 			<div class="form"><div class="form__row">
 				<label for="people-dataset">Dataset</label>
-				<select class="field" id="people-dataset" value=${chosen} onChange=${(/** @type {Event} */ event) => setName(/** @type {HTMLSelectElement} */ (event.currentTarget).value)}>
+				<select class="field" id="people-dataset" value=${chosen} onChange=${withValue(setName)}>
 					${all.map((one) => html`<option key=${one.id} value=${one.name}>${one.name}</option>`)}
 				</select>
 				<small>A role here takes the place of the one in all datasets. Leads of a dataset give roles in it, too.</small>
@@ -166,16 +163,11 @@ function InOneDataset() {
 
 /** What was done before there were accounts. @param {{people: UserJson[], adoptedBy: string | null, give: (id: number) => void}} props */
 function LocalWork({ people, adoptedBy, give }) {
-	/** @param {SubmitEvent} event */
-	function send(event) {
-		event.preventDefault();
-		give(Number(new FormData(/** @type {HTMLFormElement} */ (event.currentTarget)).get('person')));
-	}
 	return html`
 		<section class="card" aria-labelledby="people-local">
 			<h2 id="people-local">Work from before there were accounts</h2>
 			${adoptedBy ? html`<p>It is shown as ${adoptedBy}'s. The log keeps the name local.</p>` : html`
-				<form class="form" onSubmit=${send}>
+				<form class="form" onSubmit=${withForm((said) => give(Number(said.get('person'))))}>
 					<div class="form__row">
 						<label for="people-adopter">Show what local did until now as the work of</label>
 						<select class="field" id="people-adopter" name="person">${people.map((one) => html`<option key=${one.id} value=${one.id}>${one.name}</option>`)}</select>

@@ -6,6 +6,7 @@ import { useRef, useState } from 'preact/hooks';
 
 import { acceptNoise, takeNoiseBack } from '../api/noise.js';
 import { getPolicies, getPolicy, putPolicy, putPolicyText } from '../api/policies.js';
+import { withValue } from '../lib/field.js';
 import { saveText } from '../lib/save_text.js';
 import { useResource } from '../lib/resource.js';
 import { loadDatasets } from '../state/datasets.js';
@@ -48,7 +49,7 @@ function PolicyText({ one, policy, etag, busy, send }) {
 			<form class="form" onSubmit=${submit}>
 				<textarea
 					class="field policy__text" aria-label="Policy as YAML" spellcheck=${false} wrap="off" rows="26" value=${text}
-					onInput=${(/** @type {InputEvent} */ event) => setText(/** @type {HTMLTextAreaElement} */ (event.target).value)}
+					onInput=${withValue(setText)}
 				></textarea>
 				<p class="buttons">
 					<button data-needs="lead" class="button button--primary" type="submit" aria-disabled=${why !== ''} title=${why}>Save and solve</button>

@@ -3,6 +3,7 @@
 
 import { html } from 'htm/preact';
 
+import { withValue } from '../lib/field.js';
 import { pixels, plural, scoreText } from '../lib/format.js';
 import { acceptEdits, distanceTo, EVERY_SET, surest } from '../state/prediction_marks.js';
 import { acceptAll, acceptMark, leastScore, predicted, shownSet } from '../state/predictions.js';
@@ -12,8 +13,6 @@ import { Letter } from './letter.js';
 /** @import {GroupDocument, ViewJson} from '../api/types.js' */
 /** @import {Mark, ViewMarks} from '../state/prediction_marks.js' */
 /** @import {Predicted} from '../state/predictions.js' */
-
-const valueOf = (/** @type {Event} */ event) => /** @type {HTMLInputElement | HTMLSelectElement} */ (event.target).value;
 
 /** The sign that predictions have on the pictures. */
 function Brackets() {
@@ -25,7 +24,7 @@ function Choice({ predicted: { sets, set } }) {
 	return html`
 		<div class="predictions__choice">
 			${sets.length < 2 ? html`<span class="predictions__set" title=${sets[0]}>${sets[0] ?? 'No set any more'}</span>` : html`
-				<select class="field" aria-label="Set of predictions" value=${set || EVERY_SET} onChange=${(/** @type {Event} */ event) => { shownSet.value = valueOf(event); }}>
+				<select class="field" aria-label="Set of predictions" value=${set || EVERY_SET} onChange=${withValue((chosen) => { shownSet.value = chosen; })}>
 					<option value=${EVERY_SET}>All ${sets.length} sets</option>
 					${sets.map((name) => html`<option key=${name} value=${name}>${name}</option>`)}
 				</select>`}
@@ -33,7 +32,7 @@ function Choice({ predicted: { sets, set } }) {
 				sure from
 				<input
 					class="field" type="number" min="0" max="1" step="0.05" value=${leastScore.value}
-					onChange=${(/** @type {Event} */ event) => { leastScore.value = Math.min(1, Math.max(0, Number(valueOf(event)) || 0)); }}
+					onChange=${withValue((text) => { leastScore.value = Math.min(1, Math.max(0, Number(text) || 0)); })}
 				/>
 			</label>
 		</div>

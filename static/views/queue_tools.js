@@ -4,6 +4,7 @@
 import { html } from 'htm/preact';
 import { useState } from 'preact/hooks';
 
+import { withValue } from '../lib/field.js';
 import { count } from '../lib/format.js';
 import { useKeys } from '../lib/hooks.js';
 import { valueOf, withField, wordsOf } from '../state/query.js';
@@ -65,11 +66,7 @@ function Facets({ dataset, q, onQuery }) {
 function OrderChoice({ q, onQuery }) {
 	const sort = valueOf(q, 'sort');
 	const known = ORDERS.some((order) => order.sort === sort);
-	/** @param {Event} event */
-	function choose(event) {
-		const { value } = /** @type {HTMLSelectElement} */ (event.target);
-		onQuery(withField(q, 'sort', value ? [`sort:${value}`] : []));
-	}
+	const choose = withValue((value) => onQuery(withField(q, 'sort', value ? [`sort:${value}`] : [])));
 	return html`
 		<select class="field field--select" aria-label="Order" aria-describedby=${sort.startsWith('value') ? 'order-explained' : undefined} title=${ORDERS.find((order) => order.sort === sort)?.title} value=${sort} onChange=${choose}>
 			${ORDERS.map((order) => html`<option key=${order.sort} value=${order.sort} title=${order.title}>${order.label}</option>`)}

@@ -5,6 +5,7 @@ import { html } from 'htm/preact';
 import { useState } from 'preact/hooks';
 
 import { sentenceOf } from '../api/problem.js';
+import { withValue } from '../lib/field.js';
 import { follow } from '../state/jobs.js';
 import { FormDialog } from './dialog.js';
 import { JobProgress } from './job_progress.js';
@@ -64,7 +65,7 @@ export function SavePolicy({ name, changed, put, onSaved, onClose }) {
 				<label for="policy-name">Name</label>
 				<input
 					class="field" id="policy-name" maxlength="80" autocomplete="off" value=${typed} disabled=${busy || done}
-					onInput=${(/** @type {InputEvent} */ event) => setTyped(/** @type {HTMLInputElement} */ (event.target).value)}
+					onInput=${withValue(setTyped)}
 				/>
 			</div>
 			${job ? html`<${JobProgress} job=${job} />` : null}

@@ -6,6 +6,7 @@ import { useState } from 'preact/hooks';
 
 import { deleteSavedView, getSavedViews, postSavedView } from '../api/queue.js';
 import { useAttempt } from '../lib/attempt.js';
+import { withValue } from '../lib/field.js';
 import { count } from '../lib/format.js';
 import { useResource } from '../lib/resource.js';
 import { announce } from '../state/notice.js';
@@ -31,7 +32,7 @@ function SaveForm({ q, save }) {
 			<div class="buttons">
 				<input
 					class="field" id="view-name" maxlength="80" autocomplete="off" value=${name}
-					onInput=${(/** @type {InputEvent} */ event) => setName(/** @type {HTMLInputElement} */ (event.target).value)}
+					onInput=${withValue(setName)}
 				/>
 				<button data-needs="annotate" class="button" type="submit" aria-disabled=${!name.trim()}>Save</button>
 			</div>

@@ -7,6 +7,7 @@ import { useEffect, useState } from 'preact/hooks';
 import { beginSecondFactor, confirmSecondFactor, deleteSecondFactor, getSecondFactor } from '../api/people.js';
 import { ApiError } from '../api/problem.js';
 import { useAttempt } from '../lib/attempt.js';
+import { withForm } from '../lib/field.js';
 import { askWhoIsThere } from '../state/me.js';
 import { FormError } from './form_error.js';
 import { proof } from './proof.js';
@@ -16,13 +17,8 @@ import { proof } from './proof.js';
 
 /** A form with one field. @param {{id: string, label: string, button: string, name: string, type?: string, complete: string, optional?: boolean, error: ApiError | null, send: (text: string) => void, beside?: ComponentChildren, children?: ComponentChildren}} props `beside`: the button */
 export function OneField({ id, label, button, name, type = 'text', complete, optional = false, error, send, beside, children }) {
-	/** @param {SubmitEvent} event */
-	function submit(event) {
-		event.preventDefault();
-		send(String(new FormData(/** @type {HTMLFormElement} */ (event.currentTarget)).get(name)));
-	}
 	return html`
-		<form class="form" onSubmit=${submit}>
+		<form class="form" onSubmit=${withForm((said) => send(String(said.get(name))))}>
 			${children}
 			<div class="form__row"><label for=${id}>${label}</label><input class="field" id=${id} name=${name} type=${type} required=${!optional} maxlength=${type === 'password' ? 200 : 40} autocomplete=${complete} /></div>
 			<${FormError} error=${error} />

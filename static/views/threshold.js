@@ -3,6 +3,8 @@
 
 import { html } from 'htm/preact';
 
+import { withTick, withValue } from '../lib/field.js';
+
 /** @import {PolicyField, Threshold as Value} from '../api/policies.js' */
 
 const OFF = 'This threshold is off: tick the box to use it';
@@ -38,7 +40,6 @@ function endsOf({ minimum, maximum, default: usual }) {
 /** @param {{field: PolicyField, value: Value, id: string, change: (value: Value) => void}} props */
 function Slider({ field, value, id, change }) {
 	const [low, high] = endsOf(field);
-	const number = (/** @type {Event} */ event) => Number(/** @type {HTMLInputElement} */ (event.target).value);
 	const shown = typeof value === 'number' ? value : low;
 	const off = value === null;
 	const share = Math.max(0, Math.min(1, (shown - low) / (high - low)));
@@ -46,11 +47,11 @@ function Slider({ field, value, id, change }) {
 		<input
 			class="threshold__slider" type="range" min=${low} max=${high} step=${stepOf(low, high)} value=${shown} disabled=${off} title=${off ? OFF : ''}
 			aria-label=${`${field.label}, slider`} style=${{ '--share': `${100 * share}%` }}
-			onInput=${(/** @type {Event} */ event) => change(number(event))}
+			onInput=${withValue((text) => change(Number(text)))}
 		/>
 		<input
 			class="field threshold__number" id=${id} type="number" min=${low} max=${high} step="any" value=${off ? '' : shown} disabled=${off} title=${off ? OFF : ''}
-			onChange=${(/** @type {Event} */ event) => { if (Number.isFinite(number(event))) change(Math.max(low, Math.min(high, number(event)))); }}
+			onChange=${withValue((text) => { if (Number.isFinite(Number(text))) change(Math.max(low, Math.min(high, Number(text)))); })}
 		/>
 		<${Unit} unit=${field.unit} />
 	`;
@@ -63,7 +64,7 @@ const CHOICES = /** @type {{[name: string]: string}} */ ({ mean: 'mean of pairs'
 function Choice({ field, id, value, change }) {
 	const chosen = (/** @type {string} */ text) => (typeof field.default === 'string' ? text : Number(text));
 	return html`
-		<select class=${`field threshold__${typeof field.default === 'string' ? 'words' : 'number'}`} id=${id} value=${String(value)} onChange=${(/** @type {Event} */ event) => change(chosen(/** @type {HTMLSelectElement} */ (event.target).value))}>
+		<select class=${`field threshold__${typeof field.default === 'string' ? 'words' : 'number'}`} id=${id} value=${String(value)} onChange=${withValue((text) => change(chosen(text)))}>
 			${field.choices.map((option) => html`<option key=${option} value=${String(option)}>${CHOICES[option] ?? option}</option>`)}
 		</select>
 		<${Unit} unit=${field.unit} />
@@ -78,12 +79,11 @@ function Choice({ field, id, value, change }) {
  */
 export function Threshold({ field, value, present, switched, change, idle }) {
 	const id = `threshold-${field.name.replace('.', '-')}`;
-	const checked = (/** @type {Event} */ event) => /** @type {HTMLInputElement} */ (event.target).checked;
 	const changed = value !== present;
 	if (typeof field.default === 'boolean') {
 		return html`
 			<div class="threshold" data-changed=${changed}>
-				<label class="form__check"><input type="checkbox" checked=${value === true} onChange=${(/** @type {Event} */ event) => change(checked(event))} />${field.label}</label>
+				<label class="form__check"><input type="checkbox" checked=${value === true} onChange=${withTick(change)} />${field.label}</label>
 			</div>
 		`;
 	}
@@ -92,7 +92,7 @@ export function Threshold({ field, value, present, switched, change, idle }) {
 			<label class="threshold__label" for=${id} title=${ASKED[field.asks ?? ''] ?? ''}>${field.label}${idle ? html`<small class="threshold__idle">${idle}</small>` : null}</label>
 			${field.optional ? html`
 				<label class="threshold__switch">
-					<input type="checkbox" checked=${value !== null} onChange=${(/** @type {Event} */ event) => change(checked(event) ? switched : null)} />
+					<input type="checkbox" checked=${value !== null} onChange=${withTick((ticked) => change(ticked ? switched : null))} />
 					<span class="hidden-text">${field.label} is asked</span>
 				</label>` : null}
 			${field.choices.length

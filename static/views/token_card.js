@@ -7,6 +7,7 @@ import { useState } from 'preact/hooks';
 import { endToken, getTokens, postToken } from '../api/tokens.js';
 import { ApiError } from '../api/problem.js';
 import { useAttempt } from '../lib/attempt.js';
+import { withForm } from '../lib/field.js';
 import { useResource } from '../lib/resource.js';
 import { datasets } from '../state/datasets.js';
 import { roleIn, whyNot } from '../state/rights.js';
@@ -42,12 +43,7 @@ function ScopeCheck({ one }) {
 
 /** @param {{make: (form: FormData) => Promise<boolean>, error: ApiError | null}} props */
 function TokenForm({ make, error }) {
-	/** @param {SubmitEvent} event */
-	async function send(event) {
-		event.preventDefault();
-		const form = /** @type {HTMLFormElement} */ (event.currentTarget);
-		if (await make(new FormData(form))) form.reset();
-	}
+	const send = withForm(async (said, form) => { if (await make(said)) form.reset(); });
 	return html`
 		<form class="form tokens__form" onSubmit=${send}>
 			<div class="form__columns">

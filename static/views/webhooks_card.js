@@ -7,6 +7,7 @@ import { useEffect, useState } from 'preact/hooks';
 import { sentenceOf } from '../api/problem.js';
 import { deleteWebhook, getDeliveries, getWebhooks, patchWebhook, pingWebhook, postWebhook, renewWebhookSecret, sendAgain } from '../api/webhooks.js';
 import { useAttempt } from '../lib/attempt.js';
+import { withForm } from '../lib/field.js';
 import { useResource } from '../lib/resource.js';
 import { whyNot } from '../state/rights.js';
 import { CopyField } from './copy_field.js';
@@ -51,13 +52,9 @@ function Secret({ url, secret, close }) {
 
 /** @param {{found: WebhookList, make: (url: string, kinds: string[]) => Promise<boolean>}} props */
 function NewWebhook({ found, make }) {
-	/** @param {SubmitEvent} event */
-	async function send(event) {
-		event.preventDefault();
-		const form = /** @type {HTMLFormElement} */ (event.currentTarget);
-		const said = new FormData(form);
+	const send = withForm(async (said, form) => {
 		if (await make(String(said.get('url')), said.getAll('kinds').map(String))) form.reset();
-	}
+	});
 	return html`
 		<form class="form webhooks__new" onSubmit=${send}>
 			<div class="form__row">

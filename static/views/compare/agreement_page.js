@@ -8,6 +8,7 @@ import { agreementFile, getAgreement, getWaiting, putLimits } from '../../api/ag
 import { ApiError, sentenceOf } from '../../api/problem.js';
 import { getTakes } from '../../api/takes.js';
 import { getBatches } from '../../api/work.js';
+import { withValue } from '../../lib/field.js';
 import { fixed, plural, words } from '../../lib/format.js';
 import { useResource } from '../../lib/resource.js';
 import { pageDataset } from '../../lib/router.js';
@@ -120,7 +121,7 @@ function LimitsCard({ limits, dataset, saved }) {
 				${LIMITS.map(({ name, label, step }) => html`
 					<label key=${name}><span>${label}</span><input class="field"
 						type="number" min="0" step=${step} required value=${edited[name]}
-						onInput=${(/** @type {InputEvent} */ event) => setEdited({ ...edited, [name]: Number(/** @type {HTMLInputElement} */ (event.currentTarget).value) })}
+						onInput=${withValue((text) => setEdited({ ...edited, [name]: Number(text) }))}
 					/></label>`)}
 				<button class="button" type="submit">Save limits</button>
 			</form>
@@ -198,10 +199,7 @@ function BatchChoice({ dataset, batch, choose }) {
 	if (several.length === 0) return null;
 	return html`
 		<p class="agreement__choice"><label for="agreement-batch">Results of</label>
-			<select class="field" id="agreement-batch" value=${batch ?? ''} onChange=${(/** @type {Event} */ event) => {
-				const { value } = /** @type {HTMLSelectElement} */ (event.currentTarget);
-				choose(value === '' ? null : Number(value));
-			}}>
+			<select class="field" id="agreement-batch" value=${batch ?? ''} onChange=${withValue((text) => choose(text === '' ? null : Number(text)))}>
 				<option value="">all batches, and what belongs to none</option>
 				${several.map(({ id, name, state }) => html`<option key=${id} value=${id}>${name}${state === 'closed' ? ' (closed)' : ''}</option>`)}
 				<option value="0">no batch</option>

@@ -6,6 +6,7 @@ import { useEffect, useState } from 'preact/hooks';
 
 import { acceptPredictions } from '../../api/evaluations.js';
 import { sentenceOf } from '../../api/problem.js';
+import { withTick, withValue } from '../../lib/field.js';
 import { count, plural, words } from '../../lib/format.js';
 import { matchName } from '../../lib/match_name.js';
 import { useResource } from '../../lib/resource.js';
@@ -17,8 +18,6 @@ import { FormDialog } from '../dialog.js';
 
 /** @import {PredictionSet} from '../../api/evaluations.js' */
 /** @import {DatasetJson} from '../../api/types.js' */
-
-const valueOf = (/** @type {Event} */ event) => /** @type {HTMLInputElement} */ (event.target).value;
 
 const REASONS = /** @type {{[why: string]: string}} */ ({
 	annotated: 'the view has a ball already', the_same: 'this very ball is there already',
@@ -84,9 +83,9 @@ export function AcceptPredictions({ one, set, onClose }) {
 			buttons=${html`<button class="button button--primary" type="submit" aria-disabled=${why !== ''} title=${why}>${state.busy || (would ? `Accept ${count(would)}` : 'Accept')}</button>`}
 		>
 			<p>The surest prediction of each view becomes its annotation, as an edit that can be undone.</p>
-			<div class="form__row"><label for="accept-q">Groups, as a query of the queue</label><input class="field mono" id="accept-q" placeholder="every group; gate:ball for those without enough balls" value=${typed.q} autocomplete="off" spellcheck=${false} onInput=${(/** @type {Event} */ event) => setTyped({ ...typed, q: valueOf(event) })} /></div>
-			<div class="form__row"><label for="accept-score">Smallest score</label><input class="field" id="accept-score" type="number" min="0" max="1" step="0.05" defaultValue=${String(typed.min_score)} onInput=${(/** @type {Event} */ event) => setTyped({ ...typed, min_score: Number(valueOf(event)) })} /></div>
-			<label class="form__check"><input type="checkbox" checked=${typed.replace} onChange=${(/** @type {Event} */ event) => setTyped({ ...typed, replace: /** @type {HTMLInputElement} */ (event.target).checked })} />Also where the view has another ball</label>
+			<div class="form__row"><label for="accept-q">Groups, as a query of the queue</label><input class="field mono" id="accept-q" placeholder="every group; gate:ball for those without enough balls" value=${typed.q} autocomplete="off" spellcheck=${false} onInput=${withValue((text) => setTyped({ ...typed, q: text }))} /></div>
+			<div class="form__row"><label for="accept-score">Smallest score</label><input class="field" id="accept-score" type="number" min="0" max="1" step="0.05" defaultValue=${String(typed.min_score)} onInput=${withValue((text) => setTyped({ ...typed, min_score: Number(text) }))} /></div>
+			<label class="form__check"><input type="checkbox" checked=${typed.replace} onChange=${withTick((replace) => setTyped({ ...typed, replace }))} />Also where the view has another ball</label>
 			${plan.value ? html`<${Plan} plan=${plan.value} />` : null}
 			${state.error || plan.error ? html`<p class="form__error" role="alert">${state.error || sentenceOf(plan.error)}</p>` : null}
 		<//>

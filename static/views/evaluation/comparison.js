@@ -6,6 +6,7 @@ import { useState } from 'preact/hooks';
 
 import { getComparison } from '../../api/evaluations.js';
 import { sentenceOf } from '../../api/problem.js';
+import { withValue } from '../../lib/field.js';
 import { count, plural, words } from '../../lib/format.js';
 import { matchName } from '../../lib/match_name.js';
 import { useResource } from '../../lib/resource.js';
@@ -97,7 +98,7 @@ export function Comparison({ run, other, onClose }) {
 			${found.value ? html`
 				<${Numbers} run=${run} found=${found.value} />
 				<div class="form__row comparison__field"><label for="comparison-field">Frame by frame</label>
-					<select class="field" id="comparison-field" value=${field} onChange=${(/** @type {Event} */ event) => setField(/** @type {HTMLSelectElement} */ (event.target).value)}>
+					<select class="field" id="comparison-field" value=${field} onChange=${withValue(setField)}>
 						${FIELDS.map(({ name, label }) => html`<option key=${name} value=${name}>${label}</option>`)}
 					</select></div>
 				<${Frames} found=${found.value} />` : null}

@@ -7,6 +7,7 @@ import { useState } from 'preact/hooks';
 import { deletePredictions, postPredictions } from '../../api/evaluations.js';
 import { sentenceOf } from '../../api/problem.js';
 import { useAttempt } from '../../lib/attempt.js';
+import { withValue } from '../../lib/field.js';
 import { count, plural } from '../../lib/format.js';
 import { forgetPredictions } from '../../state/predictions.js';
 import { FormDialog } from '../dialog.js';
@@ -106,7 +107,7 @@ function UploadDialog({ one, onClose, onAdded }) {
 			<${UploadField} id="prediction-cameras" label="Predicted cameras, where there are any" hint="a zip of SoccerNet camera JSON" onUploaded=${took('cameras')} />
 			<div class="form__row">
 				<label for="prediction-name">Name</label>
-				<input class="field" id="prediction-name" maxlength="100" autocomplete="off" value=${name} onInput=${(/** @type {InputEvent} */ event) => setName(/** @type {HTMLInputElement} */ (event.target).value)} />
+				<input class="field" id="prediction-name" maxlength="100" autocomplete="off" value=${name} onInput=${withValue(setName)} />
 			</div>
 			${state.error ? html`<p class="form__error" role="alert">${state.error}</p>` : null}
 		<//>

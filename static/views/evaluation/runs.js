@@ -6,6 +6,7 @@ import { useState } from 'preact/hooks';
 
 import { postEvaluation } from '../../api/evaluations.js';
 import { sentenceOf } from '../../api/problem.js';
+import { withForm } from '../../lib/field.js';
 import { count } from '../../lib/format.js';
 import { follow, isOver } from '../../state/jobs.js';
 import { JobProgress } from '../job_progress.js';
@@ -36,14 +37,9 @@ function bodyOf(form) {
 
 /** @param {{sets: PredictionSet[], versions: VersionJson[], why: string, send: (form: FormData) => void}} props */
 function RunForm({ sets, versions, why, send }) {
-	/** @param {SubmitEvent} event */
-	function submit(event) {
-		event.preventDefault();
-		if (!why) send(new FormData(/** @type {HTMLFormElement} */ (event.currentTarget)));
-	}
 	const choices = sets.map(({ id, name }) => html`<option key=${id} value=${String(id)}>${name}</option>`);
 	return html`
-		<form class="form run-form" onSubmit=${submit}>
+		<form class="form run-form" onSubmit=${withForm((said) => { if (!why) send(said); })}>
 			<div class="form__row"><label for="run-predictions">Predictions</label><select class="field" id="run-predictions" name="predictions">${choices}<option value="">none: careful boxes alone</option></select></div>
 			<div class="form__row"><label for="run-against">Against</label><select class="field" id="run-against" name="against">
 				${versions.map(({ id, name }) => html`<option key=${id} value=${String(id)}>version ${name}</option>`)}

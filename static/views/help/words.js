@@ -4,6 +4,7 @@
 import { html } from 'htm/preact';
 import { useState } from 'preact/hooks';
 
+import { withValue } from '../../lib/field.js';
 import { useResource } from '../../lib/resource.js';
 import { loadGlossary } from '../../state/glossary.js';
 
@@ -26,7 +27,7 @@ export function Words() {
 			<label for="find-word">Find a word</label>
 			<input
 				id="find-word" class="field" type="search" autocomplete="off" spellcheck=${false} value=${text}
-				onInput=${(/** @type {InputEvent} */ event) => setText(/** @type {HTMLInputElement} */ (event.target).value)}
+				onInput=${withValue(setText)}
 			/>
 			<span class="note">In tables and gates, rest on an underlined word (or reach it with Tab) to read what it means.</span>
 		</p>

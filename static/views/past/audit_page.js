@@ -6,6 +6,7 @@ import { useEffect, useState } from 'preact/hooks';
 
 import { auditFile, getAudit } from '../../api/past.js';
 import { ApiError } from '../../api/problem.js';
+import { withForm } from '../../lib/field.js';
 import { address, navigate, param } from '../../lib/router.js';
 import { datasets } from '../../state/datasets.js';
 import { Loading, PageFrame, Trouble } from '../page_frame.js';
@@ -82,12 +83,9 @@ function Choice({ name, label, all, options }) {
 }
 
 function Filters() {
-	/** @param {Event} event */
-	function choose(event) {
-		event.preventDefault();
-		const said = new FormData(/** @type {HTMLFormElement} */ (event.currentTarget));
+	const choose = withForm((said) => {
 		navigate(address('/audit', Object.fromEntries(FIELDS.map((name) => [name, String(said.get(name) ?? '')]))));
-	}
+	});
 	return html`
 		<form class="form audit__filters" onSubmit=${choose} onChange=${choose} role="search" aria-label="What is shown">
 			<${Field} name="q" label="Words" type="search" />

@@ -8,6 +8,7 @@ import { postGold } from '../../api/takes.js';
 import { getVersions } from '../../api/versions.js';
 import { postBatch } from '../../api/work.js';
 import { useAttempt } from '../../lib/attempt.js';
+import { withValue } from '../../lib/field.js';
 import { count, plural } from '../../lib/format.js';
 import { useResource } from '../../lib/resource.js';
 import { navigate } from '../../lib/router.js';
@@ -42,7 +43,7 @@ function GoldFields({ dataset }) {
 	const [some, setSome] = useState(false);
 	const versions = useResource(async (signal) => (some ? getVersions(dataset.id, signal) : null), [dataset.id, some]);
 	return html`
-		<div class="form__row"><label for="batch-gold">One gold group in so many</label><input class="field" id="batch-gold" name="gold" type="number" min="1" max="1000" placeholder="none" onInput=${(/** @type {Event} */ event) => setSome(/** @type {HTMLInputElement} */ (event.currentTarget).value !== '')} /></div>
+		<div class="form__row"><label for="batch-gold">One gold group in so many</label><input class="field" id="batch-gold" name="gold" type="number" min="1" max="1000" placeholder="none" onInput=${withValue((text) => setSome(text !== ''))} /></div>
 		${some ? html`
 			<div class="form__row"><label for="batch-truth">Gold groups are</label><select class="field" id="batch-truth" name="truth">
 				<option value="">those that leads marked</option>

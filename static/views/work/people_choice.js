@@ -4,6 +4,7 @@
 import { html } from 'htm/preact';
 
 import { getMembers } from '../../api/people.js';
+import { withTick } from '../../lib/field.js';
 import { useResource } from '../../lib/resource.js';
 import { isTeam } from '../../state/me.js';
 
@@ -31,7 +32,7 @@ export function PeopleChoice({ dataset, chosen, choose }) {
 			<p class="note">${note}</p>
 			<div class="people-choice__names">
 				${people.value?.items.filter(({ role }) => roles.includes(role)).map(({ name }) => html`
-					<label key=${name}><input type="checkbox" checked=${chosen[part].includes(name)} onChange=${(/** @type {Event} */ event) => turn(part, name, /** @type {HTMLInputElement} */ (event.currentTarget).checked)} /> ${name}</label>`)}
+					<label key=${name}><input type="checkbox" checked=${chosen[part].includes(name)} onChange=${withTick((ticked) => turn(part, name, ticked))} /> ${name}</label>`)}
 			</div>
 		</fieldset>`)}`;
 }
