@@ -160,7 +160,7 @@ def _damaged_parquet(content: bytes, dice: random.Random) -> bytes:
 
     try:
         columns = parquet.read_table(io.BytesIO(content)).to_pydict()
-    except (pyarrow.ArrowException, OSError):
+    except (pyarrow.ArrowException, OSError, UnicodeError):
         return _damaged_bytes(content, dice)
     name = dice.choice([*columns])
     rows = columns[name]
