@@ -71,13 +71,20 @@ def _writing(settings: Settings) -> Iterator[None]:
     """
     with _WRITING:
         with _reported():
-            settings.uploads.mkdir(mode=0o700, parents=True, exist_ok=True)
+            _make_folder(settings)
             folder = os.open(settings.uploads, os.O_RDONLY | os.O_CLOEXEC)
         try:
             require_lock(folder, "has been writing uploads", WRITING_SECONDS)
             yield
         finally:
             os.close(folder)
+
+
+def _make_folder(settings: Settings) -> None:
+    """Make the folder of all uploads, if need be, so that it is there after a power cut."""
+    if not settings.uploads.is_dir():
+        settings.uploads.mkdir(mode=0o700, parents=True, exist_ok=True)
+        sync(settings.uploads.parent)
 
 
 def upload_path(settings: Settings, upload_id: str) -> Path:
@@ -136,14 +143,21 @@ def delete_upload(
     """
     with _writing(settings):
         upload = get_upload(settings, upload_id)
-        if upload.kept:
-            raise InputError("a dataset reads its frames from this upload, so it stays")
+        require_unread(upload)
         others = tuple(actor for actor in upload.by if not mine(actor))
         if not others:
             _remove(settings.uploads / upload_id)
+            with _reported():
+                sync(settings.uploads)
             return
         with _reported():
             _write_record(settings.uploads / upload_id, replace(upload, by=others))
+
+
+def require_unread(upload: Upload) -> None:
+    """Raise InputError while a dataset reads frames from an upload."""
+    if upload.kept:
+        raise InputError("a dataset reads its frames from this upload, so it stays")
 
 
 def expire_uploads(settings: Settings) -> int:
@@ -207,7 +221,7 @@ class UploadWriter:
         self._digest = hashlib.sha256(self._name.encode() + b"\0")
         self.bytes = 0
         with _reported():
-            settings.uploads.mkdir(mode=0o700, parents=True, exist_ok=True)
+            _make_folder(settings)
             content = self._folder / _CONTENT
             content.mkdir(mode=0o700, parents=True)
             self._folder.chmod(0o700)

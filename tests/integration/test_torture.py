@@ -30,7 +30,8 @@ from tests.torture import (
 from tests.torture.counting import processor
 from tests.torture.crowd import Load
 from tests.torture.person import Work
-from tests.torture.power import Acknowledge, Sync, Unlink, Write, cut_power, disk_at, parse
+from tests.torture.power import cut_power, disk_at
+from tests.torture.recording import Acknowledge, Name, Step, Sync, Write, parse, record
 
 
 @pytest.fixture(scope="module")
@@ -75,13 +76,22 @@ class TestPower:
     def test_what_was_acknowledged_is_there_after_the_power_was_cut(
         self, home: Path, tmp_path: Path
     ) -> None:
-        steps = power.record(home, 4)
+        steps = record(home, 4)
         found = cut_power(home, tmp_path / "cut", steps, cuts=20, seed=1)
-        assert (found.acknowledged, found.cuts, found.faults) == (4, 20, [])
+        assert (found.acknowledged, found.uploads) == (4, 4)
+        assert (found.cuts, found.faults) == (20, [])
 
     def test_a_weaker_promise_loses_changes_and_is_seen(self, home: Path, tmp_path: Path) -> None:
-        steps = power.record(home, 4, "NORMAL")
+        steps = record(home, 4, "NORMAL")
         assert cut_power(home, tmp_path / "cut", steps, cuts=20, seed=1).faults
+
+    def test_an_upload_whose_name_is_not_on_the_disk_is_lost_and_seen(
+        self, home: Path, tmp_path: Path
+    ) -> None:
+        steps = record(home, 4, plant=power.WEAK)
+        found = cut_power(home, tmp_path / "cut", steps, cuts=20, seed=1)
+        assert found.faults
+        assert all("uploads are not there" in fault for fault in found.faults)
 
 
 STEPS = (
@@ -89,7 +99,7 @@ STEPS = (
     Sync("touchline.db"),
     Write("touchline.db", 0, b"Y" * 1024),
     Acknowledge(),
-    Unlink("touchline.db-wal"),
+    Name("touchline.db-wal", None),
 )
 BEFORE = {"touchline.db": b"abcdef", "touchline.db-wal": b"w"}
 
@@ -111,9 +121,32 @@ class TestDiskAt:
     def test_a_file_that_was_taken_away_may_be_there_again(self) -> None:
         assert {present for _, present in outcomes(5)} == {True, False}
 
+    def test_a_name_is_certain_once_its_folder_was_synced(self) -> None:
+        steps = [
+            Name("new.part", "new.part"),
+            Name("new.part/a", "a"),
+            Write("new.part/a", 0, b"1"),
+            Sync("new.part/a"),
+            Sync("new.part"),
+            Name("new.part", "new"),
+        ]
+
+        def found(steps: list[Step]) -> set[str]:
+            """Where the file may be."""
+            disks = (disk_at({}, steps, len(steps), random.Random(seed)) for seed in range(200))
+            return {str(files) for files in disks}
+
+        one, other = str({"new.part/a": b"1"}), str({"new/a": b"1"})
+        assert found(steps) == {"{}", one, other}
+        assert found([*steps, Sync(".")]) == {other}
+
+    def test_what_gets_the_name_of_another_file_takes_its_place(self) -> None:
+        steps = [Write("b", 0, b"1"), Sync("b"), Name("b", "b"), Name("b", "a"), Sync(".")]
+        assert disk_at({"a": b"0"}, steps, 5, random.Random(1)) == {"a": b"1"}
+
 
 class TestParse:
-    def test_reads_what_strace_says_of_the_database_alone(self) -> None:
+    def test_reads_what_strace_says_of_the_home_alone(self) -> None:
         def text(value: str) -> str:
             return '"' + "".join(f"\\x{byte:02x}" for byte in value.encode()) + '"'
 
@@ -123,7 +156,7 @@ class TestParse:
             f"7  pwrite64(4, {text('ab')}, 2, 32)  = 2",
             f"7  pwrite64(5, {text('ab')}, 2, 32)  = 2",
             "7  fsync(4)                          = 0",
-            f'7  write(1, {text("acknowledged")[:-1]}\\x0a", 13) = 13',
+            f'7  write(1, {text("acknowledged ")[:-1]}\\x0a", 14) = 14',
             "7  ftruncate(4, 100)                 = 0",
             f"7  unlink({text('/home/touchline.db-wal')}) = 0",
             f"7  unlink({text('/home/touchline.db-journal')}) = -1 ENOENT (No such file)",
@@ -131,11 +164,35 @@ class TestParse:
             "7  fsync(4)                          = 0",
         ]
         assert list(parse(lines, Path("/home"))) == [
+            Name("touchline.db-wal", "touchline.db-wal"),
             Write("touchline.db-wal", 32, b"ab"),
             Sync("touchline.db-wal"),
             Acknowledge(),
             Write("touchline.db-wal", 100, None),
-            Unlink("touchline.db-wal"),
+            Name("touchline.db-wal", None),
+        ]
+
+    def test_a_file_keeps_its_first_path_whatever_its_folder_is_called(self) -> None:
+        def text(value: str) -> str:
+            return '"' + "".join(f"\\x{byte:02x}" for byte in value.encode()) + '"'
+
+        lines = [
+            f"7  mkdir({text('/home/a.part')}, 0700) = 0",
+            f"7  rename({text('/home/a.part')}, {text('/home/a')}) = 0",
+            f"7  openat(AT_FDCWD, {text('/home/a/b')}, O_WRONLY|O_CREAT|O_TRUNC, 0644) = 4",
+            f"7  write(4, {text('ab')}, 2)  = 2",
+            f"7  write(4, {text('c')}, 1)  = 1",
+            f"7  openat(AT_FDCWD, {text('/home')}, O_RDONLY) = 5",
+            "7  fsync(5) = 0",
+        ]
+        assert list(parse(lines, Path("/home"))) == [
+            Name("a.part", "a.part"),
+            Name("a.part", "a"),
+            Name("a.part/b", "b"),
+            Write("a.part/b", 0, None),
+            Write("a.part/b", 0, b"ab"),
+            Write("a.part/b", 2, b"c"),
+            Sync("."),
         ]
 
 

@@ -20,6 +20,7 @@ from tests.torture import (
     kills,
     people,
     power,
+    recording,
     upgrades,
 )
 
@@ -78,16 +79,24 @@ def _cuts(folder: Path, asked: argparse.Namespace) -> list[str]:
         return [sentence] if "cuts" in (asked.only or []) else []
     home = folder / "power"
     kills.prepare(home, folder / "power-files", clients=1, groups=2)
-    steps = power.record(home, 60)
+    steps = recording.record(home, 60)
     found = power.cut_power(home, folder / "cut", steps, cuts=asked.cuts, seed=asked.seed)
     # The same with a weaker promise must lose something, else the cuts show nothing.
-    weak = power.record(home, 60, "NORMAL")
-    lost = power.cut_power(home, folder / "cut", weak, cuts=asked.cuts, seed=asked.seed)
+    weak = {
+        "with synchronous=NORMAL": ("NORMAL", ""),
+        "without syncing folders": ("FULL", power.WEAK),
+    }
+    seen = {}
+    for words, promise in weak.items():
+        kept = recording.record(home, 60, *promise)
+        lost = power.cut_power(home, folder / "cut", kept, cuts=asked.cuts, seed=asked.seed)
+        seen[words] = len(lost.faults)
     print(
-        f"{found.cuts} power cuts among {found.acknowledged} acknowledged changes: "
-        f"{len(found.faults)} faults; with synchronous=NORMAL {len(lost.faults)}"
+        f"{found.cuts} power cuts among {found.acknowledged} acknowledged changes and "
+        f"{found.uploads} uploads: {len(found.faults)} faults; "
+        + ", ".join(f"{words} {number}" for words, number in seen.items())
     )
-    return found.faults if lost.faults else [*found.faults, "the planted fault was not seen"]
+    return found.faults + [f"{words}: nothing was seen" for words in seen if not seen[words]]
 
 
 def _commands(folder: Path, asked: argparse.Namespace) -> list[str]:

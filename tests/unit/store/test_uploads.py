@@ -141,7 +141,7 @@ class TestUploadWriter:
             uploads, "sync", lambda path: synced.append((path.name, bool(list_uploads(settings))))
         )
         send(settings)
-        assert synced == [("content", False), ("uploads", True)]
+        assert synced == [("home", False), ("content", False), ("uploads", True)]
 
     def test_a_full_disk_is_a_sentence_and_leaves_nothing(
         self, settings: Settings, monkeypatch: pytest.MonkeyPatch
@@ -281,6 +281,16 @@ class TestDeleteUpload:
         assert upload_path(settings, ann.id).read_bytes() == b"content"
         delete_upload(settings, ann.id, "ben".__eq__)
         assert list_uploads(settings) == []
+
+    def test_that_it_is_gone_is_on_disk_before_it_is_said(
+        self, settings: Settings, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        upload, synced = send(settings), list[tuple[str, bool]]()
+        monkeypatch.setattr(
+            uploads, "sync", lambda path: synced.append((path.name, bool(list_uploads(settings))))
+        )
+        delete_upload(settings, upload.id)
+        assert synced == [("uploads", False)]
 
     def test_who_may_delete_it_for_all_does(self, settings: Settings) -> None:
         send(settings, by="ann")
