@@ -24,6 +24,7 @@ from app.api.problem import make_problem, problem_response
 from app.api.reply import ASKED, KEPT_HEADERS, Asked
 from app.api.security.access import actor_of
 from app.api.security.bodies import BYTES, VALUE
+from app.api.security.instead import SENT
 from app.api.security.origin import SAFE_METHODS
 from app.canonical import canonical
 from app.errors import BusyError, OverloadedError, ReviewError, StorageError
@@ -226,13 +227,17 @@ class _Request:
         return {"type": "http.request", "body": b"".join(self._body), "more_body": False}
 
     def digest(self) -> str:
-        """Digest of method, address, body and actor; JSON in another order gives the same one."""
-        place = [self.scope["method"], self.scope["path"], self.scope["query_string"].decode()]
-        place += Headers(scope=self.scope).getlist(ACTOR_HEADER)
+        """Digest of method, address, body and actor; JSON in another order gives the same one.
+
+        It is that of what was sent: what is deleted is asked for under another name afterwards.
+        """
+        sent = self.scope.get(SENT, self.scope)
+        place = [sent["method"], sent["path"], sent["query_string"].decode()]
+        place += Headers(scope=sent).getlist(ACTOR_HEADER)
         if self.streamed:
             body = self._sum.hexdigest()
         else:
-            body = canonical(self.scope[VALUE]) if VALUE in self.scope else ""
+            body = canonical(sent[VALUE]) if VALUE in sent else ""
         return hashlib.sha256(canonical([*place, body]).encode()).hexdigest()
 
     async def _next(self) -> Message:

@@ -328,6 +328,14 @@ class TestWhoActs:
         assert told[0].body == told[2].body != told[1].body
         assert "idempotency-replayed" not in told[1].headers
 
+    def test_what_is_deleted_again_under_its_key_gets_the_first_answer(self, team: Team) -> None:
+        """It is not there any more, and whose it was is not known; the request is the same."""
+        sent = team.ask("POST", f"{API}/uploads?name=b.zip", b"three", role="lead", kind=BYTES)
+        target = f"{API}/uploads/{json.loads(sent.body)['id']}"
+        told = [team.ask("DELETE", target, role="lead", Idempotency_Key="k-3") for _ in "12"]
+        assert [answer.status for answer in told] == [204, 204]
+        assert told[1].headers["idempotency-replayed"] == "true"
+
 
 class TestStreams:
     @pytest.mark.parametrize("ends", ["disabled", "logged out", "nobody looks"])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable
+from functools import partial
 from typing import Annotated, Any, TypeVar
 
 from anyio import CancelScope, CapacityLimiter, to_thread
@@ -13,6 +14,7 @@ from starlette.requests import ClientDisconnect
 
 from app.api.deps import Actor, AppServices, Sees
 from app.api.problem import responses
+from app.api.reply import AskedUnder, Reply, nothing
 from app.api.schemas.upload import UploadDocument, UploadList
 from app.api.services import Services
 from app.errors import InputError, OverloadedError
@@ -20,7 +22,7 @@ from app.review.importing.receiving import (
     Upload,
     UploadWriter,
     begin_upload,
-    delete_own,
+    delete_sent,
     find_upload,
     finish_upload,
     own_uploads,
@@ -137,10 +139,20 @@ def get_one(upload: UploadId, services: AppServices) -> UploadDocument:
     return UploadDocument.model_validate(find_upload(services.settings, upload))
 
 
-@router.delete("/{upload}", operation_id="deleteUpload", status_code=204, responses=responses(404))
-def delete_one(upload: UploadId, services: AppServices, sight: Sees) -> None:
+@router.delete(
+    "/{upload}",
+    operation_id="deleteUpload",
+    status_code=204,
+    response_class=Response,
+    responses={**responses(404), 204: {"description": "It is gone."}},
+)
+def delete_one(upload: UploadId, services: AppServices, sight: Sees, asked: AskedUnder) -> Response:
     """Delete a file; 400 while a dataset reads its frames from it.
 
     Where others have sent the same file, it stays with them; an admin deletes it for all.
     """
-    delete_own(services.settings, upload, sight)
+    reply: Reply[None] = Reply(asked, nothing)
+    mine = partial(sight.sees, None)
+    keep, progress = reply.keep(None), reply.progress
+    delete_sent(services.store, upload, mine, keep=keep, progress=progress)
+    return reply.of(None)

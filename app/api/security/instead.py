@@ -19,6 +19,8 @@ from app.api.security.bodies import VALUE
 from app.finite import json_text
 from app.review.people.whereabouts import MAX_ID, Kind
 
+SENT = "touchline.sent"
+"""Where a request's scope under other names has the one that was sent."""
 _NO_ID = str(MAX_ID)
 _NO_UPLOAD = "0" * 32
 _NO_NAME = f"nothing-{secrets.token_hex(12)}"
@@ -65,7 +67,7 @@ class Instead:
                 body = _with(body, mention.field.split("/"), str(other) if kept else int(other))
         template = self._asked.route.partition(" ")[2]
         address = template.format(**path)
-        changed = {**scope, "path": address, "raw_path": quote(address).encode()}
+        changed = {**scope, SENT: scope, "path": address, "raw_path": quote(address).encode()}
         changed["query_string"] = urlencode(query).encode() if query else b""
         if body is not self._asked.body:
             changed[VALUE] = body

@@ -1,13 +1,27 @@
-"""Receiving: files that people send, taken chunk by chunk, and whose they are."""
+"""Receiving: files that people send, taken chunk by chunk, whose they are, and how they go."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from contextlib import suppress
+
 from app.config import Settings
 from app.datasets.guess_format import guess_format
+from app.errors import NotFoundError
+from app.review.answers.keep import Kept
+from app.review.answers.saved_progress import SavedProgress
 from app.review.people.roles import Sight
+from app.store.codecs import Json
+from app.store.store import Store
 from app.store.uploads import Upload as Upload
 from app.store.uploads import UploadWriter as UploadWriter
-from app.store.uploads import delete_upload, get_upload, list_uploads, require_size
+from app.store.uploads import (
+    delete_upload,
+    get_upload,
+    list_uploads,
+    require_size,
+    require_unread,
+)
 
 
 def begin_upload(settings: Settings, name: str, declared: int) -> UploadWriter:
@@ -50,11 +64,52 @@ def own_uploads(settings: Settings, sight: Sight) -> list[Upload]:
     ]
 
 
-def delete_own(settings: Settings, upload_id: str, sight: Sight) -> None:
-    """Delete an upload that somebody sent; where others have sent the same file, it stays theirs.
+def delete_sent(
+    store: Store,
+    upload_id: str,
+    mine: Callable[[str], bool],
+    *,
+    keep: Kept,
+    progress: SavedProgress | None,
+) -> None:
+    """Delete an upload, or be among those who sent it no more while others have sent it, too.
+
+    What goes is a file, which no transaction holds. That it is to go is written down before, and
+    the answer afterwards: sent again, a request that was stopped in between does the rest.
+
+    Args:
+        store: Of the home.
+        upload_id: Which.
+        mine: Whether whoever asks is that sender.
+        keep: Keeps the answer once it is gone.
+        progress: Where a request under a key says what it deletes; None: it has none.
 
     Raises:
         NotFoundError: There is none of that id.
         InputError: A dataset reads frames from it.
     """
-    delete_upload(settings, upload_id, lambda actor: sight.sees(None, actor))
+    if progress is None:
+        delete_upload(store.settings, upload_id, mine)
+        return
+    begun = _begun(store, progress) or _begin(store, progress, upload_id)
+    with suppress(NotFoundError):
+        # One that was sent once more meanwhile is another.
+        if get_upload(store.settings, begun["upload"]).created == begun["created"]:
+            delete_upload(store.settings, begun["upload"], mine)
+    with store.write() as session:
+        keep(session)
+
+
+def _begun(store: Store, progress: SavedProgress) -> Json | None:
+    """Which upload the same request was deleting when it was stopped; None: it was not."""
+    with store.read() as session:
+        return progress.read(session)
+
+
+def _begin(store: Store, progress: SavedProgress, upload_id: str) -> Json:
+    upload = get_upload(store.settings, upload_id)
+    require_unread(upload)
+    begun = {"upload": upload.id, "created": upload.created}
+    with store.write() as session:
+        progress.save(session, begun)
+    return begun

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -11,6 +12,7 @@ from sqlalchemy import select
 from structlog.testing import capture_logs
 
 from app.api.services import Services
+from app.store import uploads
 from app.store.job_models import AnswerModel
 from app.store.session import Session
 from app.store.store import Store
@@ -93,6 +95,7 @@ KEPT: dict[str, Made] = {
 behind its name tells them apart."""
 HARMLESS = {
     "changeTeam": "The same setting once more changes nothing, and has the same answer.",
+    "deleteUpload": "It is written down before what goes: the rest is done, and the answer the same.",
     "giveGroupBack": "A lease that has ended is ended.",
     "previewGroup": "Saves nothing.",
     "proposeLines": "Saves nothing.",
@@ -104,22 +107,21 @@ HARMLESS = {
     "uploadFile": "The same file again is the same upload.",
 }
 """Operations that are done again after a stop, and why nothing comes of that."""
-NOT_KEPT = {
-    "deleteUpload": "What goes is a file, in no transaction: a repetition finds none, and says so.",
-}
-"""Operations that may be answered otherwise after a stop: none may be added."""
 
 
 @contextmanager
-def stopped_after_a_commit(store: Store, patch: pytest.MonkeyPatch) -> Iterator[None]:
-    """Whatever commits first never comes back."""
-    plain = store.write
+def stopped_after_a_commit(
+    store: Store, patch: pytest.MonkeyPatch, *, commits: int = 1
+) -> Iterator[None]:
+    """Whatever commits first, or as the last of so many, never comes back."""
+    plain, left = store.write, iter(range(commits - 1))
 
     @contextmanager
     def write(**options: Any) -> Iterator[Session]:
         with plain(**options) as session:
             yield session
-        raise SystemError("stopped")
+        if next(left, None) is None:
+            raise SystemError("stopped")
 
     with patch.context() as patched, capture_logs():
         patched.setattr(store, "write", write)
@@ -142,7 +144,7 @@ class TestTable:
             if "Idempotency-Key" in [item["name"] for item in operation["parameters"]]
         ]
         kept = {name.partition(" ")[0] for name in KEPT}
-        assert sorted(keyed) == sorted([*kept, *HARMLESS, *NOT_KEPT])
+        assert sorted(keyed) == sorted([*kept, *HARMLESS])
 
 
 class TestStopped:
@@ -202,6 +204,56 @@ class TestStopped:
             assert send.status_code == 500
         again = api.request(method, f"{API}{path}", json=body, headers={**headers, **KEY})
         assert (again.status_code, "idempotency-replayed" in again.headers) == (200, False)
+
+
+@contextmanager
+def stopped_at(name: str, patch: pytest.MonkeyPatch) -> Iterator[None]:
+    """Whoever calls a function of the store of uploads never comes back."""
+
+    def stop(_path: Path) -> None:
+        raise SystemError("stopped")
+
+    with patch.context() as patched, capture_logs():
+        patched.setattr(uploads, name, stop)
+        yield
+
+
+class TestUpload:
+    """What goes is no row, and is gone in several steps: the server is stopped between any two."""
+
+    @pytest.mark.parametrize("step", ["written down", "moved", "removed", "answered"])
+    def test_one_that_was_being_deleted_is_gone_and_the_answer_the_same(
+        self, app, api, monkeypatch: pytest.MonkeyPatch, step: str
+    ) -> None:
+        store = app.state.services.store
+        stops = {
+            "written down": stopped_after_a_commit(store, monkeypatch),
+            "moved": stopped_at("clear", monkeypatch),
+            "removed": stopped_at("sync", monkeypatch),
+            "answered": stopped_after_a_commit(store, monkeypatch, commits=2),
+        }
+        path = f"{API}/uploads/{dataset_requests.uploaded(api, 'a.csv', b'a')}"
+        with stops[step]:
+            assert api.delete(path, headers=KEY).status_code == 500
+        again = [api.delete(path, headers=KEY) for _ in range(2)]
+        assert [answer.status_code for answer in again] == [204, 204]
+        assert again[1].headers["idempotency-replayed"] == "true"
+        assert api.get(path).status_code == 404
+
+    def test_one_that_is_sent_once_more_meanwhile_stays(
+        self, api, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        path = f"{API}/uploads/{dataset_requests.uploaded(api, 'a.csv', b'a')}"
+        with stopped_at("sync", monkeypatch):
+            assert api.delete(path, headers=KEY).status_code == 500
+        dataset_requests.uploaded(api, "a.csv", b"a")
+        assert api.delete(path, headers=KEY).status_code == 204
+        assert api.get(path).status_code == 200
+
+    def test_one_that_is_not_there_is_refused_under_any_key(self, api) -> None:
+        path = f"{API}/uploads/{dataset_requests.uploaded(api, 'a.csv', b'a')}"
+        told = [api.delete(path, headers={"Idempotency-Key": key}) for key in ("one", "two", "two")]
+        assert [answer.status_code for answer in told] == [204, 404, 404]
 
 
 class TestCost:

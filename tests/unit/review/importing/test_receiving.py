@@ -7,12 +7,10 @@ from pathlib import Path
 import pytest
 
 from app.config import Settings
-from app.errors import NotFoundError, TooLargeError
+from app.errors import TooLargeError
 from app.review.importing.receiving import (
     Upload,
     begin_upload,
-    delete_own,
-    find_upload,
     finish_upload,
     own_uploads,
 )
@@ -46,14 +44,3 @@ class TestOwnUploads:
         assert own_uploads(settings, ANN) == [anns]
         assert own_uploads(settings, BEN) == [bens]
         assert own_uploads(settings, EVERYTHING) == [bens, anns]
-
-
-class TestDeleteOwn:
-    def test_a_file_that_others_have_sent_stays_theirs(self, settings: Settings) -> None:
-        sent = send(settings, b"{}", "ann")
-        assert send(settings, b"{}", "ben").id == sent.id
-        delete_own(settings, sent.id, ANN)
-        assert find_upload(settings, sent.id).by == ("ben",)
-        delete_own(settings, sent.id, BEN)
-        with pytest.raises(NotFoundError):
-            find_upload(settings, sent.id)
