@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import io
+import random
 import sys
 import time
 from pathlib import Path
 
+import pyarrow
 import pytest
+from pyarrow import parquet
 
 import tests.fuzz.__main__ as fuzz
 from tests.fuzz import readers
 from tests.fuzz.case import Case
+from tests.fuzz.damage import damage
 from tests.waiting import SECONDS
 
 LEAVES = """
@@ -67,3 +72,14 @@ def test_the_case_of_one_process_is_not_taken_for_the_next_one_s(corpus: Path) -
     assert fuzz.supervise(300, [], 1, (sys.executable, "-ISc", again + first)) == 1
     assert time.monotonic() - start < 150
     assert len(list(corpus.iterdir())) == 1
+
+
+def test_a_parquet_file_whose_text_is_none_is_damaged_further() -> None:
+    words = pyarrow.StringArray.from_buffers(
+        1, pyarrow.py_buffer(b"\0\0\0\0\1\0\0\0"), pyarrow.py_buffer(b"\xff")
+    )
+    out = io.BytesIO()
+    parquet.write_table(pyarrow.table({"word": words}), out)
+    case = Case("parquet", {"a.parquet": out.getvalue()})
+    found = {damage(case, random.Random(seed)).text() for seed in range(40)}
+    assert len(found) > 20
