@@ -32,6 +32,7 @@ from tests.provider import CLIENT, SECRET, Provider, providing
 from tests.scenes import make_scenes
 from tests.security.asking import JSON, Asker
 from tests.security.door import Door
+from tests.security.table import CORPUS
 from tests.security.team import HIDDEN, Team
 from tests.waiting import SECONDS
 
@@ -91,15 +92,17 @@ def guarded(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Guarded]:
     group = make_scenes(groups=1, seed=3, faults=False)[0].group
     named = replace(group, match=group.match.replace(group.match.split("/")[0], FORMULA))
     named = replace(named, key=f"{named.match}/{group.key.rpartition('/')[2]}")
-    spoiled = replace(group, views=group.views[:4])
+    spoiled = make_scenes(groups=1, seed=9, faults=False)[0].group
     for name, one in (("small", group), ("formula", named), ("spoiled", spoiled)):
         write_soccernet_v3(files / name, [one])
     for view in group.views:
         path = files / "small" / group.match / view.key
         path.write_bytes(picture(0, view.size.width, view.size.height))
-    hostile = (b"GIF89a<script>", bomb(16_000), b"<svg xmlns='http://www.w3.org/2000/svg'/>", b"")
-    for view, content in zip(spoiled.views, hostile, strict=False):
-        (files / "spoiled" / group.match / view.key).write_bytes(content)
+    images = sorted((CORPUS / "images").iterdir())
+    # The last one would be larger than all other files of the corpus.
+    hostile = (*(path.read_bytes() for path in images), bomb(16_000))
+    for view, content in zip(spoiled.views, hostile, strict=True):
+        (files / "spoiled" / spoiled.match / view.key).write_bytes(content)
     run_touchline(
         home,
         *(f"import soccernet-v3 {files / name} --dataset {name}" for name in ("small", "formula")),

@@ -31,7 +31,6 @@ from tests.security.table import CORPUS, MISSING, TABLE, Row, lines_of, rows, se
 
 STALL_SECONDS = 45.0
 """A request that never comes whole has ended by then; the limits are 15 and 20 seconds."""
-TEXT = "text/plain"
 SOME = slice(None, None, 5)
 """Of a long list, on a route whose like was given all of it."""
 LARGE = 50_000
@@ -202,9 +201,10 @@ class TestEveryRoute:
             assert preflight.status >= 400, told_of(row, preflight, "preflight")
 
     def test_other_methods_do_nothing(self, guarded: Guarded) -> None:
+        methods = lines_of("methods.txt")
         for row in rows("methods"):
             target = target_of(row, guarded)
-            for method in ("TRACE", "PROPFIND", "BREW", "get"):
+            for method in methods:
                 answer = guarded.ask(method, target)
                 assert answer.status == 405, told_of(row, answer, method)
                 assert answer.headers["allow"], told_of(row, answer, method)
@@ -212,7 +212,7 @@ class TestEveryRoute:
 
     def test_reading_changes_nothing(self, guarded: Guarded) -> None:
         before = _state(guarded.home)
-        override = {"X-HTTP-Method-Override": "DELETE", "X-Method-Override": "DELETE"}
+        override = yaml.safe_load((CORPUS / "overrides.yaml").read_text())
         for row in rows("reading"):
             target, stream = target_of(row, guarded), row.kind == "stream"
             answer = guarded.ask("GET", target, override, only_head=stream)
@@ -291,18 +291,20 @@ class TestEveryRoute:
                 assert_guarded(answer, told_of(row, answer, shape))
 
     def test_a_body_of_another_type_is_refused(self, guarded: Guarded) -> None:
+        types = yaml.safe_load((CORPUS / "types.yaml").read_text())
         for row in rows("types"):
             own = "application/octet-stream" if row.kind == "upload" else "application/json"
-            for kind in (TEXT, "multipart/form-data; boundary=a", f"{own}, {TEXT}", f"x-{own}", ""):
+            for kind in (kind.format(own=own) for kind in types):
                 headers = {"Content-Type": kind, "If-Match": '"a"'}
                 answer = guarded.ask(row.method, row.target({}) + "?name=a", headers, b"{}")
                 assert answer.status == 415, told_of(row, answer, kind)
                 assert_guarded(answer, told_of(row, answer, kind))
 
     def test_a_body_that_is_too_large_is_refused_before_it_comes(self, guarded: Guarded) -> None:
+        lengths = lines_of("lengths.txt")
         for row in rows("sizes"):
             own = "application/octet-stream" if row.kind == "upload" else "application/json"
-            for length in ("1000000000000", "9" * 30, "-1", "1e3", "0x10", "1, 2"):
+            for length in lengths:
                 headers = {"Content-Type": own, "Content-Length": length, "If-Match": '"a"'}
                 answer = guarded.ask(row.method, row.target({}) + "?name=a", headers)
                 assert answer.status in (400, 413), told_of(row, answer, length)
@@ -388,7 +390,7 @@ class TestFilesOfOthers:
         }
         page = json.loads(guarded.ask("GET", f"{API}/groups?dataset=spoiled").body)
         group = json.loads(guarded.ask("GET", f"{API}/groups/{page['items'][0]['id']}").body)
-        assert len(group["views"]) >= 2
+        assert len(group["views"]) == 4
         for view in group["views"]:
             own = f"{API}/views/{view['id']}"
             asked = [("GET", view["image"] + width, None) for width in ("", "?width=208")]
@@ -399,9 +401,7 @@ class TestFilesOfOthers:
                 assert_guarded(answer, view["key"])
                 assert b"<s" not in answer.body
         for name in ("page.svg", "none.png", "page.html"):
-            upload = guarded.upload(
-                name, b"<svg xmlns='http://www.w3.org/2000/svg'><script/></svg>"
-            )
+            upload = guarded.upload(name, (CORPUS / "page.svg").read_bytes())
             kept = f"{API}/datasets/{group['dataset']['id']}/guidelines/pictures"
             answer = guarded.ask("POST", kept, JSON, json.dumps({"upload": upload}).encode())
             assert answer.status in (413, 415, 422), (name, answer.body)
