@@ -197,8 +197,8 @@ def _group(value: Json, shared: Mapping[str, Station]) -> Group:
             raise InputError("has another value where true or false is expected for a view")
         if view.left_out is not None:
             _check_left_out(view)
-        if not view.station.shared:
-            _checked(view.station)
+        if not isinstance(said["station"], str) and _checked(view.station).shared:
+            raise InputError(f"has the static camera {view.station.key} in a view")
     return group
 
 

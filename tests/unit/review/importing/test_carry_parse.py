@@ -11,12 +11,21 @@ import pytest
 from app.datasets.report import Report
 from app.datasets.trees import open_tree
 from app.errors import DatasetFormatError, InputError
-from app.review.importing.carry_parse import FORMAT, FORMAT_VERSION, HEAD, _station, read_head
+from app.review.importing.carry import carried_group
+from app.review.importing.carry_parse import (
+    FORMAT,
+    FORMAT_VERSION,
+    HEAD,
+    _station,
+    parse_group,
+    read_head,
+)
 from app.review.importing.group_limits import MAX_POINTS
 from app.soccer.frames import ImageSize
 from app.soccer.group import Station
 from app.soccer.policy import PAPER
 from app.store.codecs import policy_to_json, station_to_json
+from tests.scenes import make_scenes
 
 
 class TestReadHead:
@@ -67,3 +76,19 @@ class TestStation:
             InputError, match="1,001 points in the lines of cam1, and a view may have 1,000"
         ):
             _station({**value, "lines": {**lines, "Side line left": points[:1]}})
+
+
+class TestParseGroup:
+    @pytest.mark.parametrize(
+        ("shared", "said"), [(True, "has the static camera"), ("yes", "in the place of true")]
+    )
+    def test_a_static_camera_is_named_by_a_view_and_never_stands_in_it(
+        self, shared: Any, said: str
+    ) -> None:
+        group = carried_group(make_scenes(groups=1, seed=3, faults=False)[0].group)
+        more = {"base": None, "views": {}, "stations": {}, "log": [], "verdicts": []}
+        value = {"group": group, "pitches": [], "bases": [], **more}
+        assert len(parse_group(value, {}).group.views) == 2
+        group["views"][0]["station"]["shared"] = shared
+        with pytest.raises(InputError, match=said):
+            parse_group(value, {})
