@@ -145,21 +145,23 @@ class TestDiskAt:
         assert disk_at({"a": b"0"}, steps, 5, random.Random(1)) == {"a": b"1"}
 
 
+def text_of(value: str) -> str:
+    """A text as strace writes it."""
+    return '"' + "".join(f"\\x{byte:02x}" for byte in value.encode()) + '"'
+
+
 class TestParse:
     def test_reads_what_strace_says_of_the_home_alone(self) -> None:
-        def text(value: str) -> str:
-            return '"' + "".join(f"\\x{byte:02x}" for byte in value.encode()) + '"'
-
         lines = [
-            f"7  openat(AT_FDCWD, {text('/home/touchline.db-wal')}, O_RDWR|O_CREAT, 0644) = 4",
-            f"7  openat(AT_FDCWD, {text('/elsewhere/touchline.db')}, O_RDWR, 0644) = 5",
-            f"7  pwrite64(4, {text('ab')}, 2, 32)  = 2",
-            f"7  pwrite64(5, {text('ab')}, 2, 32)  = 2",
+            f"7  openat(AT_FDCWD, {text_of('/home/touchline.db-wal')}, O_RDWR|O_CREAT, 0644) = 4",
+            f"7  openat(AT_FDCWD, {text_of('/elsewhere/touchline.db')}, O_RDWR, 0644) = 5",
+            f"7  pwrite64(4, {text_of('ab')}, 2, 32)  = 2",
+            f"7  pwrite64(5, {text_of('ab')}, 2, 32)  = 2",
             "7  fsync(4)                          = 0",
-            f'7  write(1, {text("acknowledged ")[:-1]}\\x0a", 14) = 14',
+            f'7  write(1, {text_of("acknowledged ")[:-1]}\\x0a", 14) = 14',
             "7  ftruncate(4, 100)                 = 0",
-            f"7  unlink({text('/home/touchline.db-wal')}) = 0",
-            f"7  unlink({text('/home/touchline.db-journal')}) = -1 ENOENT (No such file)",
+            f"7  unlink({text_of('/home/touchline.db-wal')}) = 0",
+            f"7  unlink({text_of('/home/touchline.db-journal')}) = -1 ENOENT (No such file)",
             "7  close(4)                          = 0",
             "7  fsync(4)                          = 0",
         ]
@@ -173,17 +175,16 @@ class TestParse:
         ]
 
     def test_a_file_keeps_its_first_path_whatever_its_folder_is_called(self) -> None:
-        def text(value: str) -> str:
-            return '"' + "".join(f"\\x{byte:02x}" for byte in value.encode()) + '"'
-
         lines = [
-            f"7  mkdir({text('/home/a.part')}, 0700) = 0",
-            f"7  rename({text('/home/a.part')}, {text('/home/a')}) = 0",
-            f"7  openat(AT_FDCWD, {text('/home/a/b')}, O_WRONLY|O_CREAT|O_TRUNC, 0644) = 4",
-            f"7  write(4, {text('ab')}, 2)  = 2",
-            f"7  write(4, {text('c')}, 1)  = 1",
-            f"7  openat(AT_FDCWD, {text('/home')}, O_RDONLY) = 5",
+            f"7  mkdir({text_of('/home/a.part')}, 0700) = 0",
+            f"7  rename({text_of('/home/a.part')}, {text_of('/home/a')}) = 0",
+            f"7  openat(AT_FDCWD, {text_of('/home/a/b')}, O_WRONLY|O_CREAT|O_TRUNC, 0644) = 4",
+            f"7  write(4, {text_of('ab')}, 2)  = 2",
+            f"7  write(4, {text_of('c')}, 1)  = 1",
+            f"7  openat(AT_FDCWD, {text_of('/home')}, O_RDONLY) = 5",
             "7  fsync(5) = 0",
+            f"7  unlink({text_of('/home/a/b')}) = 0",
+            f"7  openat(AT_FDCWD, {text_of('/home/a/b')}, O_WRONLY|O_CREAT, 0644) = 4",
         ]
         assert list(parse(lines, Path("/home"))) == [
             Name("a.part", "a.part"),
@@ -193,6 +194,8 @@ class TestParse:
             Write("a.part/b", 0, b"ab"),
             Write("a.part/b", 2, b"c"),
             Sync("."),
+            Name("a.part/b", None),
+            Name("a.part/b#1", "b"),
         ]
 
 

@@ -2,7 +2,7 @@
 
 A process that edits and uploads is recorded system call by system call. For a cut, every file gets
 what was synced before it, and of what was written later any part: a disk is free to keep it or
-not, whole or torn between sectors. Names are what their folder's last sync has kept, likewise.
+not, whole or torn between sectors. A name is as certain as its folder was synced.
 """
 
 from __future__ import annotations

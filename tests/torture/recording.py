@@ -202,6 +202,8 @@ class _Recording:
         if place is None:
             return
         file = self._file(*place)
+        # What gets its name afterwards is another file.
+        self._known.add(file)
         self._called[place] = None
         if new is None:
             yield Name(file, None)
