@@ -118,15 +118,15 @@ def test_counts_jobs_by_kind_and_state(app: FastAPI, read) -> None:
     def fail(_progress: object) -> None:
         raise StorageError("the disk is gone")
 
-    first = jobs.submit("export", "Work", work, actor="ann")
+    first = jobs.submit("paint", "Work", work, actor="ann")
     last = jobs.submit("import", "Work", fail, actor="ann")
     assert begun.wait(SECONDS)
-    assert read("touchline_jobs", kind="export", state="running") == 1
+    assert read("touchline_jobs", kind="paint", state="running") == 1
     assert read("touchline_jobs", kind="import", state="waiting") == 1
     end.set()
     for job in (first, last):
         jobs.wait(job.id, SECONDS)
-    assert read("touchline_jobs", kind="export", state="done") == 1
+    assert read("touchline_jobs", kind="paint", state="done") == 1
     assert read("touchline_jobs", kind="import", state="failed") == 1
 
 

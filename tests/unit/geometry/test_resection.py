@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 
+from app.geometry import least_squares
 from app.geometry.curve_residuals import residual_rows
 from app.geometry.least_squares import CONVERGED, OUT_OF_STEPS, levenberg_marquardt
 from app.geometry.resection import (
@@ -69,7 +70,7 @@ def rows(parameters, seen):
     return offsets, jacobians
 
 
-def test_compiled_rounds_are_those_of_least_squares_bit_for_bit() -> None:
+def test_compiled_rounds_are_those_of_least_squares_bit_for_bit(monkeypatch) -> None:
     seen, prior = sightings(1.5), Prior(np.zeros(8), np.array([9.0, 9, 9, 99, 99, 99, 99, 0.1]))
     starts = TRUTH + np.random.default_rng(2).normal(0, 1, (9, 8)) * [
         0.3, 0.1, 0.02, 9, 9, 4, 0.2, 0.02,
@@ -77,14 +78,12 @@ def test_compiled_rounds_are_those_of_least_squares_bit_for_bit() -> None:
     starts[-1, 3:6] = [900.0, -900.0, 90.0]
     problem = (CURVES, seen, prior, 8.0, HALF_DIAGONAL)
     reasons = set()
+    monkeypatch.setattr(least_squares, "TOLERANCE", 1e-4)
     for steps, damping in ((4, 1e-2), (30, 1e-3)):
+        monkeypatch.setattr(least_squares, "_FIRST_DAMPING", damping)
         fit = fit_curves(starts, *problem, steps, tolerance=1e-4, damping=damping)
         slow = levenberg_marquardt(
-            lambda parameters: normal_equations(parameters, *problem),
-            starts,
-            steps,
-            tolerance=1e-4,
-            damping=damping,
+            lambda parameters: normal_equations(parameters, *problem), starts, steps
         )
         assert fit.reasons == slow.reasons
         for name in ("parameters", "cost", "information", "accepted", "rejected"):

@@ -17,7 +17,6 @@ from app.errors import (
     StorageError,
 )
 from app.review.editing import state as state_module
-from app.review.editing import submit as submit_module
 from app.review.editing.edit import IncludeView, SetBall, SetBalls, SetLines, SetPicture
 from app.review.editing.past import history
 from app.review.editing.solve_encoded import solve_encoded
@@ -99,31 +98,24 @@ class TestSubmit:
         assert caught.value.current_etag == after.etag
         assert load(store, state.id) == after
 
-    def test_a_change_during_the_solve_is_seen_before_saving(
-        self, store, state, monkeypatch
-    ) -> None:
+    def test_a_change_during_the_solve_is_seen_before_saving(self, store, state) -> None:
         def slow(group, policy, calibrations):
-            monkeypatch.setattr(submit_module, "solve_encoded", solve_encoded)
             change(store, load(store, state.id), IncludeView("7_1.png", False))
             return solve_encoded(group, policy, calibrations)
 
-        monkeypatch.setattr(submit_module, "solve_encoded", slow)
         with pytest.raises(StaleRevisionError):
-            change(store, state, SetBall("7.png", BALL))
+            change(store, state, SetBall("7.png", BALL), solve=slow)
         after = load(store, state.id)
         assert after.group.view("7.png") == state.group.view("7.png")
         assert not after.group.view("7_1.png").included
 
-    def test_another_policy_during_the_solve_judges_the_edit(
-        self, store, state, monkeypatch
-    ) -> None:
+    def test_another_policy_during_the_solve_judges_the_edit(self, store, state) -> None:
         def slow(group, policy, calibrations):
-            monkeypatch.setattr(submit_module, "solve_encoded", solve_encoded)
-            change_policy(store, state.dataset_id, STRICT, if_match=None, actor="ann")
+            if policy != STRICT:
+                change_policy(store, state.dataset_id, STRICT, if_match=None, actor="ann")
             return solve_encoded(group, policy, calibrations)
 
-        monkeypatch.setattr(submit_module, "solve_encoded", slow)
-        after = change(store, state, SetBall("7.png", BALL))
+        after = change(store, state, SetBall("7.png", BALL), solve=slow)
         assert after.policy == STRICT
         assert after.solution == solve(after.group, STRICT)
         assert load(store, state.id) == after
