@@ -9,13 +9,16 @@ nothing.
 from __future__ import annotations
 
 import asyncio
+import functools
 import threading
-from collections import deque
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, replace
+from time import monotonic
 
 import structlog
-from fastapi.sse import ServerSentEvent
+from fastapi.sse import KEEPALIVE_COMMENT, format_sse_event
+from pydantic import BaseModel
 
 from app.api.schemas.event import DatasetEvent, GroupEvent, PresenceDocument, WorkEvent
 from app.api.schemas.job import JobDocument
@@ -47,6 +50,8 @@ _WORK = "work"
 """How what processes tell each other of a lease begins."""
 RETRY_MS = 1000
 """How long a browser waits before it comes back."""
+PING_SECONDS = 15.0
+"""Between two words to a listener whom there is nothing to tell, lest a proxy thinks it gone."""
 
 
 @dataclass
@@ -70,14 +75,16 @@ class Feed:
 
     Attributes:
         lost: It did not keep up and was let go.
+        told: When it was told something last, by the monotonic clock.
+        loop: The event loop on which it is read.
     """
 
     def __init__(self, dataset_id: int | None, position: int, sight: Sight, began: int):
         self.dataset_id, self.position = dataset_id, position
         self._sight, self._began = sight, began
-        self.lost = False
-        self._events: deque[ServerSentEvent] = deque()
-        self._loop = asyncio.get_running_loop()
+        self.lost, self.told = False, monotonic()
+        self._events: list[bytes] = []
+        self.loop = asyncio.get_running_loop()
         self._ready, self._ended = asyncio.Event(), False
 
     def wants(self, dataset_id: int | None, actor: str | None = None) -> bool:
@@ -93,38 +100,23 @@ class Feed:
         gone = change.dataset is None and (change.id or 0) <= self._began
         return self.wants(change.dataset_id) and (not gone or self._sight == EVERYTHING)
 
-    def offer(self, events: list[ServerSentEvent]) -> None:
-        """Tell of something; from any thread."""
-        if events:
-            self._call(events, False)
-
-    def end(self) -> None:
-        """Tell no more; from any thread."""
-        self._call([], True)
-
-    async def read(self) -> AsyncIterator[ServerSentEvent]:
-        """Events as they come, until the feed ends."""
-        while True:
-            await self._ready.wait()
-            self._ready.clear()
-            while self._events:
-                yield self._events.popleft()
-            if self._ended:
-                return
-
-    def _call(self, events: list[ServerSentEvent], ended: bool) -> None:
-        try:
-            self._loop.call_soon_threadsafe(self._take, events, ended)
-        except RuntimeError:
-            # The loop of a server that has stopped.
-            return
-
-    def _take(self, events: list[ServerSentEvent], ended: bool) -> None:
+    def take(self, events: list[bytes], *, ended: bool = False) -> None:
+        """Have something to tell, and nothing more where it has ended; on the event loop."""
         self.lost = self.lost or len(self._events) + len(events) > MAX_WAITING
         self._ended = self._ended or ended or self.lost
         if not self._ended:
             self._events.extend(events)
+        self.told = monotonic()
         self._ready.set()
+
+    async def read(self) -> AsyncIterator[bytes]:
+        """Events as they come, those that came together at once, until the feed ends."""
+        while not self._ended or self._events:
+            await self._ready.wait()
+            self._ready.clear()
+            told, self._events = self._events, []
+            if told:
+                yield b"".join(told)
 
 
 class Events:
@@ -150,7 +142,7 @@ class Events:
         """How things stand, as a page that begins to read them tells the stream later on."""
         return "-".join(map(str, read_moment(self._store)))
 
-    def solved_since(self, solution: int, feed: Feed) -> list[ServerSentEvent]:
+    def solved_since(self, solution: int, feed: Feed) -> list[bytes]:
         """Solutions that arrived after one, for a listener that has read what was there then."""
         found = read_solved_since(self._store, solution)
         return [_change_event(item) for item in found if feed.is_told(item)]
@@ -196,7 +188,7 @@ class Events:
             self._feeds.discard(feed)
             self._counts.lost += feed.lost
 
-    def open_jobs(self, dataset_id: int | None, sight: Sight) -> list[ServerSentEvent]:
+    def open_jobs(self, dataset_id: int | None, sight: Sight) -> list[bytes]:
         """Jobs that are under way, for whoever begins to listen."""
         return [_job_event(job) for job in self._jobs.under_way(dataset_id, sight)]
 
@@ -204,8 +196,7 @@ class Events:
         """End every feed, so that the server can stop; may be called twice."""
         self._closing.set()
         self._wake.set()
-        for feed in self._listening():
-            feed.end()
+        _tell({feed: [] for feed in self._listening()}, ended=True)
         thread = self._thread
         if thread is not None and thread is not threading.current_thread():
             thread.join(5)
@@ -225,6 +216,8 @@ class Events:
                     log.warning("the log could not be read", error=str(error))
                 except Exception:
                     log.exception("events could not be told")
+                idle = monotonic() - PING_SECONDS
+                _tell({feed: [KEEPALIVE_COMMENT] for feed in feeds if feed.told < idle})
                 self._closing.wait(PAUSE)
             else:
                 awake = False
@@ -236,10 +229,14 @@ class Events:
         places = {feed.position for feed in feeds}
         news = read_news(self._store, places, None if first else self._solutions)
         self._solutions = news.solution
+        written = functools.cache(_change_event)
+        told: dict[Feed, list[bytes]] = {}
         for feed in feeds:
             wanted = [*news.changes.get(feed.position, []), *news.solved]
             feed.position = max(feed.position, news.entry)
-            feed.offer([_change_event(item) for item in wanted if feed.is_told(item)])
+            if events := [written(item) for item in wanted if feed.is_told(item)]:
+                told[feed] = events
+        _tell(told)
 
     def tell_lease(self, lease: Lease) -> None:
         """Tell who has a group of a batch open."""
@@ -260,26 +257,38 @@ class Events:
             self._tell_work(int(dataset_id), WorkEvent.model_validate_json(told))
 
     def _tell_work(self, dataset_id: int, told: WorkEvent) -> None:
-        for feed in self._listening():
-            if feed.wants(dataset_id):
-                feed.offer([ServerSentEvent(event="work", data=told)])
+        event = _event("work", told)
+        _tell({feed: [event] for feed in self._listening() if feed.wants(dataset_id)})
 
     def _tell_job(self, job: Job) -> None:
-        for feed in self._listening():
-            if feed.wants(job.dataset_id, job.actor):
-                feed.offer([_job_event(job)])
+        event, feeds = _job_event(job), self._listening()
+        _tell({feed: [event] for feed in feeds if feed.wants(job.dataset_id, job.actor)})
 
 
-def hello(position: int) -> ServerSentEvent:
+def _tell(told: Mapping[Feed, list[bytes]], *, ended: bool = False) -> None:
+    """Tell listeners of something, each loop by one call; from any thread."""
+
+    def take(loop: asyncio.AbstractEventLoop) -> None:
+        for feed, events in told.items():
+            if feed.loop is loop:
+                feed.take(events, ended=ended)
+
+    for loop in {feed.loop for feed in told}:
+        # One of a server that has stopped calls nothing any more.
+        with suppress(RuntimeError):
+            loop.call_soon_threadsafe(take, loop)
+
+
+def hello(position: int) -> bytes:
     """What a listener gets first: where it stands, should it have to come back."""
-    return ServerSentEvent(comment="listening", id=str(position), retry=RETRY_MS)
+    return format_sse_event(comment="listening", id=str(position), retry=RETRY_MS)
 
 
-def _change_event(change: Change) -> ServerSentEvent:
+def _change_event(change: Change) -> bytes:
     identity = None if change.id is None else str(change.id)
     if change.group_id is None:
         told = DatasetEvent(dataset=change.dataset, kind=change.kind, actor=change.actor)
-        return ServerSentEvent(event="dataset", data=told, id=identity)
+        return _event("dataset", told, identity)
     group = GroupEvent(
         group=change.group_id,
         dataset=change.dataset,
@@ -287,8 +296,12 @@ def _change_event(change: Change) -> ServerSentEvent:
         kind=change.kind,
         actor=change.actor,
     )
-    return ServerSentEvent(event="group", data=group, id=identity)
+    return _event("group", group, identity)
 
 
-def _job_event(job: Job) -> ServerSentEvent:
-    return ServerSentEvent(event="job", data=JobDocument.model_validate(job))
+def _job_event(job: Job) -> bytes:
+    return _event("job", JobDocument.model_validate(job))
+
+
+def _event(kind: str, told: BaseModel, identity: str | None = None) -> bytes:
+    return format_sse_event(data_str=told.model_dump_json(), event=kind, id=identity)

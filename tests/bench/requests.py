@@ -50,7 +50,7 @@ def bench_requests() -> None:
 
 
 def _measured(client: httpx.Client) -> list[tuple[str, float, float, str]]:
-    group = _Group(client)
+    group = Group(client)
     kinds: list[tuple[str, Callable[[], httpx.Response], str]] = [
         ("GET /healthz, the reference", lambda: client.get("/healthz"), ""),
         ("GET of a group", lambda: client.get(group.path), "< 4"),
@@ -61,7 +61,7 @@ def _measured(client: httpx.Client) -> list[tuple[str, float, float, str]]:
     spent: dict[str, list[float]] = {what: [] for what, _, _ in kinds}
     for number in range(ROUNDS + 1):
         for what, ask, _ in kinds:
-            milliseconds = _cost(ask)
+            milliseconds = cost(ask)
             # The first round compiles statements and fills caches.
             if number:
                 spent[what].append(milliseconds)
@@ -70,7 +70,7 @@ def _measured(client: httpx.Client) -> list[tuple[str, float, float, str]]:
     return [(what, medians[what], medians[what] / reference, limit) for what, _, limit in kinds]
 
 
-def _cost(ask: Callable[[], httpx.Response]) -> float:
+def cost(ask: Callable[[], httpx.Response]) -> float:
     """Milliseconds of the server's processor time for one request, over many."""
     before = _cpu_seconds()
     for _ in range(TURNS):
@@ -85,7 +85,7 @@ def _cpu_seconds() -> float:
     return time.clock_gettime((~int(server) << 3) | 2)
 
 
-class _Group:
+class Group:
     """The first group of four views, and changes of it that build on each other."""
 
     def __init__(self, client: httpx.Client):

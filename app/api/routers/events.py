@@ -6,8 +6,8 @@ import re
 from collections.abc import AsyncIterator
 from typing import Annotated
 
-from fastapi import APIRouter, Depends, Header, Query, Request
-from fastapi.sse import EventSourceResponse, ServerSentEvent
+from fastapi import APIRouter, Depends, Header, Query, Request, Response
+from fastapi.responses import StreamingResponse
 
 from app.api.deps import AppServices, Sees, get_services
 from app.api.events import Feed, hello
@@ -17,6 +17,8 @@ from app.api.security.requests import is_head
 from app.api.services import Services
 from app.review.datasets.dataset import dataset_id
 
+_UNBUFFERED = {"Cache-Control": "no-cache", "X-Accel-Buffering": "no"}
+"""What a proxy between asks for, which would hold events back otherwise."""
 _MOMENT = re.compile(r"(\d{1,18})-(\d{1,18})", re.ASCII)
 
 router = APIRouter(prefix="/events", tags=["events"])
@@ -97,7 +99,7 @@ def under_way(
     sight: Sees,
     start: Annotated[Start, Depends()],
     feed: Annotated[Feed, Depends(begin)],
-) -> list[ServerSentEvent]:
+) -> list[bytes]:
     """Jobs that are under way and solutions that arrived, read once the feed hears of later ones."""
     jobs = services.events.open_jobs(start.dataset_id, sight)
     if start.solution is None:
@@ -108,24 +110,26 @@ def under_way(
 @router.get(
     "",
     operation_id="listenToEvents",
-    response_class=EventSourceResponse,
+    response_class=Response,
     responses={**responses(404), **STREAM},
 )
 async def listen(
     request: Request,
     start: Annotated[Start, Depends()],
     feed: Annotated[Feed, Depends(begin)],
-    first: Annotated[list[ServerSentEvent], Depends(under_way)],
-) -> AsyncIterator[ServerSentEvent]:
+    first: Annotated[list[bytes], Depends(under_way)],
+) -> StreamingResponse:
     """What changes, as it changes: by anybody, in a browser or on the command line.
 
     `group`: a group has another ETag. `dataset`: a dataset changed as a whole. `job`: a job began,
     went on or ended. `work`: who has a group of a batch open. The stream begins with the jobs that are under way.
     """
-    yield hello(start.position)
-    for event in first:
-        yield event
-    if is_head(request.scope):
-        return
-    async for event in feed.read():
-        yield event
+
+    async def told() -> AsyncIterator[bytes]:
+        yield b"".join([hello(start.position), *first])
+        if is_head(request.scope):
+            return
+        async for events in feed.read():
+            yield events
+
+    return StreamingResponse(told(), headers=_UNBUFFERED, media_type="text/event-stream")

@@ -220,6 +220,24 @@ class TestListen:
             told = {stream.until(lambda name, _: name == "group")["group"] for _ in range(3)}
             assert told == {1, 2, 3}
 
+    def test_a_proxy_between_neither_holds_events_back_nor_thinks_a_quiet_stream_gone(
+        self, app, served, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(module, "PING_SECONDS", 0.01)
+        monkeypatch.setattr(module, "POLL", 0.01)
+        with opened(served[0]) as stream:
+            headers = stream.answer.headers
+            assert (headers["cache-control"], headers["x-accel-buffering"]) == ("no-cache", "no")
+            assert [next(line for line in stream.lines if line == ": ping") for _ in range(2)]
+
+    def test_changes_of_one_look_are_told_in_their_order_and_once(self, app, served) -> None:
+        store, (address, _) = app.state.services.store, served
+        with opened(address) as stream, opened(address, dataset="broadcast") as other:
+            for policy in (STRICT, PAPER, STRICT):
+                change_policy(store, "broadcast", policy, if_match=None, actor="bob")
+            heard = [[one.next()[1]["kind"], one.last_id] for one in (stream, other)]
+            assert heard[0] == heard[1]
+
     def test_head_is_answered_and_ends(self, served) -> None:
         answer = httpx.head(f"{served[0]}{EVENTS}", timeout=SECONDS)
         assert (answer.status_code, answer.content) == (200, b"")
@@ -270,7 +288,7 @@ class TestFeed:
             stream.next()
             seen = stream.last_id
             feed = next(iter(app.state.services.events._feeds))
-            feed.offer([module.hello(1)] * 3)
+            feed.loop.call_soon_threadsafe(feed.take, [module.hello(1)] * 3)
             with pytest.raises(EOFError):
                 stream.next()
         end = time.monotonic() + SECONDS
