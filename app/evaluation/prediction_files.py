@@ -1,4 +1,4 @@
-"""Prediction files: ball boxes with scores, as detectors and people write them.
+"""Prediction files, read: ball boxes with scores, as detectors and people write them.
 
 Three formats, each a file, a folder or a zip:
 

@@ -1,4 +1,4 @@
-"""Gates: what a group must pass to enter the dataset, in order and in words.
+"""Gates: what a group must pass to enter the dataset, in order and in words; ``verdict`` compares.
 
 The first three drop views; the others judge the group from the views that are left.
 """
