@@ -16,6 +16,7 @@ from tests.bench.browser import bench_browser
 from tests.bench.calibration import bench_calibration
 from tests.bench.geometry import bench_geometry
 from tests.bench.line_coverage import bench_line_coverage
+from tests.bench.listeners import bench_listeners
 from tests.bench.page_loads import bench_page_loads
 from tests.bench.paint import bench_paint
 from tests.bench.picture_power import bench_picture_power
@@ -51,6 +52,7 @@ def main() -> None:
     bench_paint(REAL_DATA)
     bench_propose(REAL_DATA)
     bench_requests()
+    bench_listeners()
     bench_browser()
     bench_page_loads()
 
