@@ -28,6 +28,8 @@ LINK_HINT = "Put the file itself there, or import the folder again."
 _ARCHIVES = Archives()
 _FLAGS = cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION
 """Annotations were made on the pixels as stored, so no note about rotation counts."""
+_DECODED_BYTES = 6
+"""Of a pixel while it is decoded: three channels of 16 bits at most."""
 
 
 def read_frame(media: Media, width: int | None, flipped: bool, settings: Settings) -> bytes:
@@ -243,9 +245,16 @@ def _pixels(data: bytes, settings: Settings, name: str) -> Any:
             raise MemoryError from error
         raise ImageError(f"{name} is damaged") from error
     if picture is None:
+        _require_memory(header)
         raise ImageError(f"{name} is damaged")
     _require_declared(picture, header, name)
     return picture
+
+
+def _require_memory(header: ImageHeader) -> None:
+    """Raise MemoryError where a decoder has not the memory for a picture: OpenCV's for PNG then says
+    the same as of a damaged one."""
+    np.empty((header.height, header.width, _DECODED_BYTES), np.uint8)
 
 
 def _require_declared(picture: Any, header: ImageHeader, name: str) -> None:

@@ -15,7 +15,7 @@ from app.child_figures import ChildFigures
 from app.child_pool import ChildPool
 from app.errors import ImageError, OverloadedError
 
-ALLOWANCE = Allowance(memory=300 * 2**20, processor=60.0, silence=60.0)
+ALLOWANCE = Allowance(memory=1000 * 2**20, processor=60.0, silence=60.0)
 
 
 @pytest.fixture

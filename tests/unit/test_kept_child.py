@@ -11,7 +11,7 @@ from app.child import Allowance
 from app.errors import JobCancelled
 from tests.kept_child import KeptChild
 
-ALLOWED = Allowance(memory=301 * 2**20, processor=30.0, silence=60.0)
+ALLOWED = Allowance(memory=1001 * 2**20, processor=30.0, silence=60.0)
 """As no other test allows it: these children are of this file alone."""
 
 
@@ -23,7 +23,7 @@ class TestKeptChild:
         first.close()
         assert second.run(os.getpid) == number
         second.close()
-        other = KeptChild(Allowance(302 * 2**20, 30.0, 60.0))
+        other = KeptChild(Allowance(1002 * 2**20, 30.0, 60.0))
         assert other.run(os.getpid) != number
         other.close()
 

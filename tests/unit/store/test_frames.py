@@ -8,6 +8,7 @@ import struct
 import zlib
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -22,6 +23,8 @@ from app.store.frames import Frames, make_picture
 
 PICTURE = np.full((90, 160, 3), 90, np.uint8)
 PNG = cv2.imencode(".png", PICTURE)[1].tobytes()
+LITTLE = Allowance(450 * 2**20, 60.0, 60.0)
+"""Above what a process holds that has loaded the libraries, some 300 MiB, and below a deep picture besides."""
 
 
 def deep_png(side: int) -> bytes:
@@ -82,13 +85,31 @@ class TestFrames:
     ) -> None:
         path = tmp_path / "deep.png"
         path.write_bytes(deep_png(7000))
-        monkeypatch.setattr(module, "ALLOWANCE", Allowance(200 * 2**20, 60.0, 60.0))
+        monkeypatch.setattr(module, "ALLOWANCE", LITTLE)
         frames = Frames(settings)
         try:
             frames.read(media, None, False)
-            with pytest.raises(TooLargeError, match=r"^frame deep\.png needs more than 200 MiB"):
+            with pytest.raises(TooLargeError, match=r"^frame deep\.png needs more than 450 MiB"):
                 frames.read(Media(str(path)), None, False)
             assert frames.read(media, None, False).data == PNG
+        finally:
+            frames.close()
+
+    def test_a_decoder_that_takes_want_of_memory_for_damage_is_not_believed(
+        self, tmp_path: Path, settings: Settings, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(module, "ALLOWANCE", LITTLE)
+        monkeypatch.setattr(module, "make_picture", decode_nothing)
+        frames = Frames(settings)
+        try:
+            for side, error, reason in (
+                (7000, TooLargeError, "needs more than 450 MiB"),
+                (70, ImageError, "is damaged"),
+            ):
+                path = tmp_path / f"{side}.png"
+                path.write_bytes(deep_png(side))
+                with pytest.raises(error, match=reason):
+                    frames.read(Media(str(path)), 40, False)
         finally:
             frames.close()
 
@@ -147,6 +168,13 @@ def crash(*_: object) -> None:
 
 def be_killed(*_: object) -> None:
     os.kill(os.getpid(), signal.SIGKILL)
+
+
+def decode_nothing(*arguments: Any) -> Any:
+    """Make a picture with a decoder that says nothing of why it cannot."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(cv2, "imdecode", lambda *_: None)
+        return make_picture(*arguments)
 
 
 def run_out_of_time(*_: object) -> None:
