@@ -130,6 +130,8 @@ class TestSessions:
         page.get_by_role("button", name="I have kept them").click()
         log_out(page)
         page.goto(f"{here}/jobs?state=failed")
+        # A key that comes before goes to the field that the page gives the focus.
+        expect(page.get_by_label("Name")).to_be_focused()
         page.get_by_role("button", name="Log in with Club").press("Enter")
         expect(page.get_by_label("Code of your second factor")).to_be_focused()
         # What the provider brought leaves the address bar.
