@@ -4,21 +4,17 @@ from __future__ import annotations
 
 import itertools
 import selectors
-import tempfile
 import threading
 import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
-from pathlib import Path
 
 import httpx
 import numpy as np
 
 from app.api.events import PAUSE
-from tests.bench.requests import GROUPS, Group, cost
+from tests.bench.requests import Group, cost, sample_served
 from tests.bench.table import print_table
-from tests.e2e.service import run_touchline, serving
-from tests.starting import end_nursery
 
 WINDOWS = 50
 ROUNDS = 5
@@ -27,24 +23,12 @@ EVENTS = "/api/v1/events"
 
 def bench_listeners() -> None:
     """Measure and print verdicts, one after the other, with and without windows that listen."""
-    with tempfile.TemporaryDirectory() as folder:
-        home = Path(folder)
-        tree = home / "tree"
-        run_touchline(
-            home,
-            "migrate",
-            f"sample --groups {GROUPS} {tree}",
-            f"import soccernet-v3 {tree} --dataset sample",
-            "solve --dataset sample",
+    with sample_served() as (address, client):
+        print_table(
+            "Changes that are heard, processor time of the server a change",
+            ("windows", "ms", "times nobody"),
+            _measured(address, client),
         )
-        with serving(home) as address, httpx.Client(base_url=address, timeout=60) as client:
-            # The server is the one child of this process then.
-            end_nursery()
-            print_table(
-                "Changes that are heard, processor time of the server a change",
-                ("windows", "ms", "times nobody"),
-                _measured(address, client),
-            )
 
 
 def _measured(address: str, client: httpx.Client) -> list[tuple[int, float, float]]:

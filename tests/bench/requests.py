@@ -10,7 +10,8 @@ import itertools
 import os
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +30,17 @@ API = "/api/v1"
 
 def bench_requests() -> None:
     """Measure and print, on a group of four views of the sample."""
+    with sample_served() as (_, client):
+        print_table(
+            "Requests, processor time of the server a request",
+            ("what", "ms", "times healthz", "limit, ms on a quiet machine"),
+            _measured(client),
+        )
+
+
+@contextmanager
+def sample_served() -> Iterator[tuple[str, httpx.Client]]:
+    """The address of a server over a solved sample, and a client of it."""
     with tempfile.TemporaryDirectory() as folder:
         home = Path(folder)
         tree = home / "tree"
@@ -42,11 +54,7 @@ def bench_requests() -> None:
         with serving(home) as address, httpx.Client(base_url=address, timeout=60) as client:
             # The server is the one child of this process then.
             end_nursery()
-            print_table(
-                "Requests, processor time of the server a request",
-                ("what", "ms", "times healthz", "limit, ms on a quiet machine"),
-                _measured(client),
-            )
+            yield address, client
 
 
 def _measured(client: httpx.Client) -> list[tuple[str, float, float, str]]:

@@ -35,7 +35,7 @@ CHUNK = 1024 * 1024
 """Bytes that are gathered before they are written."""
 DISK_THREADS = 1
 """For the files of all uploads: each takes turns with the event loop at each call of the disk. Beside a
-flood of uploads an editor's slowest answers took 3.0 to 3.7 times as long as alone with two, and take
+flood of uploads an editor's slowest answers took 3.0 to 3.8 times as long as alone with two, and take
 2.4 to 2.8 times as long with one."""
 _THREADS: RunVar[CapacityLimiter] = RunVar("threads of uploads")
 LOOK_SECONDS = 0.25
