@@ -235,13 +235,14 @@ class TestListen:
         with opened(address) as stream, opened(address, dataset="broadcast") as other:
             for policy in (STRICT, PAPER, STRICT):
                 change_policy(store, "broadcast", policy, if_match=None, actor="bob")
-            newest, heard = app.state.services.events.position(), []
-            for one in (stream, other):
-                told = [0]
-                while told[-1] < newest:
-                    one.next()
-                    told.append(int(one.last_id))
-                heard.append(told)
+            heard: list[list[int]] = [[0], [0]]
+            for policy in (PAPER, STRICT):
+                newest = app.state.services.events.position()
+                for one, told in zip((stream, other), heard, strict=True):
+                    while told[-1] < newest:
+                        one.next()
+                        told.append(int(one.last_id))
+                change_policy(store, "broadcast", policy, if_match=None, actor="bob")
             assert heard[0] == heard[1] == sorted(set(heard[0]))
 
     def test_head_is_answered_and_ends(self, served) -> None:
