@@ -116,6 +116,12 @@ class Child:
             raise
         return self._outcome(kind, value)
 
+    @property
+    def is_alive(self) -> bool:
+        """Whether there is a process now."""
+        process = self._process
+        return process is not None and process.is_alive()
+
     def kill(self) -> None:
         """End the process from another thread than the one that waits for its result."""
         process = self._process

@@ -94,6 +94,11 @@ class ChildPool:
         for child in self._children:
             self._free.put(child)
 
+    @property
+    def is_whole(self) -> bool:
+        """Whether each child has its process."""
+        return all(child.is_alive for child in self._children)
+
     def submit(
         self,
         work: Callable[..., Any],

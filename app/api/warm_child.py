@@ -48,7 +48,9 @@ class WarmChild:
         """Whether the process is there."""
 
     def begin(self) -> bool:
-        """Whether it is ready; the first call starts it."""
+        """Whether it is ready; the first call starts it, and the first after it broke down another."""
+        if self.is_ready and not self._pool.is_whole:
+            self.is_ready = self._begun = False
         if not self._begun:
             self._begun = True
             begun = self._pool.submit(*self._first, explain=self._explain, bounded=False)

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 from fastapi import FastAPI
 
-from app.api.large_edits import LargeEdits
+from app.api.large_edits import NICENESS, LargeEdits
 from app.child_figures import FIGURES
 from app.errors import OverloadedError
 from app.review.editing.solve_encoded import solve_encoded
@@ -43,6 +43,11 @@ def solution_of(answer: Any) -> Any:
 
 def break_down(*_: object) -> None:
     os._exit(3)
+
+
+def solve_here(*_: object) -> int:
+    """Which process that is."""
+    return os.getpid()
 
 
 def solve_nothing(*_: object) -> None:
@@ -94,6 +99,18 @@ def test_a_process_that_breaks_down_costs_its_large_edit_alone(
     assert answer.json()["detail"].startswith("solving this made the process crash")
     assert api.get(f"{API}/groups/1").json() == before
     assert draw(api, large_lines()).status_code == 200
+
+
+def test_what_takes_the_place_of_one_that_broke_down_is_made_ready_too(ready) -> None:
+    with pytest.raises(OverloadedError, match="made the process crash"):
+        ready.run(break_down, None, None, {})
+    assert ready.run(solve_here, None, None, {}) == os.getpid()
+    end = time.monotonic() + SECONDS
+    while not ready.child.begin():
+        assert time.monotonic() < end, "no other took its place"
+        time.sleep(0.02)
+    task = ready.child.submit(os.getpriority, os.PRIO_PROCESS, 0)
+    assert task.future.result(SECONDS) == os.getpriority(os.PRIO_PROCESS, 0) + NICENESS
 
 
 def test_what_people_draw_is_solved_by_the_server(app, ready, api, monkeypatch) -> None:
