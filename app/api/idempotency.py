@@ -24,7 +24,7 @@ from app.api.problem import make_problem, problem_response
 from app.api.reply import ASKED, KEPT_HEADERS, Asked
 from app.api.security.access import actor_of
 from app.api.security.bodies import BYTES, VALUE
-from app.api.security.instead import SENT
+from app.api.security.instead import HIDDEN, SENT
 from app.api.security.origin import SAFE_METHODS
 from app.canonical import canonical
 from app.errors import BusyError, OverloadedError, ReviewError, StorageError
@@ -126,7 +126,7 @@ class Idempotency:
 
     async def _answer(self, actor: str, key: str, request: _Request, send: Send) -> None:
         try:
-            known = await self._find(request.store, key, actor)
+            known = await self._find(request, key, actor)
         except StorageError as error:
             await _refuse(error, request.scope, request.receive, send)
             return
@@ -135,12 +135,19 @@ class Idempotency:
         else:
             await self._carry_out(actor, key, request, send)
 
-    async def _find(self, store: Store, key: str, actor: str) -> Answer | None:
-        """What is kept under a key; in a thread only where there is something to wait for."""
+    async def _find(self, request: _Request, key: str, actor: str) -> Answer | None:
+        """What is kept under a key; in a thread only where there is something to wait for.
+
+        Nothing for who has lost sight, meanwhile, of what it is about.
+        """
         try:
-            return find_first(store, key, actor, at_once=True)
+            found = find_first(request.store, key, actor, at_once=True)
         except BusyError:
-            return await run_sync(find_first, store, key, actor, limiter=self._finding)
+            found = await run_sync(find_first, request.store, key, actor, limiter=self._finding)
+        hidden = None if found is None else request.scope.get(HIDDEN)
+        if hidden is not None and await run_sync(hidden, limiter=self._finding):
+            return None
+        return found
 
     async def _carry_out(self, actor: str, key: str, request: _Request, send: Send) -> None:
         if request.streamed:

@@ -23,7 +23,7 @@ from app.review.people.roles import LEAST, Role, Scope
 from app.store.clock import now
 from app.store.log import Entry, append, read_log
 from app.store.store import Store
-from tests.security.asking import assert_guarded
+from tests.security.asking import Answer, assert_guarded
 from tests.security.table import MISSING, TABLE, Row, rows
 from tests.security.team import API, BYTES, GUARDED, HIDDEN, SECRET, Team, asked, cookie_in
 from tests.waiting import SECONDS
@@ -335,6 +335,24 @@ class TestWhoActs:
         told = [team.ask("DELETE", target, role="lead", Idempotency_Key="k-3") for _ in "12"]
         assert [answer.status for answer in told] == [204, 204]
         assert told[1].headers["idempotency-replayed"] == "true"
+
+    def test_who_lost_sight_of_a_dataset_is_not_told_their_first_answers_either(
+        self, team: Team
+    ) -> None:
+        team.add("leaving", Role.ANNOTATOR)
+        ensure_dataset(team.store, "left", "local")
+        target, body = f"{API}/datasets/left/saved-views", {"name": "kept", "q": ""}
+
+        def ask() -> Answer:
+            return team.ask("POST", target, body, role="leaving", Idempotency_Key="k-4")
+
+        first, again = ask(), ask()
+        assert (first.status, again.body) == (201, first.body)
+        person = find_person(team.store, "leaving").id
+        give_role(team.store, "left", person, Role.NONE, actor="local")
+        unknown = team.ask("POST", target.replace("left", "nothing"), body, role="leaving")
+        assert ask().status == unknown.status == 404
+        assert b"kept" not in ask().body
 
 
 class TestStreams:

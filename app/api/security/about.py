@@ -17,7 +17,7 @@ from starlette.types import Scope
 from app.api.security.bodies import VALUE
 from app.errors import ForbiddenError
 from app.review.people.logins import Login
-from app.review.people.roles import Action, DatasetRoles, Role, Sight, require
+from app.review.people.roles import EVERYTHING, Action, DatasetRoles, Role, Sight, require
 from app.review.people.whereabouts import MAX_ID, Kind, Named, Whereabouts, find_place, role_at
 from app.review.queue.fields import BLIND
 from app.store.store import Store
@@ -194,6 +194,16 @@ def datasets_of(store: Store, asked: Asked, login: Login) -> list[Finding]:
             sight = Sight(False, frozenset({place.dataset}), login.owner)
         found.append(Finding(mention, place))
     return found
+
+
+def is_hidden(store: Store, findings: list[Finding]) -> bool:
+    """Whether anything that a request mentions is there, and its reader does not see it."""
+    return any(
+        item.place is None
+        and item.mention.named.kind is not Kind.NEW_DATASET
+        and find_place(store, item.mention.named, EVERYTHING) is not None
+        for item in findings
+    )
 
 
 def takes_looking(asked: Asked, login: Login) -> bool:

@@ -11,6 +11,7 @@ import re
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import structlog
@@ -26,6 +27,7 @@ from app.api.security.about import (
     Asked,
     Finding,
     datasets_of,
+    is_hidden,
     is_known,
     require_allowed,
     takes_looking,
@@ -33,7 +35,7 @@ from app.api.security.about import (
 from app.api.security.bearer import SCHEME as BEARER
 from app.api.security.bearer import bearer_of
 from app.api.security.cookie import cookie_of
-from app.api.security.instead import Instead
+from app.api.security.instead import HIDDEN, Instead
 from app.api.security.rules import OPEN, RULES
 from app.api.team import Team
 from app.errors import (
@@ -200,6 +202,7 @@ class Access:
         instead = Instead(asked, let.findings)
         if instead:
             told = instead.scope(scope)
+            told[HIDDEN] = partial(is_hidden, self._store, let.findings)
             receive, send, scope = instead.receive(receive, told), instead.send(send), told
         scope[RULE], scope[LOGIN] = asked.route, let.login
         if asked.route in STREAMS:

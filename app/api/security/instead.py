@@ -21,6 +21,8 @@ from app.review.people.whereabouts import MAX_ID, Kind
 
 SENT = "touchline.sent"
 """Where a request's scope under other names has the one that was sent."""
+HIDDEN = "touchline.hidden"
+"""Where it has a function that says whether what is asked for is there, and not for its reader."""
 _NO_ID = str(MAX_ID)
 _NO_UPLOAD = "0" * 32
 _NO_NAME = f"nothing-{secrets.token_hex(12)}"
