@@ -74,7 +74,7 @@ check: setup
 	$(BIN)/lint-imports
 	$(BIN)/npm --prefix static run check
 	$(BIN)/python -m tests.release licences
-	@echo "Nobody was asked for published weaknesses of libraries: make audit"
+	@$(MAKE) --no-print-directory audit
 
 # Programs that only a release needs, apart: they would double what everybody installs.
 .venv-release/ready: requirements-release.lock .venv/ready
@@ -83,7 +83,7 @@ check: setup
 	@.venv-release/bin/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements-release.lock
 	@touch $@
 
-# Who has no network is told so, and is not wrong.
+# Published weaknesses. Who has no network, or whose registry does not answer, is told so, and is not wrong.
 audit: setup
 	@$(MAKE) --no-print-directory .venv-release/ready || echo "The programs that ask could not be installed."
 	@$(BIN)/python -m tests.release advisories .venv-release/bin

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from datetime import date, timedelta
 from email.message import Message
 from pathlib import Path
 from typing import Any
@@ -9,10 +11,22 @@ from typing import Any
 import pytest
 
 from tests.release.__main__ import SUMS, _emptied, build
-from tests.release.advisories import UNANSWERED, read_browser, read_python
+from tests.release.advisories import UNANSWERED, Accepted, read_browser, read_python
 from tests.release.bill import merged
 from tests.release.libraries import EXTRAS, closure, pinned, pins
 from tests.release.licences import allowed, complaints, licence_of, python_licence
+
+ADVISORY = {
+    "url": "https://github.com/advisories/GHSA-a-b-c",
+    "severity": "high",
+    "title": "one word is run",
+}
+BROWSER = {
+    "vulnerabilities": {
+        "z": {"severity": "high", "via": [ADVISORY]},
+        "needs-z": {"severity": "high", "via": ["z"]},
+    }
+}
 
 
 def metadata(**fields: str) -> Any:
@@ -128,11 +142,26 @@ class TestAdvisories:
         python = read_python({"dependencies": items})
         assert python.weak
         assert "2 Python libraries, 1 weak" in python.sentence
-        assert "x 2.0: PYSEC-1, mended in 2.1" in python.sentence
-        browser = read_browser({"vulnerabilities": {"z": {"severity": "high"}}})
+        assert "PYSEC-1: x 2.0: mended in 2.1" in python.sentence
+        browser = read_browser(BROWSER)
         assert browser.weak
-        assert "z: high" in browser.sentence
+        assert browser.sentence.splitlines() == [
+            "npm audit, 1 weak",
+            "GHSA-a-b-c: z: high, one word is run",
+        ]
         assert not read_browser({"vulnerabilities": {}}).weak
+
+    def test_one_that_somebody_has_accepted_is_told_and_stops_nobody_until_its_day(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        known = Accepted(date.today(), "no page uses that")
+        monkeypatch.setattr("tests.release.advisories.ACCEPTED", {"GHSA-a-b-c": known})
+        answer = read_browser(BROWSER)
+        assert not answer.weak
+        assert answer.sentence.endswith(f"(accepted until {known.until}: no page uses that)")
+        late = replace(known, until=date.today() - timedelta(days=1))
+        monkeypatch.setattr("tests.release.advisories.ACCEPTED", {"GHSA-a-b-c": late})
+        assert read_browser(BROWSER).weak
 
 
 class TestBill:
