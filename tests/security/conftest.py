@@ -27,7 +27,7 @@ from app.review.people import passwords
 from app.review.people.roles import Role
 from app.store.store import Store
 from tests.e2e.service import NOBODY, run_touchline, serving
-from tests.integration.conftest import bomb, picture
+from tests.integration.conftest import picture
 from tests.provider import CLIENT, SECRET, Provider, providing
 from tests.scenes import make_scenes
 from tests.security.asking import JSON, Asker
@@ -99,10 +99,8 @@ def guarded(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Guarded]:
         path = files / "small" / group.match / view.key
         path.write_bytes(picture(0, view.size.width, view.size.height))
     images = sorted((CORPUS / "images").iterdir())
-    # The last one would be larger than all other files of the corpus.
-    hostile = (*(path.read_bytes() for path in images), bomb(16_000))
-    for view, content in zip(spoiled.views, hostile, strict=True):
-        (files / "spoiled" / spoiled.match / view.key).write_bytes(content)
+    for view, image in zip(spoiled.views, images, strict=True):
+        (files / "spoiled" / spoiled.match / view.key).write_bytes(image.read_bytes())
     run_touchline(
         home,
         *(f"import soccernet-v3 {files / name} --dataset {name}" for name in ("small", "formula")),

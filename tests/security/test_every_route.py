@@ -143,11 +143,12 @@ class TestTable:
 def stalled(guarded: Guarded) -> Iterator[list[tuple[Row, float, socket.socket]]]:
     """For each route a request that never comes whole, under way while everything else is asked."""
     where, found = urlsplit(guarded.address), []
-    for row in rows("slow"):
+    ways = yaml.safe_load((CORPUS / "slow.yaml").read_text())
+    for number, row in enumerate(rows("slow")):
+        kind = "application/octet-stream" if row.kind == "upload" else "application/json"
+        those = ways["changes" if row.changes else "reads"]
         head = f"{row.method} {row.target({})} HTTP/1.1\r\nHost: {where.netloc}\r\n"
-        if row.changes:
-            kind = "application/octet-stream" if row.kind == "upload" else "application/json"
-            head += f"Content-Type: {kind}\r\nContent-Length: 1000\r\n\r\n{{"
+        head += those[number % len(those)].format(type=f"Content-Type: {kind}\r\n")
         connection = socket.create_connection((where.hostname, where.port or 0), timeout=5)
         connection.sendall(head.encode())
         found.append((row, time.monotonic(), connection))

@@ -8,6 +8,7 @@ import json
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import httpx
@@ -15,7 +16,8 @@ import httpx
 from app.api.security.lanes import UPLOADS
 from app.review.editing.point_limits import VIEW_POINTS
 from app.soccer.pitch import MARKINGS
-from tests.torture.connection import API, read_answer, write_head
+from tests.torture.background import Background
+from tests.torture.connection import API, Answer, read_answer, write_head
 from tests.torture.kills import Server
 from tests.torture.people import LEAD, log_in
 from tests.torture.quiet import Place
@@ -58,6 +60,7 @@ class Attack:
         may: Statuses that are in order, besides 429 and 503 with Retry-After.
         must: One of these has to be among them, for else the attack does not do what it is there for;
             none: whatever comes.
+        growth: MB that the server may take beyond what it took at rest.
     """
 
     name: str
@@ -65,6 +68,7 @@ class Attack:
     once: Callable[[int], Awaitable[tuple[int, dict[str, str]]]]
     may: frozenset[int]
     must: frozenset[int] = frozenset()
+    growth: float = 300.0
 
 
 async def nothing(_number: int) -> tuple[int, dict[str, str]]:
@@ -82,10 +86,18 @@ def _logged_in(server: Server, name: str) -> dict[str, str]:
 
 
 class Target:
-    """A server, what there is to ask of it, and where the quiet parties are meanwhile."""
+    """A server, what there is to ask of it, and where the quiet parties are meanwhile.
 
-    def __init__(self, server: Server, scale: Scale):
+    Args:
+        server: It runs.
+        scale: How much is asked.
+        home: What it serves.
+        tree: Where ``background.prepare`` has had its dataset from; None: it was not called.
+    """
+
+    def __init__(self, server: Server, scale: Scale, home: Path, tree: Path | None = None):
         self.scale, self._headers = scale, _logged_in(server, LEAD)
+        self._background = None if tree is None else Background(self._answered, home, tree)
         self.port = port = server.port
         with httpx.Client(base_url=server.address, headers=self._headers, timeout=60) as http:
             ids = http.get(f"{API}/groups/ids", params={"dataset": "client0"}).json()["ids"]
@@ -119,6 +131,18 @@ class Target:
             Attack("queries", scale.others, self._query, read | {400, 414, 422, 431}),
             Attack("edits", scale.others, self._edit, read | {400, 412, 413, 422}, read),
             Attack("previews", scale.others, self._preview, frozenset({200, 400, 422})),
+            *self._long_work(),
+        ]
+
+    def _long_work(self) -> list[Attack]:
+        work, done = self._background, frozenset({200, 202})
+        if work is None:
+            return []
+        return [
+            # Each of its processes has a solver of its own.
+            Attack("solving", 1, work.solve, done, growth=1200.0),
+            Attack("exporting", 1, work.export, done),
+            Attack("importing", 1, work.import_, done),
         ]
 
     async def _slow_body(self, _number: int) -> tuple[int, dict[str, str]]:
@@ -190,9 +214,15 @@ class Target:
     async def _ask(
         self, method: str, path: str, body: bytes | None = None, extra: dict[str, str] | None = None
     ) -> tuple[int, dict[str, str]]:
+        answer = await self._answered(method, path, body, extra)
+        return answer.status, answer.headers
+
+    async def _answered(
+        self, method: str, path: str, body: bytes | None = None, extra: dict[str, str] | None = None
+    ) -> Answer:
         async with self._connected() as (reader, writer):
             writer.write(write_head(method, path, body, self._own(extra)) + (body or b""))
-            return await _answer(reader)
+            return await read_answer(reader)
 
     def _own(self, extra: dict[str, str] | None = None) -> dict[str, str]:
         return {"Host": f"127.0.0.1:{self.port}", **self._headers, **(extra or {})}

@@ -31,8 +31,6 @@ from tests.torture.people import invite_all
 from tests.torture.quiet import PARTIES, READY, Told
 from tests.waiting import SECONDS
 
-MOST_GROWTH_MB = 300.0
-"""What the server may take beyond what it took at rest."""
 MOST_TIMES = 3.0
 """How much slower the p99 of a quiet party may become."""
 LEAST_MS = 15.0
@@ -80,6 +78,7 @@ def flood(
     *,
     times: float | None = MOST_TIMES,
     only: tuple[str, ...] = (),
+    tree: Path | None = None,
     plant: str = "",
     tell: Callable[[str], None] = lambda _sentence: None,
 ) -> list[str]:
@@ -90,6 +89,7 @@ def flood(
         scale: How much of each.
         times: How much slower a quiet party may become; None: that is not judged.
         only: Names of attacks; none: all.
+        tree: What ``background.prepare`` gave the home; None: there is no long work in it.
         plant: Python that the server runs first, to plant a fault.
         tell: Called with each line of figures.
     """
@@ -99,7 +99,7 @@ def flood(
     server.start()
     try:
         server.wait()
-        target = Target(server, scale)
+        target = Target(server, scale, home, tree)
         quiet = _watched(server, target, "nobody", lambda: None)
         tell(HEAD)
         tell(quiet.line())
@@ -124,7 +124,7 @@ def judged(seen: Seen, quiet: Seen, attack: Attack, times: float | None) -> list
     if attack.must and not attack.must & seen.statuses.keys():
         wanted = " or ".join(map(str, sorted(attack.must)))
         faults.append(f"{seen.name}: nobody was answered with {wanted}")
-    if seen.peak_mb > quiet.peak_mb + MOST_GROWTH_MB:
+    if seen.peak_mb > quiet.peak_mb + attack.growth:
         faults.append(f"{seen.name}: the server took {seen.peak_mb:.0f} MB")
     for party in PARTIES if times is not None else ():
         before, waited = quiet.percentiles(party)[1], seen.percentiles(party)[1]
