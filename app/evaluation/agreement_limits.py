@@ -11,7 +11,7 @@ from app.evaluation.annotation_distance import GroupDistance, ViewDistance
 
 
 @dataclass(frozen=True)
-class Limits:
+class AgreementLimits:
     """The most that two annotations may differ by.
 
     Attributes:
@@ -78,7 +78,7 @@ MEASURES = ("line_px", "ball_px", "diameter_px", "ball_m", "jac", "position_m")
 
 
 def disagreements(
-    distance: GroupDistance, verdicts: tuple[str | None, str | None], limits: Limits
+    distance: GroupDistance, verdicts: tuple[str | None, str | None], limits: AgreementLimits
 ) -> tuple[Disagreement, ...]:
     """What two annotations say differently, the worst first; nothing: they agree.
 
@@ -117,7 +117,7 @@ def _spread(numbers: list[float | None], low: bool) -> Spread:
 
 
 def _of_group(
-    distance: GroupDistance, verdicts: tuple[str | None, str | None], limits: Limits
+    distance: GroupDistance, verdicts: tuple[str | None, str | None], limits: AgreementLimits
 ) -> Iterator[Disagreement]:
     first, second = verdicts
     if first != second and first is not None and second is not None:
@@ -132,7 +132,7 @@ def _of_group(
         yield Disagreement("ball_m", text, None, None, ball.distance_m, limits.ball_m)
 
 
-def _of_view(view: ViewDistance, limits: Limits) -> Iterator[Disagreement]:
+def _of_view(view: ViewDistance, limits: AgreementLimits) -> Iterator[Disagreement]:
     if view.included[0] != view.included[1]:
         yield Disagreement("view", f"only {'ba'[view.included[0]]} left it in", view.view)
     ball = view.ball
@@ -155,7 +155,7 @@ def _of_view(view: ViewDistance, limits: Limits) -> Iterator[Disagreement]:
         yield Disagreement("jac", text, view.view, None, jac, limits.jac)
 
 
-def _of_lines(view: ViewDistance, limits: Limits) -> Iterator[Disagreement]:
+def _of_lines(view: ViewDistance, limits: AgreementLimits) -> Iterator[Disagreement]:
     alone = [line for line in view.lines if line.only is not None]
     if len(alone) > limits.markings:
         names = ", ".join(f"{line.marking} (only {line.only})" for line in alone)

@@ -20,8 +20,8 @@ from app.soccer.solution import Pair, Solution
 from app.solving.facts import Facts
 from app.solving.findings import closest, view_disagrees
 from app.solving.gates import reprojection
+from app.solving.judgement import failures, view_jac
 from app.solving.solve import view_letter
-from app.solving.verdict import failures, view_jac
 
 
 def has_smaller_tau(policy: Policy, before: Policy) -> bool:

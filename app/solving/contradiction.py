@@ -13,8 +13,8 @@ from app.soccer.policy import Policy
 from app.soccer.solution import ChiSquare
 from app.solving.chi_square import residuals_of, residuals_without, untestable
 from app.solving.facts import Facts
+from app.solving.judgement import Judgement, views_of
 from app.solving.triangulate import Sighting
-from app.solving.verdict import Verdict, views_of
 
 LOW_P_VALUE = 0.002
 """Below: the finding ``views_contradict``. Chance alone makes one in five hundred groups."""
@@ -59,18 +59,18 @@ class Contradiction:
 
 
 def chi_square_of(
-    keys: Sequence[str], facts: Facts, verdict: Verdict, policy: Policy
+    keys: Sequence[str], facts: Facts, judgement: Judgement, policy: Policy
 ) -> ChiSquare | None:
     """The test of a group's residuals; None where no ball lies in front of all views.
 
     Args:
         keys: Of the views.
         facts: Of the one group.
-        verdict: What the policy makes of them.
+        judgement: What the policy makes of them.
         policy: How noisy a click is.
     """
-    used = views_of(facts, verdict.valid)
-    found = residuals_of(facts, used, verdict.point, policy)
+    used = views_of(facts, judgement.valid)
+    found = residuals_of(facts, used, judgement.point, policy)
     if not np.isfinite(found.p_value[0]):
         return None
     return ChiSquare(
@@ -85,7 +85,7 @@ def contradiction(
     chi_square: ChiSquare | None,
     keys: Sequence[str],
     facts: Facts,
-    verdict: Verdict,
+    judgement: Judgement,
     sights: Sequence[Sighting],
     policy: Policy,
 ) -> Contradiction | None:
@@ -97,7 +97,7 @@ def contradiction(
         chi_square: Of the group.
         keys: Of its views.
         facts: Of the one group.
-        verdict: What the policy makes of them.
+        judgement: What the policy makes of them.
         sights: Of its views.
         policy: How noisy a click is.
     """
@@ -109,9 +109,9 @@ def contradiction(
     chosen = [sight for sight in sights if sight.view in chi_square.views]
     if len(chosen) == 2:
         one, other = chosen
-        gap, moved = _apart(one, other, verdict.point[0], policy)
+        gap, moved = _apart(one, other, judgement.point[0], policy)
         return Contradiction(chi_square, None, None, gap, moved)
-    view, confidence, point = _blamed(keys, facts, used, verdict.point, policy)
+    view, confidence, point = _blamed(keys, facts, used, judgement.point, policy)
     if view is None:
         return Contradiction(chi_square, None, None)
     sight = next(sight for sight in chosen if sight.view == view)

@@ -1,4 +1,4 @@
-"""Gates: what a group must pass to enter the dataset, in order and in words; ``verdict`` compares.
+"""Gates: what a group must pass to enter the dataset, in order and in words; ``judgement`` compares.
 
 The first three drop views; the others judge the group from the views that are left.
 """
@@ -11,7 +11,7 @@ from math import isnan
 
 from app.soccer.policy import Policy
 from app.soccer.solution import GATES, Ball3D, Calibration, ChiSquare, Gate, Pair, margin_of
-from app.solving.verdict import MIN_VIEWS, Verdict
+from app.solving.judgement import MIN_VIEWS, Judgement
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ def describe(
     left_out: Sequence[str],
     pairs: Sequence[Pair],
     ball: Ball3D | None,
-    verdict: Verdict,
+    judgement: Judgement,
     policy: Policy,
     chi_square: ChiSquare | None = None,
 ) -> tuple[Gate, ...]:
@@ -79,11 +79,11 @@ def describe(
         left_out: Letters of the views that a person left out.
         pairs: Their pairs.
         ball: The triangulated ball, or None.
-        verdict: Of the one group.
+        judgement: Of the one group.
         policy: The thresholds.
         chi_square: The test of the ball's residuals, or None.
     """
-    failed = zip(GATES, verdict.failed[:, 0].tolist(), strict=True)
+    failed = zip(GATES, judgement.failed[:, 0].tolist(), strict=True)
     group = _Group(views, left_out, frozenset(name for name, fails in failed if fails))
     return (
         _calibratable(group),
@@ -91,7 +91,7 @@ def describe(
         *_agreement(group, policy),
         _two_views(group),
         _ball(group),
-        _baseline(group, float(verdict.baseline[0]), policy),
+        _baseline(group, float(judgement.baseline[0]), policy),
         _reprojection(group, pairs),
         _parallax(group, ball, policy),
         _sigma(group, ball, policy),

@@ -11,12 +11,12 @@ from app.geometry.arrays import row_by_row
 from app.soccer.policy import Policy
 from app.soccer.solution import GATES, Ball3D, BestBall, Pair
 from app.solving.facts import Facts
+from app.solving.judgement import PASSES, Judgement
 from app.solving.spread import MeanSpread, longest_sigma
 from app.solving.triangulate import Meeting
-from app.solving.verdict import PASSES, Verdict
 
 
-def judged_pairs(meetings: Sequence[Meeting], verdict: Verdict) -> tuple[Pair, ...]:
+def judged_pairs(meetings: Sequence[Meeting], judgement: Judgement) -> tuple[Pair, ...]:
     """Every pair of views with its point, and the gate that makes it invalid."""
     return tuple(
         Pair(
@@ -29,32 +29,32 @@ def judged_pairs(meetings: Sequence[Meeting], verdict: Verdict) -> tuple[Pair, .
             valid=gate == PASSES,
             failed=None if gate == PASSES else GATES[gate],
         )
-        for item, gate in zip(meetings, verdict.pair_failed.tolist(), strict=True)
+        for item, gate in zip(meetings, judgement.pair_failed.tolist(), strict=True)
     )
 
 
 def mean_ball(
-    keys: Sequence[str], facts: Facts, verdict: Verdict, spread: MeanSpread, policy: Policy
+    keys: Sequence[str], facts: Facts, judgement: Judgement, spread: MeanSpread, policy: Policy
 ) -> Ball3D | None:
     """The mean of the valid pairs with its uncertainty; None without a valid pair.
 
     Args:
         keys: Of the views.
         facts: Of the one group.
-        verdict: What the policy makes of them.
+        judgement: What the policy makes of them.
         spread: Of the same facts.
         policy: How noisy a click is.
     """
-    if not verdict.valid.any():
+    if not judgement.valid.any():
         return None
-    covariance = spread.covariances(verdict.valid, np.array([0]), verdict.point, policy)
-    x, y, z = verdict.point[0].tolist()
+    covariance = spread.covariances(judgement.valid, np.array([0]), judgement.point, policy)
+    x, y, z = judgement.point[0].tolist()
     return Ball3D(
         point=(x, y, z),
         covariance=row_by_row(covariance[0]),
         sigma_m=float(longest_sigma(covariance)[0]),
-        parallax_degrees=float(verdict.parallax[0]),
-        views=tuple(keys[place] for place in np.unique(facts.pair_view[verdict.valid]).tolist()),
+        parallax_degrees=float(judgement.parallax[0]),
+        views=tuple(keys[place] for place in np.unique(facts.pair_view[judgement.valid]).tolist()),
     )
 
 

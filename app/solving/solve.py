@@ -30,10 +30,10 @@ from app.solving.contradiction import chi_square_of, contradiction
 from app.solving.facts import Facts, facts_of
 from app.solving.findings import find
 from app.solving.gates import JudgedView, describe
+from app.solving.judgement import PASSES, Judgement, judge
 from app.solving.mean_ball import judged_pairs, leaving_ball, mean_ball
 from app.solving.spread import MeanSpread
 from app.solving.triangulate import meet, sights_of
-from app.solving.verdict import PASSES, Verdict, judge
 
 NO_CALIBRATIONS: Mapping[str, Calibration] = MappingProxyType({})
 LEFT_OUT = "excluded"
@@ -65,21 +65,24 @@ def solve_with_facts(
     meetings = meet(combinations(sights, 2))
     facts = facts_of(group.views, found, meetings)
     spread = MeanSpread(facts)
-    verdict = judge(facts, policy, spread)
-    pairs = judged_pairs(meetings, verdict)
+    judgement = judge(facts, policy, spread)
+    pairs = judged_pairs(meetings, judgement)
     names = [view.key for view in group.views]
-    failed = _failed(group, verdict)
+    failed = _failed(group, judgement)
     left = {name for name, gate in zip(names, failed, strict=True) if gate is None}
     usable = [sight for sight in sights if sight.view in left]
-    mean, best = mean_ball(names, facts, verdict, spread, policy), best_ball(pairs, usable, policy)
+    mean, best = (
+        mean_ball(names, facts, judgement, spread, policy),
+        best_ball(pairs, usable, policy),
+    )
     ball = leaving_ball(mean, best, policy)
-    chi_square = chi_square_of(names, facts, verdict, policy)
-    contradicted = contradiction(chi_square, names, facts, verdict, sights, policy)
+    chi_square = chi_square_of(names, facts, judgement, policy)
+    contradicted = contradiction(chi_square, names, facts, judgement, sights, policy)
     views = tuple(
         _with_ball(view, ViewSolution(view.key, known[key], key, False, gate), ball, policy)
         for view, key, gate in zip(group.views, keys, failed, strict=True)
     )
-    judged, left_out = _judged(group, views, verdict, policy), _left_out(group)
+    judged, left_out = _judged(group, views, judgement, policy), _left_out(group)
     solution = Solution(
         views=views,
         pairs=pairs,
@@ -87,7 +90,7 @@ def solve_with_facts(
         best_ball=best,
         mean_ball=None if ball is mean else mean,
         chi_square=chi_square,
-        gates=describe(judged, left_out, pairs, mean, verdict, policy, chi_square),
+        gates=describe(judged, left_out, pairs, mean, judgement, policy, chi_square),
         findings=find(group, views, sights, pairs, ball, policy, contradicted),
         policy_hash=policy.hash,
         solver_version=SOLVER_VERSION,
@@ -108,11 +111,11 @@ def _calibrated(view: View, group: Group, policy: Policy, known: dict[str, Calib
     return key
 
 
-def _failed(group: Group, verdict: Verdict) -> list[str | None]:
+def _failed(group: Group, judgement: Judgement) -> list[str | None]:
     """What each view failed at, or None."""
     return [
         LEFT_OUT if not view.included else None if gate == PASSES else GATES[gate]
-        for view, gate in zip(group.views, verdict.view_failed.tolist(), strict=True)
+        for view, gate in zip(group.views, judgement.view_failed.tolist(), strict=True)
     ]
 
 
@@ -140,7 +143,7 @@ def _with_ball(
 
 
 def _judged(
-    group: Group, views: Sequence[ViewSolution], verdict: Verdict, policy: Policy
+    group: Group, views: Sequence[ViewSolution], judgement: Judgement, policy: Policy
 ) -> tuple[JudgedView, ...]:
     return tuple(
         JudgedView(
@@ -153,7 +156,7 @@ def _judged(
             failed=solved.failed,
         )
         for index, (view, solved, jac) in enumerate(
-            zip(group.views, views, verdict.jac.tolist(), strict=True)
+            zip(group.views, views, judgement.jac.tolist(), strict=True)
         )
         if view.included
     )

@@ -43,7 +43,7 @@ LIMITS = frozenset({"memory", "processor"})
 
 
 @dataclass(frozen=True)
-class Picture:
+class SentPicture:
     """A frame as it is sent.
 
     Attributes:
@@ -57,9 +57,9 @@ class Picture:
     digest: str
 
     @staticmethod
-    def of(kind: str, data: bytes) -> Picture:
+    def of(kind: str, data: bytes) -> SentPicture:
         """The picture of these bytes."""
-        return Picture(kind, data, hashlib.sha256(data).hexdigest()[:32])
+        return SentPicture(kind, data, hashlib.sha256(data).hexdigest()[:32])
 
 
 class Frames:
@@ -79,7 +79,7 @@ class Frames:
         """Start a process before anybody waits for it."""
         self._pool.submit(ready, bounded=False)
 
-    def cached(self, media: Media, width: int | None, flipped: bool) -> Picture | None:
+    def cached(self, media: Media, width: int | None, flipped: bool) -> SentPicture | None:
         """What was made before, where it is kept.
 
         Raises:
@@ -91,7 +91,7 @@ class Frames:
         if error is not None:
             raise error
         data = cached_frame(media, width, flipped, self._settings)
-        return None if data is None else Picture.of(JPEG, data)
+        return None if data is None else SentPicture.of(JPEG, data)
 
     def ask_fetch(self, media: Media) -> PoolTask | None:
         """Have a frame brought to this disk; None where it is there, and lies in no store.
@@ -111,7 +111,7 @@ class Frames:
         """
         return self._submit(media, width, flipped, bounded=True)
 
-    def read(self, media: Media, width: int | None, flipped: bool) -> Picture:
+    def read(self, media: Media, width: int | None, flipped: bool) -> SentPicture:
         """A picture, waited for however many others wait: for background work."""
         found = self.cached(media, width, flipped)
         if found is not None:
@@ -119,7 +119,7 @@ class Frames:
         fetching = self._fetch(media, bounded=False)
         if fetching is not None:
             fetching.future.result()
-        made: Picture = self._submit(media, width, flipped, bounded=False).future.result()
+        made: SentPicture = self._submit(media, width, flipped, bounded=False).future.result()
         return made
 
     def ask_neighbours(self, media: Media, group: str, static: bool) -> PoolTask:
@@ -201,10 +201,10 @@ def _refusal(media: Media, error: ChildEnded) -> ReviewError:
     return kind(f"{frame_name(media)} {error}")
 
 
-def make_picture(media: Media, width: int | None, flipped: bool, settings: Settings) -> Picture:
+def make_picture(media: Media, width: int | None, flipped: bool, settings: Settings) -> SentPicture:
     """A picture, made in this process."""
     data = read_frame(media, width, flipped, settings)
-    return Picture.of(content_type(data), data)
+    return SentPicture.of(content_type(data), data)
 
 
 def ready() -> None:

@@ -21,7 +21,7 @@ from app.api.schemas.agreement import (
 )
 from app.api.schemas.group import GroupDocument
 from app.api.schemas.take import TakeHandBack
-from app.evaluation.agreement_limits import Limits
+from app.evaluation.agreement_limits import AgreementLimits
 from app.review.agreement import adjudicate, limits
 from app.review.agreement.compare import compare_groups
 from app.review.agreement.summary import agreement_csv, agreement_of
@@ -48,7 +48,9 @@ def compare(
     ],
 ) -> Response:
     """Two annotations of the same frames, and how far they lie apart; saves nothing."""
-    return document(GroupComparisonDocument.of(compare_groups(store, [group, other], Limits())))
+    return document(
+        GroupComparisonDocument.of(compare_groups(store, [group, other], AgreementLimits()))
+    )
 
 
 @router.get("/datasets/{dataset}/agreement", operation_id="getAgreement", responses=responses(404))
@@ -85,8 +87,10 @@ def put_limits(
     dataset: DatasetPath, edit: LimitsEdit, store: AppStore, actor: Actor, asked: AskedUnder
 ) -> Response:
     """How far annotations may lie apart and still agree; counts for what is handed in from now on."""
-    reply = Reply[Limits](asked, lambda found: document(LimitsDocument.model_validate(found)))
-    wanted = Limits(**edit.model_dump())
+    reply = Reply[AgreementLimits](
+        asked, lambda found: document(LimitsDocument.model_validate(found))
+    )
+    wanted = AgreementLimits(**edit.model_dump())
     return reply.of(limits.set_limits(store, dataset, wanted, actor=actor, keep=reply.keep))
 
 

@@ -12,7 +12,7 @@ from app.api.reply import AskedUnder, Reply, document
 from app.api.schemas.job import JobDocument
 from app.api.schemas.pitches import PitchChange, PitchesDocument
 from app.review.editing.pitches import DatasetPitches, read_pitches
-from app.review.jobs.solve import Sized, request_pitches
+from app.review.jobs.solve import PitchJob, request_pitches
 from app.soccer.pitch import Pitch
 
 router = APIRouter(prefix="/datasets/{dataset}/pitches", tags=["datasets"])
@@ -75,7 +75,7 @@ def set_pitch(
     return reply.of(sized)
 
 
-def _sized(sized: Sized) -> Response:
+def _sized(sized: PitchJob) -> Response:
     pitches = PitchesDocument.model_validate(sized.state)
     job = JobDocument.model_validate(sized.job)
     job.result = {"pitches": pitches.model_dump(mode="json")}

@@ -17,7 +17,7 @@ from app.api.schemas.policy import (
     ShippedPolicyDocument,
 )
 from app.errors import InputError
-from app.review.jobs.solve import Judged, request_policy
+from app.review.jobs.solve import PolicyJob, request_policy
 from app.review.policies.policy import read_policy
 from app.review.policies.text import CUSTOM, policy_from_yaml, policy_with, unknown_policy
 from app.soccer.policy import POLICIES, THRESHOLDS, Policy
@@ -92,7 +92,7 @@ def put_policy(
     return reply.of(judged)
 
 
-def _judged(judged: Judged) -> Response:
+def _judged(judged: PolicyJob) -> Response:
     policy, job = PolicyStateDocument.of(judged.state), JobDocument.model_validate(judged.job)
     job.result = {"policy": policy.model_dump(mode="json")}
     return document(job, 202, {**_tagged(policy), **job_address(judged.job)})

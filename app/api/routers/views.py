@@ -37,7 +37,7 @@ from app.review.editing.submit import submit_view
 from app.review.editing.view_paint import NO_FRAME_HINT
 from app.soccer.frame_number import FARTHEST
 from app.soccer.media import Media
-from app.store.frames import Frames, Picture
+from app.store.frames import Frames, SentPicture
 
 router = APIRouter(prefix="/views", tags=["views"])
 
@@ -235,7 +235,7 @@ def _so_far_away(view: FoundView, around: dict[int, Media], offset: int) -> Medi
 
 async def _picture(
     request: Request, frames: Frames, view: FoundView, width: int | None
-) -> Picture | None:
+) -> SentPicture | None:
     """The frame, or None where nobody waits for it any more.
 
     What is wrong with it is said with the view that it belongs to.
@@ -249,7 +249,7 @@ async def _picture(
         fetching = await to_thread.run_sync(frames.ask_fetch, view.media)
         if fetching is not None and not await while_wanted(request, fetching):
             return None
-        made: Picture | None = await while_wanted(
+        made: SentPicture | None = await while_wanted(
             request, frames.ask(view.media, width, view.flipped)
         )
         return made

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from itertools import combinations
 
 from app.errors import InputError
-from app.evaluation.agreement_limits import Disagreement, Limits, disagreements
+from app.evaluation.agreement_limits import AgreementLimits, Disagreement, disagreements
 from app.evaluation.annotation_distance import GroupDistance, compare_annotations
 from app.review.editing.state import GroupState
 from app.review.editing.submit import load_solved
@@ -42,11 +42,11 @@ class Comparison:
 
     states: tuple[GroupState, ...]
     pairs: tuple[AnnotationPair, ...]
-    limits: Limits
+    limits: AgreementLimits
     worst_views: tuple[str, ...]
 
 
-def compare_groups(store: Store, group_ids: Sequence[int], limits: Limits) -> Comparison:
+def compare_groups(store: Store, group_ids: Sequence[int], limits: AgreementLimits) -> Comparison:
     """Groups of the same frames beside each other; saves nothing.
 
     Raises:
@@ -56,7 +56,7 @@ def compare_groups(store: Store, group_ids: Sequence[int], limits: Limits) -> Co
     return compare_states([load_solved(store, number) for number in group_ids], limits)
 
 
-def compare_states(states: Sequence[GroupState], limits: Limits) -> Comparison:
+def compare_states(states: Sequence[GroupState], limits: AgreementLimits) -> Comparison:
     """The same of groups that are read already.
 
     Raises:

@@ -1,10 +1,10 @@
-"""Limits: how far annotations of a dataset's groups may lie apart and still agree."""
+"""AgreementLimits: how far annotations of a dataset's groups may lie apart and still agree."""
 
 from __future__ import annotations
 
 from dataclasses import asdict
 
-from app.evaluation.agreement_limits import Limits
+from app.evaluation.agreement_limits import AgreementLimits
 from app.review.answers.keep import Keep, keep_nothing
 from app.review.datasets.dataset import dataset_id
 from app.store.agreement import limits_of, put_limits
@@ -17,20 +17,20 @@ KIND = "agreement"
 """Kind of the log's entries about agreement; they change no group."""
 
 
-def read_limits(session: Session, dataset: int) -> Limits:
+def read_limits(session: Session, dataset: int) -> AgreementLimits:
     """The limits of a dataset, by its id; the defaults where nobody has set any."""
     row = limits_of(session, dataset)
-    return Limits() if row is None else Limits(**row._mapping)
+    return AgreementLimits() if row is None else AgreementLimits(**row._mapping)
 
 
 def set_limits(
     store: Store,
     dataset: str | int,
-    limits: Limits,
+    limits: AgreementLimits,
     *,
     actor: str,
-    keep: Keep[Limits] = keep_nothing,
-) -> Limits:
+    keep: Keep[AgreementLimits] = keep_nothing,
+) -> AgreementLimits:
     """Let other limits count for whatever is handed in from now on.
 
     ``keep`` keeps the answer in its transaction.

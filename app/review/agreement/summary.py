@@ -9,7 +9,7 @@ from itertools import combinations
 from typing import Any
 
 from app.datasets.csv_text import csv_line
-from app.evaluation.agreement_limits import MEASURES, Limits, Spread, spreads
+from app.evaluation.agreement_limits import MEASURES, AgreementLimits, Spread, spreads
 from app.evaluation.annotation_distance import GroupDistance
 from app.evaluation.rater_agreement import (
     Coefficient,
@@ -81,7 +81,7 @@ class Agreement:
     agreed: int
     open: int
     decided: int
-    limits: Limits
+    limits: AgreementLimits
     alpha: Coefficient
     overall: PeopleAgreement
     pairs: list[PeopleAgreement]

@@ -12,10 +12,10 @@ from app.errors import ImageError, NotFoundError, StorageError, TooLargeError
 from app.object_store.address import is_address, unseal
 from app.soccer.group import Group, View
 from app.soccer.media import Media
-from app.store.frames import Picture
+from app.store.frames import SentPicture
 from app.store.media import media_facts
 
-ReadPicture = Callable[[Media, int | None, bool], Picture]
+ReadPicture = Callable[[Media, int | None, bool], SentPicture]
 """From where a frame lies, its width (None: as it is) and whether it is mirrored."""
 _SUFFIXES = {"image/jpeg": ".jpg", "image/png": ".png", "image/webp": ".webp"}
 

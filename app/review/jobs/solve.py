@@ -39,7 +39,7 @@ NAMED = 20
 
 
 @dataclass(frozen=True)
-class Judged:
+class PolicyJob:
     """A dataset under another policy, and the job that solves what that left stale."""
 
     state: PolicyState
@@ -47,7 +47,7 @@ class Judged:
 
 
 @dataclass(frozen=True)
-class Sized:
+class PitchJob:
     """The pitches of a dataset as they are now, and the job that solves what that left stale."""
 
     state: DatasetPitches
@@ -111,17 +111,17 @@ def request_policy(
     *,
     if_match: str,
     actor: str,
-    keep: Keep[Judged] = keep_nothing,
-) -> Judged:
+    keep: Keep[PolicyJob] = keep_nothing,
+) -> PolicyJob:
     """Judge a dataset by another policy, and solve what that leaves stale, soon.
 
     Raises:
         StaleRevisionError: Somebody else was faster.
     """
 
-    def change(session: Session, job: Job) -> Judged:
+    def change(session: Session, job: Job) -> PolicyJob:
         state = apply_policy(session, dataset_id, policy, if_match=if_match, actor=actor)
-        return Judged(state, job)
+        return PolicyJob(state, job)
 
     return solve_after(jobs, store, dataset_id, change, actor=actor, keep=keep)
 
@@ -134,8 +134,8 @@ def request_pitches(
     *,
     if_match: str,
     actor: str,
-    keep: Keep[Sized] = keep_nothing,
-) -> Sized:
+    keep: Keep[PitchJob] = keep_nothing,
+) -> PitchJob:
     """Give matches of a dataset another pitch, and solve what that leaves stale, soon.
 
     Raises:
@@ -143,9 +143,9 @@ def request_pitches(
         StaleRevisionError: Somebody else was faster.
     """
 
-    def change(session: Session, job: Job) -> Sized:
+    def change(session: Session, job: Job) -> PitchJob:
         state = apply_pitches(session, dataset_id, wanted, if_match=if_match, actor=actor)
-        return Sized(state, job)
+        return PitchJob(state, job)
 
     return solve_after(jobs, store, dataset_id, change, actor=actor, keep=keep)
 

@@ -28,14 +28,14 @@ from app.review.yields.judged import Judged, noise_of
 from app.review.yields.table import FIGURES, HEADS, YieldTable
 from app.soccer.policy import Policy
 from app.solving.facts import COLUMNS, NOTHING, Facts
-from app.solving.verdict import Verdict
+from app.solving.judgement import Judgement
 
 FORMAT = 5
 """Raised with every change of ``Facts``."""
 LIST, BARE = "table.json", "bare.heads"
 ARRAYS = (".facts", ".judged", ".heads", ".counted")
 """How names of files of arrays end."""
-_VERDICT = (
+_JUDGEMENT = (
     "jac",
     "view_failed",
     "pair_failed",
@@ -160,7 +160,7 @@ def keep_judged(folder: Path, block: KeptBlock, judged: Judged) -> None:
     """Write what a policy makes of a block."""
     if not block.name:
         return
-    arrays = {name: getattr(judged.verdict, name) for name in _VERDICT}
+    arrays = {name: getattr(judged.judgement, name) for name in _JUDGEMENT}
     for name in _LATER:
         if getattr(judged, name) is not None:
             arrays[name] = getattr(judged, name)
@@ -178,11 +178,11 @@ def kept_judged(folder: Path, block: KeptBlock, policy: Policy) -> Judged | None
         found = map_arrays(_judged(folder, block.name))
         if found.about["policy"] != _key(policy):
             return None
-        verdict = Verdict(**{name: found.arrays[name] for name in _VERDICT})
+        judgement = Judgement(**{name: found.arrays[name] for name in _JUDGEMENT})
         table = block.table
-        if verdict.failed.shape[1:] != (table.groups,):
-            raise ValueError("a verdict is not that of its block")
-        judged = Judged(table.facts, table.jac, policy, verdict)
+        if judgement.failed.shape[1:] != (table.groups,):
+            raise ValueError("a judgement is not that of its block")
+        judged = Judged(table.facts, table.jac, policy, judgement)
         for name in _LATER:
             setattr(judged, name, found.arrays.get(name))
         return judged

@@ -7,7 +7,7 @@ import numpy.typing as npt
 
 from app.geometry.arrays import BoolArray, FloatArray, IntArray
 from app.solving.facts import Facts
-from app.solving.verdict import MIN_VIEWS
+from app.solving.judgement import MIN_VIEWS
 
 JAC_STEPS = tuple((np.arange(101) / 100).tolist())
 """Where the curves are counted: JaC from 0 to 1."""

@@ -12,9 +12,8 @@ from app.soccer.policy import Policy
 from app.soccer.solution import GAMMAS_PERCENT
 from app.solving.chi_square import residuals_of, untestable
 from app.solving.facts import Facts
-from app.solving.spread import MeanSpread, longest_sigma
-from app.solving.verdict import (
-    Verdict,
+from app.solving.judgement import (
+    Judgement,
     compare_again,
     failures,
     judge,
@@ -22,6 +21,7 @@ from app.solving.verdict import (
     view_jac,
     views_of,
 )
+from app.solving.spread import MeanSpread, longest_sigma
 
 _NUMBERS = ("baseline", "point", "parallax", "distance")
 
@@ -34,7 +34,7 @@ class Judged:
         facts: The groups.
         jac: ``view_jac`` at each of ``GAMMAS_PERCENT``, shape (3, V).
         policy: By which they are judged.
-        verdict: What it makes of them.
+        judgement: What it makes of them.
         sigma: Standard deviation along the longest axis, metres, NaN without a ball, shape (G,).
         p_value: Of the residuals, infinite where it cannot be tested, shape (G,).
         spread: Kept from the first time that another noise is tried.
@@ -43,7 +43,7 @@ class Judged:
     facts: Facts
     jac: FloatArray
     policy: Policy
-    verdict: Verdict
+    judgement: Judgement
     sigma: FloatArray | None = None
     p_value: FloatArray | None = None
     spread: MeanSpread | None = None
@@ -53,30 +53,30 @@ class Judged:
     def by(facts: Facts, jac: FloatArray, policy: Policy) -> Judged:
         """Judge groups."""
         spread = MeanSpread(facts)
-        verdict = judge(facts, policy, spread, _jac(facts, jac, policy))
-        found = Judged(facts, jac, policy, verdict)
+        judgement = judge(facts, policy, spread, _jac(facts, jac, policy))
+        found = Judged(facts, jac, policy, judgement)
         if policy.max_sigma_m is not None:
-            found.sigma = _sigma(facts, policy, verdict, spread)
+            found.sigma = _sigma(facts, policy, judgement, spread)
         return found
 
     def complete(self) -> None:
         """Compute what somebody may ask for, so that nobody waits for it."""
         with self.lock:
             if self.sigma is None:
-                self.sigma = _sigma(self.facts, self.policy, self.verdict, MeanSpread(self.facts))
+                self.sigma = _sigma(self.facts, self.policy, self.judgement, MeanSpread(self.facts))
             if self.p_value is None:
-                self.p_value = _p_value(self.facts, self.policy, self.verdict)
+                self.p_value = _p_value(self.facts, self.policy, self.judgement)
 
     @property
     def nbytes(self) -> int:
         """Memory of what is kept, roughly."""
-        verdict = self.verdict
-        arrays = (verdict.failed, *(getattr(verdict, name) for name in _NUMBERS))
-        rows = verdict.view_failed.nbytes + verdict.pair_failed.nbytes + self.jac.nbytes
+        judgement = self.judgement
+        arrays = (judgement.failed, *(getattr(judgement, name) for name in _NUMBERS))
+        rows = judgement.view_failed.nbytes + judgement.pair_failed.nbytes + self.jac.nbytes
         spread = 0 if self.spread is None else self.spread.nbytes
         return int(rows + spread + sum(array.nbytes for array in arrays))
 
-    def under(self, policy: Policy) -> Verdict:
+    def under(self, policy: Policy) -> Judgement:
         """What another policy makes of the groups."""
         if _asks_more(policy) and noise_of(policy) != noise_of(self.policy):
             jac = _jac(self.facts, self.jac, policy)
@@ -87,8 +87,8 @@ class Judged:
         """The groups judged by another policy from now on."""
         if noise_of(policy) != noise_of(self.policy):
             return Judged.by(self.facts, self.jac, policy)
-        verdict, new, part = self._under(policy)
-        found = Judged(self.facts, self.jac, policy, verdict)
+        judgement, new, part = self._under(policy)
+        found = Judged(self.facts, self.jac, policy, judgement)
         if self.sigma is not None and self.p_value is not None:
             found.sigma, found.p_value = self.sigma.copy(), self.p_value.copy()
             if part is not None:
@@ -96,9 +96,9 @@ class Judged:
                 found.sigma[new], found.p_value[new] = part.sigma, part.p_value
         return found
 
-    def _under(self, policy: Policy) -> tuple[Verdict, BoolArray, Judged | None]:
-        """The verdict, which groups had to be judged anew, and those by themselves."""
-        facts, known = self.facts, self.verdict
+    def _under(self, policy: Policy) -> tuple[Judgement, BoolArray, Judged | None]:
+        """The judgement, which groups had to be judged anew, and those by themselves."""
+        facts, known = self.facts, self.judgement
         jac = _jac(facts, self.jac, policy)
         view_failed, pair_failed = failures(facts, jac, policy)
         new = np.zeros(facts.groups, bool)
@@ -118,16 +118,16 @@ class Judged:
             for array, name in zip(numbers, _NUMBERS, strict=True):
                 array[new] = getattr(found, name)
             part = Judged(some, self.jac, policy, found)
-        return Verdict(jac, view_failed, pair_failed, failed, *numbers), new, part
+        return Judgement(jac, view_failed, pair_failed, failed, *numbers), new, part
 
     def _measured(self, policy: Policy) -> tuple[FloatArray | None, FloatArray | None]:
         """Sigmas and p-values, where the policy asks for them."""
         with self.lock:
             if policy.max_sigma_m is not None and self.sigma is None:
                 spread = self.spread or MeanSpread(self.facts)
-                self.sigma = _sigma(self.facts, self.policy, self.verdict, spread)
+                self.sigma = _sigma(self.facts, self.policy, self.judgement, spread)
             if policy.min_p_value is not None and self.p_value is None:
-                self.p_value = _p_value(self.facts, self.policy, self.verdict)
+                self.p_value = _p_value(self.facts, self.policy, self.judgement)
         return (
             None if policy.max_sigma_m is None else self.sigma,
             None if policy.min_p_value is None else self.p_value,
@@ -158,16 +158,16 @@ def _jac(facts: Facts, jac: FloatArray, policy: Policy) -> FloatArray:
     return view_jac(facts, gamma)
 
 
-def _sigma(facts: Facts, policy: Policy, verdict: Verdict, spread: MeanSpread) -> FloatArray:
-    there = np.flatnonzero(~np.isnan(verdict.point[:, 0]))
-    spreads = spread.covariances(verdict.valid, there, verdict.point[there], policy)
+def _sigma(facts: Facts, policy: Policy, judgement: Judgement, spread: MeanSpread) -> FloatArray:
+    there = np.flatnonzero(~np.isnan(judgement.point[:, 0]))
+    spreads = spread.covariances(judgement.valid, there, judgement.point[there], policy)
     sigma = np.full(facts.groups, np.nan)
     sigma[there] = longest_sigma(spreads)
     return sigma
 
 
-def _p_value(facts: Facts, policy: Policy, verdict: Verdict) -> FloatArray:
-    used = views_of(facts, verdict.valid)
-    p_value = residuals_of(facts, used, verdict.point, policy).p_value
+def _p_value(facts: Facts, policy: Policy, judgement: Judgement) -> FloatArray:
+    used = views_of(facts, judgement.valid)
+    p_value = residuals_of(facts, used, judgement.point, policy).p_value
     p_value[untestable(facts, used, policy)] = np.inf
     return p_value

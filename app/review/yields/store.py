@@ -48,13 +48,13 @@ class Block:
     @cached_property
     def tally(self) -> Tally:
         """What is counted of its groups under the present policy."""
-        verdict = self.judged.verdict
-        return tally_of(self.table, self.live, self.judged.policy, verdict, verdict)
+        judgement = self.judged.judgement
+        return tally_of(self.table, self.live, self.judged.policy, judgement, judgement)
 
     def tally_under(self, policy: Policy) -> Tally:
         """What is counted of them under another one."""
-        verdict = self.judged.under(policy)
-        return tally_of(self.table, self.live, policy, self.judged.verdict, verdict, self.tally)
+        judgement = self.judged.under(policy)
+        return tally_of(self.table, self.live, policy, self.judged.judgement, judgement, self.tally)
 
     @property
     def table(self) -> YieldTable:

@@ -19,7 +19,7 @@ from app.review.yields.figures import is_unmeasured, qualifying_steps
 from app.soccer.solution import GAMMAS_PERCENT
 from app.solving.facts import COLUMNS, NOTHING, Facts
 from app.solving.facts import join as join_facts
-from app.solving.verdict import view_jac
+from app.solving.judgement import view_jac
 
 HEADS = ("group_id", "inputs", "split", "match", "pitch")
 """Arrays with a row for each group, solved or not."""

@@ -13,7 +13,7 @@ from app.review.yields.figures import JAC_STEPS
 from app.review.yields.table import YieldTable
 from app.soccer.policy import Policy
 from app.soccer.solution import GAMMAS_PERCENT, GATES
-from app.solving.verdict import Verdict
+from app.solving.judgement import Judgement
 
 DISTANCES = (0.0, 20.0, 30.0, 40.0, 50.0, 60.0, 70.0, 80.0, 100.0)
 """Where the bins of distance begin, metres; the last one has no end."""
@@ -73,8 +73,8 @@ def tally_of(
     table: YieldTable,
     live: BoolArray | slice,
     policy: Policy,
-    present: Verdict,
-    verdict: Verdict,
+    present: Judgement,
+    judgement: Judgement,
     counted: Tally | None = None,
 ) -> Tally:
     """Count the groups of a block.
@@ -84,23 +84,23 @@ def tally_of(
         live: Chooses the groups that count.
         policy: Whose thresholds the findings follow.
         present: What the present policy makes of the block.
-        verdict: What this one makes of it.
+        judgement: What this one makes of it.
         counted: What was counted under another policy: some of it is the same under each.
     """
     if counted is None:
         curves = np.stack([_curve(steps[live]) for steps in table.steps])
         counted = Tally(unmeasured=int(table.unmeasured[live].sum()), curves=curves)
-    passes, before = verdict.passes[live], present.passes[live]
+    passes, before = judgement.passes[live], present.passes[live]
     split = np.bincount(table.split[live][passes], minlength=len(table.splits))
     return Tally(
         passing=int(passes.sum()),
         gained=int((passes & ~before).sum()),
         lost=int((before & ~passes).sum()),
         unmeasured=counted.unmeasured,
-        dropped=np.bincount(verdict.first[live], minlength=len(GATES) + 1),
+        dropped=np.bincount(judgement.first[live], minlength=len(GATES) + 1),
         curves=counted.curves,
-        distances=_distances(verdict, live),
-        findings=_findings(table, live, policy, verdict),
+        distances=_distances(judgement, live),
+        findings=_findings(table, live, policy, judgement),
         splits=Counter(dict(zip(table.splits, split.tolist(), strict=True))),
     )
 
@@ -112,8 +112,8 @@ def _curve(steps: IntArray) -> IntArray:
     return curve
 
 
-def _distances(verdict: Verdict, live: BoolArray | slice) -> IntArray:
-    distance, passes = verdict.distance[live], verdict.passes[live]
+def _distances(judgement: Judgement, live: BoolArray | slice) -> IntArray:
+    distance, passes = judgement.distance[live], judgement.passes[live]
     place = np.searchsorted(DISTANCES, distance, "right") - 1
     place[np.isnan(distance)] = len(DISTANCES)
     bins = len(DISTANCES) + 1
@@ -123,16 +123,19 @@ def _distances(verdict: Verdict, live: BoolArray | slice) -> IntArray:
 
 
 def _findings(
-    table: YieldTable, live: BoolArray | slice, policy: Policy, verdict: Verdict
+    table: YieldTable, live: BoolArray | slice, policy: Policy, judgement: Judgement
 ) -> IntArray:
-    x, y, z = verdict.point.T
+    x, y, z = judgement.point.T
     half = table.pitch.T / 2
     outside = np.maximum(np.abs(x) - half[0], np.abs(y) - half[1])
     implausible = (
         (z > policy.below_grass_m) | (-z > policy.max_height_m) | (outside > policy.outside_pitch_m)
     )
-    low = verdict.parallax < policy.low_parallax_degrees
+    low = judgement.parallax < policy.low_parallax_degrees
     return np.array(
-        [(found[live].sum(), (found & verdict.passes)[live].sum()) for found in (implausible, low)],
+        [
+            (found[live].sum(), (found & judgement.passes)[live].sum())
+            for found in (implausible, low)
+        ],
         np.int64,
     )

@@ -14,9 +14,9 @@ from app.soccer.policy import PAPER
 from app.soccer.solution import Calibration
 from app.solving.chi_square import Residuals, residuals_of, residuals_without
 from app.solving.facts import Facts, group_facts, join
+from app.solving.judgement import judge, views_of
 from app.solving.solve import solve
 from app.solving.spread import MeanSpread
-from app.solving.verdict import judge, views_of
 from tests.unit.solving.conftest import BEHIND_GOAL, MAIN, OPPOSITE, given_view, group
 from tests.unit.solving.random_groups import random_policy, random_views
 
@@ -102,8 +102,8 @@ class TestResidualsOf:
         parts = [group_facts(*random_views(seed)) for seed in seeds]
 
         def residuals_at_ball(of: Facts) -> Residuals:
-            verdict = judge(of, policy, MeanSpread(of))
-            return residuals_of(of, views_of(of, verdict.valid), verdict.point, policy)
+            judgement = judge(of, policy, MeanSpread(of))
+            return residuals_of(of, views_of(of, judgement.valid), judgement.point, policy)
 
         together, alone = (
             residuals_at_ball(join(parts)),
@@ -166,13 +166,13 @@ class TestResidualsWithout:
     @settings(max_examples=25, deadline=None)
     def test_each_row_has_the_residuals_of_the_other_views_bit_by_bit(self, seed, policy_seed):
         of, policy = group_facts(*random_views(seed)), random_policy(policy_seed)
-        verdict = judge(of, policy, MeanSpread(of))
-        used = views_of(of, verdict.valid)
-        rows = residuals_without(of, used, verdict.point, policy)
+        judgement = judge(of, policy, MeanSpread(of))
+        used = views_of(of, judgement.valid)
+        rows = residuals_without(of, used, judgement.point, policy)
         assert len(rows.chi_square) == used.sum()
         for row, place in enumerate(np.flatnonzero(used)):
             others = used & (np.arange(len(used)) != place)
-            alone = residuals_of(of, others, verdict.point, policy)
+            alone = residuals_of(of, others, judgement.point, policy)
             for item in fields(Residuals):
                 one, other = getattr(rows, item.name)[row], getattr(alone, item.name)[0]
                 assert np.array_equal(one, other, equal_nan=True), item.name

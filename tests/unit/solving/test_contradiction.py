@@ -20,9 +20,9 @@ from app.solving.contradiction import (
     contradiction,
 )
 from app.solving.facts import facts_of
+from app.solving.judgement import judge
 from app.solving.spread import MeanSpread
 from app.solving.triangulate import meet, sights_of
-from app.solving.verdict import judge
 from tests.balls import seen
 from tests.unit.solving.conftest import BEHIND_GOAL, MAIN, OPPOSITE, given_view
 
@@ -44,9 +44,9 @@ def torn(
     calibrations = [Calibration("lines", CAMERAS[key], covariance=covariance) for key in keys]
     sights = sights_of(views, calibrations)
     facts = facts_of(views, calibrations, meet(combinations(sights, 2)))
-    verdict = judge(facts, policy, MeanSpread(facts))
-    chi_square = chi_square_of(keys, facts, verdict, policy)
-    return chi_square, contradiction(chi_square, keys, facts, verdict, sights, policy)
+    judgement = judge(facts, policy, MeanSpread(facts))
+    chi_square = chi_square_of(keys, facts, judgement, policy)
+    return chi_square, contradiction(chi_square, keys, facts, judgement, sights, policy)
 
 
 WIDE = replace(PAPER, tau_percent=5.0)

@@ -1,4 +1,4 @@
-"""The gates in words, from a verdict made by hand."""
+"""The gates in words, from a judgement made by hand."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import pytest
 from app.soccer.policy import PAPER, Policy
 from app.soccer.solution import GATES, Ball3D, Calibration, ChiSquare, Gate, PaintFit, Pair
 from app.solving.gates import JudgedView, chance, describe
-from app.solving.verdict import Verdict
+from app.solving.judgement import Judgement
 from tests.cameras import looking
 
 ASKED = replace(PAPER, min_parallax_degrees=5.0, max_sigma_m=0.5)
@@ -54,7 +54,7 @@ def gates(
     """The gates by name, of a group that fails some."""
     fails = np.array([[name in failed] for name in GATES])
     nothing = np.empty(0)
-    verdict = Verdict(
+    judgement = Judgement(
         jac=nothing,
         view_failed=nothing.astype(int),
         pair_failed=nothing.astype(int),
@@ -64,7 +64,7 @@ def gates(
         parallax=nothing,
         distance=nothing,
     )
-    found = describe(views, left_out, pairs, ball, verdict, policy, chi_square)
+    found = describe(views, left_out, pairs, ball, judgement, policy, chi_square)
     unasked = () if policy.min_agreement is not None else ("agreement",)
     assert tuple(gate.name for gate in found) == tuple(n for n in GATES if n not in unasked)
     return {gate.name: gate for gate in found}

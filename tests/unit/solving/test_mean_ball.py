@@ -9,10 +9,10 @@ import pytest
 from app.soccer.policy import PAPER
 from app.soccer.solution import Ball3D, BestBall, Calibration
 from app.solving.facts import facts_of
+from app.solving.judgement import judge
 from app.solving.mean_ball import judged_pairs, leaving_ball, mean_ball
 from app.solving.spread import MeanSpread
 from app.solving.triangulate import meet, sights_of
-from app.solving.verdict import judge
 from tests.unit.solving.conftest import BEHIND_GOAL, MAIN, OPPOSITE, given_view
 from tests.unit.solving.test_solve import shifted
 
@@ -31,8 +31,8 @@ def solved(*shifts: float, policy=PAPER):
     meetings = meet(combinations(sights_of(views, calibrations), 2))
     facts = facts_of(views, calibrations, meetings)
     spread = MeanSpread(facts)
-    verdict = judge(facts, policy, spread)
-    return judged_pairs(meetings, verdict), mean_ball(KEYS, facts, verdict, spread, policy)
+    judgement = judge(facts, policy, spread)
+    return judged_pairs(meetings, judgement), mean_ball(KEYS, facts, judgement, spread, policy)
 
 
 class TestJudgedPairs:

@@ -16,6 +16,7 @@ from app.soccer.policy import PAPER
 from app.soccer.solution import Calibration
 from app.solving.facts import group_facts, join
 from app.solving.facts_codec import facts_from_bytes, facts_to_bytes
+from app.solving.judgement import judge
 from app.solving.observations import principal_point
 from app.solving.picture_camera import picture_of, warp_of
 from app.solving.spread import (
@@ -29,7 +30,6 @@ from app.solving.spread import (
     pixel_spread,
 )
 from app.solving.triangulate import Sighting
-from app.solving.verdict import judge
 from tests.cameras import SIZE, WIDE_LENSES, looking, wide
 from tests.unit.solving.conftest import BEHIND_GOAL, MAIN, OPPOSITE, given_view
 from tests.unit.solving.random_groups import random_policy, random_views
@@ -169,8 +169,8 @@ class TestMeanSpread:
         views = [given_view(str(place), camera, BALL) for place, camera in enumerate(cameras)]
         facts = group_facts(views, [Calibration("given", camera) for camera in cameras])
         spread = MeanSpread(facts)
-        verdict = judge(facts, policy, spread)
-        return spread.covariances(verdict.valid, np.array([0]), verdict.point, policy)[0]
+        judgement = judge(facts, policy, spread)
+        return spread.covariances(judgement.valid, np.array([0]), judgement.point, policy)[0]
 
     def test_is_the_scatter_of_noisy_clicks(self):
         policy = replace(PAPER, box_sigma_share=0.0, click_sigma_px=1.5)
@@ -239,9 +239,9 @@ class TestMeanSpread:
         kept = MeanSpread(facts)
         for seed in seeds:
             policy = replace(random_policy(seed), max_sigma_m=0.1)
-            verdict, groups = judge(facts, policy, kept), np.arange(facts.groups)
-            there = groups[~np.isnan(verdict.point[:, 0])]
-            asked = (verdict.valid, there, verdict.point[there], policy)
+            judgement, groups = judge(facts, policy, kept), np.arange(facts.groups)
+            there = groups[~np.isnan(judgement.point[:, 0])]
+            asked = (judgement.valid, there, judgement.point[there], policy)
             fresh = MeanSpread(facts).covariances(*asked)
             assert np.array_equal(kept.covariances(*asked), fresh, equal_nan=True)
 

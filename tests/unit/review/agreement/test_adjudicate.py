@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from app.errors import ConflictError, ForbiddenError, NotFoundError
-from app.evaluation.agreement_limits import Limits
+from app.evaluation.agreement_limits import AgreementLimits
 from app.review.agreement import weigh
 from app.review.agreement.adjudicate import decide, get_case, hand_back, list_waiting, take_over
 from app.review.agreement.limits import read_limits, set_limits
@@ -111,7 +111,7 @@ class TestAfterHandIn:
         assert waiting.worst > 10
 
     def test_wider_limits_let_them_agree(self, store, state) -> None:
-        wide = Limits(ball_px=100, ball_m=100)
+        wide = AgreementLimits(ball_px=100, ball_m=100)
         set_limits(store, state.dataset, wide, actor="lea")
         with store.read() as session:
             assert read_limits(session, state.dataset_id) == wide

@@ -25,9 +25,9 @@ from app.soccer.group import Group
 from app.soccer.policy import PAPER, STRICT, THRESHOLDS, CalibrationPolicy, Policy
 from app.soccer.solution import GATES, PaintFit, Solution
 from app.solving.facts import group_facts, join
+from app.solving.judgement import PASSES, Judgement, judge, view_jac
 from app.solving.solve import solve
 from app.solving.spread import MeanSpread
-from app.solving.verdict import PASSES, Verdict, judge, view_jac
 from app.store.store import Store
 from tests.scenes import make_scenes
 
@@ -97,7 +97,7 @@ def random_policy(seed: int) -> Policy:
     )
 
 
-def judge_table(table: YieldTable, policy: Policy) -> Verdict:
+def judge_table(table: YieldTable, policy: Policy) -> Judgement:
     return judge(table.facts, policy, MeanSpread(table.facts))
 
 

@@ -1,4 +1,4 @@
-"""Verdict: what a policy makes of facts, all groups at once."""
+"""Judgement: what a policy makes of facts, all groups at once."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ PASSES = len(GATES)
 
 
 @dataclass(frozen=True)
-class Verdict:
+class Judgement:
     """What a policy makes of groups (G), their views (V) and pairs (P); gates are indices.
 
     Attributes:
@@ -80,7 +80,7 @@ class Verdict:
 
 def judge(
     facts: Facts, policy: Policy, spread: MeanSpread, jac: FloatArray | None = None
-) -> Verdict:
+) -> Judgement:
     """Judge every group by the thresholds of a policy.
 
     Args:
@@ -102,7 +102,7 @@ def judge_standing(
     standing: tuple[IntArray, IntArray],
     *,
     first_alone: bool = False,
-) -> Verdict:
+) -> Judgement:
     """``judge`` where it is known which views and pairs stand.
 
     Args:
@@ -138,13 +138,13 @@ def judge_standing(
             used &= ~before[facts.view_group]
         likely = residuals_of(facts, used, point, policy).p_value >= policy.min_p_value
         failed[_CHI_SQUARE] = ~likely & ~untestable(facts, used, policy)
-    return Verdict(jac, view_failed, pair_failed, failed, baseline, point, parallax, distance)
+    return Judgement(jac, view_failed, pair_failed, failed, baseline, point, parallax, distance)
 
 
 def compare_again(
-    known: Verdict, policy: Policy, sigma: FloatArray | None, p_value: FloatArray | None
+    known: Judgement, policy: Policy, sigma: FloatArray | None, p_value: FloatArray | None
 ) -> BoolArray:
-    """``Verdict.failed`` under other thresholds, of groups whose views and pairs stand as before.
+    """``Judgement.failed`` under other thresholds, of groups whose views and pairs stand as before.
 
     Args:
         known: What another policy makes of them.

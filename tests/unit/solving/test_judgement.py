@@ -12,20 +12,20 @@ from hypothesis import strategies as st
 from app.soccer.policy import PAPER, Policy
 from app.soccer.solution import GATES
 from app.solving.facts import Facts, group_facts, join
-from app.solving.spread import MeanSpread
-from app.solving.verdict import (
+from app.solving.judgement import (
     PASSES,
-    Verdict,
+    Judgement,
     compare_again,
     failures,
     judge,
     judge_standing,
     view_jac,
 )
+from app.solving.spread import MeanSpread
 from tests.unit.solving.random_groups import random_policy, random_views
 
 
-def judged(facts: Facts, policy: Policy = PAPER) -> Verdict:
+def judged(facts: Facts, policy: Policy = PAPER) -> Judgement:
     return judge(facts, policy, MeanSpread(facts))
 
 
@@ -80,8 +80,8 @@ def three(**changes: object) -> Facts:
     return facts(3, **{**pairs, **changes})
 
 
-def failing(verdict: Verdict) -> list[str]:
-    return [name for name, fails in zip(GATES, verdict.failed[:, 0], strict=True) if fails]
+def failing(judgement: Judgement) -> list[str]:
+    return [name for name, fails in zip(GATES, judgement.failed[:, 0], strict=True) if fails]
 
 
 class TestJudge:
@@ -91,7 +91,7 @@ class TestJudge:
         policy = random_policy(seed)
         parts = [group_facts(*random_views(seed)) for seed in seeds]
         together, alone = judged(join(parts), policy), [judged(part, policy) for part in parts]
-        for item in fields(Verdict):
+        for item in fields(Judgement):
             axis = 1 if item.name == "failed" else 0
             pieces = np.concatenate([getattr(one, item.name) for one in alone], axis=axis)
             assert np.array_equal(getattr(together, item.name), pieces, equal_nan=True), item.name
@@ -137,22 +137,22 @@ class TestJudge:
     )
     def test_what_equals_a_threshold_passes_but_jac_must_exceed_it(self, policy, fails):
         right = {"pair_parallax": np.array([90.0]), "pair_point": np.array([[0.0, 0.0, 0.0]])}
-        verdict = judged(facts(**right), policy)
-        assert failing(verdict)[: len(fails)] == fails
-        assert verdict.passes[0] == (not fails)
+        judgement = judged(facts(**right), policy)
+        assert failing(judgement)[: len(fails)] == fails
+        assert judgement.passes[0] == (not fails)
 
     def test_a_group_in_good_order_passes(self):
-        verdict = judged(facts())
-        assert failing(verdict) == []
-        assert (verdict.passes.tolist(), verdict.first.tolist()) == ([True], [PASSES])
-        assert verdict.point.tolist() == [[0.0, 0.0, 0.0]]
-        assert (verdict.parallax.tolist(), verdict.distance.tolist()) == ([90.0], [10.0])
+        judgement = judged(facts())
+        assert failing(judgement) == []
+        assert (judgement.passes.tolist(), judgement.first.tolist()) == ([True], [PASSES])
+        assert judgement.point.tolist() == [[0.0, 0.0, 0.0]]
+        assert (judgement.parallax.tolist(), judgement.distance.tolist()) == ([90.0], [10.0])
 
     def test_the_ball_is_the_mean_of_its_pairs_seen_from_the_first_view(self):
         points = np.array([[1.0, 2.0, -1.0], [3.0, 2.0, -1.0], [2.0, 5.0, -4.0]])
-        verdict = judged(three(pair_point=points))
-        assert verdict.point.tolist() == [[2.0, 3.0, -2.0]]
-        assert verdict.distance.tolist() == pytest.approx([77**0.5])
+        judgement = judged(three(pair_point=points))
+        assert judgement.point.tolist() == [[2.0, 3.0, -2.0]]
+        assert judgement.distance.tolist() == pytest.approx([77**0.5])
 
     def test_the_parallax_of_several_pairs_is_measured_at_their_mean(self):
         point = np.tile([0.0, 0.0, -4.0], (3, 1))
@@ -166,8 +166,8 @@ class TestJudge:
 
     def test_one_without_a_camera_is_not_to_blame_where_another_falls(self):
         marks = np.repeat([1.0, 1.0, 9.0], 4)
-        verdict = judged(three(view_camera=np.array([True, False, True]), mark_px=marks))
-        assert failing(verdict)[:2] == ["jac", "two_views"]
+        judgement = judged(three(view_camera=np.array([True, False, True]), mark_px=marks))
+        assert failing(judgement)[:2] == ["jac", "two_views"]
 
     def test_a_view_without_ball_is_no_second_view_of_it(self):
         none = {name: getattr(facts(1), name) for name in dir(facts()) if name.startswith("pair_")}
@@ -182,15 +182,15 @@ class TestJudge:
         assert judged(facts(**marked)).jac.tolist() == [1.0, 0.5]
 
     def test_two_without_a_camera_are_to_blame(self):
-        verdict = judged(facts(3, view_camera=np.array([True, False, False])))
-        assert failing(verdict)[:3] == ["calibratable", "two_views", "ball"]
-        assert verdict.view_failed.tolist() == [PASSES, 0, 0]
+        judgement = judged(facts(3, view_camera=np.array([True, False, False])))
+        assert failing(judgement)[:3] == ["calibratable", "two_views", "ball"]
+        assert judgement.view_failed.tolist() == [PASSES, 0, 0]
 
     def test_lines_that_do_not_fit_are_to_blame_where_two_have_a_camera(self):
-        verdict = judged(facts(3, mark_px=np.repeat([1.0, 9.0, 9.0], 4)))
-        assert failing(verdict)[:2] == ["jac", "two_views"]
-        assert verdict.view_failed.tolist() == [PASSES, 1, 1]
-        assert verdict.pair_failed.tolist() == [1]
+        judgement = judged(facts(3, mark_px=np.repeat([1.0, 9.0, 9.0], 4)))
+        assert failing(judgement)[:2] == ["jac", "two_views"]
+        assert judgement.view_failed.tolist() == [PASSES, 1, 1]
+        assert judgement.pair_failed.tolist() == [1]
 
     def test_an_agreement_below_is_to_blame_where_the_lines_of_two_fit(self):
         found = facts(view_agreement=np.array([0.9, 0.3]))
@@ -233,35 +233,35 @@ class TestJudge:
         assert failing(judged(facts(), replace(at, min_jac=0.7499))) == []
 
     def test_a_camera_that_cannot_be_measured_never_falls(self):
-        verdict = judged(facts(view_measured=np.zeros(2, bool)), replace(PAPER, min_jac=1.0))
-        assert np.isnan(verdict.jac).all()
-        assert failing(verdict) == []
+        judgement = judged(facts(view_measured=np.zeros(2, bool)), replace(PAPER, min_jac=1.0))
+        assert np.isnan(judgement.jac).all()
+        assert failing(judgement) == []
 
     def test_a_view_that_a_person_left_out_counts_for_nothing(self):
         without = np.array([True, False, True])
-        verdict = judged(facts(3, view_included=without, view_camera=np.array([1, 0, 1], bool)))
-        assert verdict.view_failed.tolist() == [PASSES] * 3
-        assert "calibratable" not in failing(verdict)
+        judgement = judged(facts(3, view_included=without, view_camera=np.array([1, 0, 1], bool)))
+        assert judgement.view_failed.tolist() == [PASSES] * 3
+        assert "calibratable" not in failing(judgement)
 
     @pytest.mark.parametrize(("widest", "passes"), [(1.0, True), (0.999, False)])
     def test_the_baseline_may_be_just_what_is_asked(self, widest, passes):
-        verdict = judged(facts(pair_baseline=np.array([widest])))
-        assert verdict.passes.tolist() == [passes]
-        assert verdict.pair_failed.tolist() == [PASSES if passes else GATES.index("baseline")]
+        judgement = judged(facts(pair_baseline=np.array([widest])))
+        assert judgement.passes.tolist() == [passes]
+        assert judgement.pair_failed.tolist() == [PASSES if passes else GATES.index("baseline")]
 
     def test_one_camera_twice_is_no_metre_apart(self):
         none = {name: getattr(facts(1), name) for name in dir(facts()) if name.startswith("pair_")}
-        verdict = judged(facts(**none))
-        assert verdict.baseline.tolist() == [0.0]
-        assert failing(verdict) == ["baseline", "reprojection"]
+        judgement = judged(facts(**none))
+        assert judgement.baseline.tolist() == [0.0]
+        assert failing(judgement) == ["baseline", "reprojection"]
         assert failing(judged(facts(**none), replace(PAPER, min_baseline_m=0.0))) == [
             "reprojection"
         ]
 
     def test_without_two_sights_there_is_no_baseline(self):
-        verdict = judged(facts(1))
-        assert np.isnan(verdict.baseline).all()
-        assert failing(verdict) == ["two_views", "ball", "baseline", "reprojection"]
+        judgement = judged(facts(1))
+        assert np.isnan(judgement.baseline).all()
+        assert failing(judgement) == ["two_views", "ball", "baseline", "reprojection"]
 
     @pytest.mark.parametrize("errors", [(10.1, 3.0), (3.0, 10.1)])
     def test_an_error_may_be_as_large_as_tau(self, errors):
@@ -279,7 +279,7 @@ class TestJudge:
         assert failing(judged(facts(), policy)) == fails
 
     def test_the_mean_is_over_valid_pairs_and_takes_its_own_parallax(self):
-        verdict = judged(
+        judgement = judged(
             facts(
                 3,
                 pair_group=np.zeros(3, np.int64),
@@ -292,10 +292,10 @@ class TestJudge:
                 pair_moved=np.zeros((3, 2, 2, 2, 3)),
             )
         )
-        assert verdict.valid.tolist() == [True, True, False]
-        assert verdict.point.tolist() == [[0.0, 0.0, 0.0]]
-        assert verdict.parallax == pytest.approx([180.0])
-        assert verdict.distance.tolist() == [10.0]
+        assert judgement.valid.tolist() == [True, True, False]
+        assert judgement.point.tolist() == [[0.0, 0.0, 0.0]]
+        assert judgement.parallax == pytest.approx([180.0])
+        assert judgement.distance.tolist() == [10.0]
 
     def test_sigma_is_judged_where_it_is_asked(self):
         # One pixel in either view moves the point by a metre along x; a click is one pixel.
@@ -330,7 +330,7 @@ EVERYTHING_ASKED = replace(
 
 class TestCompareAgain:
     @pytest.fixture
-    def known(self) -> Verdict:
+    def known(self) -> Judgement:
         """Four groups whose numbers are at a threshold, just beyond it, not there, and at the end."""
         return replace(
             judged(FOUR),
