@@ -9,9 +9,9 @@ from typing import Any
 from sqlalchemy import insert, select, update
 
 from app.finite import json_text
-from app.store.codecs import parse
 from app.store.group_rows import next_id
 from app.store.session import Session
+from app.store.stored_json import parse
 from app.store.view_models import VerdictBatchModel
 
 Spans = Sequence[tuple[int, int]]

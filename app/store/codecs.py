@@ -5,19 +5,13 @@ Floats go through ``repr`` and come back the same bits. Nothing here knows the d
 
 from __future__ import annotations
 
-import zlib
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, fields
-from threading import Lock
 from typing import Any
 
 import msgspec
 import numpy as np
-from zlib_ng import zlib_ng
 
-from app.canonical import canonical
-from app.errors import EXAMINE, DamagedError, GeometryError, InputError
 from app.geometry.camera import Camera, camera_covariance
 from app.geometry.lens import BROWN_CONRADY
 from app.soccer.annotation import BallAnnotation, Extras, Lines
@@ -29,89 +23,10 @@ from app.soccer.picture import PictureGeometry
 from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy, Policy
 from app.soccer.reasons import LeftOut
+from app.store.stored_json import Json, look_through
 
-Json = Any
-"""What ``json`` makes: dict, list, str, int, float, bool or None."""
 _LINES = dict[str, tuple[ImagePoint, ...]]
-_LOOKING = Lock()
-
-
-def parse(text: str | bytes) -> Json:
-    """The value of a JSON text of the database.
-
-    Raises:
-        DamagedError: The text is not what was written.
-    """
-    try:
-        return msgspec.json.decode(text)
-    except ValueError as error:
-        raise _damaged() from error
-
-
-def look_through(kind: Any) -> None:
-    """Let msgspec find out what a type is made of, once and by one thread, before it is read.
-
-    It keeps what it found at the classes before that is whole: of two threads that are the first to
-    read a type, one would follow an empty pointer, and the process would end (msgspec 0.22).
-    """
-    with _LOOKING, suppress(msgspec.ValidationError):
-        msgspec.convert(None, kind)
-
-
 look_through(_LINES)
-
-_MISSHAPEN = (
-    ArithmeticError,
-    AttributeError,
-    GeometryError,
-    InputError,
-    LookupError,
-    TypeError,
-    ValueError,
-)
-
-
-@contextmanager
-def as_written() -> Iterator[None]:
-    """For making values of stored JSON: what has another shape than we gave it is damage.
-
-    Raises:
-        DamagedError: A member is missing, or is something else.
-    """
-    try:
-        yield
-    except _MISSHAPEN as error:
-        raise _damaged() from error
-
-
-def pack(value: Json) -> bytes:
-    """A value as compressed canonical JSON."""
-    return zlib_ng.compress(canonical(value).encode())
-
-
-def unpack(data: bytes) -> Json:
-    """The value of compressed JSON.
-
-    Raises:
-        DamagedError: The bytes are not what was written.
-    """
-    return parse(inflate(data))
-
-
-def inflate(data: bytes) -> bytes:
-    """What was compressed.
-
-    Raises:
-        DamagedError: The bytes are not what was written.
-    """
-    try:
-        return zlib.decompress(data)
-    except zlib.error as error:
-        raise _damaged() from error
-
-
-def _damaged() -> DamagedError:
-    return DamagedError("the database holds a record that is not what was written", hint=EXAMINE)
 
 
 def lines_to_json(lines: Lines) -> Json:

@@ -9,7 +9,6 @@ from app.canonical import canonical
 from app.soccer.group import Group, SharedPosition, Station, View
 from app.soccer.pitch import Pitch
 from app.store.codecs import (
-    Json,
     ball_to_json,
     group_head_to_json,
     paint_to_json,
@@ -17,6 +16,7 @@ from app.store.codecs import (
     station_to_json,
     view_to_json,
 )
+from app.store.stored_json import Json
 
 
 def digest(value: Json) -> str:

@@ -19,10 +19,7 @@ from app.soccer.group import Group, Station, View
 from app.soccer.paint_evidence import reading_from_json
 from app.soccer.pitch import Pitch
 from app.store.codecs import (
-    Json,
     group_head_to_json,
-    inflate,
-    parse,
     positions_from_json,
     station_from_json,
     station_to_json,
@@ -31,6 +28,7 @@ from app.store.codecs import (
 )
 from app.store.session import Session
 from app.store.solutions import read_calibration_bodies
+from app.store.stored_json import Json, inflate, parse
 from app.store.version_models import FrozenModel
 
 SAID, STATION, SOLUTION, CALIBRATION = "said:", "station:", "solution:", "calibration:"

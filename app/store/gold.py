@@ -8,10 +8,10 @@ from typing import Any
 from sqlalchemy import delete, select
 
 from app.store.clock import now
-from app.store.codecs import Json, pack, unpack
 from app.store.dialect.statements import insert
 from app.store.models import GroupModel
 from app.store.session import Session
+from app.store.stored_json import Json, pack, unpack
 from app.store.take_models import GoldModel, TakeModel
 
 IMPORTED = "imported"

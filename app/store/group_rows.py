@@ -16,6 +16,7 @@ from app.store.dialect.statements import larger
 from app.store.digest import group_inputs_hash, station_digest, view_digest
 from app.store.models import GroupModel, StationModel, ViewModel
 from app.store.session import Session
+from app.store.stored_json import pack
 from app.store.view_models import UsedIdModel
 
 
@@ -53,7 +54,7 @@ def view_values(view: View, position: int) -> dict[str, Any]:
         "media_path": None if media is None else media.path,
         "media_member": None if media is None else media.member,
         "media_frame": None if media is None else media.frame,
-        "extras": None if extras is None else codecs.pack(extras),
+        "extras": None if extras is None else pack(extras),
         "digest": view_digest(view),
     }
 

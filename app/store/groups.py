@@ -31,6 +31,7 @@ from app.store.noise import Factors, factors_of
 from app.store.paint import paint_digests, read_readings
 from app.store.session import Session
 from app.store.stations import StoredStation, stored_station
+from app.store.stored_json import as_written, parse, unpack
 
 
 @dataclass(frozen=True)
@@ -204,7 +205,7 @@ def _view_from_row(row: Any, station: Station) -> View:
 
 
 def _paint(text: str, readings: Mapping[str, PaintReading]) -> dict[str, PaintReading]:
-    with codecs.as_written():
+    with as_written():
         return {view: readings[digest] for view, digest in paint_digests(text).items()}
 
 
@@ -212,23 +213,23 @@ def positions_of(text: str | None) -> dict[str, SharedPosition]:
     """Shared positions of a group from its column, by the views' keys."""
     if text is None:
         return {}
-    with codecs.as_written():
-        return codecs.positions_from_json(codecs.parse(text))
+    with as_written():
+        return codecs.positions_from_json(parse(text))
 
 
 def _left_out(text: str) -> LeftOut | None:
-    with codecs.as_written():
-        return codecs.left_out_from_json(codecs.parse(text))
+    with as_written():
+        return codecs.left_out_from_json(parse(text))
 
 
 # Most requests ask for what the one before asked for.
 @lru_cache(maxsize=1024)
 def _balls(text: str) -> tuple[BallAnnotation, ...]:
-    with codecs.as_written():
-        return tuple(map(codecs.ball_from_json, codecs.parse(text)))
+    with as_written():
+        return tuple(map(codecs.ball_from_json, parse(text)))
 
 
 @lru_cache(maxsize=256)
 def _extras(data: bytes) -> Extras:
-    with codecs.as_written():
-        return codecs.extras_from_json(codecs.unpack(data))
+    with as_written():
+        return codecs.extras_from_json(unpack(data))

@@ -13,13 +13,13 @@ from app.canonical import canonical
 from app.finite import finite
 from app.store.aliases import columns_shown
 from app.store.clock import now
-from app.store.codecs import Json, parse
 from app.store.dialect.statements import member
 from app.store.group_rows import next_id
 from app.store.job_models import JobModel
 from app.store.models import DatasetModel
 from app.store.session import Session
 from app.store.sight import EVERYTHING, Sight
+from app.store.stored_json import Json, parse
 
 WAITING, RUNNING = "waiting", "running"
 DONE, FAILED, CANCELLED = "done", "failed", "cancelled"

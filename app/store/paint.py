@@ -11,11 +11,11 @@ from sqlalchemy import BindParameter, Table, bindparam, func, select, true
 from zlib_ng import zlib_ng
 
 from app.soccer.paint_evidence import PaintReading, reading_from_text
-from app.store.codecs import as_written, inflate, parse
 from app.store.dialect.statements import any_of, insert, values_of
 from app.store.log import LogEntry, read_entries
 from app.store.models import GroupModel, LogModel, PaintEvidenceModel, StationModel, ViewModel
 from app.store.session import Session
+from app.store.stored_json import as_written, inflate, parse
 
 PAINT = "paint"
 """Kind of the log's entries that say what was read of a group's pictures."""

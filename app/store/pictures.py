@@ -7,9 +7,10 @@ from dataclasses import dataclass
 from sqlalchemy import func, select
 
 from app.soccer.picture import PictureGeometry
-from app.store.codecs import as_written, parse, picture_from_json
+from app.store.codecs import picture_from_json
 from app.store.models import GroupModel, StationModel, ViewModel
 from app.store.session import Session
+from app.store.stored_json import as_written, parse
 
 
 @dataclass(frozen=True)

@@ -11,13 +11,14 @@ from sqlalchemy import delete, func, insert, select
 from app.soccer.annotation import Lines
 from app.soccer.frames import ImageSize
 from app.soccer.pitch import Pitch
-from app.store.codecs import lines_from_json, parse, picture_from_json
+from app.store.codecs import lines_from_json, picture_from_json
 from app.store.dialect.statements import insert_or_replace
 from app.store.digest import digest
 from app.store.log import LogEntry, read_log
 from app.store.models import GroupModel, ImportFindingModel, LogModel, StationModel, ViewModel
 from app.store.pitch_models import PitchEstimateModel
 from app.store.session import Session
+from app.store.stored_json import parse
 
 PITCH = "pitch"
 """Kind of the log's entries that say how long and wide a pitch is, one for each group."""

@@ -10,11 +10,12 @@ from typing import Any
 from sqlalchemy import func, select
 
 from app.soccer.group import SharedPosition
-from app.store.codecs import as_written, parse, positions_from_json
+from app.store.codecs import positions_from_json
 from app.store.digest import digest
 from app.store.log import LogEntry, read_entries
 from app.store.models import GroupModel, LogModel, StationModel, ViewModel
 from app.store.session import Session
+from app.store.stored_json import as_written, parse
 
 POSITION = "position"
 """Kind of the log's entries that say where a match puts cameras, one for each group."""

@@ -11,7 +11,7 @@ from sqlalchemy import ColumnElement, delete, func, insert, select
 from app.canonical import canonical
 from app.geometry.camera import Camera
 from app.store.aliases import columns_shown
-from app.store.codecs import Json, as_written, camera_from_json, camera_to_json, parse
+from app.store.codecs import camera_from_json, camera_to_json
 from app.store.digest import digest
 from app.store.group_rows import next_id
 from app.store.models import ViewModel
@@ -21,6 +21,7 @@ from app.store.prediction_models import (
     PredictionSetModel,
 )
 from app.store.session import Session
+from app.store.stored_json import Json, as_written, parse
 
 _BATCH = 5000
 

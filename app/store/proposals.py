@@ -15,7 +15,7 @@ from sqlalchemy.orm import aliased
 
 from app.canonical import canonical
 from app.soccer.annotation import Lines
-from app.store.codecs import as_written, lines_from_json, lines_to_json, parse
+from app.store.codecs import lines_from_json, lines_to_json
 from app.store.dialect.statements import insert, items_of, numbers_in
 from app.store.models import (
     DatasetModel,
@@ -28,6 +28,7 @@ from app.store.models import (
 from app.store.proposal_models import ProposalModel
 from app.store.session import Session
 from app.store.solutions import is_current, undetermined
+from app.store.stored_json import as_written, parse
 
 _PROPOSAL = cast(Table, ProposalModel.__table__)
 _BATCH = 500

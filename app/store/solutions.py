@@ -15,10 +15,10 @@ from app.finite import json_text
 from app.soccer.group import Group
 from app.soccer.solution import SOLVER_VERSION, Calibration, Solution
 from app.store import value_codec
-from app.store.codecs import as_written, inflate, parse
 from app.store.dialect.statements import insert
 from app.store.models import CalibrationModel, DatasetModel, GroupModel, SolutionModel
 from app.store.session import Session
+from app.store.stored_json import as_written, inflate, parse
 from app.store.summary import SolutionSummary, summarize
 
 _ELSEWHERE = Calibration(source="", camera=None)

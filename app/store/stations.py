@@ -20,6 +20,7 @@ from app.store.digest import station_digest
 from app.store.group_rows import station_values
 from app.store.models import GroupModel, StationModel, ViewModel
 from app.store.session import Session
+from app.store.stored_json import as_written, parse
 
 
 @dataclass(frozen=True)
@@ -97,29 +98,29 @@ def station_pitches(session: Session, dataset_id: int) -> list[tuple[int, Pitch]
 
 @lru_cache(maxsize=1024)
 def _lines(text: str) -> Lines:
-    with codecs.as_written():
-        return codecs.lines_from_json(codecs.parse(text))
+    with as_written():
+        return codecs.lines_from_json(parse(text))
 
 
 @lru_cache(maxsize=1024)
 def _camera(text: str) -> Camera:
-    with codecs.as_written():
-        return codecs.camera_from_json(codecs.parse(text))
+    with as_written():
+        return codecs.camera_from_json(parse(text))
 
 
 @lru_cache(maxsize=1024)
 def _covariance(text: str) -> tuple[float, ...] | None:
-    with codecs.as_written():
-        return codecs.covariance_from_json(codecs.parse(text).get("covariance"))
+    with as_written():
+        return codecs.covariance_from_json(parse(text).get("covariance"))
 
 
 @lru_cache(maxsize=256)
 def _proposed(text: str) -> tuple[str, ...]:
-    with codecs.as_written():
-        return tuple(map(str, codecs.parse(text)))
+    with as_written():
+        return tuple(map(str, parse(text)))
 
 
 @lru_cache(maxsize=256)
 def _picture(text: str) -> PictureGeometry | None:
-    with codecs.as_written():
-        return codecs.picture_from_json(codecs.parse(text))
+    with as_written():
+        return codecs.picture_from_json(parse(text))

@@ -19,7 +19,8 @@ import msgspec
 
 from app.geometry.camera import Camera
 from app.soccer.frames import ImagePoint
-from app.store.codecs import as_written, camera_from_json, camera_to_json, look_through
+from app.store.codecs import camera_from_json, camera_to_json
+from app.store.stored_json import as_written, look_through
 
 T = TypeVar("T")
 Codec = tuple[Callable[[Any], Any], Callable[[Any], Any]]

@@ -10,10 +10,10 @@ from sqlalchemy import select
 from app.canonical import canonical
 from app.soccer.solution import SOLVER_VERSION
 from app.store.clock import now
-from app.store.codecs import Json, parse
 from app.store.dialect.statements import insert_or_replace
 from app.store.session import Session
 from app.store.store import Store
+from app.store.stored_json import Json, parse
 from app.store.version_models import VersionCheckModel
 
 

@@ -9,10 +9,10 @@ from typing import Any, cast
 from sqlalchemy import Table, func, insert, select
 
 from app.store.aliases import columns_shown
-from app.store.codecs import Json, parse, unpack
 from app.store.group_rows import next_id
 from app.store.models import DatasetModel, QueueModel, VerdictModel
 from app.store.session import Session
+from app.store.stored_json import Json, parse, unpack
 from app.store.version_models import VersionGroupModel, VersionModel
 
 BATCH = 200

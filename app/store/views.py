@@ -10,10 +10,11 @@ from sqlalchemy import ColumnElement, select
 
 from app.soccer.annotation import BallAnnotation
 from app.soccer.media import Media
-from app.store.codecs import as_written, ball_from_json, parse
+from app.store.codecs import ball_from_json
 from app.store.conditions import Condition
 from app.store.models import GroupModel, QueueModel, StationModel, ViewModel
 from app.store.session import Session
+from app.store.stored_json import as_written, parse
 
 
 @dataclass(frozen=True)

@@ -25,13 +25,13 @@ from sqlalchemy import MetaData, func, select, text
 
 from app.config import Settings
 from app.store.clock import now
-from app.store.codecs import pack
 from app.store.engine import WRITE, make_engine
 from app.store.home import make_home
 from app.store.log import Entry, append
 from app.store.migrate import KNOWN_REVISIONS, migrate, migrations_folder, schema_revision
 from app.store.restore import restore
 from app.store.session import Session
+from app.store.stored_json import pack
 from tests.e2e.service import ROOT
 from tests.torture import populated
 

@@ -21,8 +21,8 @@ from app.review.agreement.limits import read_limits
 from app.review.agreement.weigh import PairOfTakes, Weighed
 from app.review.datasets.dataset import dataset_id
 from app.store.agreement import AGREED, DECIDED, OPEN, agreements_of
-from app.store.codecs import unpack
 from app.store.store import Store
+from app.store.stored_json import unpack
 from app.store.value_codec import from_json
 
 

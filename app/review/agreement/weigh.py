@@ -31,12 +31,12 @@ from app.store.agreement import (
     verdicts_asked,
 )
 from app.store.clock import now
-from app.store.codecs import pack
 from app.store.log import Entry, append
 from app.store.outbox import DISPUTED, announce, stamp
 from app.store.session import Session
 from app.store.settling import settle_in_batch
 from app.store.store import Store
+from app.store.stored_json import pack
 from app.store.takes import INDEPENDENT, takes_of_group
 from app.store.value_codec import to_json
 

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 from app.finite import json_text
 from app.store.answers import UNDER_WAY, Answer, find_answer, keep_answer
-from app.store.codecs import Json, parse
 from app.store.session import Session
+from app.store.stored_json import Json, parse
 
 
 @dataclass(frozen=True)

@@ -26,7 +26,6 @@ from app.review.editing.edit import (
 )
 from app.soccer.frames import ImagePoint
 from app.store.codecs import (
-    Json,
     ball_from_json,
     ball_to_json,
     camera_from_json,
@@ -39,6 +38,7 @@ from app.store.codecs import (
     positions_from_json,
     positions_to_json,
 )
+from app.store.stored_json import Json
 
 
 def step_to_json(edit: Edit | StationEdit, inverse: Edit | StationEdit) -> Json:

@@ -7,12 +7,12 @@ from collections.abc import Callable, Mapping, Sequence
 from app.review.editing.codec import step_to_json
 from app.review.editing.edit import Edit
 from app.store.clock import now
-from app.store.codecs import Json
 from app.store.group_revisions import next_revision, save_revision
 from app.store.groups import StoredGroup, read_groups
 from app.store.log import Entry, append
 from app.store.queue import refresh_queue
 from app.store.session import Session
+from app.store.stored_json import Json
 
 _BATCH = 100
 

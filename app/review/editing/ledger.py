@@ -12,12 +12,13 @@ from app.soccer.annotation import Extras
 from app.soccer.frames import ImageSize
 from app.soccer.group import Group, Station, View
 from app.soccer.policy import Policy
-from app.store.codecs import extras_from_json, paint_to_json, unpack
+from app.store.codecs import extras_from_json, paint_to_json
 from app.store.datasets import dataset_rows, policy_of
 from app.store.digest import group_inputs_hash
 from app.store.groups import StoredGroup
 from app.store.projection import all_groups, all_noticed, all_spare, all_stations, all_verdicts
 from app.store.session import Session
+from app.store.stored_json import unpack
 
 _ELSEWHERE = Station("", ImageSize(0, 0))
 """Stands in a view for the station that is kept under its id."""

@@ -25,7 +25,7 @@ from app.soccer.pitch import Pitch
 from app.soccer.policy import Policy
 from app.soccer.solution import Calibration
 from app.solving.calibrate import calibrate_station, calibration_key
-from app.store.codecs import group_from_json, group_to_json, pack, unpack
+from app.store.codecs import group_from_json, group_to_json
 from app.store.groups import read_groups
 from app.store.queue import refresh_queue
 from app.store.session import Session
@@ -40,6 +40,7 @@ from app.store.solutions import (
 )
 from app.store.stations import read_stations, station_pitches
 from app.store.store import Store
+from app.store.stored_json import pack, unpack
 
 FIRST_CHUNK, CHUNK, CHUNK_HERE = 2, 40, 8
 """Groups a task: a second of work, or a few when lines must be calibrated. The first ones are

@@ -22,7 +22,6 @@ from app.store.codecs import (
     camera_from_json,
     extras_from_json,
     extras_to_json,
-    pack,
     policy_from_json,
     positions_from_json,
     station_from_json,
@@ -39,6 +38,7 @@ from app.store.projection import rewrite
 from app.store.queue import refresh_queue
 from app.store.session import Session
 from app.store.store import Store
+from app.store.stored_json import pack
 
 
 def replay(session: Session) -> Ledger:

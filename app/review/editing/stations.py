@@ -24,7 +24,6 @@ from app.review.editing.undo import next_step, read_station_stacks
 from app.soccer.group import Group, Station
 from app.soccer.solution import Calibration
 from app.store.clock import now
-from app.store.codecs import Json
 from app.store.datasets import dataset_name
 from app.store.digest import group_inputs_hash
 from app.store.group_revisions import refresh_inputs_hashes
@@ -39,6 +38,7 @@ from app.store.solutions import (
 )
 from app.store.stations import StoredStation, groups_of_station, read_stations, save_station
 from app.store.store import Store
+from app.store.stored_json import Json
 
 
 @dataclass(frozen=True)

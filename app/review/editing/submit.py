@@ -29,7 +29,6 @@ from app.soccer.policy import Policy
 from app.soccer.solution import Calibration, Solution
 from app.solving.solve import solve
 from app.store.clock import now
-from app.store.codecs import Json
 from app.store.group_revisions import next_revision, save_revision
 from app.store.groups import StoredGroup, group_of_view
 from app.store.log import Entry, append
@@ -38,6 +37,7 @@ from app.store.queue import refresh_queue, update_row
 from app.store.session import Session
 from app.store.solutions import EncodedSolution, insert_solutions, read_solutions
 from app.store.store import Store
+from app.store.stored_json import Json
 
 
 @dataclass(frozen=True)

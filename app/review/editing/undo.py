@@ -6,9 +6,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from app.errors import ConflictError
-from app.store.codecs import Json
 from app.store.log import group_steps, newest_steps, read_entry, station_steps
 from app.store.session import Session
+from app.store.stored_json import Json
 
 GROUP_KINDS = {"edit": "edit", "undo": "undo", "redo": "redo"}
 STATION_KINDS = {"station_edit": "edit", "station_undo": "undo", "station_redo": "redo"}

@@ -21,7 +21,6 @@ from app.review.answers.keep import Keep, keep_nothing
 from app.review.datasets.dataset import read_dataset_head
 from app.review.people.deeds import note_deed
 from app.store import evaluation_frames as frame_rows
-from app.store.codecs import Json
 from app.store.evaluation_frames import FrameCondition
 from app.store.evaluations import StoredEvaluation as StoredEvaluation
 from app.store.evaluations import (
@@ -32,6 +31,7 @@ from app.store.evaluations import (
 )
 from app.store.session import Session
 from app.store.store import Store
+from app.store.stored_json import Json
 from app.store.value_codec import from_json
 
 MAX_PAGE = 500

@@ -20,7 +20,6 @@ from app.review.evaluating.truth import AcceptedTruth
 from app.review.versions.version import Version, read_version
 from app.soccer.frames import Box
 from app.store.clock import now
-from app.store.codecs import Json
 from app.store.evaluations import (
     StoredEvaluation,
     insert_evaluation,
@@ -32,6 +31,7 @@ from app.store.predictions import (
 )
 from app.store.session import Session
 from app.store.store import Store
+from app.store.stored_json import Json
 from app.store.value_codec import to_json
 
 MAX_NAME = 100

@@ -16,9 +16,10 @@ from app.soccer.ball_boxes import ball_boxes, has_ball_3d
 from app.soccer.group import Group
 from app.soccer.policy import Policy
 from app.soccer.solution import SOLVER_VERSION, Solution
-from app.store.codecs import Json, policy_to_json
+from app.store.codecs import policy_to_json
 from app.store.digest import digest
 from app.store.session import Session
+from app.store.stored_json import Json
 from app.store.versions import BATCH, read_rows
 from app.store.views import present_ids
 

@@ -27,7 +27,6 @@ from app.review.evaluating.prediction_reader import PredictionFiles, Read, read_
 from app.review.people.deeds import note_deed
 from app.soccer.frames import ImageSize
 from app.store.clock import now
-from app.store.codecs import Json
 from app.store.predictions import PredictedBox as PredictedBox
 from app.store.predictions import PredictionSet as PredictionSet
 from app.store.predictions import (
@@ -41,6 +40,7 @@ from app.store.predictions import (
 )
 from app.store.session import Session
 from app.store.store import Store
+from app.store.stored_json import Json
 from app.store.views import dataset_views
 
 LISTED = 100

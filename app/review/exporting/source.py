@@ -13,9 +13,9 @@ from app.review.editing.state import GroupState, VerdictState, read_states
 from app.review.versions.manifest import policy_settings, version_settings, version_stamp
 from app.review.versions.version import FrozenGroup, Version, thaw
 from app.soccer.solution import SOLVER_VERSION
-from app.store.codecs import Json
 from app.store.exports import exported_groups, left_out_groups, newest_word
 from app.store.session import Session
+from app.store.stored_json import Json
 from app.store.versions import BATCH, VersionGroup, read_rows
 
 Facts = Mapping[str, Mapping[str, int]]

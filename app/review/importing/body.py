@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from app.soccer.group import Group
-from app.store.codecs import Json, group_head_to_json, view_to_json
+from app.store.codecs import group_head_to_json, view_to_json
 from app.store.groups import StoredGroup
+from app.store.stored_json import Json
 
 
 def places_of(stored: StoredGroup) -> dict[str, tuple[int, int]]:

@@ -23,14 +23,7 @@ from app.review.datasets.licence import licence_text
 from app.review.editing.lineage import Lineage, Lineages, station_lineage
 from app.soccer.group import Group
 from app.soccer.solution import SOLVER_VERSION
-from app.store.codecs import (
-    Json,
-    group_head_to_json,
-    policy_to_json,
-    station_to_json,
-    unpack,
-    view_to_json,
-)
+from app.store.codecs import group_head_to_json, policy_to_json, station_to_json, view_to_json
 from app.store.exports import newest_word
 from app.store.groups import StoredGroup, read_groups
 from app.store.imports import group_verdicts, known_groups, shared_stations
@@ -38,6 +31,7 @@ from app.store.log import LogEntry, group_entries, station_entries
 from app.store.session import Session
 from app.store.spare import sorted_spare_rows
 from app.store.store import Store
+from app.store.stored_json import Json, unpack
 
 FORMAT = "touchline"
 FORMAT_VERSION = 1

@@ -36,13 +36,13 @@ from app.review.importing.carry_verdicts import merge_verdicts
 from app.review.importing.ingest import IngestReport, Origin, attempt, ingest_batch
 from app.review.importing.spare import SpareFrame, ingest_spare
 from app.soccer.group import Group, Station
-from app.store.codecs import Json
 from app.store.datasets import find_dataset
 from app.store.groups import read_groups
 from app.store.imports import known_groups, shared_stations
 from app.store.queue import refresh_queue
 from app.store.session import Session
 from app.store.store import Store
+from app.store.stored_json import Json
 
 BATCH = 200
 T = TypeVar("T")

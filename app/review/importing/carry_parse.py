@@ -21,8 +21,9 @@ from app.soccer.group import Group, Station, View
 from app.soccer.pitch import canonical_marking
 from app.soccer.policy import PAPER, Policy
 from app.soccer.reasons import MAX_NOTE, REASONS, left_out
-from app.store.codecs import Json, extras_from_json, policy_from_json, station_from_json
+from app.store.codecs import extras_from_json, policy_from_json, station_from_json
 from app.store.imports import VERDICT
+from app.store.stored_json import Json
 
 MAX_LINE = 32 * 1024 * 1024
 MAX_BALLS, MAX_SIDE, MAX_TEXT = 100, 20_000, 1000

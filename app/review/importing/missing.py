@@ -13,7 +13,6 @@ from app.review.editing.upstream import KIND
 from app.review.importing.body import import_body, places_of
 from app.soccer.group import Group
 from app.store.clock import now
-from app.store.codecs import Json
 from app.store.findings import add_group_findings, group_findings, groups_told
 from app.store.group_revisions import save_group
 from app.store.groups import StoredGroup, read_groups
@@ -21,6 +20,7 @@ from app.store.imports import known_groups
 from app.store.log import Entry, append
 from app.store.queue import refresh_queue
 from app.store.session import Session
+from app.store.stored_json import Json
 
 GONE = "this group is gone from the dataset; it stays until a person rejects it"
 

@@ -11,8 +11,8 @@ from app.errors import NotFoundError
 from app.review.answers.keep import Kept
 from app.review.answers.saved_progress import SavedProgress
 from app.review.people.roles import Sight
-from app.store.codecs import Json
 from app.store.store import Store
+from app.store.stored_json import Json
 from app.store.uploads import Upload as Upload
 from app.store.uploads import UploadWriter as UploadWriter
 from app.store.uploads import (

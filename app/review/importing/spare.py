@@ -12,11 +12,12 @@ from app.review.datasets.dataset import read_dataset_head
 from app.review.importing.ingest import IngestReport, ensure_dataset
 from app.soccer.annotation import Extras
 from app.store.clock import now
-from app.store.codecs import extras_from_json, extras_to_json, pack, unpack
+from app.store.codecs import extras_from_json, extras_to_json
 from app.store.log import Entry, append
 from app.store.session import Session
 from app.store.spare import known_spare, put_spare, spare_rows
 from app.store.store import Store
+from app.store.stored_json import pack, unpack
 
 BATCH = 1000
 """Frames a transaction and a log entry."""

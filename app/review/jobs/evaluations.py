@@ -12,10 +12,10 @@ from app.review.evaluating.evaluation import list_evaluations
 from app.review.evaluating.evaluation_run import EvaluationRequest, check_evaluation, run_evaluation
 from app.review.jobs.job_run import JobProgress, Work
 from app.review.jobs.jobs import Jobs
-from app.store.codecs import Json
 from app.store.evaluations import StoredEvaluation
 from app.store.jobs import Job
 from app.store.store import Store
+from app.store.stored_json import Json
 
 EVALUATE, ACCEPT = "evaluate", "bulk"
 

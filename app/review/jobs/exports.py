@@ -16,10 +16,10 @@ from app.review.exporting.export import export, require_possible
 from app.review.exporting.folder import ExportFolder
 from app.review.jobs.job_run import JobProgress, Work, counting
 from app.review.jobs.jobs import Jobs
-from app.store.codecs import Json
 from app.store.frames import Frames
 from app.store.jobs import EXPORT, Job
 from app.store.store import Store
+from app.store.stored_json import Json
 
 KIND = EXPORT
 

@@ -22,10 +22,10 @@ from app.review.jobs.paint import PAINT
 from app.review.jobs.solve import request_solve
 from app.soccer.frames import ImageSize
 from app.soccer.policy import POLICIES
-from app.store.codecs import Json
 from app.store.datasets import find_dataset
 from app.store.jobs import Job
 from app.store.store import Store
+from app.store.stored_json import Json
 from app.store.uploads import get_upload, keep_upload, upload_path
 
 KIND = "import"

@@ -11,8 +11,8 @@ import structlog
 
 from app.errors import JobCancelled, ReviewError
 from app.progress import TellProgress
-from app.store.codecs import Json
 from app.store.jobs import CANCELLED, DONE, FAILED
+from app.store.stored_json import Json
 
 log = structlog.get_logger("touchline.jobs")
 

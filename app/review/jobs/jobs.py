@@ -30,7 +30,6 @@ from app.review.jobs.job_records import JobRecords, need_job
 from app.review.jobs.job_run import JobProgress, JobRun, RunQueue, Work
 from app.review.people.deeds import note_job
 from app.store.clock import now
-from app.store.codecs import Json
 from app.store.jobs import (
     CANCELLED,
     DONE,
@@ -47,6 +46,7 @@ from app.store.jobs import (
 )
 from app.store.session import Session
 from app.store.store import Store
+from app.store.stored_json import Json
 
 log = structlog.get_logger("touchline.jobs")
 

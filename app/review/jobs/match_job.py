@@ -12,10 +12,10 @@ from app.review.jobs.job_run import JobProgress, Work
 from app.review.jobs.jobs import Jobs
 from app.review.jobs.solve import solve_after
 from app.store.clock import now
-from app.store.codecs import Json
 from app.store.jobs import Job
 from app.store.session import Session
 from app.store.store import Store
+from app.store.stored_json import Json
 
 
 @dataclass(frozen=True)

@@ -12,10 +12,11 @@ from app.review.jobs.jobs import Jobs
 from app.review.jobs.match_job import MatchesAsked, MatchJob
 from app.review.jobs.solve import solve_after
 from app.soccer.picture import PictureGeometry
-from app.store.codecs import Json, picture_to_json
+from app.store.codecs import picture_to_json
 from app.store.jobs import Job
 from app.store.session import Session
 from app.store.store import Store
+from app.store.stored_json import Json
 
 
 def request_pictures(

@@ -8,10 +8,10 @@ from app.review.jobs.job_run import JobProgress, counting
 from app.review.jobs.jobs import Jobs
 from app.review.jobs.match_job import MatchesAsked, MatchJob
 from app.review.jobs.solve import request_solve
-from app.store.codecs import Json
 from app.store.jobs import Job
 from app.store.session import Session
 from app.store.store import Store
+from app.store.stored_json import Json
 
 
 def take_positions_back(

@@ -10,8 +10,8 @@ from app.review.editing.proposals import forget_proposals, propose_views
 from app.review.jobs.job_run import JobProgress, counting
 from app.review.jobs.jobs import Jobs
 from app.review.jobs.match_job import MatchesAsked, MatchJob
-from app.store.codecs import Json
 from app.store.store import Store
+from app.store.stored_json import Json
 
 
 def stop_and_forget(

@@ -9,9 +9,9 @@ from app.review.editing.rig import accept, adjustable, proposal_values, propose,
 from app.review.jobs.job_run import JobProgress, Work
 from app.review.jobs.jobs import Jobs
 from app.review.jobs.solve import request_solve
-from app.store.codecs import Json
 from app.store.jobs import Job
 from app.store.store import Store
+from app.store.stored_json import Json
 
 KIND = "rig"
 

@@ -22,11 +22,11 @@ from app.review.policies.policy import PolicyState, apply_policy
 from app.review.yields.store import AT_ONCE, YieldStore
 from app.soccer.pitch import Pitch
 from app.soccer.policy import Policy
-from app.store.codecs import Json
 from app.store.datasets import dataset_name
 from app.store.jobs import Job
 from app.store.session import Session
 from app.store.store import Store
+from app.store.stored_json import Json
 
 KIND = "solve"
 Changed = TypeVar("Changed")

@@ -13,9 +13,9 @@ from app.review.versions.freeze import FreezeRequest, freeze, plan_freeze
 from app.review.versions.verify import verify_and_keep
 from app.review.versions.version import Version, find_version, get_version
 from app.soccer.split import Split
-from app.store.codecs import Json
 from app.store.jobs import Job
 from app.store.store import Store
+from app.store.stored_json import Json
 
 FREEZE, VERIFY = "freeze", "verify"
 

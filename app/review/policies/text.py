@@ -13,7 +13,7 @@ import yaml
 
 from app.errors import InputError
 from app.soccer.policy import CALIBRATION, PAPER, POLICIES, THRESHOLDS, Policy, Threshold
-from app.store.codecs import Json
+from app.store.stored_json import Json
 
 MAX_CHARACTERS = 20_000
 MAX_DEPTH = 4

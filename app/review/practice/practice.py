@@ -24,13 +24,13 @@ from app.sample.practice import LESSONS, write_practice
 from app.sample.scene import SceneTruth
 from app.sample.truth import TRUTH, read_truth
 from app.soccer.policy import PAPER
-from app.store.codecs import Json
 from app.store.datasets import find_dataset
 from app.store.imports import known_groups
 from app.store.jobs import Job
 from app.store.locks import practice_lock
 from app.store.sight import EVERYTHING, Sight
 from app.store.store import Store
+from app.store.stored_json import Json
 
 KIND = "practice"
 DATASET = "practice"

@@ -18,12 +18,13 @@ from app.review.takes.copying import aligned
 from app.review.takes.errors import AnnotationError, TrueView, error_of, world_error
 from app.soccer.frames import ImagePoint
 from app.store.clock import now
-from app.store.codecs import Json, group_from_json, group_to_json
+from app.store.codecs import group_from_json, group_to_json
 from app.store.copy_datasets import is_copy
 from app.store.gold import STARTS, gold_heads, gold_truth, mark_gold, unmark_gold
 from app.store.log import Entry, append
 from app.store.session import Session
 from app.store.store import Store
+from app.store.stored_json import Json
 from app.store.takes import GOLD, takes_in
 
 KIND = "gold"

@@ -26,7 +26,7 @@ from app.sample.truth import TRUTH, read_truth
 from app.soccer.group import Group
 from app.store.agreement import AGREED, DECIDED, states_of
 from app.store.clock import now
-from app.store.codecs import Json, group_to_json
+from app.store.codecs import group_to_json
 from app.store.copy_datasets import is_copy
 from app.store.gold import STARTS, mark_gold
 from app.store.groups import StoredGroup, read_groups
@@ -34,6 +34,7 @@ from app.store.listing import Listing
 from app.store.log import Entry, append
 from app.store.session import Session
 from app.store.store import Store
+from app.store.stored_json import Json
 from app.store.versions import BATCH, read_rows
 
 MOST = 1000

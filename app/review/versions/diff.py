@@ -11,9 +11,10 @@ from typing import Any
 
 from app.errors import InputError
 from app.review.versions.version import Version, read_version
-from app.store.codecs import Json, parse, policy_to_json
+from app.store.codecs import policy_to_json
 from app.store.session import Session
 from app.store.store import Store
+from app.store.stored_json import Json, parse
 from app.store.versions import said_rows
 
 NEW, GONE = "not in the dataset before", "no longer in the dataset"

@@ -24,7 +24,7 @@ from app.soccer.group import Group
 from app.soccer.solution import SOLVER_VERSION
 from app.soccer.split import Split, Splitter
 from app.store.clock import now
-from app.store.codecs import Json, pack, policy_to_json
+from app.store.codecs import policy_to_json
 from app.store.frozen import (
     CALIBRATION,
     SOLUTION,
@@ -42,6 +42,7 @@ from app.store.media import media_facts
 from app.store.session import Session
 from app.store.solutions import known_calibrations, present_bodies, read_calibration_bodies
 from app.store.store import Store
+from app.store.stored_json import Json, pack
 from app.store.versions import BATCH, has_version, insert_version
 
 MAX_NOTE = 2000

@@ -8,9 +8,10 @@ from collections.abc import Iterator
 from app.review.versions.diff import read_changelog
 from app.review.versions.version import Version, read_version
 from app.soccer.policy import Policy
-from app.store.codecs import Json, policy_to_json
+from app.store.codecs import policy_to_json
 from app.store.session import Session
 from app.store.store import Store
+from app.store.stored_json import Json
 from app.store.versions import version_verdicts
 
 

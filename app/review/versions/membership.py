@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from app.errors import ConflictError
-from app.store.codecs import Json
 from app.store.session import Session
+from app.store.stored_json import Json
 from app.store.versions import candidate_rows
 
 RULES = ("accepted", "passing")

@@ -24,7 +24,6 @@ from app.soccer.solution import SOLVER_VERSION, Calibration
 from app.soccer.split import Splitter
 from app.solving.calibrate import calibrate_station, calibration_key
 from app.solving.solve import solve
-from app.store.codecs import Json
 from app.store.frozen import (
     CALIBRATION,
     PAINT,
@@ -41,6 +40,7 @@ from app.store.frozen import (
 from app.store.session import Session
 from app.store.solutions import decode_calibration, encode_calibration, encode_solution
 from app.store.store import Store
+from app.store.stored_json import Json
 from app.store.verifications import keep_verification
 from app.store.versions import VersionGroup, read_page, said_rows, version_matches
 

@@ -15,11 +15,12 @@ from app.soccer.group import Group
 from app.soccer.policy import Policy
 from app.soccer.solution import Solution
 from app.soccer.split import Split
-from app.store.codecs import Json, parse, policy_from_json
+from app.store.codecs import policy_from_json
 from app.store.frozen import CALIBRATION, json_of, named_texts, read_frozen, thaw_group
 from app.store.session import Session
 from app.store.solutions import decode_camera, decode_solution
 from app.store.store import Store
+from app.store.stored_json import Json, parse
 from app.store.verifications import Verification as Verification
 from app.store.verifications import read_verifications
 from app.store.versions import VersionGroup, all_versions, dataset_versions, version_row

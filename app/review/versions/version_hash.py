@@ -9,7 +9,7 @@ from typing import Any
 
 from app.canonical import canonical
 from app.soccer.policy import Policy, digested_values
-from app.store.codecs import Json
+from app.store.stored_json import Json
 
 HASH_FORMAT = 1
 """Of what the hash covers; part of it."""

@@ -14,9 +14,9 @@ from typing import Any
 
 from app.canonical import canonical
 from app.store import outbox
-from app.store.codecs import Json
 from app.store.jobs import DONE, FAILED
 from app.store.session import Session
+from app.store.stored_json import Json
 from app.store.webhooks import entries_since, jobs_ended_since
 
 

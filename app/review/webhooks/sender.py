@@ -24,10 +24,10 @@ from app.review.webhooks.addresses import require_allowed
 from app.review.webhooks.messages import Message, read_messages
 from app.review.webhooks.secrets import secret_of, sign
 from app.review.work.stalls import tell_stalls
-from app.store.codecs import parse
 from app.store.datasets import dataset_names
 from app.store.session import Session
 from app.store.store import Store
+from app.store.stored_json import parse
 from app.store.webhooks import (
     DELIVERED,
     FAILED,

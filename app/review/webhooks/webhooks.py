@@ -14,11 +14,11 @@ from app.review.webhooks.addresses import require_allowed
 from app.review.webhooks.messages import CHOSEN, Kind, ping
 from app.review.webhooks.secrets import new_salt, secret_of
 from app.store.clock import now
-from app.store.codecs import parse
 from app.store.datasets import dataset_name
 from app.store.log import newest_entry
 from app.store.session import Session
 from app.store.store import Store
+from app.store.stored_json import parse
 from app.store.webhooks import (
     DELIVERED,
     FAILED,

@@ -12,8 +12,8 @@ import pytest
 
 from app.review.jobs.job_run import JobProgress
 from app.review.jobs.jobs import Jobs
-from app.store.codecs import Json
 from app.store.jobs import Job
+from app.store.stored_json import Json
 from tests.waiting import SECONDS
 
 

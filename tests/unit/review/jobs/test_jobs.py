@@ -24,10 +24,10 @@ from app.review.jobs import jobs as module
 from app.review.jobs.job_run import JobProgress
 from app.review.jobs.jobs import Jobs
 from app.review.people.roles import EVERYTHING, Sight
-from app.store.codecs import Json
 from app.store.jobs import Job, NewJob, insert_job
 from app.store.session import Session
 from app.store.store import Store
+from app.store.stored_json import Json
 from tests.unit.review.jobs.steps import Gate, submit
 from tests.waiting import SECONDS
 

@@ -1,0 +1,93 @@
+"""Stored JSON: values as the database keeps them, packed or not; what is not as written is damage."""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from threading import Lock
+from typing import Any
+
+import msgspec
+from zlib_ng import zlib_ng
+
+from app.canonical import canonical
+from app.errors import EXAMINE, DamagedError, GeometryError, InputError
+
+Json = Any
+"""What ``json`` makes: dict, list, str, int, float, bool or None."""
+_LOOKING = Lock()
+_MISSHAPEN = (
+    ArithmeticError,
+    AttributeError,
+    GeometryError,
+    InputError,
+    LookupError,
+    TypeError,
+    ValueError,
+)
+
+
+def parse(text: str | bytes) -> Json:
+    """The value of a JSON text of the database.
+
+    Raises:
+        DamagedError: The text is not what was written.
+    """
+    try:
+        return msgspec.json.decode(text)
+    except ValueError as error:
+        raise _damaged() from error
+
+
+def look_through(kind: Any) -> None:
+    """Let msgspec find out what a type is made of, once and by one thread, before it is read.
+
+    It keeps what it found at the classes before that is whole: of two threads that are the first to
+    read a type, one would follow an empty pointer, and the process would end (msgspec 0.22).
+    """
+    with _LOOKING, suppress(msgspec.ValidationError):
+        msgspec.convert(None, kind)
+
+
+@contextmanager
+def as_written() -> Iterator[None]:
+    """For making values of stored JSON: what has another shape than we gave it is damage.
+
+    Raises:
+        DamagedError: A member is missing, or is something else.
+    """
+    try:
+        yield
+    except _MISSHAPEN as error:
+        raise _damaged() from error
+
+
+def pack(value: Json) -> bytes:
+    """A value as compressed canonical JSON."""
+    return zlib_ng.compress(canonical(value).encode())
+
+
+def unpack(data: bytes) -> Json:
+    """The value of compressed JSON.
+
+    Raises:
+        DamagedError: The bytes are not what was written.
+    """
+    return parse(inflate(data))
+
+
+def inflate(data: bytes) -> bytes:
+    """What was compressed.
+
+    Raises:
+        DamagedError: The bytes are not what was written.
+    """
+    try:
+        return zlib.decompress(data)
+    except zlib.error as error:
+        raise _damaged() from error
+
+
+def _damaged() -> DamagedError:
+    return DamagedError("the database holds a record that is not what was written", hint=EXAMINE)
