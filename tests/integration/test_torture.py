@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import random
 import shutil
 import subprocess
@@ -16,6 +17,7 @@ from sqlalchemy import text
 from app.config import Settings
 from app.store.store import Store
 from tests.cluster import ADVICE, find_programs
+from tests.e2e.service import serving
 from tests.torture import (
     attacks,
     commands,
@@ -27,6 +29,8 @@ from tests.torture import (
     power,
     upgrades,
 )
+from tests.torture.background import Background, Busy
+from tests.torture.connection import Connection
 from tests.torture.counting import processor
 from tests.torture.crowd import Load
 from tests.torture.person import Work
@@ -303,6 +307,20 @@ class TestFlood:
         assert len(told) == 2 + len(hold)
         # A line of each has what each of the quiet parties waited.
         assert not [line for line in told if "nan" in line]
+
+    def test_long_work_comes_to_its_end_and_work_that_fails_is_seen(
+        self, home: Path, prepared: Path
+    ) -> None:
+        with serving(home) as address:
+            line = Connection(int(address.rpartition(":")[2]))
+            trees = prepared.parent / "tree", prepared.parent / "none"
+            work, failing = (Background(line, home, Busy("client1", tree)) for tree in trees)
+
+            async def all_of_it() -> list[int]:
+                long = (work.solve, work.export, work.import_, failing.import_)
+                return [(await once(0))[0] for once in long]
+
+            assert asyncio.run(all_of_it()) == [202, 202, 200, 500]
 
     def test_a_refusal_that_does_not_say_when_to_come_back_is_seen(self) -> None:
         async def refused(_number: int) -> tuple[int, dict[str, str]]:

@@ -202,9 +202,9 @@ def _flood(folder: Path, asked: argparse.Namespace) -> list[str]:
     home = folder / "flood"
     kills.prepare(home, folder / "flood-files", clients=1, groups=12)
     planted = Path(shutil.copytree(home, folder / "flood-planted"))
-    tree = background.prepare(home, folder)
+    busy = background.prepare(home, folder)
     print("Quiet people, alone and beside somebody who asks for too much, or has long work done")
-    faults = flood.flood(home, tree=tree, tell=print)
+    faults = flood.flood(home, busy=busy, tell=print)
     # Where nobody is refused, the flood must say so, else what it says shows nothing.
     seen = flood.flood(planted, times=None, only=("uploads",), plant=flood.UNBOUNDED)
     return faults if seen else [*faults, "flood: the planted fault was not seen"]

@@ -16,8 +16,8 @@ import httpx
 from app.api.security.lanes import UPLOADS
 from app.review.editing.point_limits import VIEW_POINTS
 from app.soccer.pitch import MARKINGS
-from tests.torture.background import Background
-from tests.torture.connection import API, Answer, read_answer, write_head
+from tests.torture.background import Background, Busy
+from tests.torture.connection import API, Connection, read_answer, write_head
 from tests.torture.kills import Server
 from tests.torture.people import LEAD, log_in
 from tests.torture.quiet import Place
@@ -92,13 +92,14 @@ class Target:
         server: It runs.
         scale: How much is asked.
         home: What it serves.
-        tree: Where ``background.prepare`` has had its dataset from; None: it was not called.
+        busy: What there is long work on; None: there is no such work.
     """
 
-    def __init__(self, server: Server, scale: Scale, home: Path, tree: Path | None = None):
+    def __init__(self, server: Server, scale: Scale, home: Path, busy: Busy | None = None):
         self.scale, self._headers = scale, _logged_in(server, LEAD)
-        self._background = None if tree is None else Background(self._answered, home, tree)
         self.port = port = server.port
+        line = Connection(port, self._headers)
+        self._background = None if busy is None else Background(line, home, busy)
         with httpx.Client(base_url=server.address, headers=self._headers, timeout=60) as http:
             ids = http.get(f"{API}/groups/ids", params={"dataset": "client0"}).json()["ids"]
             *others, own = ids
@@ -214,15 +215,9 @@ class Target:
     async def _ask(
         self, method: str, path: str, body: bytes | None = None, extra: dict[str, str] | None = None
     ) -> tuple[int, dict[str, str]]:
-        answer = await self._answered(method, path, body, extra)
-        return answer.status, answer.headers
-
-    async def _answered(
-        self, method: str, path: str, body: bytes | None = None, extra: dict[str, str] | None = None
-    ) -> Answer:
         async with self._connected() as (reader, writer):
             writer.write(write_head(method, path, body, self._own(extra)) + (body or b""))
-            return await read_answer(reader)
+            return await _answer(reader)
 
     def _own(self, extra: dict[str, str] | None = None) -> dict[str, str]:
         return {"Host": f"127.0.0.1:{self.port}", **self._headers, **(extra or {})}

@@ -11,17 +11,15 @@ import itertools
 import json
 import os
 import sys
-from collections.abc import Awaitable, Callable
-from contextlib import suppress
+from contextlib import closing, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from tests.e2e.service import ROOT, SERVE, run_touchline
-from tests.torture.connection import API, Answer
+from tests.torture.connection import API, Answer, Connection
 from tests.waiting import SECONDS
 
-DATASET = "busy"
 FORMAT = "soccernet-v3d"
 GROUPS = 300
 """So many that each is at work for some seconds."""
@@ -30,60 +28,64 @@ LOOK = 0.25
 SCALES = (2.0, 2.5)
 """Pixels of ``calibration.robust_scale_px``, one after the other: all cameras are sought anew."""
 
-Ask = Callable[..., Awaitable[Answer]]
+
+@dataclass(frozen=True)
+class Busy:
+    """A dataset that somebody works on, and the folder that it came from."""
+
+    dataset: str
+    tree: Path
 
 
-def prepare(home: Path, folder: Path, groups: int = GROUPS) -> Path:
-    """Give a home the dataset, solved; the folder that it came from."""
-    tree = folder / DATASET
+def prepare(home: Path, folder: Path) -> Busy:
+    """Give a home one that takes long, solved."""
+    busy = Busy("busy", folder / "busy")
     run_touchline(
         home,
-        f"sample --workers 2 --groups {groups} --seed 7 --labels-only {tree}",
-        f"import soccernet-v3 {tree} --dataset {DATASET}",
-        f"solve --dataset {DATASET} --workers 2",
+        f"sample --workers 2 --groups {GROUPS} --seed 7 --labels-only {busy.tree}",
+        f"import soccernet-v3 {busy.tree} --dataset {busy.dataset}",
+        f"solve --dataset {busy.dataset} --workers 2",
         seconds=600,
     )
-    return tree
+    return busy
 
 
-@dataclass
 class Background:
     """Long work on a server.
 
     Args:
-        ask: Asks the server: method, path, body, further headers.
+        line: To the server, as somebody who may have it done.
         home: What it serves.
-        tree: What the command line imports.
+        busy: What is worked on.
     """
 
-    ask: Ask
-    home: Path
-    tree: Path
-
-    def __post_init__(self) -> None:
+    def __init__(self, line: Connection, home: Path, busy: Busy):
+        self._line, self._home, self._busy = line, home, busy
         self._turn = itertools.count()
 
     async def solve(self, _number: int) -> tuple[int, dict[str, str]]:
         """Every camera of the dataset is sought anew."""
-        path = f"{API}/datasets/{DATASET}/policy"
-        etag = (await self.ask("GET", path)).headers["etag"]
+        path = f"{API}/datasets/{self._busy.dataset}/policy"
         scale = SCALES[next(self._turn) % len(SCALES)]
         wanted = {"name": "busy", "values": {"calibration": {"robust_scale_px": scale}}}
-        return await self._done(await self.ask("PUT", path, _json(wanted), {"If-Match": etag}))
+        with closing(self._line):
+            etag = (await self._line.ask("GET", path)).headers["etag"]
+            return await self._done(await self._line.ask("PUT", path, _json(wanted), etag))
 
     async def export(self, _number: int) -> tuple[int, dict[str, str]]:
         """All of it is written to a zip."""
-        wanted = {"dataset": DATASET, "format": FORMAT, "all": True}
-        return await self._done(await self.ask("POST", f"{API}/exports", _json(wanted)))
+        wanted = {"dataset": self._busy.dataset, "format": FORMAT, "all": True}
+        with closing(self._line):
+            return await self._done(await self._line.ask("POST", f"{API}/exports", _json(wanted)))
 
     async def import_(self, _number: int) -> tuple[int, dict[str, str]]:
         """The command line brings the same groups into the home again, as another dataset."""
         name = f"import{next(self._turn)}"
-        words = ("import", "soccernet-v3", str(self.tree), "--dataset", name)
+        words = ("import", "soccernet-v3", str(self._busy.tree), "--dataset", name)
         command = await asyncio.create_subprocess_exec(
             *(sys.executable, "-c", SERVE, *words),
             cwd=ROOT,
-            env={**os.environ, "TOUCHLINE_HOME": str(self.home)},
+            env={**os.environ, "TOUCHLINE_HOME": str(self._home)},
             stdout=asyncio.subprocess.DEVNULL,
             stderr=asyncio.subprocess.DEVNULL,
         )
@@ -101,7 +103,7 @@ class Background:
             return asked.status, asked.headers
         place, state = asked.headers["location"], "waiting"
         for _ in range(int(SECONDS / LOOK)):
-            state = json.loads((await self.ask("GET", place)).body)["state"]
+            state = json.loads((await self._line.ask("GET", place)).body)["state"]
             if state not in ("waiting", "running"):
                 break
             await asyncio.sleep(LOOK)

@@ -25,6 +25,7 @@ import numpy as np
 
 from tests.e2e.service import ROOT
 from tests.torture.attacks import CLOSED, FULL, PERSON, Attack, Scale, Target
+from tests.torture.background import Busy
 from tests.torture.counting import family
 from tests.torture.kills import Server
 from tests.torture.people import invite_all
@@ -78,7 +79,7 @@ def flood(
     *,
     times: float | None = MOST_TIMES,
     only: tuple[str, ...] = (),
-    tree: Path | None = None,
+    busy: Busy | None = None,
     plant: str = "",
     tell: Callable[[str], None] = lambda _sentence: None,
 ) -> list[str]:
@@ -89,7 +90,7 @@ def flood(
         scale: How much of each.
         times: How much slower a quiet party may become; None: that is not judged.
         only: Names of attacks; none: all.
-        tree: What ``background.prepare`` gave the home; None: there is no long work in it.
+        busy: A dataset of the home with long work on it; None: there is no such work.
         plant: Python that the server runs first, to plant a fault.
         tell: Called with each line of figures.
     """
@@ -99,7 +100,7 @@ def flood(
     server.start()
     try:
         server.wait()
-        target = Target(server, scale, home, tree)
+        target = Target(server, scale, home, busy)
         quiet = _watched(server, target, "nobody", lambda: None)
         tell(HEAD)
         tell(quiet.line())
