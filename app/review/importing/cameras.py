@@ -19,7 +19,7 @@ from app.store.stations import groups_of_station, read_stations, save_station
 from app.store.store import Store
 from app.store.views import dataset_views
 
-BATCH = 500
+BATCH = 50
 """Cameras a transaction."""
 
 

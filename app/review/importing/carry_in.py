@@ -44,7 +44,7 @@ from app.store.session import Session
 from app.store.store import Store
 from app.store.stored_json import Json
 
-BATCH = 200
+BATCH = 20
 T = TypeVar("T")
 
 

@@ -39,7 +39,7 @@ from app.store.queue import refresh_queue
 from app.store.session import Session
 from app.store.store import Store
 
-BATCH = 200
+BATCH = 20
 """Groups a transaction: one import holds the writers up for a fraction of a second at a time."""
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from functools import partial
+from time import monotonic, sleep
 from typing import Any
 
 import pysqlite3.dbapi2
@@ -18,12 +19,20 @@ from app.store.dialect.dialect import GLANCE, Failure
 from app.store.dialect.sharing import Alone
 from app.store.session import Session
 
+BUSY_SECONDS = 5.0
+"""So long a connection waits for what another process writes."""
+AGAIN_S = 0.002
+"""Between two looks whether a write may begin. SQLite itself looks again after up to 100 ms, and who writes
+one transaction after the other, as an import does, leaves gaps that are shorter."""
+_BUSY_MS = int(1000 * BUSY_SECONDS)
+_WAIT, _WAIT_NOT = f"PRAGMA busy_timeout={_BUSY_MS}", "PRAGMA busy_timeout=0"
+
 PRAGMAS: dict[str, tuple[str, object]] = {
     "journal_mode": ("WAL", "wal"),
     # With NORMAL a power cut loses acknowledged edits.
     "synchronous": ("FULL", 2),
     "foreign_keys": ("ON", 1),
-    "busy_timeout": ("5000", 5000),
+    "busy_timeout": (str(_BUSY_MS), _BUSY_MS),
     "trusted_schema": ("OFF", 0),
 }
 """What each connection sets, and what SQLite must answer when asked."""
@@ -156,7 +165,7 @@ def _make_engine(settings: Settings, lasting: bool, **pool: int) -> Engine:
 
 
 def _wait_for_nobody(connection: Any, _record: object) -> None:
-    connection.execute("PRAGMA busy_timeout=0")
+    connection.execute(_WAIT_NOT)
 
 
 def _set_pragmas(lasting: bool, connection: Any, _record: object) -> None:
@@ -164,7 +173,7 @@ def _set_pragmas(lasting: bool, connection: Any, _record: object) -> None:
     connection.isolation_level = None
     cursor = connection.cursor()
     # First, so that the switch to WAL waits for another process doing the same.
-    cursor.execute("PRAGMA busy_timeout=5000")
+    cursor.execute(_WAIT)
     for name, (value, _answer) in PRAGMAS.items():
         cursor.execute(f"PRAGMA {name}={value}")
     if not lasting:
@@ -175,10 +184,28 @@ def _set_pragmas(lasting: bool, connection: Any, _record: object) -> None:
 def _begin(connection: Connection) -> None:
     if connection.get_execution_options().get("touchline_glance", False):
         return
-    write = _writes(connection)
-    connection.exec_driver_sql("BEGIN IMMEDIATE" if write else "BEGIN")
-    if write:
-        connection.info[_BEFORE] = _driver(connection).total_changes
+    if not _writes(connection):
+        connection.exec_driver_sql("BEGIN")
+        return
+    driver, until = _driver(connection), monotonic() + BUSY_SECONDS
+    driver.execute(_WAIT_NOT)
+    try:
+        while not _begun(connection, last=monotonic() >= until):
+            sleep(AGAIN_S)
+    finally:
+        driver.execute(_WAIT)
+    connection.info[_BEFORE] = driver.total_changes
+
+
+def _begun(connection: Connection, *, last: bool) -> bool:
+    """Whether a write could begin; the last time that it could not is an error."""
+    try:
+        connection.exec_driver_sql("BEGIN IMMEDIATE")
+    except OperationalError as error:
+        if last or DIALECT.failure(error)[0] is not Failure.BUSY:
+            raise
+        return False
+    return True
 
 
 def _count(connection: Connection) -> None:

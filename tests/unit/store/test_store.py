@@ -17,7 +17,7 @@ from app.config import Settings
 from app.errors import BusyError, DamagedError, InputError, StorageError
 from app.place import hold_place
 from app.store.anchor import read_anchor
-from app.store.dialect.sqlite import PRAGMAS
+from app.store.dialect.sqlite import AGAIN_S, PRAGMAS
 from app.store.log import Entry, append, read_log
 from app.store.migrate import KNOWN_REVISIONS, migrate, migrations_folder
 from app.store.store import Store
@@ -164,6 +164,41 @@ class TestWrite:
             other.execute("BEGIN IMMEDIATE")
         other.execute("BEGIN IMMEDIATE")
         other.close()
+
+    @pytest.mark.file_of_sqlite("BEGIN IMMEDIATE; PostgreSQL wakes who waits")
+    def test_finds_a_short_gap_between_the_writes_of_another_process(
+        self, store: Store, settings: Settings, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        """SQLite's own waiting would look again ever more seldom, and leave nobody to say so."""
+        other = sqlite.connect(str(settings.home / "touchline.db"), isolation_level=None)
+        other.execute("BEGIN IMMEDIATE")
+        looks: list[float] = []
+
+        def look_again(seconds: float) -> None:
+            looks.append(seconds)
+            if len(looks) == 40:
+                other.execute("ROLLBACK")
+
+        monkeypatch.setattr("app.store.dialect.sqlite.sleep", look_again)
+        add(store, "in the gap")
+        other.close()
+        assert (names(store), set(looks), len(looks)) == (["in the gap"], {AGAIN_S}, 40)
+
+    @pytest.mark.file_of_sqlite("BEGIN IMMEDIATE; the lock of PostgreSQL has a test of its own")
+    def test_gives_up_where_another_process_writes_all_the_while(
+        self, store: Store, settings: Settings, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr("app.store.dialect.sqlite.BUSY_SECONDS", 0.05)
+        other = sqlite.connect(str(settings.home / "touchline.db"), isolation_level=None)
+        other.execute("BEGIN IMMEDIATE")
+        with pytest.raises(StorageError, match="another process is writing"):
+            add(store, "refused")
+        other.execute("ROLLBACK")
+        other.close()
+        add(store, "afterwards")
+        assert names(store) == ["afterwards"]
+        with store.read() as session:
+            assert session.execute(text("PRAGMA busy_timeout")).scalar() == 5000
 
     def test_who_waits_for_the_disk_gives_their_place_back_before(self, store: Store) -> None:
         left: list[list[str]] = []
