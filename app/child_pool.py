@@ -95,6 +95,11 @@ class ChildPool:
             self._free.put(child)
 
     @property
+    def tasks(self) -> int:
+        """How many run or wait."""
+        return len(self._tasks)
+
+    @property
     def is_whole(self) -> bool:
         """Whether each child has its process."""
         return all(child.is_alive for child in self._children)

@@ -179,7 +179,7 @@ def create_app(settings: Settings, *, static: Path = STATIC, pool: Pool = nullco
 
 def _add_middleware(app: FastAPI, settings: Settings, site: Site, team: Team | None) -> None:
     """The first one added is the innermost."""
-    doors = Doors(app.state.services.store.sharing.is_shared)
+    doors = Doors(app.state.services.store.sharing.is_shared, settings.solves_apart)
     app.add_middleware(Lanes, doors=doors)
     # Outside of the lanes: a repetition that waits for the first answer takes nobody's place.
     app.add_middleware(Idempotency, actor=LOCAL_USER)

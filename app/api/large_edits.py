@@ -13,7 +13,7 @@ from collections.abc import Callable, Mapping
 from concurrent.futures import CancelledError
 from typing import TypeVar
 
-from app.api.warm_child import WarmChild
+from app.api.warm_child import WarmChild, least_busy
 from app.child import Allowance, ChildEnded
 from app.config import Settings
 from app.errors import OverloadedError
@@ -37,9 +37,8 @@ class LargeEdits:
     """
 
     def __init__(self, settings: Settings):
-        self.child = (
-            WarmChild("large", ALLOWANCE, _ended, make_ready) if settings.solves_apart else None
-        )
+        apart = settings.solves_apart
+        self.children = [WarmChild("large", ALLOWANCE, _ended, make_ready)] if apart else []
 
     def run(
         self,
@@ -53,9 +52,10 @@ class LargeEdits:
         Raises:
             OverloadedError: The process ended.
         """
-        if self.child is None or not self.child.begin():
+        child = least_busy(self.children)
+        if child is None:
             return work(group, policy, known)
-        task = self.child.submit(work, group, policy, known)
+        task = child.submit(work, group, policy, known)
         try:
             found: Solved = task.future.result()
         except CancelledError as error:
@@ -66,8 +66,8 @@ class LargeEdits:
 
     def close(self) -> None:
         """End the process."""
-        if self.child is not None:
-            self.child.close()
+        for child in self.children:
+            child.close()
 
 
 def make_ready() -> None:

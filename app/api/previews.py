@@ -1,8 +1,8 @@
 """Previews: what a drag asks ten times a second, solved where it keeps nobody else waiting.
 
 Among many people drags are most of what a server computes, and one interpreter computes one thing
-at a time. A server of a team has a process for them (decision 0056); the first drag starts it, and
-until it is ready they are solved here, as on a server that somebody runs alone.
+at a time. A server of a team has two processes for them (decisions 0056, 0065); the first drag starts them,
+and until one is ready they are solved here, as on a server that somebody runs alone.
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ from app.api.large_edits import LargeEdits
 from app.api.pool_answer import while_wanted
 from app.api.schemas.preview import PreviewDocument, PreviewRequest
 from app.api.schemas.solution import SolutionDocument
-from app.api.security.lanes import is_large
-from app.api.warm_child import WarmChild
+from app.api.security.lanes import PREVIEWS, is_large
+from app.api.warm_child import WarmChild, least_busy
 from app.child import Allowance, ChildEnded
 from app.config import Settings
 from app.errors import OverloadedError
@@ -43,18 +43,19 @@ class Previews:
     """Solves what-ifs of single groups; nothing is saved.
 
     Args:
-        settings: Whether there is a process for them.
+        settings: Whether there are processes for them.
         store: Has the groups.
-        paint: Reads the paint of edited lines again, which the process cannot.
-        large: Solves large ones, for the process does one at a time.
+        paint: Reads the paint of edited lines again, which no process for them can.
+        large: Solves large ones, for one of them would keep drags waiting.
     """
 
     def __init__(self, settings: Settings, store: Store, paint: PaintFollower, large: LargeEdits):
         self._settings, self._store, self._paint, self._large = settings, store, paint, large
-        made = settings.solves_apart
-        self.child = (
-            WarmChild("previews", ALLOWANCE, _ended, make_ready, settings) if made else None
-        )
+        places = PREVIEWS.apart if settings.solves_apart else None
+        self.children = [
+            WarmChild("previews", ALLOWANCE, _ended, make_ready, settings)
+            for _ in range(places or 0)
+        ]
 
     async def answer(self, request: Request, group_id: int, changes: PreviewRequest) -> bytes:
         """The document of a what-if; empty where nobody waits for it any more.
@@ -65,24 +66,23 @@ class Previews:
             SharedStationError: See ``submit.preview``.
             OverloadedError: The process ended.
         """
-        if is_large(request.scope):
-            apart = partial(self._large.run, solve)
-            return await run_in_threadpool(
-                _solve, self._store, group_id, changes, self._paint, apart
-            )
-        if self.child is not None and self.child.begin():
-            task = self.child.submit(solve_apart, self._settings, group_id, changes)
+        large = is_large(request.scope)
+        child = least_busy(self._large.children if large else self.children)
+        if child is not None:
+            task = child.submit(solve_apart, self._settings, group_id, changes)
             found: bytes | None = await while_wanted(request, task)
             if found is not None:
                 return found
             if await request.is_disconnected():
                 return b""
-        return await run_in_threadpool(_solve, self._store, group_id, changes, self._paint)
+        # It reads pictures, or there is no process: the solving alone may be done elsewhere.
+        solver: Solver = partial(self._large.run, solve) if large else solve
+        return await run_in_threadpool(_solve, self._store, group_id, changes, self._paint, solver)
 
     def close(self) -> None:
-        """End the process."""
-        if self.child is not None:
-            self.child.close()
+        """End the processes."""
+        for child in self.children:
+            child.close()
 
 
 def make_ready(settings: Settings) -> None:

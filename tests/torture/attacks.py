@@ -34,6 +34,8 @@ class Scale:
     """How much of each; the defaults are those of ``make torture``."""
 
     seconds: float = 12.0
+    warm_up: float = 8.0
+    """Seconds of the quiet parties before anything is measured."""
     bodies: int = 200
     sockets: int = 1100
     streams: int = 200
@@ -46,7 +48,7 @@ class Scale:
 
 
 FULL = Scale()
-SHORT = Scale(0.4, bodies=40, sockets=100, streams=110, uploads=60, others=12)
+SHORT = Scale(0.4, 0.0, bodies=40, sockets=100, streams=110, uploads=60, others=12)
 
 
 @dataclass(frozen=True)
@@ -140,10 +142,10 @@ class Target:
         if work is None:
             return []
         return [
-            # Each of its processes has a solver of its own.
-            Attack("solving", 1, work.solve, done, growth=1200.0),
             Attack("exporting", 1, work.export, done),
             Attack("importing", 1, work.import_, done),
+            # The last one, for it goes on when nobody waits; each of its processes has a solver of its own.
+            Attack("solving", 1, work.solve, done, growth=1200.0),
         ]
 
     async def _slow_body(self, _number: int) -> tuple[int, dict[str, str]]:

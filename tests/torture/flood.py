@@ -101,6 +101,9 @@ def flood(
     try:
         server.wait()
         target = Target(server, scale, home, busy)
+        # The first drags start the processes that solve them.
+        with _quiet(target):
+            threading.Event().wait(scale.warm_up)
         quiet = _watched(server, target, "nobody", lambda: None)
         tell(HEAD)
         tell(quiet.line())

@@ -50,6 +50,8 @@ class Lane:
         queue: How many more may wait for their turn.
         served: How many are at work where a server of databases is waited for at each statement; None:
             as many as elsewhere.
+        apart: How many are at work where each has a process that does it; None: as many as elsewhere.
+        each: How many of them one person may have at work; None: all.
         pause: Seconds until who cannot even wait is told so. A refusal costs the event loop about as
             much as any answer, and who has hundreds of them at once asks again at once.
     """
@@ -58,6 +60,8 @@ class Lane:
     width: int
     queue: int
     served: int | None = None
+    apart: int | None = None
+    each: int | None = None
     pause: float = 0.0
 
 
@@ -72,8 +76,9 @@ EDITS = Lane("edits", 1, 100, served=3)
 waits for the disk or a picture has left already (``app.place``)."""
 CHANGES = Lane("changes", 3, 100)
 """All others; they may take their time."""
-PREVIEWS = Lane("previews", 1, 100)
-"""What a drag asks: some milliseconds of solving."""
+PREVIEWS = Lane("previews", 1, 100, apart=2, each=1)
+"""What a drag asks: some milliseconds of solving, dozens where lines are dragged. A person drags one thing at
+a time."""
 LARGE = Lane("large", 1, 50)
 """Edits and previews of hundreds of points, each of which is solved for as long as dozens of others."""
 QUESTIONS = Lane("questions", 2, 100)
@@ -109,7 +114,7 @@ LARGE_BYTES = 8 * 1024
 """A body beyond these draws hundreds of points."""
 AWAY = 8
 """So many of a lane may have left it before they were done."""
-THREADS = sum(max(lane.width, lane.served or 0) for lane in LANES) + 2 * AWAY + 6
+THREADS = sum(max(lane.width, lane.served or 0, lane.apart or 0) for lane in LANES) + 2 * AWAY + 6
 """A thread for each request at work, for as many edits and changes as may have left, and some for files
 of the browser application."""
 
@@ -166,12 +171,14 @@ class Door:
     Args:
         lane: The lane.
         served: Whether a server of databases answers.
+        apart: Whether there are processes for what takes long.
     """
 
-    def __init__(self, lane: Lane, served: bool = False):
+    def __init__(self, lane: Lane, served: bool = False, apart: bool = False):
         self.lane = lane
         self.refused = self.away = 0
-        self._turns = Turns(lane.served if served and lane.served else lane.width, lane.queue)
+        width = (served and lane.served) or (apart and lane.apart) or lane.width
+        self._turns = Turns(width, lane.queue, lane.each)
 
     @property
     def busy(self) -> int:
@@ -189,7 +196,7 @@ class Door:
         Args:
             who: The person whose request it is; those of nobody wait together.
         """
-        if self._turns.take():
+        if self._turns.take(who):
             return True
         if not self._turns.has_room(who):
             self.refused += 1
@@ -200,16 +207,16 @@ class Door:
         self.refused += 1
         return False
 
-    def leave(self) -> None:
-        """Let the next one in."""
-        self._turns.give()
+    def leave(self, who: str = "") -> None:
+        """Let the next one in; ``who``: as on entering."""
+        self._turns.give(who)
 
 
 class Doors:
-    """The doors of all lanes of one server; ``served``: see ``Door``."""
+    """The doors of all lanes of one server; ``served``, ``apart``: see ``Door``."""
 
-    def __init__(self, served: bool = False) -> None:
-        self.all = tuple(Door(lane, served) for lane in LANES)
+    def __init__(self, served: bool = False, apart: bool = False) -> None:
+        self.all = tuple(Door(lane, served, apart) for lane in LANES)
         self._of = {door.lane: door for door in self.all}
 
     def of(self, scope: Scope) -> Door | None:
@@ -238,10 +245,11 @@ class Lanes:
             await self.app(scope, receive, send)
             return
         login = login_of(scope)
-        if not await door.enter("" if login is None else login.name):
+        who = "" if login is None else login.name
+        if not await door.enter(who):
             await _refusal(scope, door.lane)(scope, receive, send)
             return
-        place = _Place(door)
+        place = _Place(door, who)
         hold_place(place.leave_from_anywhere)
 
         async def watch(message: Message) -> None:
@@ -270,8 +278,8 @@ def _refusal(scope: Scope, lane: Lane) -> Response:
 class _Place:
     """One request's place in its lane; it is given back once."""
 
-    def __init__(self, door: Door):
-        self._door, self._has, self._is_over = door, True, False
+    def __init__(self, door: Door, who: str):
+        self._door, self._who, self._has, self._is_over = door, who, True, False
         self._loop = asyncio.get_running_loop()
 
     def leave_from_anywhere(self) -> None:
@@ -284,7 +292,7 @@ class _Place:
         if self._has and self._door.away < AWAY:
             self._door.away += 1
             self._has = False
-            self._door.leave()
+            self._door.leave(self._who)
 
     def end(self) -> None:
         """The work is done."""
@@ -293,6 +301,6 @@ class _Place:
         self._is_over = True
         if self._has:
             self._has = False
-            self._door.leave()
+            self._door.leave(self._who)
         else:
             self._door.away -= 1

@@ -6,7 +6,7 @@ Whoever sends a hundred requests at once waits for them himself; others wait for
 from __future__ import annotations
 
 import asyncio
-from collections import deque
+from collections import Counter, deque
 
 
 class Turns:
@@ -15,20 +15,23 @@ class Turns:
     Args:
         width: How many there are.
         queue: How many requests may wait for one.
+        each: How many one person may have at a time; None: all.
     """
 
-    def __init__(self, width: int, queue: int):
+    def __init__(self, width: int, queue: int, each: int | None = None):
         self.width, self.free, self.waiting = width, width, 0
-        self._queue = queue
+        self._queue, self._each = queue, width if each is None else each
+        self._at_work = Counter[str]()
         self._of: dict[str, deque[asyncio.Future[bool]]] = {}
         """Those who wait, with their requests: whose turn is next comes first."""
 
-    def take(self) -> bool:
-        """Take a place where one is free."""
-        if self.free:
-            self.free -= 1
-            return True
-        return False
+    def take(self, who: str) -> bool:
+        """Take a place where one is free for somebody."""
+        if not self._may(who):
+            return False
+        self.free -= 1
+        self._at_work[who] += 1
+        return True
 
     def has_room(self, who: str) -> bool:
         """Whether somebody may wait. Where all may not, somebody with few requests displaces the
@@ -51,24 +54,31 @@ class Turns:
             await asyncio.wait((mine,), timeout=seconds)
         except asyncio.CancelledError:
             if mine.done() and mine.result():
-                self.give()
+                self.give(who)
             raise
         finally:
             if not mine.done():
                 self._forget(who, mine)
         return mine.done() and mine.result()
 
-    def give(self) -> None:
-        """Give a place back, to whose turn it is."""
-        if not self._of:
-            self.free += 1
+    def give(self, who: str) -> None:
+        """Give somebody's place back, to whose turn it is."""
+        self.free += 1
+        self._at_work[who] -= 1
+        if not self._at_work[who]:
+            del self._at_work[who]
+        following = next(filter(self._may, self._of), None)
+        if following is None:
             return
-        who = next(iter(self._of))
-        waiting = self._of.pop(who)
+        waiting = self._of.pop(following)
+        self.take(following)
         waiting.popleft().set_result(True)
         self.waiting -= 1
         if waiting:
-            self._of[who] = waiting
+            self._of[following] = waiting
+
+    def _may(self, who: str) -> bool:
+        return self.free > 0 and self._at_work[who] < self._each
 
     def _forget(self, who: str, mine: asyncio.Future[bool]) -> None:
         self._of[who].remove(mine)

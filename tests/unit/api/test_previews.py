@@ -1,8 +1,10 @@
 import json
 import multiprocessing
 import os
+import signal
 import time
 from collections.abc import Iterator
+from contextlib import closing
 from dataclasses import replace
 from typing import Any
 
@@ -12,6 +14,7 @@ from fastapi import FastAPI
 from app.api.large_edits import LargeEdits
 from app.api.previews import Previews
 from app.api.security.lanes import LARGE_BYTES
+from app.config import Settings
 from app.errors import DamagedError
 from tests.waiting import SECONDS
 
@@ -22,6 +25,18 @@ def preview(api, view: str = "7.png", group: int = 1) -> Any:
     """The answer to a ball that is dragged a little."""
     ball = {"box": [801.5, 322.0, 14.0, 14.5]}
     return api.post(f"{API}/groups/{group}/preview", json={"views": {view: {"ball": ball}}})
+
+
+def large_preview(api) -> Any:
+    """The answer to more points than a person draws."""
+    group = api.get(f"{API}/groups/1").json()
+    points = [{"x": 5.0 + number / 7, "y": 40.0 + number / 3} for number in range(90)]
+    lines = dict.fromkeys(
+        ("Middle line", "Side line top", "Circle central", "Big rect. left main"), points
+    )
+    body = {"views": {group["views"][0]["key"]: {"lines": lines}}}
+    assert len(json.dumps(body)) > LARGE_BYTES
+    return api.post(f"{API}/groups/1/preview", json=body)
 
 
 def alike(answer: Any) -> Any:
@@ -39,25 +54,35 @@ def see_damage(*_: object) -> None:
 
 
 @pytest.fixture
-def apart(app: FastAPI) -> Iterator[Previews]:
-    """What a server of a team has."""
-    services = app.state.services
-    settings = services.settings.model_copy(update={"team": True})
-    made = Previews(settings, services.store, services.paint, LargeEdits(settings))
-    app.state.services = replace(services, previews=made)
-    yield made
-    made.close()
+def large(app: FastAPI) -> Iterator[LargeEdits]:
+    """What solves large ones on a server of a team."""
+    with closing(LargeEdits(settings_of_team(app))) as made:
+        yield made
 
 
 @pytest.fixture
-def ready(apart: Previews, api) -> Previews:
-    """It, once its process answers."""
+def apart(app: FastAPI, large: LargeEdits) -> Iterator[Previews]:
+    """What a server of a team has."""
+    services = app.state.services
+    with closing(Previews(settings_of_team(app), services.store, services.paint, large)) as made:
+        app.state.services = replace(services, previews=made)
+        yield made
+
+
+@pytest.fixture
+def ready(apart: Previews, large: LargeEdits, api) -> Previews:
+    """It, once all its processes answer."""
     assert preview(api).status_code == 200
     end = time.monotonic() + SECONDS
-    while not apart.child.begin():
-        assert time.monotonic() < end, "there is no process for previews"
+    while not all(child.begin() for child in (*apart.children, *large.children)):
+        assert time.monotonic() < end, "there are no processes for previews"
         time.sleep(0.02)
     return apart
+
+
+def settings_of_team(app: FastAPI) -> Settings:
+    settings: Settings = app.state.services.settings
+    return settings.model_copy(update={"team": True})
 
 
 class TestAlone:
@@ -65,18 +90,19 @@ class TestAlone:
         before = multiprocessing.active_children()
         assert preview(api).status_code == 200
         assert multiprocessing.active_children() == before
-        assert app.state.services.previews.child is None
+        assert app.state.services.previews.children == []
 
 
 class TestApart:
     def test_who_begins_is_answered_before_the_process_is_there(self, apart, api) -> None:
         answer = preview(api)
-        assert (answer.status_code, apart.child.is_ready) == (200, False)
+        assert (answer.status_code, apart.children[0].is_ready) == (200, False)
 
     def test_the_process_answers_as_the_server_does(self, app, ready, api, monkeypatch) -> None:
         asked = ({}, {"group": 99}, {"view": "no such view"})
         apart = [alike(preview(api, **one)) for one in asked]
-        monkeypatch.setattr(ready.child, "is_ready", False)
+        for child in ready.children:
+            monkeypatch.setattr(child, "is_ready", False)
         assert apart == [alike(preview(api, **one)) for one in asked]
         assert [status for status, *_ in apart] == [200, 404, 400]
 
@@ -90,19 +116,37 @@ class TestApart:
         ).raise_for_status()
         assert preview(api).json()["solution"]["pairs"] != before["pairs"]
 
-    def test_a_large_one_is_solved_elsewhere_so_that_drags_need_not_wait_for_it(
-        self, ready, api, monkeypatch
+    def test_two_people_drag_at_once(self, ready, api) -> None:
+        """Each with a process; the one that has less to do is asked."""
+        first, second = ready.children
+        task = first.submit(signal.pause)
+        assert preview(api).status_code == 200
+        assert (first.tasks, second.tasks) == (1, 0)
+        first.close()
+        assert task.future.done()
+
+    def test_large_ones_and_drags_keep_each_other_waiting_in_neither_way(
+        self, ready, large, api
     ) -> None:
-        monkeypatch.setattr("app.api.previews.solve_apart", see_damage)
-        group = api.get(f"{API}/groups/1").json()
-        points = [{"x": 5.0 + number / 7, "y": 40.0 + number / 3} for number in range(90)]
-        lines = dict.fromkeys(
-            ("Middle line", "Side line top", "Circle central", "Big rect. left main"), points
-        )
-        body = {"views": {group["views"][0]["key"]: {"lines": lines}}}
-        assert len(json.dumps(body)) > LARGE_BYTES
-        assert api.post(f"{API}/groups/1/preview", json=body).status_code == 200
-        assert preview(api).status_code == 503
+        drags = [child.submit(signal.pause) for child in ready.children]
+        assert large_preview(api).status_code == 200
+        ready.close()
+        edit = large.children[0].submit(signal.pause)
+        assert preview(api).status_code == 200
+        large.close()
+        assert all(task.future.done() for task in (*drags, edit))
+
+    def test_a_large_one_is_made_by_the_process_of_large_edits(
+        self, ready, large, api, monkeypatch
+    ) -> None:
+        apart = large_preview(api)
+        with monkeypatch.context() as without:
+            without.setattr(large.children[0], "is_ready", False)
+            assert alike(apart) == alike(large_preview(api))
+        monkeypatch.setattr("app.api.previews.solve_apart", break_down)
+        answer = large_preview(api)
+        assert (apart.status_code, answer.status_code) == (200, 503)
+        assert answer.json()["detail"].startswith("solving this made the process crash")
 
     def test_damage_that_the_process_sees_stops_changes_here(
         self, app, ready, api, monkeypatch

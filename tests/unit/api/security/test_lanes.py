@@ -39,6 +39,7 @@ from app.api.security.lanes import (
 )
 from app.place import leave_place
 
+DRAG = f"{PREFIX}/groups/1/preview"
 EDIT = f"{PREFIX}/views/1/ball"
 
 
@@ -258,20 +259,30 @@ class TestLanes:
 
         run(test)
 
-    def test_more_edits_are_let_in_where_a_server_of_databases_is_waited_for(self) -> None:
-        edit = {"type": "http", "method": "PATCH", "path": EDIT, "headers": []}
-        here, there = (Doors(served).of(edit) for served in (False, True))
-        assert here is not None and there is not None
+    @pytest.mark.parametrize(
+        ("method", "path", "elsewhere", "people", "together"),
+        [
+            ("PATCH", EDIT, {"served": True}, ("ann", "ann", "ann", "ann"), EDITS.served),
+            # One person drags one thing at a time.
+            ("POST", DRAG, {"apart": True}, ("ann", "ann", "bob", "eve"), PREVIEWS.apart),
+        ],
+    )
+    def test_more_are_let_in_where_what_takes_long_is_not_done_here(
+        self, method: str, path: str, elsewhere: Any, people: tuple[str, ...], together: int
+    ) -> None:
+        scope = {"type": "http", "method": method, "path": path, "headers": []}
 
-        async def let_in(door: Door) -> int:
-            return sum([await waiting_for(door) for _ in range(5)])
+        async def let_in(door: Door | None) -> int:
+            assert door is not None
+            return sum([await is_let_in(door, who) for who in people])
 
-        async def waiting_for(door: Door) -> bool:
+        async def is_let_in(door: Door, who: str) -> bool:
             with anyio.move_on_after(0.01):
-                return await door.enter()
+                return await door.enter(who)
             return False
 
-        assert [asyncio.run(let_in(door)) for door in (here, there)] == [1, EDITS.served]
+        doors = Doors(), Doors(**elsewhere)
+        assert [asyncio.run(let_in(one.of(scope))) for one in doors] == [1, together]
 
     def test_zips_that_are_not_written_yet_leave_reads_alone(self) -> None:
         async def test(service: Service) -> None:
@@ -316,7 +327,7 @@ class TestLanes:
         monkeypatch.setattr(lanes, "PATIENCE", 0.01)
 
         async def test(service: Service) -> None:
-            for _ in range(PREVIEWS.width + 1):
+            for _ in "12":
                 service.ask("POST", "/groups/1/preview")
             while not service.statuses:
                 await asyncio.sleep(0.01)

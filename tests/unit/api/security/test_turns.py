@@ -12,18 +12,20 @@ from tests.waiting import SECONDS
 class Waiting:
     """Requests that wait for a place, and the order in which they had one."""
 
-    def __init__(self, width: int = 1, queue: int = 10):
-        self.turns = Turns(width, queue)
+    def __init__(self, width: int = 1, queue: int = 10, each: int | None = None):
+        self.turns = Turns(width, queue, each)
+        self.at_work: list[str] = []
         self.served: list[str] = []
         self.refused: list[str] = []
         self.tasks: list[asyncio.Task[None]] = []
 
     def ask(self, who: str, seconds: float = SECONDS) -> asyncio.Task[None]:
         async def run() -> None:
-            if self.turns.take() or (
+            if self.turns.take(who) or (
                 self.turns.has_room(who) and await self.turns.wait(who, seconds)
             ):
                 self.served.append(who)
+                self.at_work.append(who)
             else:
                 self.refused.append(who)
 
@@ -38,8 +40,12 @@ class Waiting:
     async def serve_all(self) -> None:
         await self.settle()
         while self.turns.waiting:
-            self.turns.give()
+            self.end()
             await self.settle()
+
+    def end(self) -> None:
+        """The request that has been at work longest has its answer."""
+        self.turns.give(self.at_work.pop(0))
 
 
 def run(test: Callable[[], Awaitable[None]]) -> None:
@@ -57,7 +63,7 @@ class TestTurns:
                 it.ask(who)
             await it.serve_all()
             assert it.served == ["ann", "ann", "bob", "eve", "ann", "bob", "ann"]
-            it.turns.give()
+            it.end()
             assert (it.turns.free, it.turns.waiting) == (1, 0)
 
         run(test)
@@ -97,7 +103,7 @@ class TestTurns:
             gone.cancel()
             await it.settle()
             assert (it.refused, it.turns.waiting) == (["bob"], 0)
-            it.turns.give()
+            it.end()
             assert it.turns.free == 1
 
         run(test)
@@ -109,11 +115,34 @@ class TestTurns:
             gone = it.ask("bob")
             it.ask("eve")
             await it.settle()
-            it.turns.give()
+            it.end()
             gone.cancel()
             await it.settle()
             assert it.served == ["ann", "eve"]
-            it.turns.give()
+            it.end()
             assert it.turns.free == 1
+
+        run(test)
+
+    def test_one_person_has_no_more_places_than_each_may_and_others_have_the_rest(self) -> None:
+        async def test() -> None:
+            it = Waiting(width=2, each=1)
+            for who in ("ann", "ann", "ann"):
+                it.ask(who)
+            await it.settle()
+            assert (it.served, it.turns.free) == (["ann"], 1)
+            for who in ("bob", "eve"):
+                it.ask(who)
+            await it.settle()
+            assert it.served == ["ann", "bob"]
+            it.end()
+            await it.settle()
+            # Ann waited before eve.
+            assert it.served == ["ann", "bob", "ann"]
+            await it.serve_all()
+            assert it.served == ["ann", "bob", "ann", "eve", "ann"]
+            while it.at_work:
+                it.end()
+            assert (it.turns.free, it.turns.waiting) == (2, 0)
 
         run(test)
