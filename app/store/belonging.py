@@ -48,6 +48,8 @@ def owner_of_job(session: Session, job_id: int) -> Any | None:
 
 def versions_like(session: Session, text: str) -> Sequence[Any]:
     """``id``, ``dataset_id``, ``name`` and ``hash`` of the versions that a text may name."""
+    if "\0" in text:
+        return []
     fits = [VersionModel.name == text, VersionModel.hash.startswith(text, autoescape=True)]
     if text.isascii() and text.isdigit() and len(text) < 19:
         fits.append(VersionModel.id == int(text))

@@ -43,6 +43,9 @@ def find_dataset(session: Session, dataset: str | int) -> Any | None:
         if int(dataset) > MAX_ID:
             return None
         statement = _ROWS.where(DatasetModel.id == int(dataset))
+    elif "\0" in dataset:
+        # PostgreSQL would refuse the question.
+        return None
     else:
         statement = _ROWS.where(DatasetModel.name == dataset)
     return session.execute(statement).one_or_none()

@@ -11,9 +11,10 @@ from app.api.deps import Actor, AppServices, Id, Sees
 from app.api.problem import responses
 from app.api.reply import AskedUnder, Reply, document
 from app.api.schemas.job import JobDocument, JobKind, JobPage, JobState
+from app.review.answers.keep import Kept
 from app.review.datasets.dataset import dataset_id
 from app.review.jobs.job_records import Job
-from app.review.people.deeds import record_deed
+from app.review.people.deeds import with_deed
 
 router = APIRouter(prefix="/jobs", tags=["jobs"])
 
@@ -59,15 +60,11 @@ def get_job(job: Id, services: AppServices) -> Job:
 )
 def cancel_job(job: Id, services: AppServices, actor: Actor, asked: AskedUnder) -> Response:
     """End a job: one that waits at once, one that runs at its next step; 409 when it is over."""
-    ended = services.jobs.cancel(job)
     reply = Reply[Job](asked, lambda found: document(JobDocument.model_validate(found)))
-    record_deed(
-        services.store,
-        actor,
-        "job cancelled",
-        ended.dataset_id,
-        keep=reply.keep(ended),
-        job=job,
-        title=ended.title,
-    )
+
+    def keep(ended: Job) -> Kept:
+        did, of = "job cancelled", ended.dataset_id
+        return with_deed(reply.keep(ended), actor, did, of, job=ended.id, title=ended.title)
+
+    ended = services.jobs.cancel(job, keep)
     return reply.of(ended)

@@ -8,6 +8,7 @@ from contextlib import suppress
 from typing import Any
 
 from app.errors import ConflictError, NotFoundError, StorageError
+from app.review.answers.keep import Keep, keep_nothing
 from app.review.jobs.job_run import JobRun
 from app.review.people.bell import RingKind, tell
 from app.soccer.actors import person_of
@@ -107,11 +108,13 @@ class JobRecords:
         if job is not None:
             self._announce(job)
 
-    def _save_end(self, job_id: int, **values: Any) -> None:
-        """Save how a job ended, and tell who asked for it, at once."""
+    def _save_end(self, job_id: int, keep: Keep[Job] = keep_nothing, **values: Any) -> None:
+        """Save how a job ended, and tell who asked for it, at once; ``keep``: see ``cancel``."""
         with self._store.write() as session:
             update_job(session, job_id, **values)
             job = read_job(session, job_id)
+            if job is not None:
+                keep(job)(session)
             if job is not None and job.state in _TOLD:
                 tell(
                     session,

@@ -178,8 +178,12 @@ class Jobs(JobRecords):
         self._announce(job)
         return job
 
-    def cancel(self, job_id: int) -> Job:
+    def cancel(self, job_id: int, keep: Keep[Job] = keep_nothing) -> Job:
         """End a job: one that waits at once, one that runs at its next step.
+
+        Args:
+            job_id: Which.
+            keep: Keeps the answer, or who did it, in the transaction that says so.
 
         Raises:
             NotFoundError: There is none of that id.
@@ -196,7 +200,12 @@ class Jobs(JobRecords):
             elif running is not None:
                 running.progress.cancelled.set()
         if run is not None:
-            self._finish(run, state=CANCELLED, sentence="Cancelled before it began.")
+            self._finish(run, keep, state=CANCELLED, sentence="Cancelled before it began.")
+        elif keep is not keep_nothing:
+            with self._store.write() as session:
+                job = need_job(session, job_id)
+                keep(job)(session)
+            return job
         return self.get(job_id)
 
     def belongs(self, job_id: int, dataset_id: int) -> None:
@@ -432,12 +441,12 @@ class Jobs(JobRecords):
             with suppress(StorageError):
                 self._save(run.id, begun=-1)
 
-    def _finish(self, run: JobRun, **values: Any) -> None:
+    def _finish(self, run: JobRun, keep: Keep[Job] = keep_nothing, **values: Any) -> None:
         place = run.columns
         # Where the disk is full for a moment, the record waits for it.
         for _ in range(5):
             try:
-                self._save_end(run.id, **{**place, "ended": now(), **values})
+                self._save_end(run.id, keep, **{**place, "ended": now(), **values})
             except StorageError as error:
                 log.warning("the record of a job could not be written", error=str(error))
                 self._closing.wait(1.0)

@@ -16,6 +16,7 @@ from typing import Any
 import structlog
 
 from app.errors import ConflictError, JobCancelled, ReviewError, StorageError
+from app.review.answers.keep import Keep, keep_nothing
 from app.review.jobs.job_records import need_job
 from app.review.jobs.job_run import JobProgress, JobRun, Work
 from app.review.jobs.jobs import CLOSE_SECONDS, KEPT, Jobs, Pool
@@ -119,13 +120,14 @@ class SharedJobs(Jobs):
         super().close(max(until - time.monotonic(), 0.0))
         self._store.sharing.give_back(CLAIM)
 
-    def cancel(self, job_id: int) -> Job:
+    def cancel(self, job_id: int, keep: Keep[Job] = keep_nothing) -> Job:
         """See ``Jobs``."""
         with self._store.write() as session:
             if need_job(session, job_id).state in (DONE, FAILED):
                 raise ConflictError(f"job {job_id} is over already")
             self._ask_to_end(session, [job_id])
             job = need_job(session, job_id)
+            keep(job)(session)
         self._announce(job)
         return job
 
@@ -283,8 +285,8 @@ class SharedJobs(Jobs):
             log.exception("the work of a job could not be made", job=job.id)
             sentence = "It could not be read what was asked for. Ask for it again."
             problem = {"detail": sentence, "hint": None, "pointer": None}
-            ended = {"state": FAILED, "ended": now(), "sentence": sentence, "problem": problem}
-            self._save_end(job.id, **ended)
+            ended: dict[str, Any] = {"state": FAILED, "ended": now(), "sentence": sentence}
+            self._save_end(job.id, **ended, problem=problem)
             return
         progress = SharedProgress(job.id, lost, self._store)
         run = JobRun(job.id, job.kind, job.dataset_id, job.actor, work, progress)
@@ -329,9 +331,9 @@ class SharedJobs(Jobs):
         self._announce(job)
         return True
 
-    def _finish(self, run: JobRun, **values: Any) -> None:
+    def _finish(self, run: JobRun, keep: Keep[Job] = keep_nothing, **values: Any) -> None:
         if self._alone or self.leads():
-            super()._finish(run, **values)
+            super()._finish(run, keep, **values)
         else:
             # Whoever carries out jobs now begins it again.
             run.over.set()

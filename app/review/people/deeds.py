@@ -38,6 +38,18 @@ def note_job(
     append(session, [Entry(JOB, actor, now(), body, dataset_id)])
 
 
+def with_deed(
+    keep: Kept, actor: str, did: str, dataset_id: int | None, **what: str | int | None
+) -> Kept:
+    """``keep``, which writes into the log, too, who did something; see ``note_deed``."""
+
+    def write(session: Session) -> None:
+        note_deed(session, actor, did, dataset_id, **what)
+        keep(session)
+
+    return write
+
+
 def record_deed(
     store: Store,
     actor: str,
@@ -47,10 +59,9 @@ def record_deed(
     keep: Kept = _NOTHING,
     **what: str | int | None,
 ) -> None:
-    """The same where what happens is in no transaction: a file that goes, a job that is stopped.
+    """The same where what happens is in no transaction: a file that goes.
 
     ``keep`` keeps the answer with the word.
     """
     with store.write() as session:
-        note_deed(session, actor, did, dataset_id, **what)
-        keep(session)
+        with_deed(keep, actor, did, dataset_id, **what)(session)

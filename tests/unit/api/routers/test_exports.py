@@ -19,7 +19,7 @@ from app.review.jobs.jobs import Jobs
 from app.soccer.frames import ImageSize
 from app.soccer.group import Group, Station, View
 from app.soccer.media import Media
-from app.store.frames import Picture
+from app.store.frames import SentPicture
 from tests.waiting import SECONDS
 
 API = "/api/v1/exports"
@@ -231,9 +231,9 @@ class TestRestart:
         ingest(services.store, "framed", [framed], source="test", actor="local")
         solve_dataset(services.store, "framed")
 
-        def reader(media: Media, *_: object) -> Picture:
+        def reader(media: Media, *_: object) -> SentPicture:
             read.append(media.path)
-            return Picture.of("image/png", b"a picture")
+            return SentPicture.of("image/png", b"a picture")
 
         monkeypatch.setattr(services.frames, "read", reader)
         order = {**ORDER, "dataset": "framed", "all": True, "images": "copy"}
