@@ -150,6 +150,12 @@ def run() -> None:
     except ReviewError as error:
         complain(error.message, error.hint)
         sys.exit(1)
+    except PermissionError as error:
+        complain(
+            f"this user may not look at {error.filename}",
+            "Open it to them (chmod, chown), or give the command as somebody else.",
+        )
+        sys.exit(1)
     except RuntimeError as error:
         # numba's words when it finds no folder to write to; it has no class of its own for them.
         if "cannot cache function" not in str(error):

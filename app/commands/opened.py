@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
 from typing import TYPE_CHECKING
@@ -9,6 +10,7 @@ from typing import TYPE_CHECKING
 from app.commands.options import read_settings
 from app.commands.server import require_home
 from app.commands.terminal import show_progress
+from app.errors import InputError
 from app.progress import TellProgress
 
 if TYPE_CHECKING:
@@ -72,7 +74,17 @@ def cluster_of(settings: Settings) -> Iterator[Executor]:
 
 @contextmanager
 def process_pool(workers: int) -> Iterator[Executor]:
-    """Processes that solve; each starts anew, because forking a process with threads is unsafe."""
+    """Processes that solve; each starts anew, because forking a process with threads is unsafe.
+
+    Raises:
+        InputError: They could not even enter the present folder.
+    """
+    if not os.access(".", os.X_OK):
+        raise InputError(
+            "this user may not enter the folder in which the command was given, nor can the"
+            " processes that solve",
+            hint="Go to another one first (cd /), or solve with --workers 1.",
+        )
     import multiprocessing
     from concurrent.futures import ProcessPoolExecutor
 

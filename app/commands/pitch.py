@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -53,7 +54,8 @@ def pitch(
     """
     if (source is None) == (dataset is None):
         raise typer.BadParameter("give either line files or --dataset")
-    if source is not None and Path(source).exists():
+    # What this user may not see is no file of theirs, but may be a dataset.
+    if source is not None and os.path.exists(source):  # noqa: PTH110
         if accept or match or set_:
             raise typer.BadParameter("--accept, --match and --set are for datasets")
         from app.review.datasets.pitch_files import estimate_pitch_of_files

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import gc
 import json
 import os
@@ -18,8 +19,10 @@ import typer
 
 from app import cli
 from app.commands.command_line import YOUNG, app
+from app.commands.opened import process_pool
 from app.datasets.manifest import software_version
 from app.datasets.sn_calibration_writer import lines_to_json
+from app.errors import InputError
 from tests.scenes import make_scenes
 
 Run = Callable[..., tuple[int, str, str]]
@@ -134,6 +137,57 @@ class TestCompiled:
         code, _, err = run("score", line_files, line_files)
         assert code == 1
         assert "NUMBA_CACHE_DIR" in err
+
+
+class TestClosed:
+    def test_a_file_that_the_user_may_not_look_at_is_a_sentence(
+        self, run: Run, line_files: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        def refuse(*_arguments: object, **_options: object) -> None:
+            raise PermissionError(errno.EACCES, "Permission denied", "/srv/closed/x.json")
+
+        monkeypatch.setattr("app.review.datasets.score_files.score_files", refuse)
+        code, _, err = run("score", line_files, line_files)
+        assert code == 1
+        assert "this user may not look at /srv/closed/x.json" in err
+        assert "Traceback" not in err
+
+    def test_who_stands_in_a_folder_that_they_may_not_enter_is_told_before_processes_start(
+        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        """As with sudo from somebody else's home: each process would end with a traceback."""
+
+        def solve() -> str:
+            with pytest.raises(InputError) as refused, process_pool(2):
+                pass
+            return f"{refused.value.message} {refused.value.hint}"
+
+        closed = tmp_path / "closed"
+        closed.mkdir()
+        monkeypatch.chdir(closed)
+        closed.chmod(0)
+        said = as_nobody(solve)
+        closed.chmod(0o700)
+        assert "may not enter the folder" in said
+        assert "cd /" in said
+
+
+def as_nobody(work: Callable[[], str]) -> str:
+    """What a function says in a process of somebody else than root."""
+    read, write = os.pipe()
+    child = os.fork()
+    if not child:
+        try:
+            if os.getuid() == 0:
+                os.setuid(65534)
+            os.write(write, work().encode())
+        finally:
+            os._exit(0)
+    os.close(write)
+    with os.fdopen(read, encoding="utf-8") as said:
+        found = said.read()
+    os.waitpid(child, 0)
+    return found
 
 
 class TestImport:
