@@ -131,7 +131,8 @@ def write_backup(
             partial.replace(out)
             sync(out.parent)
     except OSError as error:
-        raise refused(Path(error.filename or out), error) from error
+        hint = f"Make {out.parent} writable for this user, or name another folder."
+        raise refused(Path(error.filename or out), error, hint) from error
     return manifest
 
 

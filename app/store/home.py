@@ -26,6 +26,10 @@ SERVER_LOCK, DATABASE_LOCK, OPENING_LOCK = "server.lock", "database.lock", "open
 PRACTICE_LOCK = "practice.lock"
 LOCKS = SERVER_LOCK, DATABASE_LOCK, OPENING_LOCK, PRACTICE_LOCK
 FOLDER_MODE = 0o700
+WRITABLE = (
+    "Make the home folder and its files writable for this user, or set TOUCHLINE_HOME to another."
+)
+"""What to do where a file of the home cannot be written."""
 
 _MOUNTS = Path("/proc/mounts")
 
@@ -106,16 +110,15 @@ def private_files(settings: Settings) -> Iterator[Path]:
             yield from (Path(folder, file) for file in names)
 
 
-def refused(path: Path, error: OSError) -> StorageError:
-    """What a disk said about a file of the home, as a sentence with its remedy."""
+def refused(path: Path, error: OSError, hint: str = WRITABLE) -> StorageError:
+    """What a disk said about a file, as a sentence with its remedy; without ``hint`` of the home."""
     if error.errno == errno.ENOSPC:
         return StorageError(
             f"the disk is full: {path} cannot be written", hint="Free some space and try again."
         )
     return StorageError(
         f"{path} cannot be written: {error.strerror}",
-        hint="Make the home folder and its files writable for this user, or set TOUCHLINE_HOME"
-        " to another folder.",
+        hint=hint,
     )
 
 

@@ -103,6 +103,23 @@ class TestBackUp:
             back_up(store.settings, tmp_path / "b.zip", EXPORTS)
         assert not (tmp_path / "b.zip").exists()
 
+    def test_a_folder_that_takes_no_backup_is_what_the_advice_is_about(
+        self, store: Store, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        """And not the home, which is as it should be."""
+        backups, made = tmp_path / "backups", Path.mkdir
+
+        def refuse(path: Path, *arguments: Any, **named: Any) -> Any:
+            if path.parent == backups:
+                raise PermissionError(errno.EACCES, "Permission denied", str(path))
+            return made(path, *arguments, **named)
+
+        backups.mkdir()
+        monkeypatch.setattr(Path, "mkdir", refuse)
+        with pytest.raises(StorageError, match="cannot be written") as refused:
+            back_up(store.settings, backups / "x.zip")
+        assert (refused.value.hint or "").startswith(f"Make {backups} writable")
+
     def test_what_began_to_be_written_after_the_backup_began_is_left_out(
         self, store: Store, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
