@@ -17,7 +17,7 @@ from app.child import Allowance, ChildEnded
 from app.child_figures import FIGURES
 from app.child_pool import ChildPool, PoolTask
 from app.config import Settings
-from app.errors import ImageError, ReviewError, StorageError, TooLargeError
+from app.errors import ImageError, OverloadedError, ReviewError, StorageError, TooLargeError
 from app.soccer.media import Media
 from app.store.image_header import JPEG
 from app.store.media import cached_frame, content_type, frame_name, frame_stamp, read_frame
@@ -151,7 +151,7 @@ class Frames:
         """
 
         def explain(error: ChildEnded) -> ReviewError:
-            return _refusal(media, error)
+            return refused_picture(frame_name(media), error)
 
         return self._readers.submit(
             work, media, flipped, self._settings, *arguments, explain=explain
@@ -180,7 +180,7 @@ class Frames:
 
     def _submit(self, media: Media, width: int | None, flipped: bool, *, bounded: bool) -> PoolTask:
         def explain(error: ChildEnded) -> ReviewError:
-            refusal = _refusal(media, error)
+            refusal = refused_picture(frame_name(media), error)
             if error.reason in LIMITS:
                 self._remember(media, refusal)
             return refusal
@@ -196,9 +196,15 @@ class Frames:
                 self._refused.popitem(last=False)
 
 
-def _refusal(media: Media, error: ChildEnded) -> ReviewError:
+def refused_picture(name: str, error: ChildEnded) -> ReviewError:
+    """What the end of a process over a picture says: of the picture, or of the machine."""
+    if error.reason == "killed":
+        return OverloadedError(
+            f"{name} {error}",
+            hint="Try again in a moment. Where it happens often, give more memory.",
+        )
     kind = ImageError if error.reason == "crash" else TooLargeError
-    return kind(f"{frame_name(media)} {error}")
+    return kind(f"{name} {error}")
 
 
 def make_picture(media: Media, width: int | None, flipped: bool, settings: Settings) -> SentPicture:

@@ -35,7 +35,7 @@ PLAIN_WORDS = """
     compiler dialect postgresql sqlite statements transfer triggers
     attempts lived processes shared sharing short web
     addresses messages secrets sender
-    challenges enrol
+    challenges enrol task
     joined turns
     proof provider identities sign
     access account join links login logins passwords roles team tokens

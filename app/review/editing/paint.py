@@ -12,10 +12,10 @@ from contextlib import closing
 from dataclasses import dataclass, replace
 from typing import Any
 
-from app.child import Allowance, ChildEnded
+from app.child import Allowance
 from app.child_figures import FIGURES
-from app.child_pool import ChildPool, PoolTask
-from app.errors import ConflictError, ImageError
+from app.child_pool import ChildPool
+from app.errors import ConflictError, ImageError, TooLargeError
 from app.progress import TellProgress
 from app.review.datasets.dataset import DatasetHead, need_dataset, require_matches
 from app.review.datasets.paint_reading import (
@@ -26,6 +26,7 @@ from app.review.datasets.paint_reading import (
 from app.review.editing.edit import SetPaint
 from app.review.editing.group_edits import give_edits
 from app.review.editing.known import known_calibrations
+from app.review.editing.picture_task import PictureTask
 from app.soccer.paint_evidence import NO_FRAME, NO_PAINT, PAINT_DISAGREES, PaintReading
 from app.soccer.policy import CalibrationPolicy
 from app.solving.calibrate import clicks_key
@@ -160,6 +161,7 @@ def read_paint(
     Raises:
         ConflictError: The dataset's policy does not use paint.
         NotFoundError: There is no such dataset or match.
+        OverloadedError: Processes were killed over one picture, twice; what was read stays.
     """
     found = require_readable(store, dataset, matches)
     with store.read() as session:
@@ -300,31 +302,27 @@ def _readings(
 ) -> dict[int, dict[str, PaintReading]]:
     """What was read for each group, by view; views without a camera of their clicks are left out."""
 
-    def ask(task: PaintTask) -> PoolTask:
-        return pool.submit(read_view_paint, task, store.settings, explain=_refusal, bounded=False)
-
-    asked = {number: [(task, ask(task)) for task in some] for number, some in tasks.items()}
+    asked = {
+        number: [(task, PictureTask(pool, read_view_paint, task, store.settings)) for task in some]
+        for number, some in tasks.items()
+    }
     return {
         number: {
             task.view.key: reading
-            for task, waiting in some
-            if (reading := _result(task, waiting.future)) is not None
+            for task, reads in some
+            if (reading := _result(task, reads)) is not None
         }
         for number, some in asked.items()
     }
 
 
-def _result(task: PaintTask, future: Any) -> PaintReading | None:
+def _result(task: PaintTask, reads: PictureTask) -> PaintReading | None:
     try:
-        reading: PaintReading | None = future.result()
-    except ImageError:
+        reading: PaintReading | None = reads.result()
+    except (ImageError, TooLargeError):
         # Its process ended over it: to this service that picture is unreadable.
         return task.fitting or task.without_frame
     return reading
-
-
-def _refusal(error: ChildEnded) -> ImageError:
-    return ImageError(f"the picture {error}")
 
 
 def has_pictures(store: Store, dataset: str | int) -> bool:

@@ -12,16 +12,17 @@ from contextlib import closing
 from dataclasses import dataclass, replace
 from typing import Any
 
-from app.child import Allowance, ChildEnded
+from app.child import Allowance
 from app.child_figures import FIGURES
 from app.child_pool import ChildPool
-from app.errors import ImageError, NotFoundError
+from app.errors import ImageError, NotFoundError, TooLargeError
 from app.paint.propose import SEARCH_VERSION
 from app.progress import TellProgress
 from app.review.answers.keep import Keep, keep_nothing
 from app.review.datasets.dataset import DatasetHead, need_dataset, require_matches
 from app.review.datasets.proposal_reading import UNREADABLE, ProposalTask, read_proposal
 from app.review.editing.etags import read_head
+from app.review.editing.picture_task import PictureTask
 from app.review.editing.view_paint import known_cameras
 from app.store.codecs import camera_to_json
 from app.store.digest import digest, station_digest
@@ -220,21 +221,14 @@ def _task(
 
 
 def _answers(store: Store, pool: ChildPool, tasks: Sequence[ProposalTask]) -> list[Proposal | None]:
-    asked = [
-        pool.submit(read_proposal, task, store.settings, explain=_refusal, bounded=False)
-        for task in tasks
-    ]
-    return [_result(task, waiting.future) for task, waiting in zip(tasks, asked, strict=True)]
+    asked = [PictureTask(pool, read_proposal, task, store.settings) for task in tasks]
+    return [_result(task, reads) for task, reads in zip(tasks, asked, strict=True)]
 
 
-def _result(task: ProposalTask, future: Any) -> Proposal | None:
+def _result(task: ProposalTask, reads: PictureTask) -> Proposal | None:
     try:
-        found: Proposal | None = future.result()
-    except ImageError:
+        found: Proposal | None = reads.result()
+    except (ImageError, TooLargeError):
         # Its process ended over it: to this service that picture is unreadable.
         return task.without_picture(UNREADABLE)
     return found
-
-
-def _refusal(error: ChildEnded) -> ImageError:
-    return ImageError(f"the picture {error}")

@@ -16,7 +16,7 @@ import pytest
 
 from app.child import Allowance
 from app.config import Settings
-from app.errors import ImageError, NotFoundError, TooLargeError
+from app.errors import ImageError, NotFoundError, OverloadedError, TooLargeError
 from app.soccer.media import Media
 from app.store import frames as module
 from app.store.frames import Frames, make_picture
@@ -115,7 +115,7 @@ class TestFrames:
 
     @pytest.mark.parametrize(
         ("end", "error", "reason"),
-        [("crash", ImageError, "made the process crash"), ("be_killed", TooLargeError, "killed")],
+        [("crash", ImageError, "made the process crash"), ("be_killed", OverloadedError, "killed")],
     )
     def test_what_may_be_the_machines_doing_is_tried_again(
         self,
