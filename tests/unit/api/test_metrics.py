@@ -165,8 +165,8 @@ POOLS: dict[str, Callable[[Services, Previews], Any]] = {
     "readers": lambda services, _: services.frames._readers,
     "fetchers": lambda services, _: services.frames._fetchers,
     "predictions": lambda services, _: services.predictions._pool,
-    "previews": lambda _, previews: previews.child._pool,
-    "large": lambda _, previews: previews._large.child._pool,
+    "previews": lambda _, previews: previews.children[0]._pool,
+    "large": lambda _, previews: previews._large.children[0]._pool,
 }
 
 
