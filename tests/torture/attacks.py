@@ -148,6 +148,11 @@ class Target:
             Attack("solving", 1, work.solve, done, growth=1200.0),
         ]
 
+    async def warm_up(self) -> None:
+        """Have the process of large edits started, which then belongs to what there is at rest."""
+        body = json.dumps({"views": {self._key: {"lines": _largest(0)}}}).encode()
+        await self._ask("POST", f"{API}/groups/{self._group}/preview", body)
+
     async def _slow_body(self, _number: int) -> tuple[int, dict[str, str]]:
         path = f"{API}/views/{self._view}/ball"
         head = write_head("PATCH", path, b" " * 4000, self._own())

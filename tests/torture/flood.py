@@ -101,7 +101,8 @@ def flood(
     try:
         server.wait()
         target = Target(server, scale, home, busy)
-        # The first drags start the processes that solve them.
+        # The first drags, and the first large one, start the processes that solve them.
+        asyncio.run(target.warm_up())
         with _quiet(target):
             threading.Event().wait(scale.warm_up)
         quiet = _watched(server, target, "nobody", lambda: None)
