@@ -16,6 +16,7 @@ from pydantic import TypeAdapter
 
 UNKNOWN = "extra_forbidden"
 """What the framework calls a field that a body does not have."""
+_FIELDS: dict[Callable[..., Any], frozenset[str]] = {}
 
 
 async def refuse_unknown_parameters(request: Request) -> None:
@@ -58,8 +59,11 @@ def _fields(route: APIRoute) -> frozenset[str]:
     """Every name that stands anywhere in the body of a route."""
     if route.body_field is None:
         return frozenset()
-    body: Any = route.body_field.field_info.annotation
-    return frozenset(_names(TypeAdapter(body).json_schema()))
+    if route.endpoint not in _FIELDS:
+        body: Any = route.body_field.field_info.annotation
+        # To make a schema takes milliseconds, in which nobody is answered.
+        _FIELDS[route.endpoint] = frozenset(_names(TypeAdapter(body).json_schema()))
+    return _FIELDS[route.endpoint]
 
 
 def _names(schema: Any) -> Iterator[str]:

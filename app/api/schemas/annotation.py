@@ -60,8 +60,10 @@ class Point(BaseModel):
     y: Pixel
 
 
+Points = Annotated[list[Point], Field(fail_fast=True)]
+"""Of one marking; the first that is wrong is told, for each costs as much as ten that are right."""
 LineEdits = Annotated[
-    dict[Marking, list[Point] | None],
+    dict[Marking, Points | None],
     BeforeValidator(_distinct),
 ]
 

@@ -23,8 +23,18 @@ MAX_DEPTH = 16
 MAX_CONTAINERS = 5_000
 """Lists and objects of one body: a request may bring 2,000 points, and each is an object. Ten times as
 many were read for a second, in which nobody else was answered."""
+MAX_VALUES = 10_000
+"""Values of one body, by its commas: 2,000 points are 4,000. Each one that is wrong costs as much as ten
+that are right, and whoever asks for that is answered before anybody is known by name."""
+MAX_NAMES = 200
+"""Names of one object: the 26 markings, or 64 views, and room for what comes."""
+MAX_NAME = 1_000
+"""Characters of a name; that of a view is a file's."""
+MAX_STRANGERS_BYTES = 64 * 1024
+"""Of what is asked before anybody is known: a passkey's answer has three texts of 16 kB at most."""
 VALUE = "touchline.json"
 """Where a request's scope says what its JSON body is."""
+_STRANGERS = re.compile(r"/api/v\d+/(?:session|links)(?:/|$)")
 # Possessive, and the closing quote may be missing: linear on whatever comes.
 _STRINGS = re.compile(rb'"(?:[^"\\]|\\.)*+"?', re.DOTALL)
 _NO_BRACKETS = bytes(sorted(set(range(256)) - set(b"[]{}")))
@@ -66,8 +76,11 @@ def read_json(body: bytes) -> Any:
 
 
 def _require_flat(body: bytes) -> None:
-    """Count brackets before anything is made of them, on text that may not be JSON."""
-    brackets = _without_strings(body).translate(None, _NO_BRACKETS)
+    """Count brackets and commas before anything is made of them, on text that may not be JSON."""
+    outside = _without_strings(body)
+    if outside.count(b",") > MAX_VALUES:
+        raise BodyError(400, f"the body holds more than {MAX_VALUES} values")
+    brackets = outside.translate(None, _NO_BRACKETS)
     steps = _STEPS[np.frombuffer(brackets, np.uint8)]
     if np.cumsum(steps).max(initial=0) > MAX_DEPTH:
         raise BodyError(400, f"the body is nested more than {MAX_DEPTH} levels deep")
@@ -89,6 +102,10 @@ def _refuse_constant(name: str) -> NoReturn:
 
 def _without_repetition(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     """An object whose names differ: of two equal ones, readers disagree which counts."""
+    if len(pairs) > MAX_NAMES:
+        raise BodyError(400, f"an object of the body has more than {MAX_NAMES} names")
+    if any(len(name) > MAX_NAME for name, _ in pairs):
+        raise BodyError(400, f"a name in the body has more than {MAX_NAME} characters")
     found = dict(pairs)
     if len(found) < len(pairs):
         names = Counter(name for name, _ in pairs)
@@ -133,7 +150,9 @@ class JsonBodies:
             await self._pass_on(scope, receive, send)
             return
         try:
-            body = await self._read(Headers(scope=scope), receive)
+            strangers = _STRANGERS.match(scope["path"])
+            most = min(self.max_bytes, MAX_STRANGERS_BYTES) if strangers else self.max_bytes
+            body = await _read(Headers(scope=scope), receive, most)
             if body is None:
                 return
             if body:
@@ -158,26 +177,29 @@ class JsonBodies:
         )
         await problem_response(problem)(scope, receive, send)
 
-    async def _read(self, headers: Headers, receive: Receive) -> bytes | None:
-        declared = headers.get("content-length", "0")
-        if not declared.isascii() or not declared.isdigit():
-            raise BodyError(400, "Content-Length is not a number")
-        if len(declared) > 18 or int(declared) > self.max_bytes:
-            raise self._too_large()
-        body = bytearray()
-        more = True
-        while more:
-            message = await receive()
-            if message["type"] == "http.disconnect":
-                return None
-            body += message.get("body", b"")
-            more = message.get("more_body", False)
-            if len(body) > self.max_bytes:
-                raise self._too_large()
-        return bytes(body)
 
-    def _too_large(self) -> BodyError:
-        return BodyError(413, f"a request body may have at most {self.max_bytes} bytes")
+async def _read(headers: Headers, receive: Receive, most: int) -> bytes | None:
+    """The body, of so many bytes at most; None where whoever sent it has left."""
+    declared = headers.get("content-length", "0")
+    if not declared.isascii() or not declared.isdigit():
+        raise BodyError(400, "Content-Length is not a number")
+    if len(declared) > 18 or int(declared) > most:
+        raise _too_large(most)
+    body = bytearray()
+    more = True
+    while more:
+        message = await receive()
+        if message["type"] == "http.disconnect":
+            return None
+        body += message.get("body", b"")
+        more = message.get("more_body", False)
+        if len(body) > most:
+            raise _too_large(most)
+    return bytes(body)
+
+
+def _too_large(most: int) -> BodyError:
+    return BodyError(413, f"a request body may have at most {most} bytes")
 
 
 def require_json_type(types: list[str]) -> None:

@@ -15,6 +15,10 @@ from app.api.security.bodies import (
     _STRINGS,
     MAX_CONTAINERS,
     MAX_DEPTH,
+    MAX_NAME,
+    MAX_NAMES,
+    MAX_STRANGERS_BYTES,
+    MAX_VALUES,
     BodyError,
     JsonBodies,
     _without_strings,
@@ -94,6 +98,18 @@ class TestReadJson:
         read_json(b"[" + b"{}," * (MAX_CONTAINERS - 2) + b"[]]")
         assert "lists and objects" in refusal(b"[" + b"{}," * (MAX_CONTAINERS - 1) + b"[]]")
         read_json(json.dumps(["[]" * MAX_CONTAINERS]).encode())
+
+    def test_more_values_than_any_request_needs_are_refused(self) -> None:
+        read_json(b"[" + b"1," * MAX_VALUES + b"1]")
+        assert "values" in refusal(b"[" + b"1," * (MAX_VALUES + 1) + b"1]")
+        read_json(json.dumps(["," * 2 * MAX_VALUES]).encode())
+
+    def test_more_and_longer_names_than_any_object_needs_are_refused(self) -> None:
+        names = [f"n{number}" for number in range(MAX_NAMES)]
+        read_json(json.dumps([dict.fromkeys(names, 1)] * 2).encode())
+        assert "names" in refusal(json.dumps(dict.fromkeys([*names, "one more"], 1)).encode())
+        read_json(json.dumps({"x" * MAX_NAME: "y" * 2 * MAX_NAME}).encode())
+        assert "characters" in refusal(json.dumps({"x" * (MAX_NAME + 1): 1}).encode())
 
     def test_a_large_exponent_is_no_mistake_where_the_number_is_small(self) -> None:
         assert read_json(b"[1e3, 0.000e400, 1e-999]") == [1000.0, 0.0, 0.0]
@@ -183,6 +199,25 @@ class TestJsonBodies:
     def test_a_chunked_body_is_cut_off_at_the_cap(self) -> None:
         done = Exchange([b"a" * 4] * 1000, JSON, "POST").run(10)
         assert (done.status, done.taken) == (413, 3)
+
+    @pytest.mark.parametrize(
+        ("path", "status"),
+        [
+            ("/api/v1/session", 413),
+            ("/api/v1/session/sign-on", 413),
+            ("/api/v1/links/use", 413),
+            ("/api/v1/sessions", 204),
+            ("/api/v1/groups/1/preview", 204),
+        ],
+    )
+    def test_who_is_not_known_yet_brings_less(self, path: str, status: int) -> None:
+        body = b'"' + b"a" * MAX_STRANGERS_BYTES + b'"'
+        asked = Exchange([body], JSON, "POST")
+        asked.scope["path"] = path
+        assert asked.run(2 * MAX_STRANGERS_BYTES).status == status
+        asked = Exchange([body[:-3] + b'"'], JSON, "POST")
+        asked.scope["path"] = path
+        assert asked.run(2 * MAX_STRANGERS_BYTES).status == 204
 
     @pytest.mark.parametrize(
         ("length", "status"), [(b"-1", 400), (b"1e9", 400), (b"\xb2", 400), (b"9" * 30, 413)]
