@@ -11,8 +11,10 @@ from pathlib import Path
 
 from app.config import Settings
 from app.durable import PARTIAL
-from app.errors import StorageError
+from app.errors import DamagedError, StorageError
+from app.store.anchor import read_anchor
 from app.store.dialect.dialect import dialect_of
+from app.store.wal import read_header
 
 NETWORK_FILE_SYSTEMS = frozenset(
     {"nfs", "nfs4", "cifs", "smb3", "smbfs", "afs", "fuse.sshfs", "fuse.s3fs", "9p", "glusterfs"}
@@ -25,6 +27,8 @@ ASIDE, RESTORING = "before-restore-", f".restore{PARTIAL}"
 SERVER_LOCK, DATABASE_LOCK, OPENING_LOCK = "server.lock", "database.lock", "opening.lock"
 PRACTICE_LOCK = "practice.lock"
 LOCKS = SERVER_LOCK, DATABASE_LOCK, OPENING_LOCK, PRACTICE_LOCK
+SIDES = "", "-wal", "-shm", "-journal"
+"""How names of files of SQLite go on after the database's own."""
 FOLDER_MODE = 0o700
 WRITABLE = (
     "Make the home folder and its files writable for this user, or set TOUCHLINE_HOME to another."
@@ -101,13 +105,29 @@ def private_files(settings: Settings) -> Iterator[Path]:
     home, database = settings.home, settings.database_file
     yield home
     yield from (home / name for name in LOCKS if (home / name).exists())
-    yield from database.parent.glob(f"{database.name}*")
-    yield from database.parent.glob("home.json")
+    yield from _of_database(home, database)
     ours = (home / name for name in FOLDERS)
     for top in (*ours, *home.glob(f"{ASIDE}*"), database.with_name(RESTORING)):
         for folder, _folders, names in os.walk(top):
             yield Path(folder)
             yield from (Path(folder, file) for file in names)
+
+
+def _of_database(home: Path, database: Path) -> Iterator[Path]:
+    """A database and what lies beside it; outside of the home only where it is surely ours."""
+    if not database.resolve().is_relative_to(home.resolve()) and not _is_ours(database):
+        return
+    names = (*(f"{database.name}{end}" for end in SIDES), "home.json")
+    yield from (path for path in map(database.with_name, names) if path.exists())
+
+
+def _is_ours(file: Path) -> bool:
+    """Whether a file is the database of the installation that is named beside it."""
+    try:
+        header, anchor = read_header(file), read_anchor(file)
+    except (OSError, DamagedError):
+        return False
+    return bool(header and anchor and anchor.installation.startswith(f"{header.tag:07x}"))
 
 
 def refused(path: Path, error: OSError, hint: str = WRITABLE) -> StorageError:

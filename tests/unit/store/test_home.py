@@ -16,6 +16,9 @@ server:/share /mnt/team nfs4 rw 0 0
 /dev/vdb /mnt/team/local ext4 rw 0 0
 """
 
+OF_ANOTHER_PROGRAM = b"SQLite format 3\0\x10\0\2\2" + bytes(4076)
+"""A database that has nothing to do with us."""
+
 
 class TestFileSystem:
     @pytest.mark.parametrize(
@@ -90,6 +93,41 @@ class TestMakePrivate:
         make_private(settings)
         assert old.stat().st_mode & 0o777 == 0o600
         assert old.parent.stat().st_mode & 0o777 == 0o700
+
+    @pytest.mark.file_of_sqlite("permissions of the file")
+    def test_of_a_database_elsewhere_only_what_is_its_own_is_touched(
+        self, settings, tmp_path: Path
+    ) -> None:
+        file = tmp_path / "elsewhere" / "team.db"
+        other = settings.model_copy(update={"database_url": f"sqlite:///{file}"})
+        file.parent.mkdir()
+        Store.open(other).close()
+        beside = [file.with_name(name) for name in ("team.db-wal", "team.db.txt", "team.db-old")]
+        for path in beside:
+            path.touch()
+        for path in (file, *beside):
+            path.chmod(0o644)
+        make_private(other)
+        modes = [path.stat().st_mode & 0o777 for path in (file, *beside)]
+        assert modes == [0o600, 0o600, 0o644, 0o644]
+
+    @pytest.mark.file_of_sqlite("permissions of the file")
+    @pytest.mark.parametrize("content", [b"root:x:0:0\n" * 20, b"", OF_ANOTHER_PROGRAM])
+    def test_a_file_elsewhere_that_is_none_of_ours_keeps_its_permissions(
+        self, settings, tmp_path: Path, content: bytes
+    ) -> None:
+        make_home(settings)
+        file = tmp_path / "accounts"
+        files = [file, tmp_path / "accounts-", tmp_path / "home.json"]
+        for path in files:
+            path.write_bytes(content)
+            path.chmod(0o644)
+        inside = f"{settings.home}/../accounts"
+        for place in (str(file), inside):
+            other = settings.model_copy(update={"database_url": f"sqlite:///{place}"})
+            make_private(other)
+            assert not set(files) & set(open_to_others(other))
+        assert {path.stat().st_mode & 0o777 for path in files} == {0o644}
 
     def test_from_then_on_new_files_are_private(self, settings) -> None:
         make_home(settings)
