@@ -1,16 +1,19 @@
 """A first look at a home's files, before SQLite opens the database and mends what it should not.
 
-Only headers are read. What is refused here stays as it is: SQLite would take an empty file for a
-new database, and any log beside it for its own.
+What is refused here stays as it is: SQLite would take an empty file for a new database, and any log
+beside it for its own; and whoever closes a database last writes the log into it and deletes it, also
+where its end is damaged.
 """
 
 from __future__ import annotations
 
 from pathlib import Path
+from urllib.parse import quote
 
 from app.config import Settings
 from app.errors import DamagedError, StorageError
-from app.store.anchor import read_anchor
+from app.store.anchor import read_anchor, require_own_database
+from app.store.engine import make_engine, reported
 from app.store.home import ASIDE
 from app.store.wal import DatabaseHeader, WriteAheadLog, read_header, read_log
 
@@ -26,8 +29,8 @@ def require_sound(settings: Settings) -> None:
     Nobody may have the database open meanwhile: both files change under a writer.
 
     Raises:
-        DamagedError: The database is gone, emptied, cut short, no database, or lies beside the log
-            of another one.
+        DamagedError: The database is gone, emptied, cut short, no database, lies beside the log of
+            another one, or holds less with its own than was said.
         StorageError: A file cannot be read.
     """
     database = settings.database_file
@@ -48,6 +51,8 @@ def require_sound(settings: Settings) -> None:
             hint="Run touchline restore BACKUP; it moves the file aside.",
         )
     _require_whole(database, header, log)
+    if _size(log_file(database)):
+        _require_all(settings)
 
 
 def _require_whole(database: Path, header: DatabaseHeader, log: WriteAheadLog) -> None:
@@ -64,6 +69,22 @@ def _require_whole(database: Path, header: DatabaseHeader, log: WriteAheadLog) -
             f"{database} is cut short: {size:,} of {expected:,} bytes are there",
             hint="Run touchline restore BACKUP; it moves the file aside.",
         )
+
+
+def _require_all(settings: Settings) -> None:
+    """Raise DamagedError where database and log together are not what the home knows.
+
+    A connection that only reads leaves both as they are when it is closed.
+    """
+    # Once for SQLAlchemy, which reads a URL, and once for SQLite, which is handed one.
+    file = quote(quote(str(settings.database_file)))
+    url = f"sqlite+pysqlite:///file:{file}?mode=ro&uri=true"
+    engine = make_engine(settings.model_copy(update={"database_url": url}))
+    try:
+        with reported(settings):
+            require_own_database(engine, settings)
+    finally:
+        engine.dispose()
 
 
 def _require_new(settings: Settings) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import shutil
+from collections.abc import Callable
 from contextlib import closing
 from pathlib import Path
 
@@ -13,6 +14,7 @@ from sqlalchemy import text
 
 from app.config import Settings
 from app.errors import DamagedError, StorageError
+from app.store.first_look import log_file
 from app.store.migrate import migrate
 from app.store.store import Store
 from tests.unit.store.homes import killed, say
@@ -21,8 +23,9 @@ pytestmark = pytest.mark.file_of_sqlite("the file before it is opened")
 
 
 def content(home: Path) -> dict[str, bytes]:
-    """The files of a home but its locks."""
-    return {path.name: path.read_bytes() for path in home.iterdir() if path.suffix != ".lock"}
+    """The files of a home but its locks, and the index of the log, which whoever reads makes anew."""
+    files = (path for path in home.iterdir() if not path.name.endswith((".lock", "-shm")))
+    return {path.name: path.read_bytes() for path in files}
 
 
 def refused(settings: Settings, match: str) -> None:
@@ -38,6 +41,19 @@ def refused(settings: Settings, match: str) -> None:
 def entries(settings: Settings) -> int:
     with closing(Store.open(settings)) as store, store.read() as session:
         return session.execute(text("SELECT count(*) FROM log")).scalar_one()
+
+
+def flip_a_bit(log: bytes) -> bytes:
+    middle = len(log) // 2
+    return log[:middle] + bytes([log[middle] ^ 1]) + log[middle + 1 :]
+
+
+def empty_the_header(log: bytes) -> bytes:
+    return bytes(32) + log[32:]
+
+
+def cut(log: bytes) -> bytes:
+    return log[: len(log) // 2]
 
 
 class TestRequireSound:
@@ -106,6 +122,49 @@ class TestRequireSound:
         (settings.home / "cache").mkdir(parents=True)
         (settings.home / "server.lock").touch()
         assert entries(settings) == 0
+
+    @pytest.mark.parametrize("damage", [flip_a_bit, empty_the_header, cut])
+    def test_a_damaged_log_is_refused_and_kept(
+        self, store: Store, tmp_path: Path, damage: Callable[[bytes], bytes]
+    ) -> None:
+        say(store, 3)
+        checkpoint(store)
+        say(store, 40)
+        settings = killed(store, tmp_path / "left")
+        log = log_file(settings.database_file)
+        whole = log.read_bytes()
+        log.write_bytes(damage(whole))
+        refused(settings, r"the log .* ends after \d+ entries, but 43 were said")
+        log.write_bytes(whole)
+        assert entries(settings) == 43
+
+    def test_the_torn_end_of_what_nobody_was_told_is_no_damage(
+        self, store: Store, tmp_path: Path
+    ) -> None:
+        say(store, 5)
+        settings = killed(store, tmp_path / "left")
+        say(store)
+        killed(store, tmp_path / "left", "touchline.db-wal")
+        log = log_file(settings.database_file)
+        log.write_bytes(log.read_bytes()[:-100])
+        assert entries(settings) == 5
+
+    def test_frames_of_an_earlier_log_behind_the_last_are_no_damage(
+        self, store: Store, tmp_path: Path
+    ) -> None:
+        say(store, 40)
+        checkpoint(store, "RESTART")
+        say(store, 2)
+        assert entries(killed(store, tmp_path / "left")) == 42
+
+    def test_a_damaged_log_in_a_folder_with_signs_in_its_name_is_kept(
+        self, store: Store, tmp_path: Path
+    ) -> None:
+        say(store, 40)
+        settings = killed(store, tmp_path / "50% of #1")
+        log = log_file(settings.database_file)
+        log.write_bytes(cut(log.read_bytes()))
+        refused(settings, "but 40 were said")
 
     def test_a_database_that_is_cut_short_is_refused(self, store: Store, tmp_path: Path) -> None:
         say(store, 20)
@@ -197,8 +256,8 @@ class TestAnchor:
             Store.open(settings)
 
 
-def checkpoint(store: Store) -> None:
+def checkpoint(store: Store, how: str = "TRUNCATE") -> None:
     """Everything goes into the database's own file, and the log begins anew."""
     with store._engine.connect() as connection:
         connection.exec_driver_sql("ROLLBACK")
-        connection.exec_driver_sql("PRAGMA wal_checkpoint(TRUNCATE)")
+        connection.exec_driver_sql(f"PRAGMA wal_checkpoint({how})")
