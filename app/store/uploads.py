@@ -35,6 +35,8 @@ PART = ".part"
 _ID = re.compile(r"[0-9a-f]{32}")
 _UNSAFE = re.compile(r"[^A-Za-z0-9._ -]")
 _MAX_NAME = 120
+_MAX_SUFFIX = 20
+"""With its dot; what is longer tells no kind of file, and is cut like the rest of a name."""
 _RECORD = "upload.json"
 _CONTENT = "content"
 _WRITING = threading.Lock()
@@ -161,18 +163,39 @@ def require_unread(upload: Upload) -> None:
 
 
 def expire_uploads(settings: Settings) -> int:
-    """Delete what is older than the settings allow; returns how many."""
-    day = datetime.now(UTC)
+    """Delete what is older than the settings allow, with a record or without; returns how many."""
+    limit = datetime.now(UTC) - timedelta(days=settings.upload_days)
     gone = 0
-    for upload in list(_all(settings)):
-        age = day - datetime.fromisoformat(upload.created)
-        if not upload.kept and age > timedelta(days=settings.upload_days):
+    for folder in [path for path in settings.uploads.glob("*") if _ID.fullmatch(path.name)]:
+        if _is_over(folder, limit):
             with _writing(settings):
-                known = _read(settings.uploads / upload.id)
-                if known is None or not known.kept:
-                    _remove(settings.uploads / upload.id)
+                if _is_over(folder, limit):
+                    _remove(folder)
                     gone += 1
     return gone
+
+
+def _is_over(folder: Path, limit: datetime) -> bool:
+    """Whether nobody needs a folder that has been there since before some moment."""
+    upload = _read(folder)
+    if upload is not None:
+        return not upload.kept and datetime.fromisoformat(upload.created) < limit
+    try:
+        since = datetime.fromtimestamp(folder.lstat().st_mtime, UTC)
+    except FileNotFoundError:
+        return False
+    return since < limit and not _may_be_kept(folder)
+
+
+def _may_be_kept(folder: Path) -> bool:
+    """Whether a record that is none of ours keeps frames of a dataset: it says so, or cannot say no."""
+    try:
+        values = json.loads((folder / _RECORD).read_bytes())
+    except FileNotFoundError:
+        return False
+    except (OSError, ValueError):
+        return True
+    return not isinstance(values, dict) or values.get("kept") is not False
 
 
 def _all(settings: Settings) -> Iterator[Upload]:
@@ -202,10 +225,14 @@ def safe_name(name: str) -> str:
     """
     last = re.split(r"[/\\]", name)[-1]
     clean = _UNSAFE.sub("_", last).strip(" .")
-    if not clean.strip("_"):
+    suffix = Path(clean).suffix
+    if len(suffix) > _MAX_SUFFIX:
+        suffix = ""
+    stem = clean.removesuffix(suffix)[: _MAX_NAME - len(suffix)]
+    short = (stem + suffix).rstrip(" .")
+    if not short.strip("_"):
         raise InputError("an upload needs the name of a file", pointer="/name")
-    path = Path(clean)
-    return path.stem[: _MAX_NAME - len(path.suffix)] + path.suffix
+    return short
 
 
 class UploadWriter:

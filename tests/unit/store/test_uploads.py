@@ -10,6 +10,8 @@ from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from app.config import Settings
 from app.errors import BusyError, InputError, NotFoundError, StorageError, TooLargeError
@@ -45,6 +47,20 @@ def send(
 
 def files(settings: Settings) -> list[str]:
     return sorted(str(p.relative_to(settings.uploads)) for p in settings.uploads.rglob("*.*"))
+
+
+def without_record(settings: Settings, upload: Upload, instead: str | None) -> Path:
+    """Folder of an upload whose record is gone, or another one."""
+    folder = settings.uploads / upload.id
+    (folder / "upload.json").unlink()
+    if instead is not None:
+        (folder / "upload.json").write_text(instead)
+    return folder
+
+
+def make_old(folder: Path) -> None:
+    then = (datetime.now(UTC) - timedelta(days=8)).timestamp()
+    os.utime(folder, (then, then))
 
 
 class TestUploadWriter:
@@ -175,15 +191,36 @@ class TestSafeName:
             (".hidden.json", "hidden.json"),
             ("ünï.zip", "_n_.zip"),
             ("a" * 300 + ".zip", "a" * 116 + ".zip"),
+            ("x." + "j" * 200, "x." + "j" * 118),
+            ("a" * 118 + ". " + "j" * 30, "a" * 118),
         ],
     )
     def test_an_unsafe_name_becomes_the_nearest_safe_one(self, sent: str, name: str) -> None:
         assert safe_name(sent) == name
 
-    @pytest.mark.parametrize("sent", ["", "..", "/", "...", "\x00"])
+    @pytest.mark.parametrize("sent", ["", "..", "/", "...", "\x00", "\x00" * 130 + "a"])
     def test_a_name_without_a_single_safe_letter_is_refused(self, sent: str) -> None:
         with pytest.raises(InputError):
             safe_name(sent)
+
+    @given(
+        st.lists(st.sampled_from(["j", "j" * 19, "j" * 130, ".", " ", "_", "/", "ü"])).map("".join)
+    )
+    def test_a_safe_name_is_its_own(self, sent: str) -> None:
+        try:
+            name = safe_name(sent)
+        except InputError:
+            return
+        assert safe_name(name) == name
+        assert len(name) <= 120
+        assert name == name.strip(" .")
+
+    @pytest.mark.parametrize("sent", ["x." + "j" * 200, "." * 9 + "j" * 120, "x" * 200 + ". .zip"])
+    def test_what_was_sent_under_any_name_is_there(self, settings: Settings, sent: str) -> None:
+        upload = send(settings, sent)
+        assert get_upload(settings, upload.id) == upload
+        delete_upload(settings, upload.id)
+        assert list(settings.uploads.iterdir()) == []
 
 
 class TestUploadPath:
@@ -256,6 +293,36 @@ class TestExpireUploads:
         assert expire_uploads(settings) == 1
         assert {item.name for item in list_uploads(settings)} == {"kept.zip", "new.zip"}
         assert get_upload(settings, new.id).name == "new.zip"
+
+    @pytest.mark.parametrize("record", [None, {"name": ".jjj", "kept": False}])
+    def test_what_has_no_record_of_ours_goes_when_it_is_old(
+        self, settings: Settings, record: dict[str, object] | None
+    ) -> None:
+        upload = send(settings)
+        folder = without_record(settings, upload, json.dumps(record) if record else None)
+        assert expire_uploads(settings) == 0
+        make_old(folder)
+        assert expire_uploads(settings) == 1
+        assert list(settings.uploads.iterdir()) == []
+
+    @pytest.mark.parametrize(
+        "record", ['{"name": ".jjj", "kept": true}', '{"later": 1}', "[", "[]"]
+    )
+    def test_what_a_dataset_may_read_stays_whoever_wrote_its_record(
+        self, settings: Settings, record: str
+    ) -> None:
+        folder = without_record(settings, send(settings), record)
+        make_old(folder)
+        assert expire_uploads(settings) == 0
+        assert (folder / "content" / "a.zip").read_bytes() == b"content"
+
+    def test_what_is_none_of_ours_stays_beside_the_uploads(self, settings: Settings) -> None:
+        send(settings)
+        other = settings.uploads / "lost+found"
+        other.mkdir()
+        make_old(other)
+        assert expire_uploads(settings) == 0
+        assert other.is_dir()
 
     def test_without_uploads_nothing_expires(self, settings: Settings) -> None:
         assert expire_uploads(settings) == 0
