@@ -95,11 +95,12 @@ def read_predictions(
         if tree is None:
             raise run.found.report.problems[0]
         if format == "coco":
-            _read_coco(tree, run, [] if images is None else _document(images, run, limits))
+            beside = [] if images is None else _document(images, run, limits)
+            _read_coco(_json_documents(tree, path), run, beside)
         elif format == "yolo":
-            _read_yolo(tree, run)
+            _read_yolo(tree, path, run)
         else:
-            _read_csv(tree, run, limits)
+            _read_csv(tree, path, run, limits)
     run.finish(path)
     return run.found
 
@@ -152,11 +153,10 @@ def _document(path: Path, run: PredictionRun, limits: Limits) -> Documents:
     with opened_tree(path, run.found.report, limits) as tree:
         if tree is None:
             raise run.found.report.problems[0]
-        return _json_documents(tree)
+        return _json_documents(tree, path)
 
 
-def _read_coco(tree: FileTree, run: PredictionRun, beside: Documents) -> None:
-    documents = _json_documents(tree)
+def _read_coco(documents: Documents, run: PredictionRun, beside: Documents) -> None:
     images = _coco_images([*documents, *beside])
     several = any(isinstance(value, list) for _name, value in documents)
     for shown, value in documents:
@@ -172,7 +172,7 @@ def _read_coco(tree: FileTree, run: PredictionRun, beside: Documents) -> None:
                 _add_coco(run, item, images)
 
 
-def _json_documents(tree: FileTree) -> Documents:
+def _json_documents(tree: FileTree, path: Path) -> Documents:
     found = []
     for name in tree.names():
         if not name.lower().endswith(".json"):
@@ -185,7 +185,7 @@ def _json_documents(tree: FileTree) -> Documents:
         if isinstance(value, list) or "images" in value or "annotations" in value:
             found.append((tree.shown(name), value))
     if not found:
-        raise DatasetFormatError(str(tree.path), None, None, "holds no COCO results")
+        raise DatasetFormatError(str(path), None, None, "holds no COCO results")
     return found
 
 
@@ -236,14 +236,14 @@ def _coco_frame(run: PredictionRun, identity: int | str, name: str) -> NamedFram
     return None
 
 
-def _read_yolo(tree: FileTree, run: PredictionRun) -> None:
+def _read_yolo(tree: FileTree, path: Path, run: PredictionRun) -> None:
     names = [
         name
         for name in tree.names()
         if name.lower().endswith(".txt") and PurePosixPath(name).name.lower() not in _NOT_LABELS
     ]
     if not names:
-        raise DatasetFormatError(str(tree.path), None, None, "holds no text files")
+        raise DatasetFormatError(str(path), None, None, "holds no text files")
     for name in names:
         shown = tree.shown(name)
         try:
@@ -279,11 +279,11 @@ def _add_yolo(run: PredictionRun, frame: NamedFrame | None, cells: list[str]) ->
         run.add(frame, box, score, frame.size)
 
 
-def _read_csv(tree: FileTree, run: PredictionRun, limits: Limits) -> None:
+def _read_csv(tree: FileTree, path: Path, run: PredictionRun, limits: Limits) -> None:
     names = [name for name in tree.names() if name.lower().endswith(".csv")]
     if len(names) != 1:
         what = "no CSV file" if not names else f"{len(names)} CSV files; one is read"
-        raise DatasetFormatError(str(tree.path), None, None, f"holds {what}")
+        raise DatasetFormatError(str(path), None, None, f"holds {what}")
     shown = tree.shown(names[0])
     for line, cells in read_rows(tree.read_bytes(names[0]), shown, (), limits):
         run.found.report.read += 1

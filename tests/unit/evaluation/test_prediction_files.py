@@ -40,6 +40,29 @@ def problems(found) -> list[tuple[str | None, str | None, str]]:
     return [(item.record, item.field, item.problem) for item in found.report.problems]
 
 
+class TestReadPredictions:
+    @pytest.mark.parametrize(
+        ("format_", "name", "problem"),
+        [
+            ("coco", "x.csv", "holds no COCO results"),
+            ("yolo", "x.csv", "holds no text files"),
+            ("csv", "x.json", "holds no CSV file"),
+        ],
+    )
+    def test_a_file_of_another_kind_is_named_and_not_its_folder(
+        self, tmp_path, names, format_, name, problem
+    ) -> None:
+        with pytest.raises(DatasetFormatError) as refused:
+            read_predictions(write(tmp_path / name, "a,b"), format_, names)
+        assert refused.value.message == f"{tmp_path / name}: {problem}"
+
+    def test_so_is_a_document_of_another_kind(self, tmp_path, names) -> None:
+        results, images = write(tmp_path / "r.json", [result()]), write(tmp_path / "i.csv", "a,b")
+        with pytest.raises(DatasetFormatError) as refused:
+            read_predictions(results, "coco", names, images=images)
+        assert refused.value.path == str(images)
+
+
 class TestCoco:
     def test_reads_boxes_with_scores_in_order(self, tmp_path, names) -> None:
         path = write(tmp_path / "r.json", [result(), result("7_1", score=1), result(score=0)])

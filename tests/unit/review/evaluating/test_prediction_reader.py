@@ -78,6 +78,12 @@ class TestPredictionReader:
         assert there.value.path == "b.json"
         assert there.value.hint == here.value.hint
 
+    def test_a_file_of_another_kind_is_called_by_its_name_alone(self, reader_of, tmp_path) -> None:
+        other = written(tmp_path / "x.csv", b"a,b")
+        with pytest.raises(DatasetFormatError) as refused:
+            reader_of().read(other, NAMES, Limits.of(Settings()))
+        assert refused.value.message == "x.csv: holds no COCO results"
+
     def test_what_needs_too_much_memory_is_refused_and_the_next_is_read(
         self, reader_of, tmp_path
     ) -> None:
