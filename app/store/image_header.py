@@ -1,13 +1,16 @@
-"""The size that an image's header declares, read before anything is decoded.
+"""What an image says of itself, read before anything is decoded: its size, and how often it is drawn.
 
-A small file can declare a picture that takes gigabytes to decode, so the header decides first.
+A small file can declare a picture that takes gigabytes or minutes to decode, so this decides first.
 """
 
 from __future__ import annotations
 
+import re
 import struct
+from collections.abc import Iterator
 from dataclasses import dataclass
 from io import BytesIO
+from itertools import islice
 
 from PIL import Image
 
@@ -19,6 +22,12 @@ _KINDS = {"JPEG": JPEG, "MPO": JPEG, "PNG": PNG, "WEBP": WEBP}
 """By Pillow's names; a JPEG with further pictures behind it is one of MPO."""
 _BROKEN = (OSError, SyntaxError, ValueError, IndexError, KeyError, EOFError, struct.error)
 """What Pillow raises over a damaged header."""
+MAX_SCANS = 100
+"""Of a JPEG; each goes through the whole picture, and a progressive one has about ten."""
+_SCAN, _END = b"\xda", b"\xd9"
+_MARKER = re.compile(rb"\xff([\xc0-\xcf\xd9-\xfe])")
+"""What follows FF where a decoder stops to look: neither a stuffed byte of a scan's data, nor a
+restart of it, nor one of the reserved ones, which a decoder that looks for a restart passes over."""
 
 # The limits are those of the settings, see ``check_size``.
 Image.MAX_IMAGE_PIXELS = None
@@ -64,3 +73,28 @@ def check_size(header: ImageHeader, settings: Settings, name: str = "the image")
             f"{name} declares {width} x {height} pixels; {settings.max_side} a side and "
             f"{settings.max_pixels} in all are allowed"
         )
+
+
+def check_scans(data: bytes, name: str = "the image") -> None:
+    """Refuse a JPEG that draws its picture over and over.
+
+    Args:
+        data: Its bytes.
+        name: How a complaint calls it.
+
+    Raises:
+        TooLargeError: It has more than ``MAX_SCANS`` scans.
+    """
+    if next(islice(_scans(data), MAX_SCANS, None), None) is not None:
+        raise TooLargeError(
+            f"{name} is drawn in more than {MAX_SCANS} scans; progressive pictures have about 10"
+        )
+
+
+def _scans(data: bytes) -> Iterator[int]:
+    """Where each scan of a JPEG begins, as a decoder comes by them."""
+    place = 0
+    while (found := _MARKER.search(data, place)) is not None and found[1] != _END:
+        if found[1] == _SCAN:
+            yield found.start()
+        place = found.end() + int.from_bytes(data[found.end() : found.end() + 2], "big")

@@ -19,7 +19,7 @@ from app.errors import ImageError, NotFoundError, StorageError, TooLargeError
 from app.object_store.address import unseal
 from app.soccer.media import Media
 from app.store.archives import Archives
-from app.store.image_header import ImageHeader, check_size, read_header
+from app.store.image_header import JPEG, ImageHeader, check_scans, check_size, read_header
 from app.store.object_frames import is_stored, read_object
 from app.store.video import open_video
 
@@ -47,7 +47,7 @@ def read_frame(media: Media, width: int | None, flipped: bool, settings: Setting
     Raises:
         NotFoundError: The file, member or video frame is not there.
         ImageError: It is no image of these kinds, or damaged.
-        TooLargeError: It is larger than the limits, in bytes or in declared pixels.
+        TooLargeError: It is larger than the limits, in bytes, declared pixels or scans.
     """
     _require_contained(media, settings)
     if media.frame is None and width is None and not flipped:
@@ -209,7 +209,7 @@ def decode_frame(media: Media, flipped: bool, settings: Settings) -> npt.NDArray
     Raises:
         NotFoundError: The file, member or video frame is not there.
         ImageError: It is no image of these kinds, or damaged.
-        TooLargeError: It is larger than the limits, in bytes or in declared pixels.
+        TooLargeError: It is larger than the limits, in bytes, declared pixels or scans.
     """
     _require_contained(media, settings)
     return _as_annotated(_decode(media, settings), flipped)
@@ -230,7 +230,7 @@ def decode_picture(data: bytes, settings: Settings, name: str) -> npt.NDArray[np
 
     Raises:
         ImageError: It is no image of these kinds, or damaged.
-        TooLargeError: It declares more pixels than the limits allow.
+        TooLargeError: It declares more pixels than the limits allow, or has too many scans.
     """
     return np.ascontiguousarray(_pixels(data, settings, name)[:, :, ::-1])
 
@@ -238,6 +238,8 @@ def decode_picture(data: bytes, settings: Settings, name: str) -> npt.NDArray[np
 def _pixels(data: bytes, settings: Settings, name: str) -> Any:
     header = read_header(data, name)
     check_size(header, settings, name)
+    if header.kind == JPEG:
+        check_scans(data, name)
     try:
         picture = cv2.imdecode(np.frombuffer(data, dtype=np.uint8), _FLAGS)
     except cv2.error as error:

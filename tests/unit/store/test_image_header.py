@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from app.config import Settings
 from app.errors import ImageError, TooLargeError
-from app.store.image_header import ImageHeader, check_size, read_header
+from app.store.image_header import MAX_SCANS, ImageHeader, check_scans, check_size, read_header
 
 PICTURE = np.random.default_rng(3).integers(0, 255, (37, 53, 3), dtype=np.uint8)
 WEBP_LOSSLESS = [cv2.IMWRITE_WEBP_QUALITY, 101]
@@ -37,6 +37,14 @@ def webp_extended() -> bytes:
     data = cv2.imencode(".webp", transparent, [cv2.IMWRITE_WEBP_QUALITY, 50])[1].tobytes()
     assert data[12:16] == b"VP8X"
     return data
+
+
+def many_scans(count: int) -> bytes:
+    """A progressive JPEG that a decoder takes, with so many scans: the last one of ten again and again."""
+    whole = encoded(".jpg", cv2.IMWRITE_JPEG_PROGRESSIVE, 1)
+    last = whole.rfind(b"\xff\xda")
+    assert whole.count(b"\xff\xda") == 10
+    return whole[:last] + whole[last:-2] * (count - 9) + whole[-2:]
 
 
 class TestReadHeader:
@@ -111,3 +119,49 @@ class TestCheckSize:
             except TooLargeError:
                 refused.append(size)
         assert refused == [larger]
+
+
+class TestCheckScans:
+    def test_refuses_what_is_drawn_once_more_than_the_most(self) -> None:
+        most, more = many_scans(MAX_SCANS), many_scans(MAX_SCANS + 1)
+        check_scans(most)
+        with pytest.raises(TooLargeError, match=r"^frame 7\.jpg is drawn in more than 100 scans"):
+            check_scans(more, "frame 7.jpg")
+        for data in (most, more):
+            picture = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR)
+            assert picture.shape == PICTURE.shape
+
+    @pytest.mark.parametrize(
+        "option", [(), (cv2.IMWRITE_JPEG_PROGRESSIVE, 1), (cv2.IMWRITE_JPEG_RST_INTERVAL, 1)]
+    )
+    def test_takes_what_encoders_write(self, option: tuple[int, ...]) -> None:
+        check_scans(encoded(".jpg", cv2.IMWRITE_JPEG_QUALITY, 100, *option))
+
+    @pytest.mark.parametrize(
+        "between",
+        [
+            pytest.param(b"\xff\xfe\x00\x04\xff\xd9", id="an end within a comment"),
+            pytest.param(b"\xff\x02\xff\xff", id="a reserved marker and a length"),
+            pytest.param(b"\xff\x00\xff\xff", id="a stuffed byte and a length"),
+            pytest.param(b"\xff\xd3\xff\xff", id="a restart and a length"),
+            pytest.param(b"\xff\xff\xff", id="bytes that fill"),
+            pytest.param(b"\xff\xfe\x00\x00", id="a comment without its length"),
+        ],
+    )
+    def test_counts_the_scans_behind_whatever_a_decoder_passes_over(self, between: bytes) -> None:
+        scan = b"\xff\xda\x00\x08\x01\x01\x00\x00\x3f\x00" + between
+        check_scans(b"\xff\xd8" + scan * MAX_SCANS)
+        with pytest.raises(TooLargeError):
+            check_scans(b"\xff\xd8" + scan * (MAX_SCANS + 1))
+
+    @pytest.mark.parametrize("place", ["a comment", "behind the end"])
+    def test_what_is_no_scan_counts_as_none(self, place: str) -> None:
+        data, scans = encoded(".jpg"), b"\xff\xda\x00\x02" * (MAX_SCANS + 1)
+        comment = b"\xff\xfe" + struct.pack(">H", len(scans) + 2) + scans
+        check_scans(
+            data[:2] + comment + data[2:] if place == "a comment" else data + bytes(2) + scans
+        )
+
+    @given(st.lists(st.sampled_from([b"\xff", b"\xda", b"\xd9", b"\xfe", b"\0", b"\x02"])))
+    def test_any_bytes_come_to_an_end(self, parts: list[bytes]) -> None:
+        check_scans(b"\xff\xd8" + b"".join(parts))

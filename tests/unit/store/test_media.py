@@ -282,6 +282,19 @@ class TestReadFrame:
             read_frame(Media(str(path)), width, False, settings)
 
     @pytest.mark.parametrize("width", [None, 40])
+    def test_so_is_a_picture_that_is_drawn_over_and_over(
+        self, tmp_path, settings, monkeypatch, width
+    ) -> None:
+        data = cv2.imencode(".jpg", PICTURE, [cv2.IMWRITE_JPEG_PROGRESSIVE, 1])[1].tobytes()
+        path, last = tmp_path / "slow.jpg", data.rfind(b"\xff\xda")
+        path.write_bytes(data[:last] + data[last:-2] * 100 + data[-2:])
+        monkeypatch.setattr(cv2, "imdecode", lambda *_: pytest.fail("decoded"))
+        with pytest.raises(
+            TooLargeError, match=r"^frame slow\.jpg is drawn in more than 100 scans"
+        ):
+            read_frame(Media(str(path)), width, False, settings)
+
+    @pytest.mark.parametrize("width", [None, 40])
     @pytest.mark.parametrize("data", [b"", b"hello", b"<svg/>", PNG[:60], b"\xff\xd8\xff\xe0" * 9])
     def test_a_file_that_is_no_image_is_refused(self, tmp_path, settings, data, width) -> None:
         path = tmp_path / "x.png"
