@@ -60,12 +60,12 @@ def read_readings(session: Session, digests: Iterable[str]) -> dict[str, PaintRe
     for start in range(0, len(wanted), _BATCH):
         some = wanted[start : start + _BATCH]
         for row in session.execute(_READINGS, {"digests": some}):
-            found[row.digest] = _reading(row.digest, row.body)
+            found[row.digest] = reading_of(row.digest, row.body)
     return found
 
 
 @lru_cache(maxsize=64)
-def _reading(digest: str, body: bytes) -> PaintReading:
+def reading_of(digest: str, body: bytes) -> PaintReading:
     with as_written():
         reading = reading_from_text(inflate(body).decode())
         if reading.digest != digest:

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+
+SHOWN = 5
+"""Records that a sentence names."""
 
 
 @dataclass(frozen=True)
@@ -20,3 +24,19 @@ class Check:
     ok: bool
     sentence: str
     mend: str | None = None
+
+
+def compared(name: str, whole: str, apart: Sequence[str], wrong: str, mend: str) -> Check:
+    """What came of looking at many records.
+
+    Args:
+        name: What was looked at.
+        whole: What is said where none is at fault.
+        apart: Names of those that are.
+        wrong: What is wrong with them.
+        mend: What to do about them.
+    """
+    if not apart:
+        return Check(name, True, whole)
+    shown = ", ".join(apart[:SHOWN]) + (" and others" if len(apart) > SHOWN else "")
+    return Check(name, False, f"{len(apart):,} {wrong}: {shown}", mend)

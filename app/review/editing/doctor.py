@@ -7,18 +7,18 @@ from typing import Any
 
 from app.errors import StorageError
 from app.review.datasets.dataset import list_datasets
-from app.review.editing.check import Check
+from app.review.editing.check import Check, compared
 from app.review.editing.ledger import Ledger, read_ledger
 from app.review.editing.recompute import stale_groups
 from app.review.editing.replay import replay
+from app.review.editing.solution_check import examine_computed
 from app.store.log import newest_entry
 from app.store.session import Session
 from app.store.soundness import count_lost_references, file_faults, no_fault, restoring
 from app.store.store import Store
 
 REBUILD = "Run touchline doctor --rebuild: it writes these tables anew from the log."
-SHOWN = 5
-"""Records that a sentence names."""
+UNLIKE = "not as the log says"
 REBUILT = {
     "groups": "groups",
     "stations": "cameras",
@@ -31,7 +31,7 @@ KEPT = {"datasets": "datasets", "verdicts": "groups' verdicts"}
 
 
 def examine(store: Store) -> list[Check]:
-    """Look at the file, the log's hash chain, the tables and the solutions.
+    """Look at the file, the log's hash chain, the tables and everything that was computed.
 
     Nothing is changed. The tables are compared with what follows from the log alone, unless the
     log is broken: then nothing follows from it.
@@ -46,7 +46,8 @@ def examine(store: Store) -> list[Check]:
             checks.append(Check("log", False, error.message, error.hint or restore))
         else:
             checks.append(Check("log", True, f"{entries:,} entries, each as it was written"))
-            checks += _tables(said, read_ledger(session), restore)
+            checks += _compared_tables(session, said, restore)
+        checks += examine_computed(session, restore)
     return [*checks, *_solutions(store)]
 
 
@@ -60,18 +61,21 @@ def _file(session: Session, restore: str) -> Check:
     return Check("file", True, no_fault(session))
 
 
+def _compared_tables(session: Session, said: Ledger, restore: str) -> list[Check]:
+    try:
+        present = read_ledger(session)
+    except StorageError as error:
+        return [Check("tables", False, error.message, REBUILD)]
+    return _tables(said, present, restore)
+
+
 def _tables(said: Ledger, present: Ledger, restore: str) -> list[Check]:
     checks = []
     for names, mend in ((REBUILT, REBUILD), (KEPT, restore)):
         for name, words in names.items():
             ours, theirs = getattr(said, name), getattr(present, name)
-            apart = _apart(ours, theirs)
-            if apart:
-                shown = ", ".join(apart[:SHOWN]) + (" and others" if len(apart) > SHOWN else "")
-                sentence = f"{len(apart):,} not as the log says: {shown}"
-                checks.append(Check(words, False, sentence, mend))
-            else:
-                checks.append(Check(words, True, f"{len(theirs):,}, as the log says"))
+            whole = f"{len(theirs):,}, as the log says"
+            checks.append(compared(words, whole, _apart(ours, theirs), UNLIKE, mend))
     return checks
 
 

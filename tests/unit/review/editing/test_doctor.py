@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+import json
+import zlib
+from dataclasses import replace
+from typing import Any
+
 import pytest
 from sqlalchemy import text
 
@@ -10,9 +15,11 @@ from app.review.editing.doctor import REBUILD, examine
 from app.review.editing.replay import rebuild
 from app.review.editing.submit import load
 from app.review.verdicts.verdict import set_verdict
+from app.soccer.annotation import make_lines
 from app.store.dialect.dialect import dialect_of
 from app.store.store import Store
 from tests.databases import said_for_sqlite
+from tests.unit.review.conftest import OPPOSITE
 
 
 @pytest.fixture
@@ -32,6 +39,107 @@ def change(store: Store, *statements: str) -> None:
         session.execute(text("PRAGMA defer_foreign_keys = ON"))
         for statement in statements:
             session.execute(text(statement))
+
+
+def stations_of(group_id: int) -> str:
+    return f"SELECT station_id FROM view WHERE group_id = {group_id}"
+
+
+def swap(store: Store, table: str, columns: str, key: str, one: object, other: object) -> None:
+    """Let two rows hold each other's values."""
+    names = columns.split(", ")
+    values = ", ".join(f"{name} = :{name}" for name in names)
+    with store.write() as session, said_for_sqlite(session):
+        session.execute(text(f"DROP TRIGGER {table}_refuses_update"))
+        read = text(f"SELECT {columns} FROM {table} WHERE {key} = :key")
+        held = [session.execute(read, {"key": place}).one() for place in (one, other)]
+        for place, row in zip((other, one), held, strict=True):
+            statement = text(f"UPDATE {table} SET {values} WHERE {key} = :key")
+            session.execute(statement, {**row._mapping, "key": place})
+
+
+def first(store: Store, statement: str) -> Any:
+    with store.read() as session:
+        return session.scalar(text(statement))
+
+
+GARBAGE = "X'00FF00FF'"
+
+
+class TestComputed:
+    @pytest.fixture
+    def restoring(self, store: Store) -> str:
+        return dialect_of(store.settings).restoring
+
+    @pytest.mark.parametrize("body", [GARBAGE, f"X'{zlib.compress(b'[1').hex()}'"])
+    def test_a_calibration_that_cannot_be_read_is_named_by_its_key(
+        self, store: Store, ids, restoring: str, body: str
+    ) -> None:
+        key = first(store, "SELECT min(key) FROM calibration")
+        trigger = "DROP TRIGGER calibration_refuses_update"
+        change(store, trigger, f"UPDATE calibration SET body = {body} WHERE key = '{key}'")
+        found = faults(store)
+        assert found.keys() == {"calibrations"}
+        assert found["calibrations"].sentence == f"1 not as it was written: {key}"
+        assert found["calibrations"].mend == restoring
+
+    def test_calibrations_that_were_swapped_are_not_those_that_a_solution_rests_on(
+        self, store: Store, ids
+    ) -> None:
+        keys = json.loads(first(store, "SELECT min(calibrations) FROM solution"))
+        swap(store, "calibration", "body", "key", *keys)
+        assert faults(store).keys() == {"solutions"}
+
+    @pytest.mark.parametrize("column", ["body", "facts"])
+    def test_a_solution_that_cannot_be_read_is_named_with_its_group(
+        self, store: Store, ids, column: str, restoring: str
+    ) -> None:
+        trigger = "DROP TRIGGER solution_refuses_update"
+        change(
+            store, trigger, f"UPDATE solution SET {column} = {GARBAGE} WHERE group_id = {ids[1]}"
+        )
+        number = first(store, f"SELECT id FROM solution WHERE group_id = {ids[1]}")
+        found = faults(store)
+        assert found.keys() == {"solutions"}
+        sentence = f"1 not as it was written: {number} of group {ids[1]}"
+        assert found["solutions"].sentence == sentence
+        assert found["solutions"].mend == restoring
+
+    @pytest.mark.parametrize("column", ["body", "summary"])
+    def test_solutions_that_were_swapped_are_those_of_neither_group(
+        self, store: Store, fill, make_static, column: str
+    ) -> None:
+        """Of static cameras, whose calibrations both groups share."""
+        made = fill(make_static(10), make_static(11, ball=(9.0, 2.0, -0.5)), make_static(12))
+        swap(store, "solution", column, "group_id", *made[:2])
+        found = faults(store)
+        assert found.keys() == {"solutions"}
+        assert found["solutions"].sentence.startswith("2 not as it was written")
+
+    def test_a_solution_names_the_calibrations_that_it_rests_on(self, store: Store, ids) -> None:
+        trigger = "DROP TRIGGER solution_refuses_update"
+        change(store, trigger, "UPDATE solution SET calibrations = '[]'")
+        assert faults(store)["solutions"].sentence.startswith("2 not as it was written")
+
+    def test_a_whole_solution_of_another_group_rests_on_none_of_its_cameras(
+        self, store: Store, fill, make_group
+    ) -> None:
+        other = make_group(8)
+        moved = replace(other.views[0].station, lines=make_lines({}), given=OPPOSITE)
+        views = (
+            replace(other.views[0], key="7.png", station=moved),
+            replace(other.views[1], key="7_1.png"),
+        )
+        ids = fill(make_group(7), replace(other, views=views))
+        swap(store, "solution", "body, summary, calibrations, facts", "group_id", *ids)
+        assert faults(store)["solutions"].sentence.startswith("2 not as it was written")
+
+    def test_what_was_read_of_paint_has_the_digest_by_which_it_is_named(
+        self, store: Store, ids
+    ) -> None:
+        values = f"('{'0' * 32}', (SELECT min(id) FROM dataset), {GARBAGE})"
+        change(store, f"INSERT INTO paint_evidence (digest, dataset_id, body) VALUES {values}")
+        assert faults(store).keys() == {"readings of paint"}
 
 
 class TestExamine:
@@ -64,6 +172,14 @@ class TestExamine:
         found = faults(store)
         assert found.keys() == {"log"}
         assert "row 3 of the log" in found["log"].sentence
+
+    def test_a_reading_of_the_tables_that_breaks_off_is_a_fault_among_the_others(
+        self, store: Store, ids
+    ) -> None:
+        change(store, f"UPDATE station SET lines = '[' WHERE id IN ({stations_of(ids[0])})")
+        assert faults(store)["tables"].mend == REBUILD
+        rebuild(store)
+        assert faults(store) == {}
 
     def test_groups_that_wait_are_told_and_are_no_fault(
         self, store: Store, fill, make_group
