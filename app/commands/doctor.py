@@ -51,6 +51,7 @@ def _examine(settings: Settings) -> list[Check]:
     from app.review.editing.check import Check
     from app.review.editing.checkup import examine_home, examine_surroundings
     from app.review.editing.doctor import examine
+    from app.review.versions.version_check import examine_versions
     from app.review.yields.soundness import examine_yields
     from app.store.home import make_home
 
@@ -58,6 +59,7 @@ def _examine(settings: Settings) -> list[Check]:
     checks = [*examine_home(settings), examine_yields(settings)]
     try:
         with opened_store(settings) as store:
-            return [*checks, *examine_surroundings(store), *examine(store)]
+            checks += [*examine_surroundings(store), *examine(store)]
+            return [*checks, *examine_versions(store)]
     except StorageError as error:
         return [*checks, Check("database", False, error.message, error.hint)]

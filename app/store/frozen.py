@@ -169,6 +169,19 @@ def read_frozen(session: Session, dataset_id: int, keys: Iterable[str]) -> dict[
     return {key: body for key, body in bodies.items() if body is not None}
 
 
+def fitting_key(key: str, body: bytes) -> str:
+    """The key that content has by its digest; ``key`` itself, where it is that of a calibration.
+
+    Raises:
+        DamagedError: The content cannot be read.
+    """
+    prefix = key.partition(":")[0] + ":"
+    if prefix == CALIBRATION:
+        return key
+    # A solution is frozen as it was stored, everything else under the digest of its text.
+    return prefix + digest_of(body if prefix == SOLUTION else inflate(body))
+
+
 def text_of(body: bytes) -> str:
     """The text of frozen JSON."""
     return inflate(body).decode()

@@ -141,6 +141,11 @@ def read_entries_of(
     return read_log(session, LogModel.group_id.in_(group_ids), LogModel.kind.in_(list(kinds)))
 
 
+def entries_of_kinds(session: Session, kinds: Iterable[str]) -> Iterator[LogEntry]:
+    """All entries of some kinds, oldest first."""
+    return read_log(session, LogModel.kind.in_(list(kinds)))
+
+
 def station_entries(session: Session, station_id: int) -> list[LogEntry]:
     """Everything that was said about a static camera, oldest first."""
     where = (LogModel.station_id == station_id, LogModel.group_id.is_(None))

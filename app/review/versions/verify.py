@@ -26,11 +26,7 @@ from app.solving.calibrate import calibrate_station, calibration_key
 from app.solving.solve import solve
 from app.store.frozen import (
     CALIBRATION,
-    PAINT,
-    SAID,
-    SOLUTION,
-    STATION,
-    digest_of,
+    fitting_key,
     json_of,
     named_texts,
     read_frozen,
@@ -296,14 +292,11 @@ def _differences(
 
 def _frozen_differences(row: VersionGroup, task: VerifyTask) -> Iterator[Difference]:
     """Parts that are not what their key says."""
-    said = task.frozen[row.said or ""]
-    parts = {row.said or "": text_of(said).encode()}
-    parts |= {key: text_of(task.frozen[key]).encode() for key in named_texts(json_of(said))}
-    parts[row.solution or ""] = task.frozen[row.solution or ""]
-    for key, content in parts.items():
-        prefix = next(name for name in (SAID, STATION, PAINT, SOLUTION) if key.startswith(name))
-        if prefix + digest_of(content) != key:
-            yield Difference(row.key, "digest", key, prefix + digest_of(content))
+    said, solution = row.said or "", row.solution or ""
+    for key in (said, *named_texts(json_of(task.frozen[said])), solution):
+        found = fitting_key(key, task.frozen[key])
+        if found != key:
+            yield Difference(row.key, "digest", key, found)
 
 
 def _split_differences(row: VersionGroup, group: Group, splitter: Splitter) -> Iterator[Difference]:
