@@ -62,6 +62,8 @@ def append(session: Session, entries: Sequence[Entry]) -> list[int]:
         return []
     last = session.execute(_LAST).one_or_none()
     number, previous = (0, GENESIS) if last is None else last
+    if session.log_end is None:
+        session.log_before = number
     rows: list[dict[str, Any]] = []
     for entry in entries:
         number += 1

@@ -20,11 +20,13 @@ class Session(Connection):
 
     Attributes:
         log_end: Id and hash of the last entry that was written into the log; None: none was.
+        log_before: Id of the log's last entry before those that were written; 0: it had none.
     """
 
     def __init__(self, engine: Engine):
         super().__init__(engine)
         self.log_end: tuple[int, str] | None = None
+        self.log_before = 0
         self._then: list[Callable[[], None]] = []
 
     def __enter__(self) -> Self:

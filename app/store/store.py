@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import replace
 
 import structlog
@@ -15,6 +15,7 @@ from app.config import Settings
 from app.errors import EXAMINE, BusyError, DamagedError, StorageError
 from app.place import leave_place
 from app.store.anchor import (
+    Anchor,
     move_anchor,
     read_anchor,
     renew_anchor,
@@ -178,6 +179,7 @@ class Store:
             yield session
             if not lasting and session.log_end is not None:
                 raise RuntimeError("what the log says must last")
+            self._require_anchored(session)
             if lasting:
                 self.sharing.tell(session, COMMITTED)
                 leave_place()
@@ -230,6 +232,27 @@ class Store:
     def note_damage(self, error: DamagedError) -> None:
         """Refuse writes from now on: something read was not what was written. The first sign stays."""
         self._damage = self._damage or error.message
+
+    def _require_anchored(self, session: Session) -> None:
+        """Raise DamagedError where the log had ended before what was said already.
+
+        It only ever grows, whoever writes: not even an anchor that another process moved is ahead.
+        """
+        if session.log_end is None or self._anchor is None:
+            return
+        there: Anchor | None = self._anchor
+        with suppress(OSError, DamagedError):
+            there = read_anchor(self.settings.database_file)
+        # One that was taken away is meant to be.
+        if there is None:
+            return
+        said = max(there.entries, self._anchor.entries)
+        if session.log_before < said:
+            raise DamagedError(
+                f"the log ends after {session.log_before:,} entries, but {said:,} were said in this"
+                " home",
+                hint=EXAMINE,
+            )
 
     def _anchored(self, session: Session) -> None:
         """Tell the home how long the log is by now; an anchor that stays behind is right, too."""

@@ -4,7 +4,7 @@ import subprocess
 import sys
 import threading
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import ExitStack
+from contextlib import ExitStack, closing
 from contextvars import copy_context
 from pathlib import Path
 
@@ -16,7 +16,8 @@ from structlog.testing import capture_logs
 from app.config import Settings
 from app.errors import BusyError, DamagedError, InputError, StorageError
 from app.place import hold_place
-from app.store.anchor import read_anchor
+from app.store.anchor import anchor_file, read_anchor
+from app.store.dialect.dialect import dialect_of
 from app.store.dialect.sqlite import AGAIN_S, PRAGMAS
 from app.store.log import Entry, append, read_log
 from app.store.migrate import KNOWN_REVISIONS, migrate, migrations_folder
@@ -330,6 +331,88 @@ class TestPeek:
         monkeypatch.setattr(store, "_peeker", None)
         with pytest.raises(BusyError), store.peek():
             pytest.fail("it was answered")
+
+
+class TestBeforeTheCommit:
+    @pytest.mark.parametrize("times", [1, 5])
+    def test_a_log_that_has_lost_its_end_takes_no_entry_and_the_home_forgets_nothing(
+        self, store: Store, times: int
+    ) -> None:
+        say(store, 5)
+        cut_log(store, after=3)
+        with pytest.raises(DamagedError, match="ends after 3 entries, but 5 were said"):
+            say_at_once(store, times)
+        with pytest.raises(DamagedError, match="no change is taken"):
+            add(store, "late")
+        assert (log_ids(store), said(store)) == ([1, 2, 3], 5)
+
+    def test_an_end_that_another_process_wrote_counts_too(self, store: Store) -> None:
+        say(store, 2)
+        with closing(Store.open(store.settings)) as other:
+            say(other, 3)
+        cut_log(store, after=4)
+        with pytest.raises(DamagedError, match="ends after 4 entries, but 5 were said"):
+            say(store)
+
+    def test_beside_the_writes_of_another_process_the_log_grows(self, store: Store) -> None:
+        say(store, 2)
+        with closing(Store.open(store.settings)) as other:
+            say(other, 3)
+            say(store)
+            say(other)
+        assert (log_ids(store), said(store)) == ([1, 2, 3, 4, 5, 6, 7], 7)
+
+    def test_an_anchor_that_cannot_be_read_costs_no_change(
+        self, store: Store, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        say(store)
+        with monkeypatch.context() as broken:
+            broken.setattr("app.store.store.read_anchor", refuse)
+            say(store)
+            cut_log(store, after=1)
+            # What this process has said itself it knows all the same.
+            with pytest.raises(DamagedError, match="but 2 were said"):
+                say(store)
+
+    def test_a_home_whose_anchor_was_taken_away_believes_its_database(self, store: Store) -> None:
+        say(store, 5)
+        cut_log(store, after=3)
+        anchor_file(store.settings.database_file).unlink()
+        say(store)
+        assert log_ids(store) == [1, 2, 3, 4]
+
+
+def cut_log(store: Store, *, after: int) -> None:
+    """Take the end of the log away, as only somebody can who changes the schema."""
+    on_file = dialect_of(store.settings).is_file
+    with store.write() as session:
+        session.execute(text(_OPENED_ON_FILE if on_file else _OPENED_ON_SERVER))
+        session.execute(text(f"DELETE FROM log WHERE id > {after}"))
+
+
+_OPENED_ON_FILE = "DROP TRIGGER log_refuses_delete"
+_OPENED_ON_SERVER = "ALTER TABLE log DISABLE TRIGGER USER"
+
+
+def say_at_once(store: Store, times: int) -> None:
+    with store.write() as session:
+        for _ in range(times):
+            append(session, [Entry("work", "ada", "2026-11-23T10:00:00+00:00", {})])
+
+
+def log_ids(store: Store) -> list[int]:
+    with store.read() as session:
+        return [entry.id for entry in read_log(session)]
+
+
+def said(store: Store) -> int:
+    anchor = read_anchor(store.settings.database_file)
+    assert anchor is not None
+    return anchor.entries
+
+
+def refuse(*_: object) -> None:
+    raise PermissionError("refused")
 
 
 class TestAfterTheCommit:
