@@ -35,6 +35,7 @@ from app.store.migrate import (
     newer_schema,
     schema_revision,
 )
+from app.store.opened_file import OpenedFile
 from app.store.session import Session
 from app.store.soundness import file_faults
 
@@ -99,7 +100,9 @@ class Store:
         self._listeners: list[Callable[[], None]] = []
         self._anchor = read_anchor(settings.database_file)
         self._anchor_refused = False
-        self._damage: str | None = None
+        file = settings.database_file
+        self._file = OpenedFile(file) if dialect_of(settings).is_file else None
+        self._damage: tuple[str, str] | None = None
 
     @staticmethod
     def open(settings: Settings, turn: AbstractContextManager[object] | None = None) -> Store:
@@ -180,6 +183,9 @@ class Store:
             if not lasting and session.log_end is not None:
                 raise RuntimeError("what the log says must last")
             self._require_anchored(session)
+            if self._file is not None:
+                self._file.require_there()
+                self._file.require_log()
             if lasting:
                 self.sharing.tell(session, COMMITTED)
                 leave_place()
@@ -200,12 +206,16 @@ class Store:
         return self._damage is not None
 
     def require_undamaged(self) -> None:
-        """Raise DamagedError once the database was seen to be damaged.
+        """Raise DamagedError once the database was seen to be damaged, or its file is another.
 
         What is left of it is read as long as it can be; another change could only spoil more.
         """
         if self._damage is not None:
-            raise DamagedError(f"no change is taken: {self._damage}", hint=EXAMINE)
+            message, hint = self._damage
+            raise DamagedError(f"no change is taken: {message}", hint=hint)
+        if self._file is not None:
+            with self._watched():
+                self._file.require_there()
 
     def require_whole(self, wanted: Callable[[], bool] = lambda: True) -> None:
         """Let SQLite look at every page and index; raise DamagedError where it finds a fault.
@@ -231,7 +241,7 @@ class Store:
 
     def note_damage(self, error: DamagedError) -> None:
         """Refuse writes from now on: something read was not what was written. The first sign stays."""
-        self._damage = self._damage or error.message
+        self._damage = self._damage or (error.message, error.hint or EXAMINE)
 
     def _require_anchored(self, session: Session) -> None:
         """Raise DamagedError where the log had ended before what was said already.

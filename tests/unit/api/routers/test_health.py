@@ -30,6 +30,17 @@ class TestHealth:
         assert api.get("/healthz").json()["status"] == "ok"
         assert api.get("/readyz").json() == {"status": "ready"}
 
+    @pytest.mark.file_of_sqlite("the file that is open")
+    def test_a_process_whose_database_is_moved_away_is_not_ready(
+        self, api: TestClient, tmp_path: Path
+    ) -> None:
+        file = tmp_path / "home" / "touchline.db"
+        file.rename(tmp_path / "aside.db")
+        with capture_logs():
+            ready = api.get("/readyz")
+        assert ready.status_code == 503
+        assert ready.json()["detail"] == "touchline.db was moved or deleted while it was open"
+
 
 @pytest.fixture
 def spoil(app: FastAPI, tmp_path: Path) -> Callable[[Callable[[Path], None]], None]:
