@@ -15,6 +15,7 @@ from app.errors import DamagedError, StorageError
 from app.store.anchor import read_anchor, require_own_database
 from app.store.engine import make_engine, reported
 from app.store.home import ASIDE
+from app.store.keys import KEYS
 from app.store.wal import DatabaseHeader, WriteAheadLog, read_header, read_log
 
 
@@ -106,12 +107,15 @@ def signs_of_use(settings: Settings) -> list[str | None]:
     anchor = read_anchor(database)
     log = log_file(database)
     aside = next(settings.home.glob(f"{ASIDE}*/{database.name}"), None)
+    keys = [name for name in KEYS if (settings.home / name).exists()]
     return [
         None if anchor is None else f"home.json knows {anchor.entries:,} entries of its log",
         f"{log.name} holds changes" if _size(log) else None,
         _filled(settings.uploads, "*/upload.json"),
         _filled(settings.exports, "*.json"),
         _filled(settings.home / "backups", "*.zip"),
+        *(_filled(settings.home / name, "*") for name in ("sample", "practice")),
+        *(f"{name} is there" for name in keys),
         None if aside is None else f"{aside.parent.name}/ holds its database",
     ]
 

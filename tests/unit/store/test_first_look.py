@@ -105,6 +105,11 @@ class TestRequireSound:
             "exports/1.json",
             "backups/before-schema-0032.zip",
             "before-restore-2030-01-01/touchline.db",
+            "sample/game/Labels-v3.json",
+            "practice/truth.json",
+            "second-factor.key",
+            "webhooks.key",
+            "begun.key",
         ],
     )
     def test_a_home_that_was_used_is_no_new_home(
