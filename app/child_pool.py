@@ -19,16 +19,21 @@ PATIENCE = 1.0
 Explain = Callable[[ChildEnded], Exception]
 
 
+def begin_all() -> None:
+    """Say nothing against any task."""
+
+
 class PoolTask:
     """A task that waits or runs; ``future`` has its result.
 
     Args:
         explain: From the way that its child ended to the error that a caller reads.
+        begin: Called when its turn has come; what it raises is the result, and no child works.
     """
 
-    def __init__(self, explain: Explain) -> None:
+    def __init__(self, explain: Explain, begin: Callable[[], None]) -> None:
         self.future: Future[Any] = Future()
-        self._explain = explain
+        self._explain, self._begin = explain, begin
         self._left = threading.Event()
 
     def leave(self) -> None:
@@ -54,6 +59,7 @@ class PoolTask:
                 raise CancelledError
 
         try:
+            self._begin()
             with figures.working():
                 result = child.run(work, *arguments, stop=stop)
         except ChildEnded as error:
@@ -109,6 +115,7 @@ class ChildPool:
         work: Callable[..., Any],
         *arguments: Any,
         explain: Explain = lambda error: error,
+        begin: Callable[[], None] = begin_all,
         bounded: bool = True,
     ) -> PoolTask:
         """Have a function of a module called in a child.
@@ -117,12 +124,13 @@ class ChildPool:
             work: The function.
             arguments: What it is called with.
             explain: See ``PoolTask``.
+            begin: Likewise.
             bounded: Refuse it where as many wait as may; else it waits with them.
 
         Raises:
             OverloadedError: As many wait as may.
         """
-        task = PoolTask(explain)
+        task = PoolTask(explain, begin)
         with self._lock:
             if bounded and len(self._tasks) >= self._most:
                 raise OverloadedError(

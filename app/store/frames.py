@@ -11,6 +11,9 @@ import threading
 from collections import OrderedDict
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
+from math import inf
+from time import monotonic
 from typing import Any
 
 from app.child import Allowance, ChildEnded
@@ -37,9 +40,10 @@ FETCHERS = 2
 WAITING = 64
 """Pictures that may wait; one more is told to come back."""
 REMEMBERED = 256
-"""Frames that went beyond the allowance and are not tried again."""
-LIMITS = frozenset({"memory", "processor"})
-"""How a frame goes beyond the allowance; whatever else ends a process may be the machine's doing."""
+"""Frames that went beyond the allowance and are not tried again, in whatever width."""
+REMEMBERED_SECONDS = {"memory": inf, "processor": inf, "silence": 300.0}
+"""How long, by the way in which a frame went beyond the allowance: a busy machine is silent, too.
+Whatever else ends a process is the machine's doing, and the frame is tried again."""
 
 
 @dataclass(frozen=True)
@@ -72,7 +76,7 @@ class Frames:
         )
         self._readers = ChildPool(READING, READERS, WAITING, "pictures", FIGURES["readers"])
         self._fetchers = ChildPool(FETCHING, FETCHERS, WAITING, "pictures", FIGURES["fetchers"])
-        self._refused: OrderedDict[str, ReviewError] = OrderedDict()
+        self._refused: OrderedDict[str, tuple[ReviewError, float]] = OrderedDict()
         self._lock = threading.Lock()
 
     def warm(self) -> None:
@@ -86,10 +90,7 @@ class Frames:
             NotFoundError: The file is not there.
             TooLargeError: It was tried before, and went beyond the allowance.
         """
-        with self._lock:
-            error = self._refused.get(frame_stamp(media))
-        if error is not None:
-            raise error
+        self._require_untried(media)
         data = cached_frame(media, width, flipped, self._settings)
         return None if data is None else SentPicture.of(JPEG, data)
 
@@ -181,17 +182,32 @@ class Frames:
     def _submit(self, media: Media, width: int | None, flipped: bool, *, bounded: bool) -> PoolTask:
         def explain(error: ChildEnded) -> ReviewError:
             refusal = refused_picture(frame_name(media), error)
-            if error.reason in LIMITS:
-                self._remember(media, refusal)
+            if error.reason in REMEMBERED_SECONDS:
+                self._remember(media, refusal, REMEMBERED_SECONDS[error.reason])
             return refusal
 
         return self._pool.submit(
-            make_picture, media, width, flipped, self._settings, explain=explain, bounded=bounded
+            make_picture,
+            media,
+            width,
+            flipped,
+            self._settings,
+            explain=explain,
+            # Other widths of it may have waited while it was tried.
+            begin=partial(self._require_untried, media),
+            bounded=bounded,
         )
 
-    def _remember(self, media: Media, refusal: ReviewError) -> None:
+    def _require_untried(self, media: Media) -> None:
+        """Raise the refusal of a frame that went beyond the allowance, while it is remembered."""
         with self._lock:
-            self._refused[frame_stamp(media)] = refusal
+            refusal, until = self._refused.get(frame_stamp(media), (None, 0.0))
+        if refusal is not None and monotonic() < until:
+            raise refusal
+
+    def _remember(self, media: Media, refusal: ReviewError, seconds: float) -> None:
+        with self._lock:
+            self._refused[frame_stamp(media)] = (refusal, monotonic() + seconds)
             while len(self._refused) > REMEMBERED:
                 self._refused.popitem(last=False)
 

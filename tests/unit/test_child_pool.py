@@ -96,6 +96,18 @@ class TestSubmit:
             task.future.result(60)
         assert pool.submit(os.getpid).future.result(60) != os.getpid()
 
+    def test_what_has_become_needless_until_its_turn_is_not_begun(
+        self, pool: ChildPool, tmp_path: Path
+    ) -> None:
+        def begin() -> None:
+            raise ImageError("tried before")
+
+        task = pool.submit(note, tmp_path, "late", begin=begin)
+        with pytest.raises(ImageError, match="tried before"):
+            task.future.result(60)
+        assert not (tmp_path / "late").exists()
+        assert not pool.is_whole
+
     def test_a_child_that_ends_is_explained_and_replaced(self, pool: ChildPool) -> None:
         def explain(error: ChildEnded) -> Exception:
             return ImageError(f"7.png {error}")

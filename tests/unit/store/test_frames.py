@@ -8,6 +8,7 @@ import struct
 import zlib
 from collections.abc import Iterator
 from pathlib import Path
+from time import monotonic, sleep
 from typing import Any
 
 import cv2
@@ -145,6 +146,29 @@ class TestFrames:
         Path(media.path).write_bytes(PNG + b"\0")
         assert frames.read(media, None, False).kind == "image/png"
 
+    def test_another_width_that_waited_meanwhile_is_not_tried_either(
+        self, frames: Frames, media: Media, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(module, "make_picture", note_and_run_out_of_time)
+        for task in [frames.ask(media, width, False) for width in (None, 40, 80)]:
+            with pytest.raises(TooLargeError, match="takes more than 10 seconds"):
+                task.future.result()
+        assert Path(f"{media.path}.tries").read_text() == "None\n"
+
+    def test_what_is_silent_is_tried_again_after_a_while(
+        self, frames: Frames, media: Media, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        with monkeypatch.context() as patch:
+            patch.setattr(module, "make_picture", sleep_on)
+            patch.setattr(frames._pool._children[0], "allowance", Allowance(2**30, 10.0, 0.01))
+            with pytest.raises(TooLargeError, match="without a result"):
+                frames.read(media, None, False)
+        with pytest.raises(TooLargeError, match="without a result"):
+            frames.read(media, 40, False)
+        later = monotonic() + module.REMEMBERED_SECONDS["silence"]
+        monkeypatch.setattr(module, "monotonic", lambda: later)
+        assert frames.read(media, 40, False).kind == "image/jpeg"
+
     def test_a_refusal_is_that_of_this_process(self, frames: Frames, tmp_path: Path) -> None:
         with pytest.raises(NotFoundError, match=r"gone\.png is not where it was imported from"):
             frames.read(Media(str(tmp_path / "gone.png")), None, False)
@@ -179,3 +203,13 @@ def decode_nothing(*arguments: Any) -> Any:
 
 def run_out_of_time(*_: object) -> None:
     os.kill(os.getpid(), signal.SIGXCPU)
+
+
+def note_and_run_out_of_time(media: Media, width: int | None, *_: object) -> None:
+    with Path(f"{media.path}.tries").open("a") as file:
+        file.write(f"{width}\n")
+    run_out_of_time()
+
+
+def sleep_on(*_: object) -> None:
+    sleep(600)
