@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 from urllib.parse import urlsplit
 
+from app.datasets.plain_file import open_plain
 from app.errors import InputError, ReviewError
 
 if TYPE_CHECKING:
@@ -83,18 +84,16 @@ def read_token(path: Path) -> str:
     """The token in a file that its owner alone can read.
 
     Raises:
-        InputError: Others can read it, or it holds none.
+        InputError: It is no plain file, others can read it, or it holds none.
     """
     from app.review.people.access_tokens import is_whole
 
     try:
-        with path.open("rb") as file:
+        with open_plain(path) as file:
             mode = os.fstat(file.fileno()).st_mode
             text = file.read(MAX_TOKEN).decode("ascii", "replace").strip()
     except OSError as error:
         raise InputError(f"{path} cannot be read ({error.strerror})") from error
-    if not stat.S_ISREG(mode):
-        raise InputError(f"{path} is not a plain file")
     if stat.S_IMODE(mode) & 0o077:
         raise InputError(f"others can read {path}", hint=f"chmod 600 {path}")
     if not is_whole(text):

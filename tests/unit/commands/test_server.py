@@ -19,7 +19,7 @@ from app.api.server import listen, make_server
 from app.api.team import Team
 from app.commands.command_line import app
 from app.commands.remote import write_evaluation
-from app.commands.server import Server, _explained, connected
+from app.commands.server import Server, _explained, connected, read_token
 from app.commands.terminal import log_to_stderr
 from app.config import Settings
 from app.datasets.soccernet_v3_writer import write_soccernet_v3
@@ -218,6 +218,14 @@ class TestRefusals:
         path.chmod(mode)
         with pytest.raises(InputError, match="others can read"), connected(Server(place.url, path)):
             pass
+
+    def test_a_pipe_in_the_place_of_a_token_is_refused_at_once(
+        self, place: Place, tmp_path: Path
+    ) -> None:
+        path = tmp_path / "token"
+        os.mkfifo(path, 0o600)
+        with pytest.raises(InputError, match="is not a plain file"):
+            read_token(path)
 
     def test_without_a_token_it_asks_for_one(self, place: Place) -> None:
         done = CliRunner().invoke(app, ["--server", place.url, "datasets", "list"])
