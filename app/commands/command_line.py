@@ -11,7 +11,7 @@ from __future__ import annotations
 import gc
 import sys
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -42,8 +42,9 @@ from app.commands import (
 )
 from app.commands.options import act_as
 from app.commands.server import work_at
-from app.commands.terminal import complain, spell_out
+from app.commands.terminal import complain, harmless, spell_out
 from app.errors import ReviewError
+from app.finite import quoted
 
 READER_GONE = 141
 """Exit code of a command whose reader has gone, as shells have it."""
@@ -51,8 +52,24 @@ YOUNG = 50_000
 """New objects before the collector looks at them: what libraries bring is there to stay, and to walk
 through it again and again is a sixth of a start."""
 
+SHOWN = 200
+"""Letters of a name in a complaint that it is too long, or no text."""
+
+
+class _Commands(typer.core.TyperGroup):
+    """Commands whose complaints about what was typed do not steer a terminal with it."""
+
+    def invoke(self, ctx: Any) -> Any:
+        try:
+            return super().invoke(ctx)
+        except typer.BadParameter as error:
+            error.message = harmless(error.message)
+            raise
+
+
 app = typer.Typer(
     name="touchline",
+    cls=_Commands,
     no_args_is_help=True,
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
@@ -155,6 +172,17 @@ def run() -> None:
             f"this user may not look at {error.filename}",
             "Open it to them (chmod, chown), or give the command as somebody else.",
         )
+        sys.exit(1)
+    except OSError as error:
+        if error.filename is None:
+            raise
+        complain(f"{quoted(str(error.filename), SHOWN)} cannot be used: {error.strerror}")
+        sys.exit(1)
+    except UnicodeEncodeError as error:
+        # What stands for bytes of the command line that are no UTF-8.
+        if "surrogates" not in error.reason:
+            raise
+        complain(f"{quoted(error.object, SHOWN)} has letters that are no text in UTF-8")
         sys.exit(1)
     except RuntimeError as error:
         # numba's words when it finds no folder to write to; it has no class of its own for them.

@@ -126,6 +126,7 @@ def read_text(path: Path, most: int) -> str:
 def read_settings(**given: object) -> Settings:
     """Settings from the environment and, stronger, from the command line."""
     from pydantic import ValidationError
+    from pydantic_settings import SettingsError
 
     from app.config import Settings
 
@@ -136,6 +137,20 @@ def read_settings(**given: object) -> Settings:
         first = error.errors()[0]
         name = "_".join(str(part) for part in first["loc"]).upper()
         raise typer.BadParameter(f"{first['msg']} (TOUCHLINE_{name})") from None
+    except SettingsError as error:
+        raise typer.BadParameter(_about_json(str(error))) from None
+
+
+def _about_json(error: str) -> str:
+    """What is wrong with a variable that should hold JSON; nothing of what it holds, maybe a secret."""
+    from app.config import Settings
+
+    found = re.search(r'field "(\w+)"', error)
+    if found is None:
+        return "a variable TOUCHLINE_... should hold JSON, and does not"
+    several = isinstance(Settings.model_fields[found[1]].get_default(), list)
+    example = '["ONE", "ANOTHER"]' if several else '{"NAME": {...}}'
+    return f"TOUCHLINE_{found[1].upper()} is no JSON; write it as {example}"
 
 
 def require_safe(settings: Settings) -> None:

@@ -18,6 +18,7 @@ import pytest
 import typer
 
 from app import cli
+from app.commands import command_line
 from app.commands.command_line import YOUNG, app
 from app.commands.opened import process_pool
 from app.datasets.manifest import software_version
@@ -188,6 +189,48 @@ def as_nobody(work: Callable[[], str]) -> str:
         found = said.read()
     os.waitpid(child, 0)
     return found
+
+
+class TestNames:
+    @pytest.mark.parametrize("name", ["a" * 256, "a/" * 2500 + "a"])
+    @pytest.mark.parametrize(
+        "words",
+        [
+            ("import", "coco", "{}", "--dataset", "sn"),
+            ("export", "--dataset", "sn", "--format", "sn-calibration", "--all", "{}"),
+            ("backup", "{}.zip"),
+            ("restore", "{}"),
+        ],
+    )
+    def test_one_that_the_system_does_not_take_is_said_with_its_beginning(
+        self, run: Run, line_files: Path, words: tuple[str, ...], name: str
+    ) -> None:
+        run("import", "sn-calibration", line_files, "--dataset", "sn")
+        code, _, err = run(*(word.replace("{}", name) for word in words))
+        assert code == 1
+        assert err.endswith(" cannot be used: File name too long\n")
+        assert len(err) < 300
+
+    def test_one_that_is_no_text_is_said_so(self, run: Run) -> None:
+        code, _, err = run("findings", "--dataset", "a\udcff")
+        assert (code, err) == (1, '"a\\udcff" has letters that are no text in UTF-8\n')
+
+    @pytest.mark.parametrize(
+        "error",
+        [
+            OSError(errno.EIO, "Input/output error"),
+            UnicodeEncodeError("ascii", "ü", 0, 1, "ordinal not in range(128)"),
+        ],
+    )
+    def test_an_error_that_is_about_no_name_is_not_hidden(
+        self, monkeypatch: pytest.MonkeyPatch, error: Exception
+    ) -> None:
+        def fail() -> None:
+            raise error
+
+        monkeypatch.setattr(command_line, "app", fail)
+        with pytest.raises(type(error)):
+            command_line.run()
 
 
 class TestImport:
