@@ -27,6 +27,8 @@ MEDIA_TYPES = {
 """What is served, and as what; the machine's own table of types has no say."""
 LIBRARY_TYPES = frozenset({".css", ".js", ".json", ".map", ".mjs", ".wasm", ".woff2"})
 """Libraries bring pages and pictures of their own, which are not ours to serve."""
+TOOLS = frozenset({".json", ".mjs"})
+"""At the top of the folder these are of the tools that check and join the modules: no page asks for them."""
 FOR_GOOD = "public, max-age=31536000, immutable"
 REVALIDATED = "no-cache"
 
@@ -51,7 +53,9 @@ class Modules(StaticFiles):
         if scope["method"] not in ("GET", "HEAD"):
             raise HTTPException(status_code=405, headers={"Allow": "GET, HEAD"})
         parts = Path(path).parts
-        allowed = LIBRARY_TYPES if "node_modules" in parts else MEDIA_TYPES.keys()
+        allowed = LIBRARY_TYPES if "node_modules" in parts else frozenset(MEDIA_TYPES)
+        if len(parts) == 1:
+            allowed -= TOOLS
         hidden = any(part.startswith(".") for part in parts)
         if hidden or "\\" in path or Path(path).suffix.lower() not in allowed:
             raise HTTPException(status_code=404)

@@ -53,6 +53,17 @@ class TestModules:
         answer = pages_client.get(f"/static/{path}")
         assert answer.status_code == 404
 
+    @pytest.mark.parametrize("below", ["/static", "/assets/0123456789abcdef"])
+    def test_what_belongs_to_the_tools_is_404_and_what_pages_read_is_not(
+        self, pages_client, static_folder: Path, below: str
+    ) -> None:
+        (static_folder / "help").mkdir()
+        for name in ("package.json", "package-lock.json", "build.mjs", "help/guide.json"):
+            (static_folder / name).write_text("{}")
+        for path in ("package.json", "package-lock.json", "build.mjs", "package.json/"):
+            assert pages_client.get(f"{below}/{path}").status_code == 404
+        assert pages_client.get(f"{below}/help/guide.json").status_code == 200
+
     def test_another_name_of_a_file_gives_that_file(self, pages_client) -> None:
         assert pages_client.get("/static/main.js/").text == "export const one = 1;\n"
 
