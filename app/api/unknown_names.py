@@ -1,7 +1,11 @@
-"""Names that nobody knows: a parameter or field that would be ignored is refused, with the nearest one."""
+"""Names that nobody knows: a parameter or field that would be ignored is refused, with the nearest one.
+
+So is a parameter that stands there twice, of which one would be ignored.
+"""
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterator
 from difflib import get_close_matches
 from functools import lru_cache
@@ -17,20 +21,25 @@ from pydantic import TypeAdapter
 UNKNOWN = "extra_forbidden"
 """What the framework calls a field that a body does not have."""
 _FIELDS: dict[Callable[..., Any], frozenset[str]] = {}
+REPEATED = "repeated"
+_ONCE = "is there more than once; no parameter is a list"
 
 
 async def refuse_unknown_parameters(request: Request) -> None:
-    """Refuse a query parameter that its route does not read.
+    """Refuse a query parameter that its route does not read, or of which it would read one alone.
 
     Raises:
         RequestValidationError: There is one; a misspelt ``dry_run`` must not become a deed.
     """
     known = _parameters(request.scope["route"])
-    unknown = [name for name in request.query_params if name not in known]
-    if unknown:
-        raise RequestValidationError(
-            [{"type": UNKNOWN, "loc": ("query", name), "msg": ""} for name in unknown]
-        )
+    given = Counter(name for name, _ in request.query_params.multi_items())
+    problems = [
+        {"type": REPEATED if name in known else UNKNOWN, "loc": ("query", name), "msg": _ONCE}
+        for name, times in given.items()
+        if name not in known or times > 1
+    ]
+    if problems:
+        raise RequestValidationError(problems)
 
 
 def sentence_about(request: Request, location: tuple[int | str, ...]) -> str:

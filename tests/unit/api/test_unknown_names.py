@@ -34,6 +34,27 @@ class TestParameters:
     def test_parameters_that_only_a_dependency_reads_are_known(self, api) -> None:
         assert api.get(f"{API}/events", params={"dataset": "nowhere"}).status_code == 404
 
+    @pytest.mark.parametrize("query", ["name=a.zip&name=b.zip", "name=a.zip&name=a.zip"])
+    def test_one_that_is_there_twice_is_refused(self, api, app, query: str) -> None:
+        kind = {"Content-Type": "application/octet-stream"}
+        answer = api.post(f"{API}/uploads?{query}", content=b"PK", headers=kind)
+        assert answer.status_code == 422
+        assert answer.json()["errors"] == [
+            {"pointer": "/name", "detail": "is there more than once; no parameter is a list"}
+        ]
+        assert api.get(f"{API}/uploads").json()["items"] == []
+
+    def test_an_unknown_one_that_is_there_twice_is_unknown(self, api) -> None:
+        answer = api.get(f"{API}/jobs?zzz=1&zzz=2")
+        assert answer.json()["detail"] == "/zzz: there is no such parameter"
+
+    def test_none_is_a_list(self, app) -> None:
+        for path, operations in app.openapi()["paths"].items():
+            for operation in operations.values():
+                for one in operation.get("parameters", []):
+                    kinds = one["schema"].get("anyOf", [one["schema"]])
+                    assert "array" not in [kind.get("type") for kind in kinds], (path, one["name"])
+
 
 class TestFields:
     @pytest.mark.parametrize(
