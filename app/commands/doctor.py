@@ -51,6 +51,7 @@ def _examine(settings: Settings) -> list[Check]:
     from app.review.editing.check import Check
     from app.review.editing.checkup import examine_home, examine_surroundings
     from app.review.editing.doctor import examine
+    from app.review.talk.thread_check import examine_threads
     from app.review.versions.version_check import examine_versions
     from app.review.yields.soundness import examine_yields
     from app.store.home import make_home
@@ -60,6 +61,6 @@ def _examine(settings: Settings) -> list[Check]:
     try:
         with opened_store(settings) as store:
             checks += [*examine_surroundings(store), *examine(store)]
-            return [*checks, *examine_versions(store)]
+            return [*checks, examine_threads(store), *examine_versions(store)]
     except StorageError as error:
         return [*checks, Check("database", False, error.message, error.hint)]

@@ -49,6 +49,24 @@ class StoredThread:
     comments: tuple[StoredComment, ...] = ()
 
 
+@dataclass
+class ThreadRecord:
+    """A thread as far as the log has it.
+
+    Attributes:
+        resolved: When it was settled, and by whom.
+        comments: Actor, time, time of the last change, and text, by id.
+    """
+
+    dataset_id: int | None
+    group_id: int | None
+    view: str | None
+    x: float | None
+    y: float | None
+    resolved: tuple[str | None, str | None] = (None, None)
+    comments: dict[int, tuple[str, str, str | None, str | None]] = field(default_factory=dict)
+
+
 @dataclass(frozen=True)
 class ThreadGroup:
     """The group that a thread is about, and what people call it."""
@@ -85,6 +103,22 @@ def read_threads(
     rows = session.execute(select(*columns).where(*where).order_by(ThreadModel.id)).all()
     comments = _comments(session, [row.id for row in rows])
     return [StoredThread(**row._mapping, comments=tuple(comments[row.id])) for row in rows]
+
+
+def all_threads(session: Session) -> dict[int, ThreadRecord]:
+    """Every thread by its id, under the names that were written."""
+    thread, comment = ThreadModel, CommentModel
+    found = {}
+    for row in session.execute(select(*thread.__table__.columns)):
+        settled = (row.resolved, row.resolved_by)
+        place = (row.dataset_id, row.group_id, row.view, row.x, row.y)
+        found[row.id] = ThreadRecord(*place, resolved=settled)
+    for row in session.execute(select(*comment.__table__.columns).order_by(comment.id)):
+        # One whose thread is gone is a lost reference, and the thread is missed.
+        if row.thread_id in found:
+            said = (row.actor, row.at, row.edited, row.text)
+            found[row.thread_id].comments[row.id] = said
+    return found
 
 
 def _comments(session: Session, threads: Sequence[int]) -> dict[int, list[StoredComment]]:
