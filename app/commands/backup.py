@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -14,6 +15,9 @@ if TYPE_CHECKING:
     from app.config import Settings
 
 commands = typer.Typer()
+
+_PASSWORD = re.compile(r"://[^:/@]*:[^@]*@|[?&]password=")
+"""In the address of a database, as its driver reads it."""
 
 
 @commands.command()
@@ -51,7 +55,12 @@ def backup(
 @commands.command()
 def transfer(
     source: Annotated[
-        str, typer.Argument(metavar="FROM", help="A home folder, or postgresql://HOST/DATABASE.")
+        str,
+        typer.Argument(
+            metavar="FROM",
+            help="A home folder, postgresql://HOST/DATABASE, or a file of mode 0600 with such an "
+            "address.",
+        ),
     ],
     target: Annotated[
         str, typer.Argument(metavar="TO", help="The same: a new folder, or an empty database.")
@@ -61,7 +70,8 @@ def transfer(
     """Copy a whole database between SQLite and PostgreSQL, and compare every row and the log.
 
     No server may run. A transfer that was stopped goes on when it is given again. Files of the home
-    (uploads, exports) stay where they are. Keep passwords out of both: use PGPASSWORD or ~/.pgpass.
+    (uploads, exports) stay where they are. Everybody on the machine can read what is typed here: an
+    address with a password stands in a file, or the password in ~/.pgpass.
     """
     from app.store.transfer import transfer as run_transfer
 
@@ -73,8 +83,9 @@ def transfer(
             say(f"  {table}")
         told.add(table)
 
-    begin = _database(source, settings)
-    end = _database(target, begin if "://" in target else settings)
+    begin, address = _database(source, "FROM", settings), _address(target, "TO")
+    # The files of a home that goes into a database stay in that home.
+    end = _database(target, "TO", settings if address is None else begin)
     done = run_transfer(begin, end, tell)
     if json_:
         print_json(vars(done))
@@ -84,11 +95,41 @@ def transfer(
         say(f"  version {name} {digest[:12]}")
 
 
-def _database(place: str, settings: Settings) -> Settings:
-    """Settings of the database that an argument names."""
-    if "://" in place:
-        return settings.model_copy(update={"database_url": place})
+def _database(place: str, name: str, settings: Settings) -> Settings:
+    """Settings of the database that an argument of some name gives."""
+    address = _address(place, name)
+    if address is not None:
+        return settings.model_copy(update={"database_url": address})
     return settings.model_copy(update={"home": Path(place).absolute(), "database_url": None})
+
+
+def _address(place: str, name: str) -> str | None:
+    """The address that an argument is, or that the file holds which it names; None: it is a home.
+
+    Raises:
+        InputError: The address has a password that everybody could read, or others than its owner
+            may use the file, or it holds no address.
+    """
+    from app.errors import InputError
+    from app.private_file import read_private
+
+    if "://" in place:
+        if _PASSWORD.search(place):
+            raise InputError(
+                f"everybody on this machine can read the password in {name} while this runs",
+                hint="Write the address into a file, chmod 600 it, and name that file instead.",
+            )
+        return place
+    file = Path(place)
+    if not file.is_file():
+        return None
+    address = read_private(file, name)
+    if "://" not in address:
+        raise InputError(
+            f"{file} holds no address of a database",
+            hint="Write postgresql://USER:PASSWORD@HOST/DATABASE into it, or name a home folder.",
+        )
+    return address
 
 
 @commands.command()
@@ -116,7 +157,7 @@ def restore(
         say("  the write-ahead log beside it was another database's, and is left out")
     if restored.aside is not None:
         say(f"  what was there is in {restored.aside}")
-    say("  touchline doctor compares every table with the log")
+    say("  touchline doctor reads what was computed, and compares the rest with the log")
 
 
 def _contents(entries: int, rows: dict[str, int]) -> str:

@@ -82,6 +82,8 @@ def transfer(
         engine = make_engine(target)
         held.callback(engine.dispose)
         held.enter_context(reported(target))
+        # Before the source is read: what goes wrong in there is told as the source's.
+        dialect.require_promises(engine)
         with store.read() as session:
             writer = engine.execution_options(**WRITE)
             return _transfer(session, writer, dialect, target.yields, tell)
@@ -97,7 +99,6 @@ def _transfer(
     anchor = anchor_of(session)
     if anchor is None:
         raise InputError("the database has no installation yet", hint="Run touchline migrate.")
-    dialect.require_promises(target)
     _begin(target, dialect, anchor.installation)
     copied = 0
     for tables in _steps():

@@ -5,12 +5,14 @@ from __future__ import annotations
 import json
 from contextlib import closing
 from pathlib import Path
+from socket import socket
 
 import pytest
 from typer.testing import CliRunner
 
 from app.commands.command_line import app
 from app.config import Settings
+from app.errors import InputError, StorageError
 from app.store.store import Store
 from tests.unit.store.homes import say
 
@@ -62,3 +64,52 @@ class TestRestore:
         assert done.exit_code == 0
         assert f"{tmp_path / 'new'} is restored" in done.output
         assert (tmp_path / "new" / "touchline.db").exists()
+
+
+class TestTransfer:
+    @pytest.fixture
+    def file(self, tmp_path: Path) -> Path:
+        """A file of its owner alone."""
+        file = tmp_path / "database_url"
+        file.touch(mode=0o600)
+        return file
+
+    @pytest.mark.parametrize(
+        "address",
+        [
+            "postgresql://ann:secret@localhost/touchline",
+            "postgresql://ann:se/cret@localhost/touchline",
+            "postgresql://ann@localhost/touchline?password=secret",
+        ],
+    )
+    def test_a_password_is_not_taken_from_the_command_line(self, home: Path, address: str) -> None:
+        for places in ([str(home), address], [address, str(home)]):
+            done = CliRunner().invoke(app, ["transfer", *places])
+            assert isinstance(done.exception, InputError)
+            assert "read the password" in str(done.exception)
+            assert "name that file" in (done.exception.hint or "")
+            assert "secret" not in f"{done.output} {done.exception} {done.exception.hint}"
+
+    def test_a_file_with_an_address_is_its_owners_alone(self, home: Path, file: Path) -> None:
+        file.write_text("postgresql://ann:secret@localhost/touchline")
+        file.chmod(0o640)
+        done = CliRunner().invoke(app, ["transfer", str(home), str(file)])
+        assert isinstance(done.exception, InputError)
+        assert done.exception.hint == f"chmod 600 {file}"
+
+    def test_a_file_without_an_address_is_no_place(self, home: Path, file: Path) -> None:
+        done = CliRunner().invoke(app, ["transfer", str(home), str(file)])
+        assert isinstance(done.exception, InputError)
+        assert str(done.exception) == f"{file} holds no address of a database"
+
+    @pytest.mark.parametrize("turned", [False, True])
+    def test_a_server_that_does_not_answer_cannot_be_reached(
+        self, home: Path, file: Path, tmp_path: Path, turned: bool
+    ) -> None:
+        with socket() as free:
+            free.bind(("127.0.0.1", 0))
+            file.write_text(f"postgresql://ann:x@127.0.0.1:{free.getsockname()[1]}/touchline")
+            places = [str(file), str(tmp_path / "new")] if turned else [str(home), str(file)]
+            done = CliRunner().invoke(app, ["transfer", *places])
+        assert isinstance(done.exception, StorageError)
+        assert str(done.exception) == "the database touchline cannot be reached"

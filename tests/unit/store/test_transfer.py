@@ -96,6 +96,18 @@ class TestTransfer:
             transfer(source, filled.settings)
         assert contents(filled.settings) == before
 
+    def test_the_command_reads_an_address_from_a_private_file(
+        self, source: Settings, databases, touchline, tmp_path: Path
+    ) -> None:
+        file = tmp_path / "database_url"
+        file.touch(mode=0o600)
+        file.write_text(databases.new() + "\n")
+        code, out, _ = touchline("transfer", source.home, file, "--json")
+        assert (code, json.loads(out)["entries"]) == (0, 3)
+        code, out, _ = touchline("transfer", file, tmp_path / "back", "--json")
+        assert (code, json.loads(out)["entries"]) == (0, 3)
+        assert contents(Settings(home=tmp_path / "back")) == contents(source)
+
     def test_the_command_says_what_is_equal(self, source: Settings, databases, touchline) -> None:
         code, out, _ = touchline("transfer", source.home, databases.new(), "--json")
         assert (code, json.loads(out)["entries"]) == (0, 3)
