@@ -77,7 +77,10 @@ def resolve_folder(settings: Settings, path: str) -> Root:
         raise NotFoundError("there is no folder of so long a name to import from")
     root, _, inside = check_name(path.rstrip("/")).partition("/")
     if root not in folders:
-        raise NotFoundError(f'there is no folder "{root}" to import from')
+        names = ", ".join(sorted(folders))
+        raise NotFoundError(
+            f'there is no folder "{root}" to import from', hint=f"There are: {names}."
+        )
     found = resolve_inside(folders[root], inside) if inside else folders[root]
     if not os.path.exists(found):  # noqa: PTH110 - a path that is too long is not there either
         raise NotFoundError(f'there is no "{path}" to import from')

@@ -68,6 +68,12 @@ class TestResolveFolder:
         with pytest.raises(NotFoundError):
             resolve_folder(settings, path)
 
+    def test_who_names_no_allowed_folder_is_told_which_there_are(self, settings: Settings) -> None:
+        names = ", ".join(sorted(allowed_folders(settings)))
+        with pytest.raises(NotFoundError) as caught:
+            resolve_folder(settings, "imp/data")
+        assert caught.value.hint == f"There are: {names}."
+
     def test_without_allowed_folders_it_says_who_names_them(self, tmp_path: Path) -> None:
         with pytest.raises(InputError) as caught:
             resolve_folder(Settings(home=tmp_path), "data")
