@@ -32,9 +32,7 @@ def frozen_batches(session: Session) -> Iterator[Sequence[Any]]:
 
 def lost_calibrations(session: Session) -> list[str]:
     """Keys of frozen calibrations whose body is neither there nor where the solver keeps it."""
-    kept = FrozenModel.key.startswith(CALIBRATION) & (
-        CalibrationModel.key == func.substr(FrozenModel.key, len(CALIBRATION) + 1)
-    )
+    kept = CalibrationModel.key == func.replace(FrozenModel.key, CALIBRATION, "")
     statement = (
         select(FrozenModel.key)
         .outerjoin(CalibrationModel, kept)

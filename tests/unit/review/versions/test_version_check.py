@@ -12,7 +12,9 @@ from app.review.versions.version_check import examine_versions
 from app.store.dialect.dialect import dialect_of
 from app.store.frozen import body_of
 from app.store.store import Store
-from tests.databases import said_for_sqlite
+from tests.databases import POSTGRESQL, SQLITE, said_for_sqlite
+
+DATABASES = [SQLITE, POSTGRESQL]
 
 
 @pytest.fixture(autouse=True)
@@ -31,6 +33,14 @@ def change(store: Store, trigger: str, *statements: str) -> None:
         session.execute(text(f"DROP TRIGGER {trigger}"))
         for statement in statements:
             session.execute(text(statement))
+
+
+def forge(store: Store, key: str, body: bytes) -> None:
+    """Put another content under a key."""
+    with store.write() as session, said_for_sqlite(session):
+        session.execute(text("DROP TRIGGER frozen_refuses_update"))
+        statement = text("UPDATE frozen SET body = :body WHERE key = :key")
+        session.execute(statement, {"key": key, "body": body})
 
 
 def keys(store: Store, prefix: str) -> list[str]:
@@ -91,9 +101,7 @@ class TestFrozenContent:
     @pytest.mark.parametrize("prefix", ["said:", "station:", "solution:"])
     def test_content_has_the_digest_by_which_it_is_named(self, store: Store, prefix: str) -> None:
         key = keys(store, prefix)[0]
-        body = body_of('{"views":[]}').hex()
-        statement = f"UPDATE frozen SET body = X'{body}' WHERE key = '{key}'"
-        change(store, "frozen_refuses_update", statement)
+        forge(store, key, body_of('{"views":[]}'))
         found = faults(store)
         assert found.keys() == {"frozen content"}
         assert found["frozen content"].sentence == f"1 not as it was frozen: {key}"
@@ -103,9 +111,7 @@ class TestFrozenContent:
         self, store: Store, prefix: str
     ) -> None:
         key = keys(store, prefix)[0]
-        change(
-            store, "frozen_refuses_update", f"UPDATE frozen SET body = X'00FF' WHERE key = '{key}'"
-        )
+        forge(store, key, b"garbage")
         assert faults(store)["frozen content"].sentence.endswith(f": {key}")
 
     @pytest.mark.parametrize("prefix", ["said:", "station:", "solution:", "calibration:"])
