@@ -124,7 +124,32 @@ def update_verdict(
     session.execute(_ROW, {"row": stored.id, **_judged(stored, verdict, edited, passes)})
 
 
+def rows_apart(session: Session) -> tuple[int, list[int]]:
+    """How many groups there are, and ids of those whose row ``refresh_queue`` would write otherwise.
+
+    Raises:
+        DamagedError: A solution's summary is not what was written.
+    """
+    ids = session.scalars(select(GroupModel.id).order_by(GroupModel.id)).all()
+    apart: list[int] = []
+    for start in range(0, len(ids), _BATCH):
+        some = ids[start : start + _BATCH]
+        present = session.execute(select(_QUEUE).where(_QUEUE.c.group_id.in_(some)))
+        found = {row.group_id: dict(row._mapping) for row in present}
+        apart += [
+            row["group_id"] for row in _rows(session, some) if row != found.get(row["group_id"])
+        ]
+    return len(ids), apart
+
+
 def _refresh(session: Session, ids: Sequence[int]) -> None:
+    rows = _rows(session, ids)
+    if rows:
+        session.execute(_REPLACE, rows)
+
+
+def _rows(session: Session, ids: Sequence[int]) -> list[dict[str, Any]]:
+    """Rows of groups as they follow from everything else."""
     views, verdicts = _views(session, ids), _verdicts(session, ids)
     findings, edited = import_findings(session, ids), edited_groups(session, ids)
     rows = []
@@ -134,8 +159,7 @@ def _refresh(session: Session, ids: Sequence[int]) -> None:
         row = {**_said(head, views[head.id]), **judged}
         row.update(_computed(summary, [item.kind for item in findings[head.id]]))
         rows.append(row)
-    if rows:
-        session.execute(_REPLACE, rows)
+    return rows
 
 
 def _heads(session: Session, ids: Sequence[int]) -> list[tuple[Any, SolutionSummary | None]]:

@@ -13,6 +13,7 @@ from app.review.editing.recompute import stale_groups
 from app.review.editing.replay import replay
 from app.review.editing.solution_check import examine_computed
 from app.store.log import newest_entry
+from app.store.queue import rows_apart
 from app.store.session import Session
 from app.store.soundness import count_lost_references, file_faults, no_fault, restoring
 from app.store.store import Store
@@ -47,7 +48,9 @@ def examine(store: Store) -> list[Check]:
         else:
             checks.append(Check("log", True, f"{entries:,} entries, each as it was written"))
             checks += _compared_tables(session, said, restore)
-        checks += examine_computed(session, restore)
+        computed = examine_computed(session, restore)
+        is_whole = all(check.ok for check in computed)
+        checks += [*computed, _queue(session, REBUILD if is_whole else restore)]
     return [*checks, *_solutions(store)]
 
 
@@ -91,6 +94,17 @@ def _name(key: object) -> str:
     if isinstance(key, tuple):
         return " ".join(str(part) for part in key if part is not None)
     return str(key)
+
+
+def _queue(session: Session, mend: str) -> Check:
+    """Whether the row of each group follows from what was said of it and computed for it."""
+    try:
+        count, apart = rows_apart(session)
+    except StorageError as error:
+        return Check("queue", False, error.message, mend)
+    whole = f"{count:,} rows, as groups, verdicts and solutions say"
+    wrong = "not as groups, verdicts and solutions say"
+    return compared("queue", whole, [str(number) for number in apart], wrong, mend)
 
 
 def _solutions(store: Store) -> list[Check]:

@@ -18,8 +18,10 @@ from app.review.verdicts.verdict import set_verdict
 from app.soccer.annotation import make_lines
 from app.store.dialect.dialect import dialect_of
 from app.store.store import Store
-from tests.databases import said_for_sqlite
+from tests.databases import POSTGRESQL, SQLITE, said_for_sqlite
 from tests.unit.review.conftest import OPPOSITE
+
+DATABASES = [SQLITE, POSTGRESQL]
 
 
 @pytest.fixture
@@ -33,12 +35,12 @@ def faults(store: Store) -> dict[str, Check]:
     return {check.name: check for check in examine(store) if not check.ok}
 
 
-def change(store: Store, *statements: str) -> None:
-    """Behind the service's back."""
+def change(store: Store, *statements: str, body: bytes = b"garbage") -> None:
+    """Behind the service's back; ``body`` is what statements call so."""
     with store.write() as session, said_for_sqlite(session):
         session.execute(text("PRAGMA defer_foreign_keys = ON"))
         for statement in statements:
-            session.execute(text(statement))
+            session.execute(text(statement), {"body": body} if ":body" in statement else {})
 
 
 def stations_of(group_id: int) -> str:
@@ -63,21 +65,19 @@ def first(store: Store, statement: str) -> Any:
         return session.scalar(text(statement))
 
 
-GARBAGE = "X'00FF00FF'"
-
-
 class TestComputed:
     @pytest.fixture
     def restoring(self, store: Store) -> str:
         return dialect_of(store.settings).restoring
 
-    @pytest.mark.parametrize("body", [GARBAGE, f"X'{zlib.compress(b'[1').hex()}'"])
+    @pytest.mark.parametrize("body", [b"garbage", zlib.compress(b"[1")])
     def test_a_calibration_that_cannot_be_read_is_named_by_its_key(
-        self, store: Store, ids, restoring: str, body: str
+        self, store: Store, ids, restoring: str, body: bytes
     ) -> None:
         key = first(store, "SELECT min(key) FROM calibration")
         trigger = "DROP TRIGGER calibration_refuses_update"
-        change(store, trigger, f"UPDATE calibration SET body = {body} WHERE key = '{key}'")
+        statement = f"UPDATE calibration SET body = :body WHERE key = '{key}'"
+        change(store, trigger, statement, body=body)
         found = faults(store)
         assert found.keys() == {"calibrations"}
         assert found["calibrations"].sentence == f"1 not as it was written: {key}"
@@ -95,9 +95,7 @@ class TestComputed:
         self, store: Store, ids, column: str, restoring: str
     ) -> None:
         trigger = "DROP TRIGGER solution_refuses_update"
-        change(
-            store, trigger, f"UPDATE solution SET {column} = {GARBAGE} WHERE group_id = {ids[1]}"
-        )
+        change(store, trigger, f"UPDATE solution SET {column} = :body WHERE group_id = {ids[1]}")
         number = first(store, f"SELECT id FROM solution WHERE group_id = {ids[1]}")
         found = faults(store)
         assert found.keys() == {"solutions"}
@@ -107,14 +105,15 @@ class TestComputed:
 
     @pytest.mark.parametrize("column", ["body", "summary"])
     def test_solutions_that_were_swapped_are_those_of_neither_group(
-        self, store: Store, fill, make_static, column: str
+        self, store: Store, fill, make_static, column: str, restoring: str
     ) -> None:
         """Of static cameras, whose calibrations both groups share."""
         made = fill(make_static(10), make_static(11, ball=(9.0, 2.0, -0.5)), make_static(12))
         swap(store, "solution", column, "group_id", *made[:2])
         found = faults(store)
-        assert found.keys() == {"solutions"}
         assert found["solutions"].sentence.startswith("2 not as it was written")
+        # A queue that was made of these would be as wrong.
+        assert {check.mend for check in found.values()} == {restoring}
 
     def test_a_solution_names_the_calibrations_that_it_rests_on(self, store: Store, ids) -> None:
         trigger = "DROP TRIGGER solution_refuses_update"
@@ -137,9 +136,33 @@ class TestComputed:
     def test_what_was_read_of_paint_has_the_digest_by_which_it_is_named(
         self, store: Store, ids
     ) -> None:
-        values = f"('{'0' * 32}', (SELECT min(id) FROM dataset), {GARBAGE})"
+        values = f"('{'0' * 32}', (SELECT min(id) FROM dataset), :body)"
         change(store, f"INSERT INTO paint_evidence (digest, dataset_id, body) VALUES {values}")
         assert faults(store).keys() == {"readings of paint"}
+
+
+class TestQueue:
+    @pytest.mark.parametrize(
+        "forged",
+        [
+            "DELETE FROM queue WHERE group_id =",
+            "UPDATE queue SET passes = NOT passes WHERE group_id =",
+            "UPDATE queue SET error_px = error_px + 1 WHERE group_id =",
+            "UPDATE queue SET reviewer = 'eve' WHERE group_id =",
+            "UPDATE queue SET views = 9 WHERE group_id =",
+        ],
+    )
+    def test_each_group_has_the_row_that_rebuilding_writes(
+        self, store: Store, ids, forged: str
+    ) -> None:
+        change(store, f"{forged} {ids[1]}")
+        found = faults(store)
+        assert found.keys() == {"queue"}
+        assert found["queue"].sentence.startswith("1 not as")
+        assert found["queue"].sentence.endswith(f": {ids[1]}")
+        assert found["queue"].mend == REBUILD
+        rebuild(store)
+        assert faults(store) == {}
 
 
 class TestExamine:
