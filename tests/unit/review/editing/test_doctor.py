@@ -183,6 +183,24 @@ class TestExamine:
         rebuild(store)
         assert faults(store) == {}
 
+    @pytest.mark.parametrize(
+        ("forged", "named"),
+        [
+            ("UPDATE groups SET inputs_hash = 'x' WHERE id = {group}", "group"),
+            ("UPDATE view SET digest = 'x' WHERE group_id = {group}", "group"),
+            ("UPDATE station SET digest = 'x' WHERE id IN ({stations})", "camera"),
+        ],
+    )
+    def test_a_digest_is_that_of_what_was_said(
+        self, store: Store, ids, forged: str, named: str
+    ) -> None:
+        change(store, forged.format(group=ids[1], stations=stations_of(ids[1])))
+        found = faults(store)["digests"]
+        assert f" not of what was said: {named} " in found.sentence
+        assert found.mend == REBUILD
+        rebuild(store)
+        assert faults(store) == {}
+
     def test_a_verdict_that_was_changed_needs_a_backup(self, store: Store, ids) -> None:
         trigger = "DROP TRIGGER verdict_refuses_update"
         change(store, trigger, f"UPDATE verdict SET actor = 'eve' WHERE group_id = {ids[0]}")
