@@ -14,7 +14,6 @@ from app.durable import PARTIAL
 from app.errors import DamagedError, StorageError
 from app.store.anchor import read_anchor
 from app.store.dialect.dialect import dialect_of
-from app.store.wal import read_header
 
 NETWORK_FILE_SYSTEMS = frozenset(
     {"nfs", "nfs4", "cifs", "smb3", "smbfs", "afs", "fuse.sshfs", "fuse.s3fs", "9p", "glusterfs"}
@@ -123,6 +122,9 @@ def _of_database(home: Path, database: Path) -> Iterator[Path]:
 
 def _is_ours(file: Path) -> bool:
     """Whether a file is the database of the installation that is named beside it."""
+    # It needs numpy, and commands that only print a help text come by here.
+    from app.store.wal import read_header
+
     try:
         header, anchor = read_header(file), read_anchor(file)
     except (OSError, DamagedError):
