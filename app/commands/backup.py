@@ -157,7 +157,9 @@ def restore(
         say("  the write-ahead log beside it was another database's, and is left out")
     if restored.aside is not None:
         say(f"  what was there is in {restored.aside}")
-    say("  touchline doctor reads what was computed, and compares the rest with the log")
+    say(
+        "  touchline doctor compares with the log what follows from it, and reads what was computed"
+    )
 
 
 def _contents(entries: int, rows: dict[str, int]) -> str:

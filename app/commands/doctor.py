@@ -25,7 +25,7 @@ def doctor(
     ] = False,
     json_: Json = False,
 ) -> None:
-    """Look whether home and database are whole and the tables are what the log says; 1 if not."""
+    """Look whether home and database are whole: what the log tells of, and what was computed; 1 if not."""
     from app.review.editing.replay import rebuild as rebuild_tables
     from app.store.locks import server_lock
 
