@@ -116,8 +116,23 @@ class TestComputed:
         assert {check.mend for check in found.values()} == {restoring}
 
     def test_a_solution_names_the_calibrations_that_it_rests_on(self, store: Store, ids) -> None:
+        turned = json.loads(first(store, "SELECT calibrations FROM solution WHERE id = 1"))[::-1]
         trigger = "DROP TRIGGER solution_refuses_update"
-        change(store, trigger, "UPDATE solution SET calibrations = '[]'")
+        statement = f"UPDATE solution SET calibrations = '{json.dumps(turned)}' WHERE id = 1"
+        change(store, trigger, statement)
+        assert (
+            faults(store)["solutions"].sentence == f"1 not as it was written: 1 of group {ids[0]}"
+        )
+
+    def test_a_solution_is_that_of_the_policy_of_its_row(self, store: Store, ids) -> None:
+        trigger = "DROP TRIGGER solution_refuses_update"
+        change(store, trigger, "UPDATE solution SET policy_hash = 'x' WHERE id = 1")
+        assert "solutions" in faults(store)
+
+    def test_a_solution_is_of_the_views_of_its_group(self, store: Store, fill, make_static) -> None:
+        whole = make_static(11)
+        ids = fill(make_static(10), replace(whole, views=whole.views[:2]))
+        swap(store, "solution", "body, summary, calibrations, facts", "group_id", *ids)
         assert faults(store)["solutions"].sentence.startswith("2 not as it was written")
 
     def test_a_whole_solution_of_another_group_rests_on_none_of_its_cameras(
