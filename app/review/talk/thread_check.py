@@ -11,6 +11,7 @@ from app.store.log import LogEntry, entries_of_kinds
 from app.store.session import Session
 from app.store.soundness import restoring
 from app.store.store import Store
+from app.store.stored_json import as_written
 from app.store.threads import ThreadRecord, all_threads
 
 WRONG = "not as the log says"
@@ -27,7 +28,8 @@ def examine_threads(store: Store) -> Check:
 
 def _examine(session: Session, restore: str) -> Check:
     try:
-        said = said_threads(entries_of_kinds(session, (COMMENT, "dataset_deleted")))
+        with as_written():
+            said = said_threads(entries_of_kinds(session, (COMMENT, "dataset_deleted")))
     except StorageError as error:
         return Check("threads", False, error.message, error.hint or restore)
     present = all_threads(session)

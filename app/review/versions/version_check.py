@@ -42,7 +42,8 @@ def examine_versions(store: Store) -> list[Check]:
 def _apart(session: Session, versions: Any) -> Iterator[str]:
     """Each version that is not what was frozen, with what is wrong with it."""
     try:
-        logged = _logged(session)
+        with as_written():
+            logged = _logged(session)
     except StorageError:
         # Nothing follows from a log that cannot be read, which is named by itself.
         logged = None
@@ -55,7 +56,7 @@ def _apart(session: Session, versions: Any) -> Iterator[str]:
         if why is not None:
             yield f"{row.dataset}/{row.name} ({why})"
     for entry in (logged or {}).values():
-        yield f"{entry.body['name']} of dataset {entry.dataset_id} (it is gone)"
+        yield f"{entry.body.get('name')} of dataset {entry.dataset_id} (it is gone)"
 
 
 def _logged(session: Session) -> dict[int, LogEntry]:
@@ -73,7 +74,7 @@ def _logged(session: Session) -> dict[int, LogEntry]:
 def _is_said(row: Any, entry: LogEntry | None) -> bool:
     if entry is None:
         return False
-    said = (entry.dataset_id, entry.body["name"], entry.body["hash"], entry.at, entry.actor)
+    said = (entry.dataset_id, entry.body.get("name"), entry.body.get("hash"), entry.at, entry.actor)
     return said == (row.dataset_id, row.name, row.hash, row.created, row.actor)
 
 

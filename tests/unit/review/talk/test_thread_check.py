@@ -44,6 +44,12 @@ class TestExamineThreads:
         check = examine_threads(store)
         assert (check.ok, check.sentence) == (True, "3, as the log says")
 
+    def test_a_log_that_was_forged_is_a_fault_and_breaks_nothing_off(self, store: Store) -> None:
+        with store.write() as session, said_for_sqlite(session):
+            session.execute(text("DROP TRIGGER log_refuses_update"))
+            session.execute(text("UPDATE log SET kind = 'comment' WHERE id = 1"))
+        assert "not what was written" in examine_threads(store).sentence
+
     def test_a_name_that_is_shown_in_the_place_of_another_is_none(self, store: Store) -> None:
         with store.read() as session:
             anna = person_by_name(session, "anna").id
