@@ -31,7 +31,7 @@ class PoolTask:
         begin: Called when its turn has come; what it raises is the result, and no child works.
     """
 
-    def __init__(self, explain: Explain, begin: Callable[[], None]) -> None:
+    def __init__(self, explain: Explain, begin: Callable[[], None] = begin_all) -> None:
         self.future: Future[Any] = Future()
         self._explain, self._begin = explain, begin
         self._left = threading.Event()
