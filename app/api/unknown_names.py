@@ -20,9 +20,11 @@ from pydantic import TypeAdapter
 
 UNKNOWN = "extra_forbidden"
 """What the framework calls a field that a body does not have."""
-_FIELDS: dict[Callable[..., Any], frozenset[str]] = {}
 REPEATED = "repeated"
+"""What we call a parameter that is there more than once."""
 _ONCE = "is there more than once; no parameter is a list"
+_FIELDS: dict[Callable[..., Any], frozenset[str]] = {}
+"""Of each route by its function, once somebody misspelt one."""
 
 
 async def refuse_unknown_parameters(request: Request) -> None:

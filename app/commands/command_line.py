@@ -167,16 +167,17 @@ def run() -> None:
     except ReviewError as error:
         complain(error.message, error.hint)
         sys.exit(1)
-    except PermissionError as error:
-        complain(
-            f"this user may not look at {error.filename}",
-            "Open it to them (chmod, chown), or give the command as somebody else.",
-        )
-        sys.exit(1)
     except OSError as error:
         if error.filename is None:
             raise
-        complain(f"{quoted(str(error.filename), SHOWN)} cannot be used: {error.strerror}")
+        name = quoted(str(error.filename), SHOWN)
+        if isinstance(error, PermissionError):
+            complain(
+                f"this user may not look at {name}",
+                "Open it to them (chmod, chown), or give the command as somebody else.",
+            )
+        else:
+            complain(f"{name} cannot be used: {error.strerror}")
         sys.exit(1)
     except UnicodeEncodeError as error:
         # What stands for bytes of the command line that are no UTF-8.

@@ -71,10 +71,8 @@ def solve_with_facts(
     failed = _failed(group, judgement)
     left = {name for name, gate in zip(names, failed, strict=True) if gate is None}
     usable = [sight for sight in sights if sight.view in left]
-    mean, best = (
-        mean_ball(names, facts, judgement, spread, policy),
-        best_ball(pairs, usable, policy),
-    )
+    mean = mean_ball(names, facts, judgement, spread, policy)
+    best = best_ball(pairs, usable, policy)
     ball = leaving_ball(mean, best, policy)
     chi_square = chi_square_of(names, facts, judgement, policy)
     contradicted = contradiction(chi_square, names, facts, judgement, sights, policy)

@@ -1,4 +1,4 @@
-"""AgreementLimits: how far annotations of a dataset's groups may lie apart and still agree."""
+"""Limits: how far annotations of a dataset's groups may lie apart and still agree."""
 
 from __future__ import annotations
 
