@@ -7,8 +7,11 @@ where its end is damaged.
 
 from __future__ import annotations
 
+from contextlib import closing
 from pathlib import Path
 from urllib.parse import quote
+
+import pysqlite3.dbapi2
 
 from app.config import Settings
 from app.errors import DamagedError, StorageError
@@ -17,6 +20,9 @@ from app.store.engine import make_engine, reported
 from app.store.home import ASIDE
 from app.store.keys import KEYS
 from app.store.wal import DatabaseHeader, WriteAheadLog, read_header, read_log
+
+VERSION_TABLE = "alembic_version"
+"""Every database of ours has it."""
 
 
 def log_file(database: Path) -> Path:
@@ -32,7 +38,7 @@ def require_sound(settings: Settings) -> None:
     Raises:
         DamagedError: The database is gone, emptied, cut short, no database, lies beside the log of
             another one, or holds less with its own than was said.
-        StorageError: A file cannot be read.
+        StorageError: A file cannot be read, or is the database of another program.
     """
     database = settings.database_file
     try:
@@ -52,6 +58,8 @@ def require_sound(settings: Settings) -> None:
             hint="Run touchline restore BACKUP; it moves the file aside.",
         )
     _require_whole(database, header, log)
+    if read_anchor(database) is None:
+        _require_ours(database)
     if _size(log_file(database)):
         _require_all(settings)
 
@@ -86,6 +94,24 @@ def _require_all(settings: Settings) -> None:
             require_own_database(engine, settings)
     finally:
         engine.dispose()
+
+
+def _require_ours(database: Path) -> None:
+    """Raise StorageError where a file that would get our tables has those of another program."""
+    file = f"file:{quote(str(database))}?mode=ro"
+    question = "SELECT name FROM sqlite_schema WHERE type = 'table' ORDER BY name"
+    try:
+        with closing(pysqlite3.dbapi2.connect(file, uri=True)) as connection:
+            tables = [name for (name,) in connection.execute(question)]
+    except pysqlite3.dbapi2.Error:
+        # Whoever opens it says what is the matter with it.
+        return
+    if tables and VERSION_TABLE not in tables:
+        named = ", ".join(tables[:3]) + (", ..." if len(tables) > 3 else "")
+        raise StorageError(
+            f"{database} is the database of another program (tables: {named})",
+            hint="Nothing in it was changed. Move it away, or name another file in TOUCHLINE_DATABASE_URL.",
+        )
 
 
 def _require_new(settings: Settings) -> None:

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import sqlite3
 import subprocess
 import sys
 from contextlib import closing
@@ -70,6 +71,18 @@ class TestMigrate:
         migrate(settings)
         with store.read() as session:
             assert session.execute(text("SELECT count(*) FROM calibration")).scalar() == 1
+
+    def test_the_database_of_another_program_gets_no_tables(self, settings: Settings) -> None:
+        settings.home.mkdir(parents=True, exist_ok=True)
+        with closing(sqlite3.connect(settings.database_file)) as other:
+            other.execute("CREATE TABLE cookies (name TEXT)")
+            other.commit()
+        before = settings.database_file.read_bytes()
+        with pytest.raises(StorageError, match=r"another program \(tables: cookies\)"):
+            Store.open(settings)
+        with pytest.raises(StorageError, match="another program"):
+            migrate(settings)
+        assert settings.database_file.read_bytes() == before
 
     def test_knows_every_migration_there_is(self) -> None:
         scripts = ScriptDirectory(str(migrations_folder()))
