@@ -3,6 +3,11 @@
 from __future__ import annotations
 
 import ipaddress
+import re
+import socket
+
+_SHORT = re.compile(r"[0-9a-fA-FxX.]+")
+"""IPv4 addresses as the system takes them, ``127.1`` for one."""
 
 
 def is_local(host: str) -> bool:
@@ -10,6 +15,8 @@ def is_local(host: str) -> bool:
     if host == "localhost":
         return True
     try:
+        if _SHORT.fullmatch(host):
+            host = socket.inet_ntoa(socket.inet_aton(host))
         return ipaddress.ip_address(host.strip("[]")).is_loopback
-    except ValueError:
+    except (OSError, ValueError):
         return False
