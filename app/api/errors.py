@@ -122,7 +122,8 @@ async def _review_error(request: Request, error: Exception) -> Response:
         headers["ETag"], current = error.etag, error.current
     if isinstance(error, DamagedError):
         request.app.state.services.store.note_damage(error)
-    if status >= 500:
+    # Of what is only too much at once the line of its request is enough: there may be thousands.
+    if status >= 500 and not isinstance(error, OverloadedError):
         cause = str(error.__cause__ or "").partition("\n")[0]
         log.error("request refused", instance=problem.instance, error=str(error), cause=cause)
     return problem_response(problem, headers, current)

@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import time
 import uuid
+from collections.abc import Callable
+from math import inf
 
 import structlog
 from starlette.datastructures import Headers, MutableHeaders
@@ -22,13 +24,39 @@ HEADER = "X-Request-ID"
 """Tells the caller under which id the log speaks of its request."""
 
 
+MOST_REFUSALS = 20
+"""Refused requests of one second that are told of one by one; of the others the number is told."""
+
+
+class RefusalBound:
+    """How many refusals the log tells of: whoever sends what is refused does not fill a disk."""
+
+    def __init__(self, clock: Callable[[], float] = time.monotonic):
+        self._clock = clock
+        self._began = -inf
+        self._told = self._untold = 0
+
+    def admits(self) -> bool:
+        """Whether one more is told of; only the event loop asks."""
+        if self._clock() - self._began >= 1.0:
+            if self._untold:
+                log.warning("more requests were refused", count=self._untold)
+            self._began, self._told, self._untold = self._clock(), 0, 0
+        if self._told == MOST_REFUSALS:
+            self._untold += 1
+            return False
+        self._told += 1
+        return True
+
+
 def new_request_id() -> str:
     """An id that no other request has."""
     return uuid.uuid4().hex[:16]
 
 
 class RequestLog:
-    """Names each request; logs those that change something, and those that the server failed.
+    """Names each request; logs those that change something, and those that the server failed, of
+    refused ones so many a second.
 
     With the Idempotency-Key of the browser's click and the ETag of what was committed, an edit can
     be followed from one to the other.
@@ -40,6 +68,7 @@ class RequestLog:
 
     def __init__(self, app: ASGIApp):
         self.app = app
+        self._refusals = RefusalBound()
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         if scope["type"] != "http":
@@ -70,6 +99,8 @@ class RequestLog:
                     raise
                 await problem_response(problem)(scope, receive, watch)
             if scope["method"] in SAFE_METHODS and status < 500:
+                return
+            if status >= 400 and not self._refusals.admits():
                 return
             log.info(
                 "request answered",

@@ -10,7 +10,7 @@ from fastapi import FastAPI
 from starlette.responses import Response
 from starlette.testclient import TestClient
 
-from app.api.request_log import RequestLog
+from app.api.request_log import MOST_REFUSALS, RefusalBound, RequestLog
 
 
 @pytest.fixture
@@ -70,3 +70,32 @@ def test_what_only_reads_is_logged_where_the_server_failed(logged, lines) -> Non
 def test_every_request_has_a_name_of_its_own(logged) -> None:
     names = {logged.get("/thing").headers["x-request-id"] for _ in range(3)}
     assert len(names) == 3
+
+
+class TestRefusalBound:
+    def test_of_many_in_a_second_some_are_told_and_the_rest_is_counted(self, lines) -> None:
+        clock = [5.0]
+        bound = RefusalBound(lambda: clock[0])
+        assert [bound.admits() for _ in range(MOST_REFUSALS + 3)].count(True) == MOST_REFUSALS
+        assert lines == []
+        clock[0] += 1.0
+        assert bound.admits()
+        assert [(line["event"], line["count"]) for line in lines] == [
+            ("more requests were refused", 3)
+        ]
+
+    def test_seldom_ones_are_all_told(self, lines) -> None:
+        clock = [5.0]
+        bound = RefusalBound(lambda: clock[0])
+        for _ in range(3 * MOST_REFUSALS):
+            clock[0] += 0.1
+            assert bound.admits()
+        assert lines == []
+
+    def test_what_changed_something_is_always_told(self, logged, lines) -> None:
+        for _ in range(MOST_REFUSALS + 5):
+            logged.put("/nothing")
+            logged.put("/thing")
+        statuses = [line["status"] for line in lines if line["event"] == "request answered"]
+        assert statuses.count(404) == MOST_REFUSALS
+        assert statuses.count(200) == MOST_REFUSALS + 5
