@@ -24,7 +24,7 @@ from pathlib import Path
 from time import monotonic
 from typing import Any, Literal
 
-from app.errors import OverloadedError, ReviewError
+from app.errors import JobCancelled, OverloadedError, ReviewError
 
 TICK = 0.1
 """Seconds between two looks whether the work is still wanted."""
@@ -42,12 +42,12 @@ class Allowance:
     """What a child may use.
 
     Attributes:
-        memory: Bytes of memory of its own, libraries' code left out.
-        processor: Seconds of processor time a task.
+        memory: Bytes of memory of its own, libraries' code left out; infinite: as many as there are.
+        processor: Seconds of processor time a task; infinite: as many as it takes.
         silence: Seconds by the clock between two words of a task, its result the last one.
     """
 
-    memory: int
+    memory: float
     processor: float
     silence: float
 
@@ -83,7 +83,7 @@ class Child:
         self,
         work: Callable[..., Any],
         *arguments: Any,
-        heard: Callable[[Any], None] | None = None,
+        heard: Callable[[Any], Any] | None = None,
         stop: Callable[[], None] | None = None,
     ) -> Any:
         """The result of a function, called in the child.
@@ -92,11 +92,11 @@ class Child:
             work: A function of a module; it, its arguments and its result travel by pickle.
             arguments: What it is called with.
             heard: Hears each word of the work: with it, the work's last argument is a function
-                that sends one and returns when it was heard.
+                that sends one and returns what was answered.
             stop: Called every now and then; what it raises ends the child.
 
         Raises:
-            ReviewError: As the work raised it.
+            ReviewError: As the work raised it; ``JobCancelled`` likewise.
             OverloadedError: No process could be started.
             ChildEnded: The work went beyond a limit, or crashed.
             RuntimeError: The work has a fault; the text is its traceback.
@@ -106,8 +106,7 @@ class Child:
             line.send((work, arguments, heard is not None))
             kind, value = self._word(line, self.allowance.silence, stop)
             while kind == "word" and heard is not None:
-                heard(value)
-                line.send(None)
+                line.send(heard(value))
                 kind, value = self._word(line, self.allowance.silence, stop)
         except (EOFError, ConnectionError):
             raise ChildEnded(self._cause_of_death(), self.allowance) from None
@@ -247,20 +246,22 @@ def _serve(line: Connection, allowance: Allowance) -> None:
             work, arguments, talks = line.recv()
             usage = resource.getrusage(resource.RUSAGE_SELF)
             used = usage.ru_utime + usage.ru_stime
-            _limit(resource.RLIMIT_CPU, math.ceil(used + allowance.processor))
+            _limit(resource.RLIMIT_CPU, used + allowance.processor)
             line.send(_answer(work, (*arguments, _teller(line)) if talks else arguments))
 
 
-def _limit(kind: int, amount: int) -> None:
+def _limit(kind: int, amount: float) -> None:
+    if math.isinf(amount):
+        return
     hard = resource.getrlimit(kind)[1]
-    soft = amount if hard == resource.RLIM_INFINITY else min(amount, hard)
-    resource.setrlimit(kind, (soft, hard))
+    soft = math.ceil(amount)
+    resource.setrlimit(kind, (soft if hard == resource.RLIM_INFINITY else min(soft, hard), hard))
 
 
 def _answer(work: Callable[..., Any], arguments: tuple[Any, ...]) -> tuple[str, Any]:
     try:
         return "result", work(*arguments)
-    except ReviewError as error:
+    except (ReviewError, JobCancelled) as error:
         return "refusal", error
     except MemoryError:
         return "memory", None
@@ -268,9 +269,9 @@ def _answer(work: Callable[..., Any], arguments: tuple[Any, ...]) -> tuple[str, 
         return "fault", traceback.format_exc()
 
 
-def _teller(line: Connection) -> Callable[[Any], None]:
-    def tell(word: Any) -> None:
+def _teller(line: Connection) -> Callable[[Any], Any]:
+    def tell(word: Any) -> Any:
         line.send(("word", word))
-        line.recv()
+        return line.recv()
 
     return tell

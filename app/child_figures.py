@@ -17,6 +17,12 @@ KINDS = (
     "large",
     "predictions",
     "imports",
+    "exports",
+    "freezing",
+    "verifying",
+    "evaluating",
+    "accepting",
+    "practice",
     "paint",
     "proposals",
 )

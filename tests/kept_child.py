@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 
 from app.child import Allowance, Child
 
-USERS = ("app.child_pool", "app.review.datasets.picture_files", "app.review.importing.import_child")
+USERS = ("app.child_pool", "app.review.datasets.picture_files", "app.store.apart")
 """Modules that make children."""
 
 

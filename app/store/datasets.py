@@ -87,6 +87,12 @@ def group_ids(
     return list(session.scalars(statement.order_by(GroupModel.id)))
 
 
+def has_more_groups(session: Session, dataset_id: int, count: int) -> bool:
+    """Whether a dataset has more groups than that; no more are counted."""
+    statement = select(GroupModel.id).where(GroupModel.dataset_id == dataset_id)
+    return session.scalar(statement.offset(count).limit(1)) is not None
+
+
 def has_match(session: Session, dataset_id: int, match: str) -> bool:
     """Whether a dataset has a group of a match; none is counted."""
     group = GroupModel

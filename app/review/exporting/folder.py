@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import json
 import re
-import shutil
 import time
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -18,6 +18,7 @@ from app.object_store.path import StoredPath
 from app.review.exporting.export import ExportReport
 from app.store.clock import now
 from app.store.leftovers import DAY, last_written
+from app.store.uploads import clear
 
 _ID = re.compile(r"[0-9a-f]{32}|[1-9][0-9]{0,18}")
 """Ids of jobs, and those of exports that were made before there were jobs."""
@@ -44,14 +45,19 @@ class ExportFolder:
     def __init__(self, folder: Path):
         self.folder = folder
 
-    def prepare(self) -> None:
-        """Make the folder, and clear what a killed server left half written."""
+    @contextmanager
+    def writing(self, name: str) -> Iterator[Path]:
+        """Where the zip of an export is to be written.
+
+        What a server or a process that was killed at it has left half written goes, before and after;
+        others may be at theirs meanwhile.
+        """
         self.folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-        for path in self.folder.glob(f".*{PARTIAL}"):
-            if path.is_dir():
-                shutil.rmtree(path, ignore_errors=True)
-            else:
-                path.unlink(missing_ok=True)
+        self._clear(name)
+        try:
+            yield self.content(name)
+        finally:
+            self._clear(name)
 
     def keep(self, name: str, request: Mapping[str, Any], report: ExportReport) -> ExportEntry:
         """Record an export whose zip is written; only then it can be found.
@@ -120,6 +126,10 @@ class ExportFolder:
                 path.unlink(missing_ok=True)
                 gone += 1
         return gone
+
+    def _clear(self, name: str) -> None:
+        for path in self.folder.glob(f".{name}.zip.*{PARTIAL}"):
+            clear(path)
 
     def _record(self, name: str) -> Path:
         return self.folder / f"{name}.json"

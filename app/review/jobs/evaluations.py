@@ -5,11 +5,13 @@ from __future__ import annotations
 from dataclasses import asdict
 from typing import Any
 
+from app.progress import TellProgress
 from app.review.answers.keep import Keep, keep_nothing
 from app.review.datasets.dataset import get_dataset_head
 from app.review.evaluating.accept import AcceptReport, AcceptRequest, accept, plan_accept
 from app.review.evaluating.evaluation import list_evaluations
 from app.review.evaluating.evaluation_run import EvaluationRequest, check_evaluation, run_evaluation
+from app.review.jobs.apart import carry_out_apart
 from app.review.jobs.job_run import JobProgress, Work
 from app.review.jobs.jobs import Jobs
 from app.store.evaluations import StoredEvaluation
@@ -106,8 +108,17 @@ def evaluation_work(store: Store, dataset_id: int, request: EvaluationRequest, a
     """The work of evaluating; its result names the evaluation."""
 
     def work(progress: JobProgress) -> Json:
-        found = run_evaluation(store, dataset_id, request, actor=actor, progress=progress)
-        return evaluation_result(found)
+        return carry_out_apart(
+            store,
+            "evaluating",
+            "the evaluation",
+            _evaluate,
+            dataset_id,
+            request,
+            actor,
+            dataset_id=dataset_id,
+            progress=progress,
+        )
 
     return work
 
@@ -116,9 +127,33 @@ def accept_work(store: Store, dataset_id: int, request: AcceptRequest, actor: st
     """The work of accepting; its result counts what changed."""
 
     def work(progress: JobProgress) -> Json:
-        return accept_result(accept(store, dataset_id, request, actor=actor, progress=progress))
+        return carry_out_apart(
+            store,
+            "accepting",
+            "the acceptance",
+            _accept,
+            dataset_id,
+            request,
+            actor,
+            dataset_id=dataset_id,
+            progress=progress,
+        )
 
     return work
+
+
+def _evaluate(
+    store: Store, dataset_id: int, request: EvaluationRequest, actor: str, progress: TellProgress
+) -> Json:
+    return evaluation_result(
+        run_evaluation(store, dataset_id, request, actor=actor, progress=progress)
+    )
+
+
+def _accept(
+    store: Store, dataset_id: int, request: AcceptRequest, actor: str, progress: TellProgress
+) -> Json:
+    return accept_result(accept(store, dataset_id, request, actor=actor, progress=progress))
 
 
 def evaluation_result(found: StoredEvaluation) -> dict[str, Any]:

@@ -12,8 +12,10 @@ from app.object_store.address import SCHEME
 from app.object_store.path import StoredPath, target_path
 from app.review.answers.keep import Keep, keep_nothing
 from app.review.datasets.dataset import get_dataset_head
-from app.review.exporting.export import export, require_possible
+from app.review.exporting.asked import export_asked
+from app.review.exporting.export import require_possible
 from app.review.exporting.folder import ExportFolder
+from app.review.jobs.apart import carry_out_apart
 from app.review.jobs.job_run import JobProgress, Work, counting
 from app.review.jobs.jobs import Jobs
 from app.store.frames import Frames
@@ -91,24 +93,22 @@ def export_work(
     """The work itself; the zip appears whole or not at all, and its record after it."""
 
     def work(progress: JobProgress) -> Json:
-        name, version = str(progress.job_id), request.get("version")
-        to = request.get("to")
+        name, to = str(progress.job_id), request.get("to")
         progress(0, None, f"Writing {request['format']}.")
-        folder.prepare()
-        report = export(
-            store,
-            dataset_id,
-            request["format"],
-            folder.content(name) if to is None else _target(store, to),
-            everything=request["all"],
-            boxes=request["boxes"],
-            images=request["images"],
-            # Requests of before say nothing of views.
-            views=request.get("views", "valid"),
-            version=None if version is None else str(version),
-            progress=counting(progress, "groups written"),
-            read=frames.read,
-        )
+        with folder.writing(name) as content:
+            report = carry_out_apart(
+                store,
+                "exports",
+                "the export",
+                export_asked,
+                dataset_id,
+                content if to is None else _target(store, to),
+                request,
+                dataset_id=dataset_id,
+                progress=progress,
+                told=counting(progress, "groups written"),
+                answer=lambda frame: frames.read(*frame),
+            )
         entry = folder.keep(name, request, report)
         return {
             "export": entry.id,

@@ -5,8 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 from app.errors import NotFoundError
+from app.progress import TellProgress
 from app.review.answers.keep import Keep, keep_nothing
 from app.review.datasets.dataset import get_dataset_head
+from app.review.jobs.apart import carry_out_apart
 from app.review.jobs.job_run import JobProgress, Work
 from app.review.jobs.jobs import Jobs
 from app.review.versions.freeze import FreezeRequest, freeze, plan_freeze
@@ -89,7 +91,17 @@ def freeze_work(store: Store, dataset_id: int, request: FreezeRequest, actor: st
 
     def work(progress: JobProgress) -> Json:
         progress(0, None, f"Freezing {request.name}.")
-        return version_result(freeze(store, dataset_id, request, actor=actor, progress=progress))
+        return carry_out_apart(
+            store,
+            "freezing",
+            "the freeze",
+            _freeze,
+            dataset_id,
+            request,
+            actor,
+            dataset_id=dataset_id,
+            progress=progress,
+        )
 
     return work
 
@@ -98,9 +110,18 @@ def verify_work(store: Store, version_id: int, actor: str) -> Work:
     """The work of verifying; its result is the report, which the version keeps, too."""
 
     def work(progress: JobProgress) -> Json:
-        progress(0, None, f"Verifying {get_version(store, version_id).name}.")
-        report = verify_and_keep(store, version_id, progress=progress, actor=actor)
-        return {"version_id": version_id, **report.values()}
+        version = get_version(store, version_id)
+        progress(0, None, f"Verifying {version.name}.")
+        return carry_out_apart(
+            store,
+            "verifying",
+            "the verification",
+            _verify,
+            version_id,
+            actor,
+            dataset_id=version.dataset_id,
+            progress=progress,
+        )
 
     return work
 
@@ -113,6 +134,17 @@ def version_result(version: Version) -> dict[str, Any]:
         "hash": version.hash,
         "counts": dict(version.counts),
     }
+
+
+def _freeze(
+    store: Store, dataset_id: int, request: FreezeRequest, actor: str, progress: TellProgress
+) -> Json:
+    return version_result(freeze(store, dataset_id, request, actor=actor, progress=progress))
+
+
+def _verify(store: Store, version_id: int, actor: str, progress: TellProgress) -> Json:
+    report = verify_and_keep(store, version_id, progress=progress, actor=actor)
+    return {"version_id": version_id, **report.values()}
 
 
 def _request_values(request: FreezeRequest) -> Json:

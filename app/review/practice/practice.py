@@ -16,6 +16,7 @@ from app.review.datasets.delete import delete_dataset
 from app.review.editing.recompute import solve_dataset
 from app.review.editing.state import GroupState, read_states
 from app.review.importing.sources import Source, import_source
+from app.review.jobs.apart import carry_out_apart
 from app.review.jobs.job_run import JobProgress, Work
 from app.review.jobs.jobs import Jobs
 from app.review.practice.lessons import Feedback, judge, kind_of
@@ -112,9 +113,22 @@ def practice_work(store: Store, settings: Settings, *, again: bool, actor: str) 
     """The work itself; its result names the dataset and its first group."""
 
     def work(progress: JobProgress) -> Json:
-        return make_practice_dataset(store, settings, progress, again=again, actor=actor)
+        return carry_out_apart(
+            store,
+            "practice",
+            "the practice groups",
+            _make_dataset,
+            again,
+            actor,
+            dataset_id=None,
+            progress=progress,
+        )
 
     return work
+
+
+def _make_dataset(store: Store, again: bool, actor: str, progress: TellProgress) -> Json:
+    return make_practice_dataset(store, store.settings, progress, again=again, actor=actor)
 
 
 def make_practice_dataset(

@@ -15,6 +15,7 @@ from app.api.routers import exports as module
 from app.review.datasets.dataset import dataset_id
 from app.review.editing.recompute import solve_dataset
 from app.review.importing.ingest import ingest
+from app.review.jobs import apart
 from app.review.jobs.jobs import Jobs
 from app.soccer.frames import ImageSize
 from app.soccer.group import Group, Station, View
@@ -242,6 +243,14 @@ class TestRestart:
         assert done.state == "done", done.problem
         assert done.result["missing_images"] == 0
         assert read == [str(tmp_path / "7.png"), str(tmp_path / "7_1.png")]
+        here = api.get(job["content"]).content
+
+        # A process of its own asks for the same frames, and writes the same bytes.
+        monkeypatch.setattr(apart, "SMALL", 0)
+        again = api.post(API, json=order).json()
+        assert services.jobs.wait(again["id"], SECONDS).state == "done"
+        assert read[2:] == read[:2]
+        assert api.get(again["content"]).content == here
 
     def test_an_export_that_was_under_way_is_written_by_the_next_server(
         self, app, api, monkeypatch: pytest.MonkeyPatch

@@ -16,7 +16,7 @@ REQUEST = {"dataset": "small", "format": "cameras"}
 @pytest.fixture
 def folder(tmp_path: Path) -> ExportFolder:
     folder = ExportFolder(tmp_path / "exports")
-    folder.prepare()
+    folder.folder.mkdir()
     return folder
 
 
@@ -73,11 +73,28 @@ class TestForget:
         assert folder.get("13") == kept
 
 
-class TestPrepare:
-    def test_clears_half_written_files_of_a_killed_server(self, folder: ExportFolder) -> None:
+class TestWriting:
+    def test_what_was_left_half_written_of_it_goes_before_and_after(
+        self, folder: ExportFolder
+    ) -> None:
         keep(folder, "12")
-        (folder.folder / ".13.zip.abc.partial").mkdir()
-        (folder.folder / ".13.zip.abc.partial" / "x.csv").write_text("x")
-        (folder.folder / ".13.json.partial").write_text("{")
-        folder.prepare()
+        half = folder.folder / ".13.zip.abc.partial"
+        half.mkdir()
+        (half / "x.csv").write_text("x")
+        with folder.writing("13") as content:
+            assert content == folder.folder / "13.zip"
+            assert not half.exists()
+            half.write_text("the zip itself")
         assert sorted(path.name for path in folder.folder.iterdir()) == ["12.json", "12.zip"]
+
+    def test_what_others_are_writing_stays(self, folder: ExportFolder) -> None:
+        others = folder.folder / ".12.zip.abc.partial"
+        others.mkdir()
+        with folder.writing("2"), folder.writing("13"):
+            assert others.is_dir()
+        assert others.is_dir()
+
+    def test_a_folder_that_is_missing_is_made_for_its_owner_alone(self, tmp_path: Path) -> None:
+        folder = ExportFolder(tmp_path / "home" / "exports")
+        with folder.writing("1"):
+            assert folder.folder.stat().st_mode & 0o777 == 0o700

@@ -60,7 +60,7 @@ def store(there: Store) -> Store:
 
 def take_and_keep(*told: Any) -> None:
     """An import that has its turn to write, and never gives it back."""
-    told[-1]("take")
+    told[-1].take_turn()
     time.sleep(SECONDS)
 
 

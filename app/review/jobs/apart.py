@@ -1,0 +1,70 @@
+"""Apart: the work of a job in a process of its own, so that requests do not wait for it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+from app.child import ChildEnded, Reason
+from app.errors import OverloadedError
+from app.progress import TellProgress
+from app.review.jobs.job_run import JobProgress
+from app.store.apart import SILENCE, nothing, patiently, work_apart, work_here
+from app.store.datasets import has_more_groups
+from app.store.store import Store
+
+Result = TypeVar("Result")
+
+SMALL = 100
+"""Groups of a dataset that are worked on here: to start a process takes longer."""
+_ENDS: dict[Reason, str] = {
+    "killed": "was killed, most likely for want of memory",
+    "silence": f"took no step for {SILENCE:,.0f} seconds",
+    "crash": "crashed",
+}
+
+
+def carry_out_apart(
+    store: Store,
+    kind: str,
+    what: str,
+    work: Callable[..., Result],
+    *arguments: Any,
+    dataset_id: int | None,
+    progress: JobProgress,
+    told: TellProgress | None = None,
+    answer: Callable[[Any], Any] = nothing,
+) -> Result:
+    """The result of ``work(store, *arguments, caller)``, as ``store.apart.work_apart`` has it.
+
+    Args:
+        store: The database.
+        kind: What is done, as its figures are called.
+        what: The same in a sentence.
+        work: A function of a module.
+        arguments: What it is called with besides.
+        dataset_id: What it works on; where that is small, it is done here. None: never here.
+        progress: Of the job; who cancels it ends the work.
+        told: Hears how far the work is; None: the job's progress itself.
+        answer: What the work's questions are answered with.
+
+    Raises:
+        OverloadedError: The process did not come to its end.
+        ReviewError: As the work raised it.
+    """
+    hears = told or progress
+    if dataset_id is not None and _is_small(store, dataset_id):
+        return work_here(store, work, *arguments, progress=hears, answer=answer)
+    stop = patiently(progress.check)
+    try:
+        return work_apart(store, kind, work, *arguments, progress=hears, stop=stop, answer=answer)
+    except ChildEnded as error:
+        raise OverloadedError(
+            f"the process of {what} {_ENDS.get(error.reason, 'needs more memory than there is')}",
+            hint="Start it again. Where it happens often, give more memory.",
+        ) from error
+
+
+def _is_small(store: Store, dataset_id: int) -> bool:
+    with store.read() as session:
+        return not has_more_groups(session, dataset_id, SMALL)

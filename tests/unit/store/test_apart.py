@@ -1,0 +1,212 @@
+"""Work apart: it sees the database, takes its turn, tells, asks, and ends when it is told to."""
+
+from __future__ import annotations
+
+import os
+import threading
+import time
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from app.child import ChildEnded
+from app.child_figures import FIGURES
+from app.errors import DamagedError, InputError, JobCancelled, NotFoundError
+from app.progress import TellProgress
+from app.review.datasets.dataset import list_datasets
+from app.soccer.policy import PAPER
+from app.store import apart as module
+from app.store.apart import Caller, patiently, work_apart
+from app.store.clock import now
+from app.store.datasets import insert_dataset_row
+from app.store.store import Store
+from tests.waiting import SECONDS
+
+KIND = "exports"
+
+
+def wanted() -> None:
+    """Nobody ends it."""
+
+
+def deaf(*_: object) -> None:
+    """Hears nothing."""
+
+
+def run(
+    store: Store,
+    work: Any,
+    *arguments: Any,
+    progress: TellProgress = deaf,
+    stop: Any = wanted,
+    answer: Any = lambda question: None,
+) -> Any:
+    return work_apart(store, KIND, work, *arguments, progress=progress, stop=stop, answer=answer)
+
+
+def name_process(store: Store, word: str, _caller: Caller) -> tuple[int, str, Path]:
+    return os.getpid(), word, store.settings.home
+
+
+def count(_store: Store, last: int, caller: Caller) -> None:
+    for number in range(1, last + 1):
+        caller(number, last, "counting")
+
+
+def count_slowly(_store: Store, mark: Path, caller: Caller) -> None:
+    try:
+        for number in range(10_000):
+            caller(number)
+            time.sleep(0.01)
+    finally:
+        mark.write_text("put away")
+
+
+def never_look_up(_store: Store, caller: Caller) -> None:
+    caller(1)
+    time.sleep(SECONDS)
+
+
+def take_turn(_store: Store, mark: Path, caller: Caller) -> None:
+    caller.take_turn()
+    mark.write_text("taken")
+    time.sleep(SECONDS)
+
+
+def ask(_store: Store, question: str, caller: Caller) -> str:
+    try:
+        return f"answered {caller.ask(question)}"
+    except NotFoundError as error:
+        return f"refused: {error.message}"
+
+
+def write(store: Store, _caller: Caller) -> None:
+    with store.write() as session:
+        insert_dataset_row(session, "made apart", PAPER, now())
+
+
+def break_down(*_: object) -> None:
+    os.abort()
+
+
+def meet_damage(*_: object) -> None:
+    raise DamagedError("touchline.db is damaged", hint="Restore it.")
+
+
+class TestWorkApart:
+    def test_is_done_by_another_process_over_the_same_home(self, store: Store) -> None:
+        number, word, home = run(store, name_process, "word")
+        assert number != os.getpid()
+        assert (word, home) == ("word", store.settings.home)
+
+    def test_who_waits_hears_the_first_step_and_the_last_and_not_every_one(
+        self, store: Store
+    ) -> None:
+        heard: list[Any] = []
+        run(store, count, 5_000, progress=lambda *told: heard.append(told))
+        assert heard[0] == (1, 5_000, "counting")
+        assert heard[-1] == (5_000, 5_000, "counting")
+        assert len(heard) < 500
+
+    def test_a_question_is_answered_here(self, store: Store) -> None:
+        assert run(store, ask, "why", answer=str.upper) == "answered WHY"
+
+    def test_a_question_that_is_refused_is_refused_in_the_work(self, store: Store) -> None:
+        def refuse(question: str) -> None:
+            raise NotFoundError(f"nobody knows {question}")
+
+        assert run(store, ask, "why", answer=refuse) == "refused: nobody knows why"
+
+    def test_it_writes_in_the_turn_of_those_here(self, store: Store) -> None:
+        with ExitStack() as others:
+            others.enter_context(store.write())
+            working = threading.Thread(target=run, args=(store, write))
+            working.start()
+            working.join(0.5)
+            assert working.is_alive()
+        working.join(SECONDS)
+        assert [item.name for item in list_datasets(store)] == ["made apart"]
+
+    def test_told_to_end_it_puts_away_what_it_has_begun(self, store: Store, tmp_path: Path) -> None:
+        def progress(done: int, *_: object) -> None:
+            if done > 3:
+                raise JobCancelled
+
+        mark = tmp_path / "mark"
+        with pytest.raises(JobCancelled):
+            run(store, count_slowly, mark, progress=progress)
+        assert mark.read_text() == "put away"
+
+    def test_told_to_end_after_its_last_step_it_is_done(self, store: Store) -> None:
+        def progress(done: int, *_: object) -> None:
+            if done == 2:
+                raise JobCancelled
+
+        run(store, count, 2, progress=progress)
+
+    def test_one_that_comes_to_no_step_is_ended_and_lets_others_write(
+        self, store: Store, tmp_path: Path
+    ) -> None:
+        mark = tmp_path / "mark"
+
+        def stop() -> None:
+            if mark.exists():
+                raise JobCancelled
+
+        with pytest.raises(JobCancelled):
+            run(store, take_turn, mark, stop=stop)
+        with store.write():
+            pass
+
+    def test_damage_that_it_meets_ends_changes_here(self, store: Store) -> None:
+        with pytest.raises(DamagedError, match=r"^touchline\.db is damaged$"):
+            run(store, meet_damage)
+        with pytest.raises(DamagedError, match="no change is taken"), store.write():
+            pass
+
+    def test_one_that_breaks_down_is_counted(self, store: Store) -> None:
+        before = FIGURES[KIND].ended["crash"]
+        with pytest.raises(ChildEnded, match="made the process crash"):
+            run(store, break_down)
+        assert FIGURES[KIND].ended["crash"] == before + 1
+
+    def test_what_it_refuses_is_refused_here(self, store: Store) -> None:
+        def progress(*_: object) -> None:
+            raise InputError("no")
+
+        with pytest.raises(InputError, match=r"^no$"):
+            run(store, count_slowly, store.settings.home / "mark", progress=progress)
+
+
+class TestPatiently:
+    def test_nothing_ends_what_is_wanted(self) -> None:
+        stop = patiently(wanted)
+        stop()
+        stop()
+
+    def test_what_is_not_wanted_may_come_to_its_next_step(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        def unwanted() -> None:
+            raise JobCancelled
+
+        stop, clock = patiently(unwanted), [100.0]
+        monkeypatch.setattr(module, "monotonic", lambda: clock[0])
+        stop()
+        clock[0] += module.PATIENCE
+        stop()
+        clock[0] += 0.1
+        with pytest.raises(JobCancelled):
+            stop()
+
+    def test_it_ends_work_that_comes_to_none(
+        self, store: Store, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        def unwanted() -> None:
+            raise JobCancelled
+
+        monkeypatch.setattr(module, "PATIENCE", 0.3)
+        with pytest.raises(JobCancelled):
+            run(store, never_look_up, stop=patiently(unwanted))
