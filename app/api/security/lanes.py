@@ -51,7 +51,7 @@ class Lane:
         served: How many are at work where a server of databases is waited for at each statement; None:
             as many as elsewhere.
         apart: How many are at work where each has a process that does it; None: as many as elsewhere.
-        each: How many of them one person may have at work; None: all.
+        each: How many of them one person of a team may have at work; None: all.
         pause: Seconds until who cannot even wait is told so. A refusal costs the event loop about as
             much as any answer, and who has hundreds of them at once asks again at once.
     """
@@ -69,8 +69,9 @@ LOOKS = Lane("looks", 2, 200)
 """What one group, view or camera is, and what a window asks again and again."""
 PAGES = Lane("pages", 2, 200)
 """The page of the browser application, whichever address it is asked for under."""
-READS = Lane("reads", min(4, max(2, os.cpu_count() or 2)), 200)
-"""All other reading: lists and counts of many groups, which the database takes a processor for."""
+READS = Lane("reads", min(4, max(2, os.cpu_count() or 2)), 200, each=1)
+"""All other reading: lists and counts of many groups, which the database takes a processor for. What one
+person of a team asks is read one after the other: two long lists at once take the server from all others."""
 EDITS = Lane("edits", 1, 100, served=3)
 """What people do to one group, view or lease all day: read, solved and encoded one after the other. Who
 waits for the disk or a picture has left already (``app.place``)."""
@@ -87,7 +88,7 @@ STREAMS = Lane("streams", 1, 200)
 """Those that begin: who listens takes nobody's place. All windows of a team come back at the same
 moment when a server starts again, and what each asks first would keep readers waiting."""
 IMAGES = Lane("images", 6, 200)
-UPLOADS = Lane("uploads", 8, 8, pause=4.0)
+UPLOADS = Lane("uploads", 8, 8, each=2, pause=4.0)
 ZIPS = Lane("zips", 16, 100)
 """Those of exports, which a request may find still being written."""
 LOGINS = Lane("logins", 4, 50)

@@ -15,7 +15,8 @@ class Turns:
     Args:
         width: How many there are.
         queue: How many requests may wait for one.
-        each: How many one person may have at a time; None: all.
+        each: How many one person may have at a time; None: all. Who has no name, as on a server that
+            somebody runs alone, may have all.
     """
 
     def __init__(self, width: int, queue: int, each: int | None = None):
@@ -78,7 +79,7 @@ class Turns:
             self._of[following] = waiting
 
     def _may(self, who: str) -> bool:
-        return self.free > 0 and self._at_work[who] < self._each
+        return self.free > 0 and (not who or self._at_work[who] < self._each)
 
     def _forget(self, who: str, mine: asyncio.Future[bool]) -> None:
         self._of[who].remove(mine)

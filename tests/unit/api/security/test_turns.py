@@ -146,3 +146,17 @@ class TestTurns:
             assert (it.turns.free, it.turns.waiting) == (2, 0)
 
         run(test)
+
+    def test_who_has_no_name_may_have_all(self) -> None:
+        async def test() -> None:
+            it = Waiting(width=2, each=1)
+            for _ in range(3):
+                it.ask("")
+            await it.settle()
+            assert (it.served, it.turns.free, it.turns.waiting) == (["", ""], 0, 1)
+            await it.serve_all()
+            while it.at_work:
+                it.end()
+            assert it.turns.free == 2
+
+        run(test)
