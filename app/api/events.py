@@ -153,6 +153,11 @@ class Events:
         with self._lock:
             return replace(self._counts, open=len(self._feeds))
 
+    def require_room(self) -> None:
+        """Raise OverloadedError where as many listen as may, or the server stops; waits for nothing."""
+        if len(self._feeds) >= MAX_FEEDS or self._closing.is_set():
+            raise OverloadedError("too many windows listen for events")
+
     def subscribe(
         self,
         dataset_id: int | None,
@@ -171,8 +176,7 @@ class Events:
         """
         feed = Feed(dataset_id, position, sight, position if began is None else began)
         with self._lock:
-            if len(self._feeds) >= MAX_FEEDS or self._closing.is_set():
-                raise OverloadedError("too many windows listen for events")
+            self.require_room()
             self._feeds.add(feed)
             self._counts.opened += 1
             self._counts.resumed += resumed

@@ -1,7 +1,7 @@
 """Background: long work of one person, beside which others go on as if there were none.
 
-A dataset is solved anew, exported whole, and imported from the command line, one after the other of its
-kind without a pause; each is an attack like any other (``flood``).
+A dataset is solved anew, exported whole, frozen and verified, and imported from the command line, one
+after the other of its kind without a pause; each is an attack like any other (``flood``).
 """
 
 from __future__ import annotations
@@ -77,6 +77,19 @@ class Background:
         wanted = {"dataset": self._busy.dataset, "format": FORMAT, "all": True}
         with closing(self._line):
             return await self._done(await self._line.ask("POST", f"{API}/exports", _json(wanted)))
+
+    async def freeze(self, _number: int) -> tuple[int, dict[str, str]]:
+        """A version of what passes, which is computed again and compared."""
+        wanted = {"name": f"turn {next(self._turn)}", "groups": "passing"}
+        path = f"{API}/datasets/{self._busy.dataset}/versions"
+        with closing(self._line):
+            asked = await self._line.ask("POST", path, _json(wanted))
+            frozen = await self._done(asked)
+            if frozen[0] != 202:
+                return frozen
+            job = json.loads((await self._line.ask("GET", asked.headers["location"])).body)
+            path = f"{API}/versions/{job['result']['version']}/verify"
+            return await self._done(await self._line.ask("POST", path))
 
     async def import_(self, _number: int) -> tuple[int, dict[str, str]]:
         """The command line brings the same groups into the home again, as another dataset."""

@@ -9,7 +9,7 @@ from typing import Annotated
 from fastapi import APIRouter, Depends, Header, Query, Request, Response
 from fastapi.responses import StreamingResponse
 
-from app.api.deps import AppServices, Sees, get_services
+from app.api.deps import AppServices, Sees
 from app.api.events import Feed, hello
 from app.api.problem import Responses, responses
 from app.api.schemas.event import EVENTS
@@ -39,12 +39,18 @@ STREAM: Responses = {
 }
 
 
+async def where_room_is(services: AppServices) -> Services:
+    """The services, unless as many listen as may: who is turned away costs the database nothing."""
+    services.events.require_room()
+    return services
+
+
 class Start:
     """Where a listener begins: all that asks the database, done off the event loop."""
 
     def __init__(
         self,
-        services: Annotated[Services, Depends(get_services)],
+        services: Annotated[Services, Depends(where_room_is)],
         dataset: Annotated[
             str | None, Query(max_length=200, description="Name or id; default: all datasets.")
         ] = None,
