@@ -88,7 +88,7 @@ STREAMS = Lane("streams", 1, 200)
 """Those that begin: who listens takes nobody's place. All windows of a team come back at the same
 moment when a server starts again, and what each asks first would keep readers waiting."""
 IMAGES = Lane("images", 6, 200)
-UPLOADS = Lane("uploads", 8, 8, each=2, pause=4.0)
+UPLOADS = Lane("uploads", 8, 8, each=4, pause=4.0)
 ZIPS = Lane("zips", 16, 100)
 """Those of exports, which a request may find still being written."""
 LOGINS = Lane("logins", 4, 50)
