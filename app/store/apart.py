@@ -139,6 +139,7 @@ def work_apart(
                     turn.enter_context(store.turn)
                 elif said == "written":
                     turn.close()
+                    store.tell_listeners()
                 elif said == "step":
                     progress(*what)
                 else:

@@ -191,9 +191,10 @@ class Store:
                 leave_place()
             session.commit()
             self._anchored(session)
-        self._tell_listeners()
+        self.tell_listeners()
 
-    def _tell_listeners(self) -> None:
+    def tell_listeners(self) -> None:
+        """Call all who listen: this process has committed, or another one that works for it."""
         for listener in self._listeners:
             try:
                 listener()
@@ -299,7 +300,7 @@ class Store:
 
     def _hear(self, word: str) -> None:
         if word in (COMMITTED, AGAIN):
-            self._tell_listeners()
+            self.tell_listeners()
 
     def close(self) -> None:
         """Close all connections."""

@@ -129,6 +129,12 @@ class TestWorkApart:
         working.join(SECONDS)
         assert [item.name for item in list_datasets(store)] == ["made apart"]
 
+    def test_who_listens_here_hears_what_it_writes(self, store: Store) -> None:
+        told: list[str] = []
+        store.listen(lambda: told.append("committed"))
+        run(store, write)
+        assert told == ["committed"]
+
     def test_told_to_end_it_puts_away_what_it_has_begun(self, store: Store, tmp_path: Path) -> None:
         def progress(done: int, *_: object) -> None:
             if done > 3:

@@ -178,6 +178,7 @@ class TestAccept:
         (ball,) = views(running)[0]["view"]["balls"]
         assert (ball["source"], ball["predicted_by"]) == ("prediction", "exact")
 
+    @pytest.mark.usefixtures("wherever")
     def test_a_query_is_a_job_that_can_be_undone_group_by_group(self, running, exact) -> None:
         body = {"dataset": "broadcast", "predictions": exact["id"], "q": "number:2"}
         answer = running.post(f"{API}/predictions/accept", json={**body, "replace": True})
@@ -214,6 +215,7 @@ class TestAccept:
 
 
 class TestEvaluations:
+    @pytest.mark.usefixtures("wherever")
     def test_from_upload_to_tables_figures_and_frames(self, running, exact) -> None:
         number = evaluate(running, predictions=exact["id"], name="first")
         document = running.get(f"{API}/evaluations/{number}").json()

@@ -35,6 +35,7 @@ def ended(services: Services, answer) -> dict[str, Any]:
 
 
 class TestFreezeVersion:
+    @pytest.mark.usefixtures("wherever")
     def test_a_job_freezes_and_its_result_names_the_version(self, api, services) -> None:
         body = {"name": "v1", "groups": "passing", "split": {"kind": "given"}, "licence": "mine"}
         job = ended(services, api.post(f"{API}/datasets/broadcast/versions", json=body))
@@ -137,6 +138,7 @@ class TestVersions:
         assert api.get(address, params={"dataset": "static"}).json()["id"] == other.id
         assert api.get(f"{API}/versions/{other.hash[:12]}").json()["id"] == other.id
 
+    @pytest.mark.usefixtures("wherever")
     def test_verifying_is_a_job_that_reports(self, api, services, version) -> None:
         job = ended(services, api.post(f"{API}/versions/{version.id}/verify"))
         assert job["result"]["ok"], job
