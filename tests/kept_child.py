@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 
 from app.child import Allowance, Child
 
-USERS = ("app.child_pool", "app.review.datasets.picture_files", "app.store.apart")
+USERS = ("app.child_pool", "app.review.datasets.picture_files", "app.store.store_child")
 """Modules that make children."""
 
 

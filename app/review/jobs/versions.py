@@ -8,7 +8,7 @@ from app.errors import NotFoundError
 from app.progress import TellProgress
 from app.review.answers.keep import Keep, keep_nothing
 from app.review.datasets.dataset import get_dataset_head
-from app.review.jobs.apart import carry_out_apart
+from app.review.jobs.job_child import carry_out_apart
 from app.review.jobs.job_run import JobProgress, Work
 from app.review.jobs.jobs import Jobs
 from app.review.versions.freeze import FreezeRequest, freeze, plan_freeze

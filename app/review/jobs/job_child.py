@@ -1,4 +1,4 @@
-"""Apart: the work of a job in a process of its own, so that requests do not wait for it."""
+"""Job child: the work of a job in a process of its own, so that requests do not wait for it."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from app.child import ChildEnded, Reason
 from app.errors import OverloadedError
 from app.progress import TellProgress
 from app.review.jobs.job_run import JobProgress
-from app.store.apart import SILENCE, nothing, patiently, work_apart, work_here
 from app.store.datasets import has_more_groups
 from app.store.store import Store
+from app.store.store_child import SILENCE, nothing, patiently, work_apart, work_here
 
 Result = TypeVar("Result")
 
@@ -35,7 +35,7 @@ def carry_out_apart(
     told: TellProgress | None = None,
     answer: Callable[[Any], Any] = nothing,
 ) -> Result:
-    """The result of ``work(store, *arguments, caller)``, as ``store.apart.work_apart`` has it.
+    """The result of ``work(store, *arguments, caller)``, as ``store.store_child.work_apart`` has it.
 
     Args:
         store: The database.

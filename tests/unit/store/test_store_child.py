@@ -17,11 +17,11 @@ from app.errors import DamagedError, InputError, JobCancelled, NotFoundError
 from app.progress import TellProgress
 from app.review.datasets.dataset import list_datasets
 from app.soccer.policy import PAPER
-from app.store import apart as module
-from app.store.apart import Caller, patiently, work_apart
+from app.store import store_child as module
 from app.store.clock import now
 from app.store.datasets import insert_dataset_row
 from app.store.store import Store
+from app.store.store_child import Caller, patiently, work_apart
 from tests.waiting import SECONDS
 
 KIND = "exports"

@@ -1,4 +1,4 @@
-"""An export as it was asked for, written by a process that keeps no request waiting.
+"""Export child: an export as it was asked for, written by a process that keeps no request waiting.
 
 Frames are files of somebody else. They are made where they are made for requests, in children with
 limits, and travel from there.
@@ -12,9 +12,9 @@ from typing import Any
 from app.datasets.file_tree import Root
 from app.review.exporting.export import ExportReport, export
 from app.soccer.media import Media
-from app.store.apart import Caller
 from app.store.frames import SentPicture
 from app.store.store import Store
+from app.store.store_child import Caller
 
 
 def export_asked(
