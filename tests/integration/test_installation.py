@@ -8,7 +8,6 @@ import shutil
 import subprocess
 import sys
 import sysconfig
-import tarfile
 import venv
 import zipfile
 from collections.abc import Iterator
@@ -22,6 +21,7 @@ from playwright.sync_api import sync_playwright
 from tests.e2e.install_chromium import ADVICE, find_chromium
 from tests.e2e.screen import Screen, rows
 from tests.e2e.service import ROOT
+from tests.release.sources import unpack
 
 SECONDS = 300
 LOAD_ALL = """(modules) => {
@@ -54,10 +54,7 @@ def dist(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def sources(dist: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The project as the source distribution has it."""
-    folder = tmp_path_factory.mktemp("sources")
-    with tarfile.open(next(dist.glob(SOURCES))) as archive:
-        archive.extractall(folder, filter="data")
-    return next(folder.iterdir())
+    return unpack(next(dist.glob(SOURCES)), tmp_path_factory.mktemp("sources"))
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,6 @@ import hashlib
 import shutil
 import subprocess
 import sys
-import tarfile
 import tempfile
 from pathlib import Path
 
@@ -22,6 +21,7 @@ from tests.release.advisories import ask_browser, ask_python
 from tests.release.bill import write_bill
 from tests.release.libraries import EXTRAS, ROOT, closure, pins
 from tests.release.licences import complaints
+from tests.release.sources import unpack
 
 SUMS = "SHA256SUMS"
 
@@ -83,9 +83,8 @@ def _same_again(out: Path) -> bool:
     """Whether the source distribution builds the wheel beside it, byte for byte."""
     with tempfile.TemporaryDirectory(prefix="touchline-release-") as name:
         folder = Path(name)
-        with tarfile.open(next(out.glob("*.tar.gz"))) as archive:
-            archive.extractall(folder / "sources", filter="data")
-        _build(next((folder / "sources").iterdir()), folder, "wheel")
+        project = unpack(next(out.glob("*.tar.gz")), folder / "sources")
+        _build(project, folder, "wheel")
         one, other = next(out.glob("*.whl")), next(folder.glob("*.whl"))
         return one.name == other.name and one.read_bytes() == other.read_bytes()
 
