@@ -48,9 +48,14 @@ def shown_entries(session: Session, entries: Iterable[LogEntry]) -> list[LogEntr
     return shown
 
 
+def given_aliases(session: Session) -> dict[str, str]:
+    """As whose the work of each actor is shown that was given to somebody."""
+    return {row.actor: row.shown for row in session.execute(_ALIASES)}
+
+
 def find_alias(session: Session, actor: str) -> str | None:
     """As whose the work of an actor is shown; None where it was given to nobody."""
-    return next((row.shown for row in session.execute(_ALIASES) if row.actor == actor), None)
+    return given_aliases(session).get(actor)
 
 
 def insert_alias(session: Session, actor: str, person_id: int, name: str, at: str, by: str) -> None:

@@ -1,0 +1,123 @@
+"""People check: whether accounts and roles are what the log says.
+
+A row that somebody writes past the service, to make themselves an admin, has no word in the log.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from app.review.editing.check import Check, compared
+from app.review.people.names import PERSON
+from app.store.aliases import given_aliases
+from app.store.dataset_roles import all_dataset_roles
+from app.store.log import LogEntry, entries_of_kinds
+from app.store.people import all_people
+from app.store.session import Session
+
+DELETED = "dataset_deleted"
+UNLIKE = "not as the log says"
+
+
+@dataclass
+class People:
+    """Who there is, and as what.
+
+    Attributes:
+        accounts: Role on the server, and whether they are disabled, by name.
+        roles: Role in a single dataset, by name and the dataset's id.
+        shown: As whose the work of another actor is shown, by that actor.
+    """
+
+    accounts: dict[str, tuple[str, bool]] = field(default_factory=dict)
+    roles: dict[tuple[str, int], str] = field(default_factory=dict)
+    shown: dict[str, str] = field(default_factory=dict)
+
+
+def examine_people(session: Session, restore: str) -> list[Check]:
+    """Compare accounts, roles in datasets and adopted names with what the log says of them.
+
+    Args:
+        session: A read session on a log whose chain is whole.
+        restore: What to do where a row is not what was said.
+    """
+    said, present = _said(session), _present(session)
+    parts = {"accounts": "accounts", "roles": "roles in datasets", "shown": "adopted names"}
+    checks = []
+    for name, words in parts.items():
+        ours, theirs = getattr(said, name), getattr(present, name)
+        whole = f"{len(theirs):,}, as the log says"
+        checks.append(compared(words, whole, _apart(ours, theirs), UNLIKE, restore))
+    return checks
+
+
+def _present(session: Session) -> People:
+    people = all_people(session)
+    names = {row.id: row.name for row in people}
+    return People(
+        {row.name: (row.role, bool(row.disabled)) for row in people},
+        {(names[row.person_id], row.dataset_id): row.role for row in all_dataset_roles(session)},
+        given_aliases(session),
+    )
+
+
+def _said(session: Session) -> People:
+    people = People()
+    for entry in entries_of_kinds(session, [PERSON, DELETED]):
+        if entry.kind == DELETED:
+            people.roles = {
+                (name, dataset): role
+                for (name, dataset), role in people.roles.items()
+                if dataset != entry.dataset_id
+            }
+        elif (step := _STEPS.get(entry.body["did"])) is not None:
+            step(people, entry, str(entry.body["person"]))
+    return people
+
+
+def _account(people: People, entry: LogEntry, name: str) -> None:
+    _, disabled = people.accounts.get(name, ("", False))
+    people.accounts[name] = (entry.body["role"], disabled)
+
+
+def _disabled(people: People, entry: LogEntry, name: str) -> None:
+    people.accounts[name] = (entry.body["role"], entry.body["did"] == "disabled")
+
+
+def _given(people: People, entry: LogEntry, name: str) -> None:
+    assert entry.dataset_id is not None
+    people.roles[name, entry.dataset_id] = entry.body["role"]
+
+
+def _taken(people: People, entry: LogEntry, name: str) -> None:
+    assert entry.dataset_id is not None
+    people.roles.pop((name, entry.dataset_id), None)
+
+
+def _adopted(people: People, entry: LogEntry, name: str) -> None:
+    people.shown[entry.body["from"]] = name
+
+
+_STEPS: Mapping[str, Callable[[People, LogEntry, str], None]] = {
+    "first admin": _account,
+    "invited": _account,
+    "came by single sign-on": _account,
+    "role": _account,
+    "disabled": _disabled,
+    "enabled": _disabled,
+    "role in dataset": _given,
+    "role taken": _taken,
+    "adopted": _adopted,
+}
+"""What of the words about people changes who there is, and as what."""
+
+
+def _apart(ours: Mapping[Any, Any], theirs: Mapping[Any, Any]) -> list[str]:
+    keys = sorted(ours.keys() | theirs.keys())
+    return [_name(key) for key in keys if ours.get(key) != theirs.get(key)]
+
+
+def _name(key: str | tuple[str, int]) -> str:
+    return key if isinstance(key, str) else f"{key[0]} in dataset {key[1]}"
