@@ -12,6 +12,15 @@ from app.store.dialect.statements import insert
 from app.store.session import Session
 from app.store.take_models import CopyDatasetModel, GuidelineModel, GuidelinePictureModel
 
+GUIDELINE = "guideline"
+"""Kind of the log's entries about them; each has the digest of a text."""
+
+
+def all_guidelines(session: Session) -> Sequence[Any]:
+    """``dataset_id``, ``number`` and ``text`` of every version of every dataset."""
+    model = GuidelineModel
+    return session.execute(select(model.dataset_id, model.number, model.text)).all()
+
 
 def told_dataset(session: Session, dataset_id: int) -> int:
     """Of which dataset the guidelines count in a dataset: of that which it holds copies of."""

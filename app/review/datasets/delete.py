@@ -86,9 +86,9 @@ def delete_dataset(
     with store.write() as session:
         contents = _contents(session, identity)
         removal.keep_used_ids(session)
-        body = {"name": contents.name, "counts": contents.counts}
-        append(session, [Entry(KIND, actor, now(), body, identity)])
         heir = None if afresh is None else removal.move_access(session, identity)
+        body = {"name": contents.name, "counts": contents.counts, "heir": heir}
+        append(session, [Entry(KIND, actor, now(), body, identity)])
         removal.delete_rows(session, identity)
         if afresh is not None:
             assert insert_dataset(session, contents.name, afresh, actor) == heir

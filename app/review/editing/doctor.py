@@ -8,6 +8,7 @@ from typing import Any
 from app.errors import StorageError
 from app.review.datasets.dataset import list_datasets
 from app.review.editing.check import Check, compared
+from app.review.editing.guideline_check import examine_guidelines
 from app.review.editing.ledger import Ledger, read_ledger
 from app.review.editing.people_check import examine_people
 from app.review.editing.recompute import stale_groups
@@ -52,7 +53,7 @@ def examine(store: Store) -> list[Check]:
         else:
             checks.append(Check("log", True, f"{entries:,} entries, each as it was written"))
             checks += _compared_tables(session, said, restore)
-            checks += examine_people(session, restore)
+            checks += [*examine_people(session, restore), examine_guidelines(session, restore)]
         computed = examine_computed(session, restore)
         is_whole = all(check.ok for check in computed)
         checks += [*computed, _queue(session, REBUILD if is_whole else restore)]

@@ -12,6 +12,7 @@ from app.soccer.media import Media
 from app.store.clock import now
 from app.store.frames import Frames
 from app.store.guidelines import (
+    GUIDELINE,
     count_pictures,
     find_picture,
     guideline_heads,
@@ -25,7 +26,6 @@ from app.store.session import Session
 from app.store.store import Store
 from app.store.uploads import upload_path
 
-KIND = "guideline"
 MAX_LETTERS = 100_000
 MAX_PICTURE = 4_000_000
 """Bytes of a picture."""
@@ -123,7 +123,7 @@ def write_guidelines(
             insert_guideline(session, told, newest + 1, text, actor)
             digest = hashlib.sha256(text.encode()).hexdigest()
             body = {"number": newest + 1, "digest": digest}
-            append(session, [Entry(KIND, actor, now(), body, told)])
+            append(session, [Entry(GUIDELINE, actor, now(), body, told)])
         written = _read(session, told)
         keep(written)(session)
         return written

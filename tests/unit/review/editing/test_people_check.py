@@ -5,14 +5,19 @@ from __future__ import annotations
 import pytest
 from sqlalchemy import text
 
+from app.review.datasets import delete
 from app.review.datasets.dataset import dataset_id
 from app.review.datasets.delete import delete_dataset
 from app.review.editing.check import Check
 from app.review.editing.doctor import examine
+from app.review.importing.ingest import ensure_dataset
 from app.review.people.adopt import adopt
 from app.review.people.members import give_role
 from app.review.people.people import change_person, find_person, invite
 from app.review.people.roles import Role
+from app.soccer.policy import PAPER
+from app.store.log import Entry
+from app.store.session import Session
 from app.store.store import Store
 from tests.databases import said_for_sqlite
 
@@ -70,6 +75,31 @@ class TestExaminePeople:
         checks = found(team)
         assert checks["roles in datasets"].sentence == "0, as the log says"
         assert all(check.ok for check in checks.values())
+
+    @pytest.mark.parametrize("earlier", [False, True], ids=["now", "as earlier versions wrote"])
+    def test_roles_in_a_dataset_that_begins_afresh_are_those_of_the_new_one(
+        self, team: Store, monkeypatch: pytest.MonkeyPatch, earlier: bool
+    ) -> None:
+        plain = delete.append
+
+        def without_heir(session: Session, entries: list[Entry]) -> object:
+            for entry in entries:
+                entry.body.pop("heir")
+            return plain(session, entries)
+
+        if earlier:
+            monkeypatch.setattr(delete, "append", without_heir)
+        delete_dataset(team, "demo", confirm="demo", actor="ann", afresh=PAPER)
+        assert found(team)["roles in datasets"].sentence == "1, as the log says"
+        forge(team, "UPDATE dataset_role SET role = 'viewer'")
+        assert not found(team)["roles in datasets"].ok
+
+    def test_one_of_the_same_name_that_somebody_makes_later_has_none(
+        self, team: Store, fill, make_group
+    ) -> None:
+        delete_dataset(team, "demo", confirm="demo", actor="ann")
+        ensure_dataset(team, "demo", actor="ann")
+        assert all(check.ok for check in found(team).values())
 
     @pytest.mark.parametrize(
         ("statement", "name", "whom"),
