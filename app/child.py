@@ -206,9 +206,14 @@ def _launch(allowance: Allowance) -> tuple[BaseProcess, Connection]:
 def abandon(executor: ProcessPoolExecutor) -> None:
     """End the processes of a pool with what they are at; nothing of it is waited for."""
     workers = list((executor._processes or {}).values())
+    tasks: Any = getattr(executor, "_call_queue")  # noqa: B009
     executor.shutdown(wait=False, cancel_futures=True)
     for worker in workers:
         worker.terminate()
+    # Before Python 3.11.5 a large task that was being handed over is handed over for ever: this process
+    # holds the end from which nobody reads any more (https://github.com/python/cpython/issues/94777).
+    if tasks is not None:
+        tasks._reader.close()
 
 
 def end_with_parent() -> None:

@@ -11,11 +11,13 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
 from pathlib import Path
 
 import pytest
 
-from app.child import Allowance, Child, ChildEnded
+from app.child import Allowance, Child, ChildEnded, abandon
 from app.errors import (
     DatasetFormatError,
     JobCancelled,
@@ -258,3 +260,28 @@ class TestEndWithParent:
         finally:
             parent.kill()
             parent.communicate()
+
+
+def sleep_beside(mark: Path, _large: bytes) -> None:
+    mark.touch()
+    time.sleep(SECONDS)
+
+
+class TestAbandon:
+    def test_tasks_that_are_being_handed_over_hold_nothing_up(self, tmp_path: Path) -> None:
+        executor = ProcessPoolExecutor(1, get_context("spawn"))
+        # More than a pipe holds: while one is at work, another is on its way.
+        for _ in range(4):
+            executor.submit(sleep_beside, tmp_path / "mark", bytes(2**22))
+        manager, tasks = executor._executor_manager_thread, executor._call_queue
+        end = time.monotonic() + SECONDS
+        while not (tmp_path / "mark").exists() and time.monotonic() < end:
+            time.sleep(0.05)
+        time.sleep(0.2)
+        abandon(executor)
+        try:
+            manager.join(SECONDS / 2)
+            assert not manager.is_alive()
+        finally:
+            # Or this process could not end, either.
+            tasks._reader.close()
