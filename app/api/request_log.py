@@ -100,7 +100,8 @@ class RequestLog:
                 await problem_response(problem)(scope, receive, watch)
             if scope["method"] in SAFE_METHODS and status < 500:
                 return
-            if status >= 400 and not self._refusals.admits():
+            refused = 400 <= status < 500 or status == 503
+            if refused and not self._refusals.admits():
                 return
             log.info(
                 "request answered",

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import ExitStack, closing, suppress
+from math import inf
 from time import monotonic
 from typing import Any, Literal, TypeVar
 
@@ -21,7 +22,7 @@ from app.store.store import Store
 
 SILENCE = 900.0
 """Seconds in which work must have come to its next step."""
-NO_LIMIT = Allowance(float("inf"), float("inf"), SILENCE)
+NO_LIMIT = Allowance(inf, inf, inf)
 """For work on what is ours already: it takes as long as there are groups."""
 STEP_SECONDS = 0.1
 """Between two words of how far the work is: each is heard by the process that answers requests."""
@@ -136,6 +137,8 @@ def work_apart(
             said, what = word
             try:
                 if said == "write":
+                    # What was seen here, the process may not have seen.
+                    store.require_undamaged()
                     turn.enter_context(store.turn)
                 elif said == "written":
                     turn.close()

@@ -11,15 +11,16 @@ from app.progress import TellProgress
 from app.review.jobs.job_run import JobProgress
 from app.store.datasets import has_more_groups
 from app.store.store import Store
-from app.store.store_child import SILENCE, nothing, patiently, work_apart, work_here
+from app.store.store_child import nothing, patiently, work_apart, work_here
 
 Result = TypeVar("Result")
 
 SMALL = 100
 """Groups of a dataset that are worked on here: to start a process takes longer."""
+STOP_SECONDS = 2.0
+"""So long after its process a server may be told to stop."""
 _ENDS: dict[Reason, str] = {
     "killed": "was killed, most likely for want of memory",
-    "silence": f"took no step for {SILENCE:,.0f} seconds",
     "crash": "crashed",
 }
 
@@ -59,6 +60,8 @@ def carry_out_apart(
     try:
         return work_apart(store, kind, work, *arguments, progress=hears, stop=stop, answer=answer)
     except ChildEnded as error:
+        # Who ends a service may end its processes first: then the next server goes on with it.
+        progress.check_within(STOP_SECONDS)
         raise OverloadedError(
             f"the process of {what} {_ENDS.get(error.reason, 'needs more memory than there is')}",
             hint="Start it again. Where it happens often, give more memory.",

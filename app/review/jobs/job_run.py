@@ -71,6 +71,11 @@ class JobProgress:
         if self.cancelled.is_set():
             raise JobCancelled
 
+    def check_within(self, seconds: float) -> None:
+        """``check``, once the server stops or this time is over."""
+        self._closing.wait(seconds)
+        self.check()
+
     def check(self) -> None:
         """Raise ``JobCancelled`` where the work shall end here."""
         if self.cancelled.is_set() or self._closing.is_set():

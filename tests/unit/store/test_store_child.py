@@ -172,6 +172,12 @@ class TestWorkApart:
         with pytest.raises(DamagedError, match="no change is taken"), store.write():
             pass
 
+    def test_damage_that_was_seen_here_ends_its_changes(self, store: Store) -> None:
+        store.note_damage(DamagedError("a page is lost"))
+        with pytest.raises(DamagedError, match="no change is taken"):
+            run(store, write)
+        assert list_datasets(store) == []
+
     def test_one_that_breaks_down_is_counted(self, store: Store) -> None:
         before = FIGURES[KIND].ended["crash"]
         with pytest.raises(ChildEnded, match="made the process crash"):

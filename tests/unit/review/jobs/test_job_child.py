@@ -116,3 +116,11 @@ class TestCarryOutApart:
     def test_one_that_breaks_down_is_a_sentence(self, store: Store) -> None:
         with pytest.raises(OverloadedError, match=r"^the process of the export crashed$"):
             carry_out(store, break_down, dataset_id=None)
+
+    def test_one_that_ends_before_its_server_is_told_to_stop_goes_on_with_the_next(
+        self, store: Store
+    ) -> None:
+        closing = threading.Event()
+        threading.Timer(0.5, closing.set).start()
+        with pytest.raises(JobCancelled):
+            carry_out(store, break_down, dataset_id=None, progress=JobProgress(1, closing))
