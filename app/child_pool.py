@@ -94,6 +94,7 @@ class ChildPool:
         self._most = children + waiting
         self._tasks: set[PoolTask] = set()
         self._lock = threading.Lock()
+        self._closed = False
         self._children = [Child(allowance) for _ in range(children)]
         # The child that worked last is the one that is warm.
         self._free: LifoQueue[Child] = LifoQueue()
@@ -127,11 +128,17 @@ class ChildPool:
             begin: Likewise.
             bounded: Refuse it where as many wait as may; else it waits with them.
 
+        Returns:
+            The task; of a pool that is closed, one that is not begun.
+
         Raises:
             OverloadedError: As many wait as may.
         """
         task = PoolTask(explain, begin)
         with self._lock:
+            if self._closed:
+                task.leave()
+                return task
             if bounded and len(self._tasks) >= self._most:
                 raise OverloadedError(
                     f"{len(self._tasks)} {self._what} are being made or wait already",
@@ -139,13 +146,14 @@ class ChildPool:
                 )
             self._tasks.add(task)
             self._figures.wait()
-        task.future.add_done_callback(lambda _: self._forget(task))
-        self._threads.submit(self._run, task, work, arguments)
+            task.future.add_done_callback(lambda _: self._forget(task))
+            self._threads.submit(self._run, task, work, arguments)
         return task
 
     def close(self) -> None:
         """End all children, in the midst of their tasks too; what waits is not begun."""
         with self._lock:
+            self._closed = True
             left = list(self._tasks)
         for task in left:
             task.leave()

@@ -5,14 +5,14 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Iterator
-from concurrent.futures import CancelledError
+from concurrent.futures import CancelledError, ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
 
 from app.child import Allowance, ChildEnded
 from app.child_figures import ChildFigures
-from app.child_pool import ChildPool
+from app.child_pool import ChildPool, PoolTask
 from app.errors import ImageError, OverloadedError
 
 ALLOWANCE = Allowance(memory=1000 * 2**20, processor=60.0, silence=60.0)
@@ -52,6 +52,10 @@ def pass_gate(gate: Gate, name: str) -> str:
 
 def note(folder: Path, name: str) -> None:
     (folder / name).write_text("done")
+
+
+def submit_many(pool: ChildPool, folder: Path) -> list[PoolTask]:
+    return [pool.submit(note, folder, "late") for _ in range(20)]
 
 
 class TestSubmit:
@@ -163,3 +167,25 @@ class TestClose:
         for task in (running, waiting):
             with pytest.raises((ChildEnded, CancelledError)):
                 task.future.result(0)
+
+    def test_what_comes_later_is_not_begun(
+        self, pool: ChildPool, figures: ChildFigures, tmp_path: Path
+    ) -> None:
+        pool.close()
+        late = pool.submit(note, tmp_path, "late")
+        with pytest.raises(CancelledError):
+            late.future.result(0)
+        assert (pool.tasks, figures.waiting) == (0, 0)
+        assert not (tmp_path / "late").exists()
+
+    def test_what_comes_at_the_same_moment_has_its_end_too(
+        self, figures: ChildFigures, tmp_path: Path
+    ) -> None:
+        for _ in range(20):
+            pool = ChildPool(ALLOWANCE, 1, 1000, "pictures", figures)
+            with ThreadPoolExecutor(4) as threads:
+                begun = [threads.submit(submit_many, pool, tmp_path) for _ in range(3)]
+                pool.close()
+            for task in (task for submitted in begun for task in submitted.result()):
+                assert task.future.done()
+            assert (pool.tasks, figures.waiting) == (0, 0)
