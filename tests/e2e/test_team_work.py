@@ -10,7 +10,7 @@ from playwright.sync_api import Page, expect
 
 from app.review.people.roles import Role
 from app.review.work.batches import NewBatch, make_batch
-from tests.e2e.screen import Screen, hears, holding, until
+from tests.e2e.screen import TWO_FRAMES, Screen, hears, holding, until
 from tests.e2e.team import (
     REFUSED,
     OpenPage,
@@ -73,6 +73,26 @@ class TestWork:
         until(tove, lambda: verdict(tove, first) == {"state": "deferred", "by": "tove"})
         until(tove, lambda: screen.group != first)
         expect(tove.get_by_text("in A few")).to_be_visible()
+
+    def test_whoever_is_at_something_else_stays_there_when_their_work_arrives(
+        self, open_page: OpenPage, team: str, team_home: Path, console: Any
+    ) -> None:
+        console.expect(REFUSED)
+        join(team_home, "quinto", Role.REVIEWER)
+        new = NewBatch("Late", "id:10", reviewers=["quinto"], skip_given=False)
+        in_store(team_home, lambda store: make_batch(store, "sample", new, actor="local"))
+        page = open_page("/work", address=team)
+        log_in(page, "quinto")
+        go_on = page.get_by_role("button", name="Go on: 1 group of Late")
+        expect(go_on).to_be_visible()
+        with holding(page, "**/api/v1/work") as asked:
+            page.reload()
+            asked.arrive()
+            elsewhere = page.get_by_role("link").first
+            elsewhere.focus()
+        expect(go_on).to_be_visible()
+        page.evaluate(TWO_FRAMES)
+        expect(elsewhere).to_be_focused()
 
     def test_nobody_is_sent_back_to_what_they_have_judged_and_is_on_its_way(
         self, open_page: OpenPage, team: str, team_home: Path, console: Any
