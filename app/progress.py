@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Protocol
+from collections.abc import Iterable, Iterator
+from typing import Protocol, TypeVar
+
+Item = TypeVar("Item")
 
 
 class TellProgress(Protocol):
@@ -37,3 +40,22 @@ def telling(
         progress(start + done, of if total is None else total, sentence)
 
     return tell
+
+
+def told(
+    items: Iterable[Item], total: int, progress: TellProgress | None, sentence: str
+) -> Iterator[Item]:
+    """The same items, each of which is told as it comes.
+
+    Args:
+        items: What is worked through.
+        total: How many they are.
+        progress: Hears how many were done before each, and that all are.
+        sentence: What is done with them.
+    """
+    for done, item in enumerate(items):
+        if progress is not None:
+            progress(done, total, sentence)
+        yield item
+    if progress is not None:
+        progress(total, total, sentence)

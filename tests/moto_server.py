@@ -27,7 +27,7 @@ from tests.waiting import SECONDS
 ROOT = Path(__file__).parents[1]
 MOTO = ROOT / ".moto"
 PROGRAM = "import sys; from moto.server import main; main(['-H', '127.0.0.1', '-p', sys.argv[1]])"
-_SIGNED = "AWS4-HMAC-SHA256 Credential=k/20260101/us-east-1/s3/aws4_request, SignedHeaders=host, Signature=0"
+SIGNED = "AWS4-HMAC-SHA256 Credential=k/20260101/us-east-1/s3/aws4_request, SignedHeaders=host, Signature=0"
 _GONE = {
     "denied": (403, "AccessDenied"),
     "expired": (400, "ExpiredToken"),
@@ -125,7 +125,7 @@ def _make_bucket(port: int, name: str) -> None:
     while True:
         with suppress(OSError):
             line = http.client.HTTPConnection("127.0.0.1", port, timeout=SECONDS)
-            line.request("PUT", f"/{name}", headers={"Authorization": _SIGNED})
+            line.request("PUT", f"/{name}", headers={"Authorization": SIGNED})
             assert line.getresponse().status == 200
             return
         assert time.monotonic() < end, "the S3 server does not start"

@@ -10,8 +10,9 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-from app.datasets.view_files import gathered
+from app.datasets.view_files import GatheredFiles
 from app.finite import json_text
+from app.progress import TellProgress, told
 
 MANIFEST = "manifest.json"
 SOFTWARE = "touchline"
@@ -69,7 +70,7 @@ def software_version() -> str:
         return "unknown"
 
 
-def write_manifest(root: Path, manifest: Manifest) -> Path:
+def write_manifest(root: Path, manifest: Manifest, progress: TellProgress | None = None) -> Path:
     """Write ``manifest.json`` with size and sha256 of every other file below ``root``."""
     value = {
         "dataset": manifest.dataset,
@@ -80,7 +81,7 @@ def write_manifest(root: Path, manifest: Manifest) -> Path:
         "settings": dict(manifest.settings),
         "software": {"name": SOFTWARE, "version": software_version()},
         "licence": manifest.licence,
-        "files": list(_files(root)),
+        "files": list(_files(root, progress)),
         "media": [dict(item) for item in manifest.media],
         "verdicts": dict(manifest.verdicts),
         "overrides": [dict(item) for item in manifest.overrides],
@@ -91,8 +92,9 @@ def write_manifest(root: Path, manifest: Manifest) -> Path:
     return path
 
 
-def _files(root: Path) -> Iterator[dict[str, Any]]:
-    for name, file in gathered(root):
+def _files(root: Path, progress: TellProgress | None) -> Iterator[dict[str, Any]]:
+    files = GatheredFiles(root)
+    for name, file in told(files, len(files), progress, "Reading the files' checksums."):
         if name == MANIFEST:
             continue
         if isinstance(file, bytes):

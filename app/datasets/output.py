@@ -13,9 +13,10 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from app.datasets.manifest import MANIFEST, SOFTWARE
-from app.datasets.view_files import gathered
+from app.datasets.view_files import GatheredFiles
 from app.durable import PARTIAL, sync
 from app.errors import InputError, StorageError
+from app.progress import TellProgress, told
 
 MAX_MANIFEST = 1 << 30
 """Bytes of a manifest that is read; that of a hundred thousand frames has a tenth of it."""
@@ -28,14 +29,19 @@ _DATE = (1980, 1, 1, 0, 0, 0)
 
 
 @contextmanager
-def output_tree(out: Path) -> Iterator[Path]:
+def output_tree(
+    out: Path, beside: Path | None = None, progress: TellProgress | None = None
+) -> Iterator[Path]:
     """A folder to write into, which becomes ``out`` when the block ends without an error.
 
-    The files are written beside ``out`` under a temporary name, synced and renamed. An error
-    inside the block leaves nothing behind and an earlier ``out`` as it was.
+    The files are written beside it under a temporary name, synced and renamed. An error inside the
+    block leaves nothing behind and an earlier ``out`` as it was.
 
     Args:
         out: Folder, or file that ends in ``.zip``. An earlier export there is replaced.
+        beside: A path of the same folder, after which the temporary names are called; by default
+            ``out`` itself.
+        progress: Hears how many of its files are in a zip.
 
     Raises:
         InputError: Something else than an earlier export is there.
@@ -45,7 +51,8 @@ def output_tree(out: Path) -> Iterator[Path]:
     _check_free(out)
     try:
         out.parent.mkdir(parents=True, exist_ok=True)
-        staging = Path(tempfile.mkdtemp(prefix=f".{out.name}.", suffix=PARTIAL, dir=out.parent))
+        prefix = f".{(beside or out).name}."
+        staging = Path(tempfile.mkdtemp(prefix=prefix, suffix=PARTIAL, dir=out.parent))
     except OSError as error:
         raise StorageError(
             f"the folder of {out.name} cannot be written ({error.strerror})"
@@ -53,7 +60,7 @@ def output_tree(out: Path) -> Iterator[Path]:
     try:
         yield staging
         if out.suffix.lower() == ".zip":
-            _publish_zip(staging, out)
+            _publish_zip(staging, out, prefix, progress)
         else:
             _publish_folder(staging, out)
     except OSError as error:
@@ -112,12 +119,12 @@ def listed(manifest: bytes) -> set[str]:
         return set()
 
 
-def _publish_zip(staging: Path, out: Path) -> None:
-    handle, name = tempfile.mkstemp(prefix=f".{out.name}.", suffix=PARTIAL, dir=out.parent)
+def _publish_zip(staging: Path, out: Path, prefix: str, progress: TellProgress | None) -> None:
+    handle, name = tempfile.mkstemp(prefix=prefix, suffix=PARTIAL, dir=out.parent)
     partial = Path(name)
     try:
         with os.fdopen(handle, "wb") as file:
-            write_zip(staging, file)
+            write_zip(staging, file, progress)
             file.flush()
             os.fsync(file.fileno())
         partial.chmod(0o644)
@@ -127,10 +134,11 @@ def _publish_zip(staging: Path, out: Path) -> None:
     sync(out.parent)
 
 
-def write_zip(root: Path, file: object) -> None:
+def write_zip(root: Path, file: object, progress: TellProgress | None = None) -> None:
     """All files below ``root`` into a zip: sorted names, dated 1980-01-01."""
+    files = GatheredFiles(root)
     with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:  # type: ignore[call-overload]
-        for name, content in gathered(root):
+        for name, content in told(files, len(files), progress, "Packing the files."):
             entry = zipfile.ZipInfo(name, _DATE)
             entry.external_attr = 0o644 << 16
             entry.create_system = 3

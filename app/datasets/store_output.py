@@ -21,17 +21,22 @@ from app.durable import PARTIAL
 from app.errors import InputError, NotFoundError, StorageError, TooLargeError
 from app.nested_zip import open_zip_elsewhere
 from app.object_store.path import StoredPath
+from app.progress import TellProgress, told
 
 _CHUNK = 1024 * 1024
 
 
 @contextmanager
-def stored_output(out: StoredPath, beside: Path) -> Iterator[Path]:
+def stored_output(
+    out: StoredPath, beside: Path, progress: TellProgress | None = None
+) -> Iterator[Path]:
     """A folder to write into, which becomes ``out`` when the block ends without an error.
 
     Args:
         out: Where it goes; a zip by its ending.
-        beside: Folder on this disk, made where it is missing, in which the files are gathered.
+        beside: Path on this disk after which the folder is called in which the files are gathered;
+            the folder of both is made where it is missing.
+        progress: Hears how many of its files are on their way.
 
     Raises:
         InputError: Exports may not be written there, or something else is there.
@@ -39,25 +44,38 @@ def stored_output(out: StoredPath, beside: Path) -> Iterator[Path]:
     """
     require_free(out)
     try:
-        beside.mkdir(mode=0o700, parents=True, exist_ok=True)
-        staging = Path(tempfile.mkdtemp(prefix=".stored.", suffix=PARTIAL, dir=beside))
+        beside.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+        prefix = f".{beside.name}."
+        staging = Path(tempfile.mkdtemp(prefix=prefix, suffix=PARTIAL, dir=beside.parent))
     except OSError as error:
         raise StorageError(f"the folder of exports cannot be written ({error.strerror})") from error
     try:
         yield staging
         if _is_zip(out):
             with out.store.writing(out.key, "application/zip") as file:
-                write_zip(staging, file)
+                write_zip(staging, file, progress)
         else:
-            _publish_folder(staging, out)
+            _publish_folder(staging, out, progress)
     finally:
         shutil.rmtree(staging, ignore_errors=True)
 
 
 @contextmanager
-def output_anywhere(out: Root, beside: Path) -> Iterator[Path]:
-    """``output_tree`` on a disk, ``stored_output`` in an object store."""
-    opened = stored_output(out, beside) if isinstance(out, StoredPath) else output_tree(out)
+def output_anywhere(
+    out: Root, exports: Path, beside: Path | None = None, progress: TellProgress | None = None
+) -> Iterator[Path]:
+    """``output_tree`` on a disk, ``stored_output`` in an object store.
+
+    Args:
+        out: Where it goes.
+        exports: The folder in which what goes into a store is gathered.
+        beside: See there; by default a name in ``exports``, or ``out`` itself.
+        progress: See there.
+    """
+    if isinstance(out, StoredPath):
+        opened = stored_output(out, beside or exports / "stored", progress)
+    else:
+        opened = output_tree(out, beside, progress)
     with opened as folder:
         yield folder
 
@@ -126,7 +144,7 @@ def _is_earlier_export(out: StoredPath) -> bool:
         return False
 
 
-def _publish_folder(staging: Path, out: StoredPath) -> None:
+def _publish_folder(staging: Path, out: StoredPath, progress: TellProgress | None) -> None:
     """Put files in place, the manifest last; that of an earlier export goes first."""
     store, earlier = out.store, {item.key for item in out.store.below(out.key)}
     manifest = (out / MANIFEST).key
@@ -134,7 +152,8 @@ def _publish_folder(staging: Path, out: StoredPath) -> None:
         # Until the new one is complete the old files are what an export cut off left behind.
         store.delete(manifest)
     files = sorted(path for path in staging.rglob("*") if path.is_file())
-    for path in sorted(files, key=lambda path: path == staging / MANIFEST):
+    files.sort(key=lambda path: path == staging / MANIFEST)
+    for path in told(files, len(files), progress, "Sending the files to the store."):
         key = (out / path.relative_to(staging).as_posix()).key
         with store.writing(key, _kind(path)) as target, path.open("rb") as source:
             shutil.copyfileobj(source, target, _CHUNK)

@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator
 from contextlib import closing
 from heapq import merge
 from pathlib import Path, PurePosixPath
+from typing import Any, TypeAlias
 
 from app.datasets.safe_path import check_name, resolve_inside
 from app.datasets.spill import disk_errors
@@ -20,6 +21,8 @@ PutText = Callable[[str, str], None]
 HELD = ".view-files"
 """Where they wait, in the folder in which an export is gathered."""
 _BATCH = 1000
+Gathered: TypeAlias = tuple[str, Path | bytes]
+"""A file's relative path; where it lies, or its content."""
 
 
 def put_on_disk(root: Path) -> PutText:
@@ -90,26 +93,33 @@ class ViewFiles:
         self._waiting.clear()
 
 
-def gathered(root: Path) -> Iterator[tuple[str, Path | bytes]]:
+class GatheredFiles:
     """All files below a folder, those that wait among them, in the order of their paths.
 
-    Yields:
-        Relative path; where it lies, or its content.
-
-    Raises:
+    Raises (each method):
         OSError: The disk refuses.
     """
-    held = root / HELD
-    paths = (path for path in root.rglob("*") if path != held and path.is_file())
-    names: dict[str, Path | bytes] = {path.relative_to(root).as_posix(): path for path in paths}
-    on_disk = sorted(names.items(), key=_name)
-    if not held.exists():
-        yield from on_disk
-        return
-    with disk_errors(), closing(sqlite3.connect(held)) as connection:
-        waiting = connection.execute("SELECT path, body FROM file ORDER BY path")
-        yield from merge(on_disk, waiting, key=_name)
+
+    def __init__(self, root: Path):
+        self._held = root / HELD
+        paths = (path for path in root.rglob("*") if path != self._held and path.is_file())
+        names: dict[str, Path | bytes] = {path.relative_to(root).as_posix(): path for path in paths}
+        self._on_disk = sorted(names.items(), key=_name)
+
+    def __len__(self) -> int:
+        waiting = self._ask("SELECT count(*) FROM file")
+        count: int = sum(number for (number,) in waiting)
+        return len(self._on_disk) + count
+
+    def __iter__(self) -> Iterator[Gathered]:
+        waiting = self._ask("SELECT path, body FROM file ORDER BY path")
+        return merge(self._on_disk, waiting, key=_name)
+
+    def _ask(self, question: str) -> Iterator[Any]:
+        if self._held.exists():
+            with disk_errors(), closing(sqlite3.connect(self._held)) as connection:
+                yield from connection.execute(question)
 
 
-def _name(item: tuple[str, Path | bytes]) -> str:
+def _name(item: Gathered) -> str:
     return item[0]

@@ -51,7 +51,7 @@ class Caller:
         self._untold = False
 
     def __call__(self, done: int, total: int | None = None, sentence: str = "", /) -> None:
-        """Say how far the work is.
+        """Say how far the work is: every now and then, and at once what it does next.
 
         Raises:
             JobCancelled: It shall end here.
@@ -59,7 +59,7 @@ class Caller:
         _, last_total, last_sentence = self._place
         self._place = done, last_total if total is None else total, sentence or last_sentence
         self._untold = True
-        if monotonic() - self._told >= STEP_SECONDS:
+        if self._place[2] != last_sentence or monotonic() - self._told >= STEP_SECONDS:
             self.catch_up()
 
     def catch_up(self) -> None:

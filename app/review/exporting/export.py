@@ -55,6 +55,7 @@ class ExportReport:
     """What was written.
 
     Attributes:
+        groups: How many groups were to be written.
         counts: As the format counts: groups, views, balls, cameras ...
         left_out: Accepted groups that are not in it, by reason: ``stale`` (changed after the
             verdict), ``failing`` (a gate, and nobody overrode it), ``unsolved``.
@@ -63,6 +64,7 @@ class ExportReport:
 
     out: Root
     format: str
+    groups: int
     counts: Mapping[str, int]
     left_out: Mapping[str, int] = field(default_factory=dict)
     missing_images: tuple[str, ...] = ()
@@ -112,6 +114,7 @@ def export(
     version: str | None = None,
     progress: TellProgress | None = None,
     read: ReadPicture | None = None,
+    beside: Path | None = None,
 ) -> ExportReport:
     """Write a dataset's accepted groups, or all groups, in a format that consumers read.
 
@@ -133,8 +136,9 @@ def export(
             views that annotate a ball and are in no valid pair. ``everything`` says all.
         version: Name, id or hash of a frozen version to export instead of the dataset as it is:
             the same bytes every time.
-        progress: Called as groups are written.
+        progress: Called as groups are written, and as their files are packed.
         read: Reads frames; in this process by default.
+        beside: After which its half written files are called, see ``output_anywhere``.
 
     Raises:
         InputError: Nothing to export, or the groups do not fit the format.
@@ -144,10 +148,11 @@ def export(
     options.check(out)
     _require_plain(format, everything, version)
     if format == CARRY:
-        return ExportReport(out, CARRY, carry_out(store, dataset, out, progress))
+        counts = carry_out(store, dataset, out, progress, beside)
+        return ExportReport(out, CARRY, counts["groups"], counts)
     with store.read() as session:
         source = _source(session, store, dataset, everything, version)
-        with output_anywhere(out, store.settings.exports) as root:
+        with output_anywhere(out, store.settings.exports, beside, progress) as root:
             frames = ExportImages(root, images, read or _here(store), frame_layout(format))
             run = _Run(source, options, frames, progress)
             # A version is the same every time; spare frames are the dataset's as it is.
@@ -156,9 +161,9 @@ def export(
             with _view_files(root, out) as put:
                 counts = run.write(root, put)
             _require_content(source.dataset, format, counts)
-            write_manifest(root, run.manifest(counts))
+            write_manifest(root, run.manifest(counts), progress)
     left_out = source.left_out if isinstance(source, LiveSource) else {}
-    return ExportReport(out, format, counts, left_out, tuple(frames.missing))
+    return ExportReport(out, format, source.count, counts, left_out, tuple(frames.missing))
 
 
 @contextmanager

@@ -7,6 +7,7 @@ limits, and travel from there.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 from app.datasets.file_tree import Root
@@ -18,7 +19,12 @@ from app.store.store_child import Caller
 
 
 def export_asked(
-    store: Store, dataset_id: int, out: Root, request: Mapping[str, Any], caller: Caller
+    store: Store,
+    dataset_id: int,
+    out: Root,
+    beside: Path,
+    request: Mapping[str, Any],
+    caller: Caller,
 ) -> ExportReport:
     """Write it.
 
@@ -26,6 +32,7 @@ def export_asked(
         store: The database.
         dataset_id: What is exported.
         out: Where to.
+        beside: After which its half written files are called.
         request: The fields of an export request, plain JSON values.
         caller: Hears how far it is, and has the frames.
 
@@ -51,4 +58,5 @@ def export_asked(
         version=None if version is None else str(version),
         progress=caller,
         read=read,
+        beside=beside,
     )

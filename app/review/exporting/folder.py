@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import secrets
 import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -47,17 +48,18 @@ class ExportFolder:
 
     @contextmanager
     def writing(self, name: str) -> Iterator[Path]:
-        """Where the zip of an export is to be written.
+        """A path beside the zip of an export, for this run to call its half written files after.
 
-        What a server or a process that was killed at it has left half written goes, before and after;
-        others may be at theirs meanwhile.
+        What a server or a process that was killed at an export has left of it goes before; after
+        it, this run's alone: another server may have begun with it anew.
         """
         self.folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-        self._clear(name)
+        self._clear(f"{name}.zip")
+        beside = self.folder / f"{name}.zip.{secrets.token_hex(4)}"
         try:
-            yield self.content(name)
+            yield beside
         finally:
-            self._clear(name)
+            self._clear(beside.name)
 
     def keep(self, name: str, request: Mapping[str, Any], report: ExportReport) -> ExportEntry:
         """Record an export whose zip is written; only then it can be found.
@@ -128,7 +130,7 @@ class ExportFolder:
         return gone
 
     def _clear(self, name: str) -> None:
-        for path in self.folder.glob(f".{name}.zip.*{PARTIAL}"):
+        for path in self.folder.glob(f".{name}.*{PARTIAL}"):
             clear(path)
 
     def _record(self, name: str) -> Path:

@@ -43,7 +43,11 @@ _BATCH = 200
 
 
 def carry_out(
-    store: Store, dataset: str | int, out: Root, progress: TellProgress | None = None
+    store: Store,
+    dataset: str | int,
+    out: Root,
+    progress: TellProgress | None = None,
+    beside: Path | None = None,
 ) -> dict[str, int]:
     """Write everything that was said about a dataset, from one snapshot; returns counts.
 
@@ -51,9 +55,11 @@ def carry_out(
         store: The database.
         dataset: Name or id.
         out: Folder, or file that ends in .zip; appears whole or not at all.
-        progress: Called as groups are written.
+        progress: Called as groups are written, and as their files are packed.
+        beside: After which its half written files are called, see ``output_anywhere``.
     """
-    with store.read() as session, output_anywhere(out, store.settings.exports) as root:
+    output = output_anywhere(out, store.settings.exports, beside, progress)
+    with store.read() as session, output as root:
         found = read_dataset_head(session, dataset)
         counts = {
             "stations": _write_lines(root / STATIONS, _stations(session, found.id)),
@@ -67,7 +73,7 @@ def carry_out(
             "policy": policy_to_json(found.policy),
         }
         (root / HEAD).write_text(json_text(head, indent=1, ascii_=True) + "\n", encoding="utf-8")
-        write_manifest(root, _manifest(session, found, counts))
+        write_manifest(root, _manifest(session, found, counts), progress)
     return counts
 
 

@@ -95,7 +95,8 @@ def export_work(
     def work(progress: JobProgress) -> Json:
         name, to = str(progress.job_id), request.get("to")
         progress(0, None, f"Writing {request['format']}.")
-        with folder.writing(name) as content:
+        content = folder.content(name)
+        with folder.writing(name) as beside:
             report = carry_out_apart(
                 store,
                 "exports",
@@ -103,12 +104,15 @@ def export_work(
                 export_asked,
                 dataset_id,
                 content if to is None else _target(store, to),
+                beside,
                 request,
                 dataset_id=dataset_id,
                 progress=progress,
                 told=counting(progress, "groups written"),
                 answer=lambda frame: frames.read(*frame),
             )
+        # It is done, also where somebody cancels it now.
+        progress.place = report.groups, report.groups, f"{report.groups:,} groups written"
         entry = folder.keep(name, request, report)
         return {
             "export": entry.id,

@@ -35,11 +35,14 @@ class FailedWithReportError(ReviewError):
 
 
 def counting(progress: JobProgress, what: str) -> TellProgress:
-    """A progress that says its numbers in words, too: ``1,200 of 12,764 groups solved``."""
+    """A progress that says its numbers in words, too: ``1,200 of 12,764 groups solved``.
 
-    def count(done: int, total: int | None = None, _sentence: str = "") -> None:
+    Where the work says a sentence, it is that one.
+    """
+
+    def count(done: int, total: int | None = None, sentence: str = "") -> None:
         of = "" if total is None else f" of {total:,}"
-        progress(done, total, f"{done:,}{of} {what}")
+        progress(done, total, sentence or f"{done:,}{of} {what}")
 
     return count
 

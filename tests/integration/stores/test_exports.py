@@ -4,25 +4,37 @@ from __future__ import annotations
 
 import contextlib
 import json
+import multiprocessing
+import os
+import signal
+import threading
 import time
 import zipfile
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import httpx
 import pytest
 
 from app.config import Settings
-from app.errors import InputError, NotFoundError, StorageError
+from app.errors import InputError, JobCancelled, NotFoundError, OverloadedError, StorageError
 from app.object_store.path import find_path, target_path
 from app.object_store.store import open_store
+from app.review.datasets.dataset import dataset_id
 from app.review.exporting.export import export
+from app.review.exporting.folder import ExportFolder
 from app.review.importing.sources import Source, import_source
+from app.review.jobs import job_child
+from app.review.jobs.exports import export_work
+from app.review.jobs.job_run import JobProgress
+from app.soccer.media import Media
+from app.store.frames import Frames, SentPicture, make_picture
 from app.store.store import Store
+from app.store.stored_json import Json
 from tests.e2e.service import serving
-from tests.moto_server import Door, store_settings, stored_settings
+from tests.moto_server import SIGNED, Door, store_settings, stored_settings
 
 
 @pytest.fixture(scope="session")
@@ -123,6 +135,94 @@ class TestExports:
                 target_path(closed, "s3://frames/x.zip"),
                 everything=True,
             )
+
+
+class TestExportApart:
+    """A process of its own writes into the store."""
+
+    def test_it_appears_whole(self, imported: Store, door: Door, apart: Apart) -> None:
+        to = "s3://frames/apart/league.zip"
+        result = apart.export(to, JobProgress(31, threading.Event()))
+        out = find_path(imported.settings, to)
+        assert (result["bytes"], apart.half_written()) == (out.size, [])
+        assert len(apart.processes) == 1 and os.getpid() not in apart.processes
+
+    def test_cancelled_while_it_is_packed_nothing_of_it_is_there(
+        self, imported: Store, door: Door, apart: Apart
+    ) -> None:
+        to = "s3://frames/apart/cancelled.zip"
+        with pytest.raises(JobCancelled):
+            apart.export(to, CancelledAt("Packing the files."))
+        assert apart.half_written() == []
+        assert _uploads(door) == 0
+        with pytest.raises(NotFoundError):
+            find_path(imported.settings, to)
+
+    def test_killed_what_it_had_gathered_is_gone_with_it(
+        self, imported: Store, door: Door, apart: Apart
+    ) -> None:
+        apart.killed = True
+        with pytest.raises(OverloadedError, match="the process of the export was killed"):
+            apart.export("s3://frames/apart/killed.zip", JobProgress(31, threading.Event()))
+        assert apart.half_written() == []
+
+
+class CancelledAt(JobProgress):
+    """The progress of a job that somebody cancels when it says a sentence."""
+
+    def __init__(self, sentence: str):
+        super().__init__(31, threading.Event())
+        self._sentence = sentence
+
+    def __call__(self, done: int, total: int | None = None, sentence: str = "") -> None:
+        if sentence == self._sentence:
+            self.cancelled.set()
+        super().__call__(done, total, sentence)
+
+
+class Apart:
+    """Exports of the dataset, each by a process of its own."""
+
+    def __init__(self, store: Store, monkeypatch: pytest.MonkeyPatch):
+        monkeypatch.setattr(job_child, "SMALL", 0)
+        monkeypatch.setattr(job_child, "STOP_SECONDS", 0.0)
+        self._store, self._folder = store, ExportFolder(store.settings.exports)
+        self.processes: set[int] = set()
+        self.killed = False
+
+    def read(self, media: Media, width: int | None, flipped: bool) -> SentPicture:
+        """A frame for the process, which may be its last one."""
+        children = {process.pid for process in multiprocessing.active_children()}
+        self.processes |= {number for number in children if number is not None}
+        if self.killed:
+            assert self.half_written() != []
+            for number in self.processes:
+                os.kill(number, signal.SIGKILL)
+        return make_picture(media, width, flipped, self._store.settings)
+
+    def export(self, to: str, progress: JobProgress) -> Json:
+        """The result of the job."""
+        request = {"dataset": "league", "format": "coco", "all": True, "boxes": "optimized"}
+        request |= {"images": "copy", "to": to}
+        frames = cast(Frames, self)
+        number = dataset_id(self._store, "league")
+        return export_work(self._store, self._folder, frames, number, request)(progress)
+
+    def half_written(self) -> list[str]:
+        """Names of what is not complete in the folder of exports."""
+        return [path.name for path in self._folder.folder.glob(".*")]
+
+
+@pytest.fixture
+def apart(imported: Store, monkeypatch: pytest.MonkeyPatch) -> Apart:
+    return Apart(imported, monkeypatch)
+
+
+def _uploads(door: Door) -> int:
+    """How many uploads in parts are begun and neither ended nor taken back."""
+    answer = httpx.get(f"{door.endpoint}/soccer-data?uploads", headers={"Authorization": SIGNED})
+    assert answer.status_code == 200, answer.text
+    return answer.text.count("<Upload>")
 
 
 class TestServer:

@@ -32,6 +32,17 @@ class TestWriteManifest:
         assert value["settings"] == {"boxes": "optimized"}
         assert value["licence"] == LICENCES["sample"]
 
+    def test_how_many_files_are_read_is_told(self, tmp_path: Path) -> None:
+        (tmp_path / "a.csv").write_text("1")
+        (tmp_path / "b.csv").write_text("1")
+        told: list[tuple] = []
+        write_manifest(
+            tmp_path,
+            Manifest("d", "cameras", "2030-01-02", {}),
+            lambda *place: told.append(place),
+        )
+        assert [place[:2] for place in told] == [(0, 2), (1, 2), (2, 2)]
+
     def test_the_same_content_makes_the_same_text(self, tmp_path: Path) -> None:
         (tmp_path / "a").write_text("1")
         manifest = Manifest("d", "cameras", "2030-01-02", {})

@@ -8,7 +8,7 @@ import pytest
 
 from app.datasets.manifest import Manifest, write_manifest
 from app.datasets.output import output_tree
-from app.errors import InputError, StorageError
+from app.errors import InputError, JobCancelled, StorageError
 
 MANIFEST = Manifest("d", "cameras", "2030-01-02", {})
 
@@ -46,6 +46,38 @@ class TestOutputTree:
         for name in ("a.zip", "b.zip"):
             _export(tmp_path / name)
         assert (tmp_path / "a.zip").read_bytes() == (tmp_path / "b.zip").read_bytes()
+
+    def test_who_is_told_how_much_is_packed_may_end_it_there(self, tmp_path: Path) -> None:
+        out, told = tmp_path / "out.zip", []
+        _export(out, "before")
+        before = out.read_bytes()
+
+        def progress(done: int, total: int | None = None, sentence: str = "") -> None:
+            told.append((done, total, sentence))
+            if done == 1:
+                raise JobCancelled
+
+        with pytest.raises(JobCancelled), output_tree(out, progress=progress) as root:
+            (root / "a.txt").write_text("1")
+            (root / "b.txt").write_text("1")
+        assert told == [(0, 2, "Packing the files."), (1, 2, "Packing the files.")]
+        assert out.read_bytes() == before
+        assert _names(tmp_path) == ["out.zip"]
+
+    @pytest.mark.parametrize("name", ["out", "out.zip"])
+    def test_what_is_half_written_is_called_after_whoever_writes_it(
+        self, tmp_path: Path, name: str
+    ) -> None:
+        half: set[str] = set()
+
+        def progress(*_: object) -> None:
+            half.update(_names(tmp_path))
+
+        with output_tree(tmp_path / name, tmp_path / "12.zip.ab", progress) as root:
+            (root / "a.txt").write_text("1")
+            half.update(_names(tmp_path))
+        assert half and all(item.startswith(".12.zip.ab.") for item in half)
+        assert _names(tmp_path) == [name]
 
     @pytest.mark.parametrize("name", ["out", "out.zip"])
     def test_its_content_is_on_disk_before_its_name_and_then_its_name(

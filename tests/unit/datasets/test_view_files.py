@@ -6,7 +6,7 @@ import zipfile
 import pytest
 
 from app.datasets.output import write_zip
-from app.datasets.view_files import HELD, ViewFiles, gathered, put_on_disk
+from app.datasets.view_files import HELD, GatheredFiles, ViewFiles, put_on_disk
 from app.errors import UnsafePathError
 
 
@@ -18,7 +18,7 @@ class TestViewFiles:
             files.put("b/3.json", "ü")
             files.put("b/1.json", "{}")
             files.put("a.json", "")
-        assert list(gathered(tmp_path)) == [
+        assert list(GatheredFiles(tmp_path)) == [
             ("a.json", b""),
             ("b/1.json", b"{}"),
             ("b/2.csv", tmp_path / "b" / "2.csv"),
@@ -29,7 +29,7 @@ class TestViewFiles:
         with ViewFiles(tmp_path) as files:
             files.put("a", "first")
             files.put("./a", "then")
-        assert list(gathered(tmp_path)) == [("a", b"then")]
+        assert list(GatheredFiles(tmp_path)) == [("a", b"then")]
 
     def test_a_zip_of_them_is_that_of_files_on_the_disk_to_the_byte(self, tmp_path):
         texts = {f"{match}/camera_{view}.json": f"{match} {view}" * view for match in "ba" for view in range(40)}  # fmt: skip

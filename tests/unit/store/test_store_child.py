@@ -55,6 +55,12 @@ def count(_store: Store, last: int, caller: Caller) -> None:
         caller(number, last, "counting")
 
 
+def change_over(_store: Store, caller: Caller) -> None:
+    caller(1, 9, "reading")
+    caller(1, 9, "packing")
+    caller(2, 9, "packing")
+
+
 def count_slowly(_store: Store, mark: Path, caller: Caller) -> None:
     try:
         for number in range(10_000):
@@ -109,6 +115,11 @@ class TestWorkApart:
         assert heard[0] == (1, 5_000, "counting")
         assert heard[-1] == (5_000, 5_000, "counting")
         assert len(heard) < 500
+
+    def test_what_the_work_does_next_is_heard_at_once(self, store: Store) -> None:
+        heard: list[Any] = []
+        run(store, change_over, progress=lambda *told: heard.append(told))
+        assert heard == [(1, 9, "reading"), (1, 9, "packing"), (2, 9, "packing")]
 
     def test_a_question_is_answered_here(self, store: Store) -> None:
         assert run(store, ask, "why", answer=str.upper) == "answered WHY"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
@@ -24,7 +25,7 @@ def keep(folder: ExportFolder, name: str) -> ExportEntry:
     """Stands for an export: the smallest zip there is."""
     path = folder.content(name)
     path.write_bytes(b"PK\x05\x06" + b"\0" * 18)
-    report = ExportReport(path, "cameras", {"cameras": 2}, {"stale": 1}, ("7.png: gone",))
+    report = ExportReport(path, "cameras", 2, {"cameras": 2}, {"stale": 1}, ("7.png: gone",))
     return folder.keep(name, REQUEST, report)
 
 
@@ -81,10 +82,9 @@ class TestWriting:
         half = folder.folder / ".13.zip.abc.partial"
         half.mkdir()
         (half / "x.csv").write_text("x")
-        with folder.writing("13") as content:
-            assert content == folder.folder / "13.zip"
+        with folder.writing("13") as beside:
             assert not half.exists()
-            half.write_text("the zip itself")
+            beside.with_name(f".{beside.name}.abc.partial").write_text("half of the zip")
         assert sorted(path.name for path in folder.folder.iterdir()) == ["12.json", "12.zip"]
 
     def test_what_others_are_writing_stays(self, folder: ExportFolder) -> None:
@@ -93,6 +93,16 @@ class TestWriting:
         with folder.writing("2"), folder.writing("13"):
             assert others.is_dir()
         assert others.is_dir()
+
+    def test_another_server_that_has_begun_with_it_meanwhile_goes_on(
+        self, folder: ExportFolder
+    ) -> None:
+        with ExitStack() as other:
+            with folder.writing("13"):
+                beside = other.enter_context(folder.writing("13"))
+                half = beside.with_name(f".{beside.name}.abc.partial")
+                half.mkdir()
+            assert half.is_dir()
 
     def test_a_folder_that_is_missing_is_made_for_its_owner_alone(self, tmp_path: Path) -> None:
         folder = ExportFolder(tmp_path / "home" / "exports")
