@@ -98,7 +98,9 @@ def _require_all(settings: Settings) -> None:
 
 def _require_ours(database: Path) -> None:
     """Raise StorageError where a file that would get our tables has those of another program."""
-    file = f"file:{quote(str(database))}?mode=ro"
+    # Where its log is empty, SQLite need not make files for it either.
+    alone = "" if _size(log_file(database)) else "&immutable=1"
+    file = f"file:{quote(str(database))}?mode=ro{alone}"
     question = "SELECT name FROM sqlite_schema WHERE type = 'table' ORDER BY name"
     try:
         with closing(pysqlite3.dbapi2.connect(file, uri=True)) as connection:

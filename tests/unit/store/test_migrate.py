@@ -72,9 +72,13 @@ class TestMigrate:
         with store.read() as session:
             assert session.execute(text("SELECT count(*) FROM calibration")).scalar() == 1
 
-    def test_the_database_of_another_program_gets_no_tables(self, settings: Settings) -> None:
+    @pytest.mark.parametrize("mode", ["delete", "wal"])
+    def test_the_database_of_another_program_gets_no_tables(
+        self, settings: Settings, mode: str
+    ) -> None:
         settings.home.mkdir(parents=True, exist_ok=True)
         with closing(sqlite3.connect(settings.database_file)) as other:
+            other.execute(f"PRAGMA journal_mode = {mode}")
             other.execute("CREATE TABLE cookies (name TEXT)")
             other.commit()
         before = settings.database_file.read_bytes()
@@ -83,6 +87,8 @@ class TestMigrate:
         with pytest.raises(StorageError, match="another program"):
             migrate(settings)
         assert settings.database_file.read_bytes() == before
+        # SQLite makes files beside a database of this mode, also for whoever only reads.
+        assert list(settings.home.glob("touchline.db?*")) == []
 
     def test_knows_every_migration_there_is(self) -> None:
         scripts = ScriptDirectory(str(migrations_folder()))
