@@ -123,7 +123,8 @@ async def _review_error(request: Request, error: Exception) -> Response:
     if isinstance(error, DamagedError):
         request.app.state.services.store.note_damage(error)
     # Of what is only too much at once the line of its request is enough: there may be thousands.
-    if status >= 500 and not isinstance(error, OverloadedError):
+    is_only_much = isinstance(error, OverloadedError) and error.__cause__ is None
+    if status >= 500 and not is_only_much:
         cause = str(error.__cause__ or "").partition("\n")[0]
         log.error("request refused", instance=problem.instance, error=str(error), cause=cause)
     return problem_response(problem, headers, current)

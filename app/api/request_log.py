@@ -6,10 +6,12 @@ the rest.
 
 from __future__ import annotations
 
+import asyncio
 import time
 import uuid
 from collections.abc import Callable
 from math import inf
+from typing import Any
 
 import structlog
 from starlette.datastructures import Headers, MutableHeaders
@@ -28,25 +30,42 @@ MOST_REFUSALS = 20
 """Refused requests of one second that are told of one by one; of the others the number is told."""
 
 
-class RefusalBound:
-    """How many refusals the log tells of: whoever sends what is refused does not fill a disk."""
+def _in_a_second(work: Callable[[], None]) -> None:
+    asyncio.get_running_loop().call_later(1.0, work)
 
-    def __init__(self, clock: Callable[[], float] = time.monotonic):
-        self._clock = clock
+
+class RefusalBound:
+    """How many refusals the log tells of: whoever sends what is refused does not fill a disk.
+
+    Args:
+        clock: Seconds.
+        later: Has something done in a second.
+    """
+
+    def __init__(
+        self,
+        clock: Callable[[], float] = time.monotonic,
+        later: Callable[[Callable[[], None]], Any] = _in_a_second,
+    ):
+        self._clock, self._later = clock, later
         self._began = -inf
         self._told = self._untold = 0
 
     def admits(self) -> bool:
         """Whether one more is told of; only the event loop asks."""
         if self._clock() - self._began >= 1.0:
-            if self._untold:
-                log.warning("more requests were refused", count=self._untold)
-            self._began, self._told, self._untold = self._clock(), 0, 0
-        if self._told == MOST_REFUSALS:
-            self._untold += 1
-            return False
-        self._told += 1
-        return True
+            self._began, self._told = self._clock(), 0
+        if self._told < MOST_REFUSALS:
+            self._told += 1
+            return True
+        if not self._untold:
+            self._later(self._tell_rest)
+        self._untold += 1
+        return False
+
+    def _tell_rest(self) -> None:
+        log.warning("more requests were refused", count=self._untold)
+        self._untold = 0
 
 
 def new_request_id() -> str:

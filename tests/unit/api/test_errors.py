@@ -48,6 +48,12 @@ def full_disk() -> StorageError:
     return error
 
 
+def no_process() -> OverloadedError:
+    error = OverloadedError("no process could be started for this")
+    error.__cause__ = OSError(12, "Cannot allocate memory")
+    return error
+
+
 SINCE = "2026-11-22T09:00:00Z"
 STALE = StaleRevisionError("changed", base_etag='"a"', current_etag='"b"')
 CASES: list[tuple[ReviewError, int]] = [
@@ -68,6 +74,7 @@ CASES: list[tuple[ReviewError, int]] = [
     (StorageError("x"), 503),
     (full_disk(), 507),
     (OverloadedError("x"), 503),
+    (no_process(), 503),
 ]
 
 
@@ -129,6 +136,15 @@ class TestReviewErrors:
             answer = client.get(f"/raise/{index}")
         assert "INSERT" not in answer.text
         assert "RefusalError" in logs[0]["cause"]
+
+    def test_what_is_too_much_at_once_is_logged_where_something_else_is_the_cause(
+        self, client
+    ) -> None:
+        with capture_logs() as logs:
+            for index, (error, _) in enumerate(CASES):
+                if isinstance(error, OverloadedError):
+                    client.get(f"/raise/{index}")
+        assert [line["cause"] for line in logs] == ["[Errno 12] Cannot allocate memory"]
 
 
 class TestValidationErrors:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from types import SimpleNamespace
 
 import pytest
@@ -74,19 +75,30 @@ def test_every_request_has_a_name_of_its_own(logged) -> None:
 
 class TestRefusalBound:
     def test_of_many_in_a_second_some_are_told_and_the_rest_is_counted(self, lines) -> None:
-        clock = [5.0]
-        bound = RefusalBound(lambda: clock[0])
+        clock, later = [5.0], []
+        bound = RefusalBound(lambda: clock[0], later.append)
         assert [bound.admits() for _ in range(MOST_REFUSALS + 3)].count(True) == MOST_REFUSALS
-        assert lines == []
+        assert (lines, len(later)) == ([], 1)
         clock[0] += 1.0
         assert bound.admits()
+        later.pop()()
         assert [(line["event"], line["count"]) for line in lines] == [
             ("more requests were refused", 3)
         ]
 
+    def test_the_rest_is_counted_also_where_nothing_more_is_refused(self, lines) -> None:
+        async def refuse_many() -> None:
+            bound = RefusalBound()
+            for _ in range(MOST_REFUSALS + 2):
+                bound.admits()
+            await asyncio.sleep(1.1)
+
+        asyncio.run(refuse_many())
+        assert [line["count"] for line in lines] == [2]
+
     def test_seldom_ones_are_all_told(self, lines) -> None:
         clock = [5.0]
-        bound = RefusalBound(lambda: clock[0])
+        bound = RefusalBound(lambda: clock[0], pytest.fail)
         for _ in range(3 * MOST_REFUSALS):
             clock[0] += 0.1
             assert bound.admits()
