@@ -24,6 +24,7 @@ from app.api.warm_child import WarmChild, least_busy
 from app.child import Allowance, ChildEnded
 from app.config import Settings
 from app.errors import OverloadedError
+from app.log import log_to_stderr
 from app.review.editing.edit import Edit
 from app.review.editing.follow_paint import PaintFollower, WithoutPictures
 from app.review.editing.submit import Solver, preview
@@ -87,6 +88,7 @@ class Previews:
 
 def make_ready(settings: Settings) -> None:
     """In the process: open the database and load the solver's kernels."""
+    log_to_stderr()
     _opened(settings)
     warm_up()
     gc.collect()

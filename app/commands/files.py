@@ -201,4 +201,5 @@ def export(
         report = run_export(
             store, dataset, format_, target, everything=everything, **asked, progress=progress
         )
-    print_export({**vars(report), "out": str(report.out)}, json_)
+    values = {name: value for name, value in vars(report).items() if name != "groups"}
+    print_export({**values, "out": str(report.out)}, json_)

@@ -11,7 +11,7 @@ import typer
 from app.commands.opened import cluster_of, opened_store, process_pool
 from app.commands.options import Cluster, acting, read_settings, require_safe
 from app.commands.sample import ensure_sample
-from app.commands.terminal import log_to_stderr, say
+from app.commands.terminal import say
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
@@ -61,14 +61,15 @@ def serve(
     )
     require_safe(settings)
     _require_one_process(settings)
-    log_to_stderr()
     from app.api.application import create_app
     from app.api.server import listen, run
     from app.api.web_processes import serve_with
+    from app.log import log_to_stderr
     from app.review.jobs.vitals import file_sizes
     from app.store.dialect.dialect import dialect_of
     from app.store.locks import server_lock
 
+    log_to_stderr()
     with server_lock(settings, shared=not dialect_of(settings).is_file):
         _prepare(settings)
         if not settings.team and team is None:
@@ -106,6 +107,7 @@ def _serve_part(settings: Settings, socket: socket) -> None:
     """Serve in one process of several."""
     from app.api.application import create_app
     from app.api.server import run
+    from app.log import log_to_stderr
 
     log_to_stderr()
     run(create_app(settings, pool=_pool_of(settings)), socket)

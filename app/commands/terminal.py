@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import codecs
 import io
-import logging
 import math
 import signal
 import sys
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping, MutableMapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from threading import Event
-from typing import Any, TextIO, TypeVar, cast
+from typing import Any, TypeVar
 
 from app.finite import finite, json_text
 from app.progress import TellProgress
@@ -174,36 +173,3 @@ def _text(value: Any) -> str:
     if isinstance(value, (list, tuple)):
         return str(len(value))
     return "none" if finite(value) is None else str(value)
-
-
-def only_finite(_logger: Any, _method: str, event: MutableMapping[str, Any]) -> Mapping[str, Any]:
-    """What is logged without numbers that are infinite or NaN."""
-    return {name: finite(value) for name, value in event.items()}
-
-
-class _Stderr:
-    """The stderr of the moment: what a logger is given once may be closed later."""
-
-    def write(self, line: str) -> None:
-        sys.stderr.write(line)
-
-    def flush(self) -> None:
-        sys.stderr.flush()
-
-
-def log_to_stderr() -> None:
-    """Keep what is logged apart from what is printed."""
-    import structlog
-
-    structlog.configure(
-        processors=[
-            structlog.contextvars.merge_contextvars,
-            only_finite,
-            structlog.processors.add_log_level,
-            structlog.processors.TimeStamper(fmt="iso", utc=True),
-            structlog.processors.format_exc_info,
-            structlog.processors.KeyValueRenderer(key_order=["timestamp", "level", "event"]),
-        ],
-        logger_factory=structlog.WriteLoggerFactory(file=cast(TextIO, _Stderr())),
-    )
-    logging.basicConfig(stream=sys.stderr, level=logging.WARNING)

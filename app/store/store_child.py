@@ -7,16 +7,19 @@ that edits do not wait longer than they would for a thread. It says how far it i
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import ExitStack, closing, suppress
 from math import inf
 from time import monotonic
 from typing import Any, Literal, TypeVar
 
+import structlog
+
 from app.child import Allowance, Child
 from app.child_figures import FIGURES
 from app.config import Settings
 from app.errors import DamagedError, JobCancelled, ReviewError
+from app.log import log_to_stderr
 from app.progress import TellProgress
 from app.store.store import Store
 
@@ -151,7 +154,7 @@ def work_apart(
                 return True, error
             return False, None
 
-        given = store.settings, work, arguments
+        given = store.settings, structlog.contextvars.get_contextvars(), work, arguments
         try:
             with FIGURES[kind].working():
                 result: Result = child.run(_work, *given, heard=hear, stop=stop)
@@ -201,12 +204,17 @@ def patiently(check: Callable[[], None]) -> Callable[[], None]:
 
 def _work(
     settings: Settings,
+    spoken_of: Mapping[str, Any],
     work: Callable[..., Any],
     arguments: tuple[Any, ...],
     tell: Callable[[Word], Answer],
 ) -> Any:
+    log_to_stderr()
     caller = Caller(tell)
-    with closing(Store.open(settings, _Turn(caller))) as store:
+    with (
+        structlog.contextvars.bound_contextvars(**spoken_of),
+        closing(Store.open(settings, _Turn(caller))) as store,
+    ):
         return _told_to_its_end(work, store, arguments, caller)
 
 

@@ -26,7 +26,7 @@ from pydantic import BaseModel
 import app
 import app.api.schemas as schemas
 from app.api.schemas.solution import SolutionDocument
-from app.commands.terminal import only_finite, print_json, print_values
+from app.commands.terminal import print_json, print_values
 from app.datasets.export_record import ExportRecord
 from app.datasets.manifest import Manifest, write_manifest
 from app.datasets.parquet import pyarrow_modules
@@ -34,6 +34,7 @@ from app.evaluation.figure import Axis, Figure, Panel, Series
 from app.evaluation.figure_csv import figure_csv
 from app.finite import finite, json_text
 from app.geometry.camera import Camera
+from app.log import only_finite
 from app.review.exporting.formats import FORMATS, WriteOptions, write_format
 from app.review.queue.findings import GroupFindings
 from app.soccer.finding import Finding, Fix

@@ -109,7 +109,8 @@ class JobRun:
         decides."""
         try:
             self.progress.require_wanted()
-            return {"state": DONE, "result": self.work(self.progress)}
+            with structlog.contextvars.bound_contextvars(job=self.id):
+                return {"state": DONE, "result": self.work(self.progress)}
         except JobCancelled:
             if not self.progress.cancelled.is_set():
                 return None

@@ -20,11 +20,11 @@ from app.api.team import Team
 from app.commands.command_line import app
 from app.commands.remote import write_evaluation
 from app.commands.server import Server, _explained, connected, read_token
-from app.commands.terminal import log_to_stderr
 from app.config import Settings
 from app.datasets.soccernet_v3_writer import write_soccernet_v3
 from app.errors import InputError, UnsafePathError
 from app.finite import json_text
+from app.log import log_to_stderr
 from app.review.evaluating.evaluation import get_evaluation
 from app.review.evaluating.folder import evaluation_values
 from app.review.evaluating.predictions import list_predictions

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import threading
 import time
 from contextlib import ExitStack
@@ -10,8 +11,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import structlog
 
-from app.child import ChildEnded
+from app.child import Child, ChildEnded
 from app.child_figures import FIGURES
 from app.errors import DamagedError, InputError, JobCancelled, NotFoundError
 from app.progress import TellProgress
@@ -59,6 +61,10 @@ def change_over(_store: Store, caller: Caller) -> None:
     caller(1, 9, "reading")
     caller(1, 9, "packing")
     caller(2, 9, "packing")
+
+
+def log_a_word(*_: object) -> None:
+    structlog.get_logger("touchline.tests").warning("seen")
 
 
 def count_slowly(_store: Store, mark: Path, caller: Caller) -> None:
@@ -120,6 +126,17 @@ class TestWorkApart:
         heard: list[Any] = []
         run(store, change_over, progress=lambda *told: heard.append(told))
         assert heard == [(1, 9, "reading"), (1, 9, "packing"), (2, 9, "packing")]
+
+    def test_what_it_logs_is_a_line_of_the_log_here_that_names_the_job(
+        self, store: Store, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        # One that was kept from another test writes to the stderr of then.
+        monkeypatch.setattr(module, "Child", Child)
+        with structlog.contextvars.bound_contextvars(job=31):
+            run(store, log_a_word)
+        printed = capfd.readouterr()
+        assert printed.out == ""
+        assert re.search(r"level='warning' event='seen' .*job=31", printed.err)
 
     def test_a_question_is_answered_here(self, store: Store) -> None:
         assert run(store, ask, "why", answer=str.upper) == "answered WHY"
