@@ -310,6 +310,9 @@ class Store:
                 engine.dispose()
         try:
             sync_anchor(self.settings.database_file)
+        except OSError as error:
+            # One that stays behind is right, too.
+            log.warning("home.json cannot be synced", error=str(error))
         finally:
             self._lock.release()
 

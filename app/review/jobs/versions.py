@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from app.errors import NotFoundError
+from app.errors import NotFoundError, OverloadedError
 from app.progress import TellProgress
 from app.review.answers.keep import Keep, keep_nothing
 from app.review.datasets.dataset import get_dataset_head
@@ -12,7 +12,7 @@ from app.review.jobs.job_child import carry_out_apart
 from app.review.jobs.job_run import JobProgress, Work
 from app.review.jobs.jobs import Jobs
 from app.review.versions.freeze import FreezeRequest, freeze, plan_freeze
-from app.review.versions.verify import verify_and_keep
+from app.review.versions.verify import keep_failure, verify_and_keep
 from app.review.versions.version import Version, find_version, get_version
 from app.soccer.split import Split
 from app.store.jobs import Job
@@ -112,16 +112,21 @@ def verify_work(store: Store, version_id: int, actor: str) -> Work:
     def work(progress: JobProgress) -> Json:
         version = get_version(store, version_id)
         progress(0, None, f"Verifying {version.name}.")
-        return carry_out_apart(
-            store,
-            "verifying",
-            "the verification",
-            _verify,
-            version_id,
-            actor,
-            dataset_id=version.dataset_id,
-            progress=progress,
-        )
+        try:
+            return carry_out_apart(
+                store,
+                "verifying",
+                "the verification",
+                _verify,
+                version_id,
+                actor,
+                dataset_id=version.dataset_id,
+                progress=progress,
+            )
+        except OverloadedError as error:
+            # The process did not come to keeping it.
+            keep_failure(store, version_id, error.message, actor=actor)
+            raise
 
     return work
 

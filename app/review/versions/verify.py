@@ -5,11 +5,12 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Executor
+from contextlib import suppress
 from dataclasses import asdict, dataclass, field
 from itertools import islice
 from typing import Any
 
-from app.errors import JobCancelled, ReviewError, StorageError
+from app.errors import DamagedError, JobCancelled, ReviewError, StorageError
 from app.progress import TellProgress
 from app.review.datasets.fan_out import fan_out
 from app.review.versions.version import (
@@ -182,10 +183,16 @@ def verify_and_keep(
         raise
     except Exception as error:
         problem = error.message if isinstance(error, ReviewError) else UNEXPECTED
-        keep_verification(store, version_id, actor=actor, problem=problem)
+        keep_failure(store, version_id, problem, actor=actor)
         raise
     keep_verification(store, version_id, actor=actor, report=report.values())
     return report
+
+
+def keep_failure(store: Store, version_id: int, problem: str, *, actor: str) -> None:
+    """Keep with a version why nothing came of verifying it; what is damaged takes no word of it."""
+    with suppress(DamagedError):
+        keep_verification(store, version_id, actor=actor, problem=problem)
 
 
 def verify_task(task: VerifyTask) -> list[list[Difference]]:

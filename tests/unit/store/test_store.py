@@ -506,6 +506,19 @@ class TestAfterTheCommit:
         assert anchor is not None
         assert anchor.entries == 6
 
+    def test_an_anchor_that_cannot_be_synced_costs_nothing_when_it_is_closed(
+        self, settings: Settings, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        def refuse(*_: object) -> None:
+            raise OSError(5, "Input/output error")
+
+        monkeypatch.setattr("app.store.store.sync_anchor", refuse)
+        with capture_logs() as logs:
+            Store.open(settings).close()
+        assert [line["event"] for line in logs] == ["home.json cannot be synced"]
+        monkeypatch.undo()
+        Store.open(settings).close()
+
     def test_a_listener_that_fails_costs_neither_the_change_nor_the_others(
         self, store: Store
     ) -> None:

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from app.errors import JobCancelled, NotFoundError, StorageError
+from app.errors import DamagedError, JobCancelled, NotFoundError, StorageError
 from app.review.datasets.delete import delete_dataset
 from app.review.versions import verify as verify_module
 from app.review.versions.freeze import FreezeRequest, freeze
@@ -57,6 +57,17 @@ class TestVerifyAndKeep:
             verify_and_keep(store, version.id, actor="ben")
         kept = get_version(store, version.id).verified
         assert (kept.problem, kept.report) == ("the disk is full", None)
+
+    def test_of_a_damaged_database_the_damage_is_told(self, store, version, monkeypatch) -> None:
+        def broken(*_arguments, **_options):
+            error = DamagedError("touchline.db is damaged")
+            store.note_damage(error)
+            raise error
+
+        monkeypatch.setattr(verify_module, "verify", broken)
+        with pytest.raises(DamagedError, match=r"^touchline\.db is damaged$"):
+            verify_and_keep(store, version.id, actor="ben")
+        assert get_version(store, version.id).verified is None
 
     def test_a_run_that_was_cancelled_leaves_what_was_kept(self, store, version) -> None:
         def cancel(_done: int, _total: int) -> None:
