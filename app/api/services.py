@@ -131,7 +131,7 @@ class Services:
         resume_versions(self.jobs, self.store)
         resume_imports(self.jobs, self.store, self.settings)
         resume_evaluations(self.jobs, self.store)
-        resume_practice(self.jobs, self.store, self.settings)
+        resume_practice(self.jobs, self.store)
         make_rigs(self.jobs, self.store)
         self.jobs.on_lead(self._lead)
         self.jobs.start()

@@ -180,7 +180,7 @@ def work_here(
         progress(*what)
         return False, None
 
-    return _told_to_its_end(work, store, arguments, Caller(hear))
+    return _with_last_word(work, store, arguments, Caller(hear))
 
 
 def patiently(check: Callable[[], None]) -> Callable[[], None]:
@@ -189,14 +189,15 @@ def patiently(check: Callable[[], None]) -> Callable[[], None]:
     Args:
         check: Raises ``JobCancelled`` once it shall end.
     """
-    until: list[float] = []
+    until = inf
 
     def stop() -> None:
+        nonlocal until
         try:
             check()
         except JobCancelled:
-            until.append(monotonic() + PATIENCE)
-            if monotonic() > until[0]:
+            until = min(until, monotonic() + PATIENCE)
+            if monotonic() > until:
                 raise
 
     return stop
@@ -215,10 +216,10 @@ def _work(
         structlog.contextvars.bound_contextvars(**spoken_of),
         closing(Store.open(settings, _Turn(caller))) as store,
     ):
-        return _told_to_its_end(work, store, arguments, caller)
+        return _with_last_word(work, store, arguments, caller)
 
 
-def _told_to_its_end(
+def _with_last_word(
     work: Callable[..., Result], store: Store, arguments: tuple[Any, ...], caller: Caller
 ) -> Result:
     result = work(store, *arguments, caller)

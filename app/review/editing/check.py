@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 SHOWN = 5
 """Records that a sentence names."""
@@ -40,3 +41,31 @@ def compared(name: str, whole: str, apart: Sequence[str], wrong: str, mend: str)
         return Check(name, True, whole)
     shown = ", ".join(apart[:SHOWN]) + (" and others" if len(apart) > SHOWN else "")
     return Check(name, False, f"{len(apart):,} {wrong}: {shown}", mend)
+
+
+def spelt(key: object) -> str:
+    """What a record is called: its key, or the parts of it."""
+    if isinstance(key, tuple):
+        return " ".join(str(part) for part in key if part is not None)
+    return str(key)
+
+
+def as_logged(
+    name: str, said: Any, present: Any, mend: str, call: Callable[[Any], str] = spelt
+) -> Check:
+    """What came of comparing a table with what the log says of it.
+
+    Args:
+        name: What was looked at.
+        said: By the log: values by key, or a set.
+        present: The same as it is.
+        mend: What to do where they are not the same.
+        call: What a key is called.
+    """
+    if isinstance(said, Mapping):
+        apart = {key for key in said.keys() | present if said.get(key) != present.get(key)}
+    else:
+        apart = said ^ present
+    whole = f"{len(present):,}, as the log says"
+    names = [call(key) for key in sorted(apart)]
+    return compared(name, whole, names, "not as the log says", mend)

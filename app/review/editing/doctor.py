@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
-
 from app.errors import StorageError
 from app.review.datasets.dataset import list_datasets
-from app.review.editing.check import Check, compared
+from app.review.editing.check import Check, as_logged, compared
 from app.review.editing.guideline_check import examine_guidelines
 from app.review.editing.ledger import Ledger, read_ledger
 from app.review.editing.people_check import examine_people
@@ -24,7 +21,6 @@ from app.store.soundness import count_lost_references, file_faults, no_fault, re
 from app.store.store import Store
 
 REBUILD = "Run touchline doctor --rebuild: it writes these tables anew from the log."
-UNLIKE = "not as the log says"
 REBUILT = {
     "groups": "groups",
     "stations": "cameras",
@@ -81,13 +77,11 @@ def _compared_tables(session: Session, said: Ledger, restore: str) -> list[Check
 
 
 def _tables(said: Ledger, present: Ledger, restore: str) -> list[Check]:
-    checks = []
-    for names, mend in ((REBUILT, REBUILD), (KEPT, restore)):
-        for name, words in names.items():
-            ours, theirs = getattr(said, name), getattr(present, name)
-            whole = f"{len(theirs):,}, as the log says"
-            checks.append(compared(words, whole, _apart(ours, theirs), UNLIKE, mend))
-    return checks
+    return [
+        as_logged(words, getattr(said, name), getattr(present, name), mend)
+        for names, mend in ((REBUILT, REBUILD), (KEPT, restore))
+        for name, words in names.items()
+    ]
 
 
 def _digests(session: Session) -> Check:
@@ -106,20 +100,6 @@ def _digests(session: Session) -> Check:
             apart.append(f"group {group.id}")
     whole = f"of {count:,} groups and cameras, each that of what was said"
     return compared("digests", whole, apart, "not of what was said", REBUILD)
-
-
-def _apart(ours: Any, theirs: Any) -> list[str]:
-    """Names of what one side has, or has otherwise."""
-    if isinstance(ours, Mapping):
-        keys = sorted(ours.keys() | theirs.keys())
-        return [_name(key) for key in keys if ours.get(key) != theirs.get(key)]
-    return sorted(_name(item) for item in ours ^ theirs)
-
-
-def _name(key: object) -> str:
-    if isinstance(key, tuple):
-        return " ".join(str(part) for part in key if part is not None)
-    return str(key)
 
 
 def _queue(session: Session, mend: str) -> Check:

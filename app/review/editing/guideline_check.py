@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import hashlib
 
-from app.review.editing.check import Check, compared
-from app.review.editing.people_check import DELETED, UNLIKE
+from app.review.editing.check import Check, as_logged
+from app.review.editing.people_check import DELETED
 from app.store.guidelines import GUIDELINE, all_guidelines
 from app.store.log import entries_of_kinds
 from app.store.session import Session
@@ -23,13 +23,12 @@ def examine_guidelines(session: Session, restore: str) -> Check:
         (row.dataset_id, row.number): hashlib.sha256(row.text.encode()).hexdigest()
         for row in all_guidelines(session)
     }
-    apart = [
-        f"version {number} of dataset {dataset}"
-        for dataset, number in sorted(said.keys() | present.keys())
-        if said.get((dataset, number)) != present.get((dataset, number))
-    ]
-    whole = f"{len(present):,}, as the log says"
-    return compared("guidelines", whole, apart, UNLIKE, restore)
+    return as_logged("guidelines", said, present, restore, _name)
+
+
+def _name(key: tuple[int, int]) -> str:
+    dataset, number = key
+    return f"version {number} of dataset {dataset}"
 
 
 def _said(session: Session) -> dict[tuple[int, int], str]:

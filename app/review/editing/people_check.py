@@ -7,9 +7,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any
 
-from app.review.editing.check import Check, compared
+from app.review.editing.check import Check, as_logged
 from app.review.people.names import PERSON
 from app.store.aliases import given_aliases
 from app.store.dataset_roles import all_dataset_roles
@@ -18,7 +17,6 @@ from app.store.people import all_people
 from app.store.session import Session
 
 DATASET, DELETED = "dataset", "dataset_deleted"
-UNLIKE = "not as the log says"
 
 
 @dataclass
@@ -50,12 +48,10 @@ def examine_people(session: Session, restore: str) -> list[Check]:
         if present.roles.get(key) == role:
             said.roles[key] = role
     parts = {"accounts": "accounts", "roles": "roles in datasets", "shown": "adopted names"}
-    checks = []
-    for name, words in parts.items():
-        ours, theirs = getattr(said, name), getattr(present, name)
-        whole = f"{len(theirs):,}, as the log says"
-        checks.append(compared(words, whole, _apart(ours, theirs), UNLIKE, restore))
-    return checks
+    return [
+        as_logged(words, getattr(said, name), getattr(present, name), restore, _name)
+        for name, words in parts.items()
+    ]
 
 
 def _present(session: Session) -> People:
@@ -140,11 +136,6 @@ _STEPS: Mapping[str, Callable[[People, LogEntry, str], None]] = {
     "adopted": _adopted,
 }
 """What of the words about people changes who there is, and as what."""
-
-
-def _apart(ours: Mapping[Any, Any], theirs: Mapping[Any, Any]) -> list[str]:
-    keys = sorted(ours.keys() | theirs.keys())
-    return [_name(key) for key in keys if ours.get(key) != theirs.get(key)]
 
 
 def _name(key: str | tuple[str, int]) -> str:

@@ -19,9 +19,19 @@ SMALL = 100
 """Groups of a dataset that are worked on here: to start a process takes longer."""
 STOP_SECONDS = 2.0
 """So long after its process a server may be told to stop."""
-_ENDS: dict[Reason, str] = {
-    "killed": "was killed, most likely for want of memory",
-    "crash": "crashed",
+_AGAIN = "Start it again."
+_ENDS: dict[Reason, tuple[str, str]] = {
+    "memory": (
+        "needs more memory than there is",
+        f"{_AGAIN} Where it happens often, give more memory.",
+    ),
+    "killed": (
+        "was killed, most likely for want of memory",
+        f"{_AGAIN} Where it happens often, give more memory.",
+    ),
+    "crash": ("crashed", f"{_AGAIN} Where it crashes again, report it: the log says where it was."),
+    "processor": ("took too long to work out", _AGAIN),
+    "silence": ("came to no next step", f"{_AGAIN} The disk or a store may not answer."),
 }
 
 
@@ -62,10 +72,8 @@ def carry_out_apart(
     except ChildEnded as error:
         # Who ends a service may end its processes first: then the next server goes on with it.
         progress.check_within(STOP_SECONDS)
-        raise OverloadedError(
-            f"the process of {what} {_ENDS.get(error.reason, 'needs more memory than there is')}",
-            hint="Start it again. Where it happens often, give more memory.",
-        ) from error
+        ended, hint = _ENDS[error.reason]
+        raise OverloadedError(f"the process of {what} {ended}", hint=hint) from error
 
 
 def _is_small(store: Store, dataset_id: int) -> bool:

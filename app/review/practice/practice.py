@@ -91,7 +91,7 @@ def request_practice(
     return jobs.submit(
         KIND,
         "Begin the practice again" if again else "Make the practice groups",
-        practice_work(store, settings, again=again, actor=actor),
+        practice_work(store, again=again, actor=actor),
         actor=actor,
         request={"again": again},
         once=True,
@@ -99,17 +99,17 @@ def request_practice(
     )
 
 
-def resume_practice(jobs: Jobs, store: Store, settings: Settings) -> None:
+def resume_practice(jobs: Jobs, store: Store) -> None:
     """Let what an earlier server was at go on."""
 
     def work_of(job: Job) -> Work:
         again = bool((job.request or {}).get("again"))
-        return practice_work(store, settings, again=again, actor=job.actor)
+        return practice_work(store, again=again, actor=job.actor)
 
     jobs.resumes(KIND, work_of)
 
 
-def practice_work(store: Store, settings: Settings, *, again: bool, actor: str) -> Work:
+def practice_work(store: Store, *, again: bool, actor: str) -> Work:
     """The work itself; its result names the dataset and its first group."""
 
     def work(progress: JobProgress) -> Json:
