@@ -33,8 +33,8 @@ START_SECONDS = 120.0
 _ONE_THREAD = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "OPENCV_FOR_THREADS_NUM")
 """Each thread of these libraries reserves memory before it does anything."""
 
-Reason = Literal["memory", "processor", "silence", "killed", "crash"]
-"""``memory`` and ``processor`` are limits of ours; who is killed, is so from outside."""
+Reason = Literal["memory", "processor", "silence", "killed", "told", "crash"]
+"""``memory`` and ``processor`` are limits of ours; who is killed or told to end, is so from outside."""
 
 
 @dataclass(frozen=True)
@@ -67,6 +67,7 @@ def _sentence(reason: Reason, allowance: Allowance) -> str:
         "processor": f"takes more than {allowance.processor:,.0f} seconds to work out",
         "silence": f"was at work for {allowance.silence:,.0f} seconds without a result",
         "killed": "was not finished: its process was killed, most likely for want of memory",
+        "told": "was not finished: its process was told to end",
         "crash": "made the process crash that read it",
     }[reason]
 
@@ -185,6 +186,7 @@ class Child:
             -signal.SIGXCPU: "processor",
             # Without a word of ours, this is the kernel's when the machine runs out of memory.
             -signal.SIGKILL: "killed",
+            -signal.SIGTERM: "told",
         }
         return causes.get(code, "crash")
 
@@ -195,11 +197,15 @@ def _launch(allowance: Allowance) -> tuple[BaseProcess, Connection]:
     line, far = context.Pipe()
     with closing(far):
         process = context.Process(target=_serve, args=(far, allowance), daemon=True)
+        # Ctrl+C reaches every process of a terminal; the parent alone decides what ends.
+        mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
         try:
             process.start()
         except BaseException:
             line.close()
             raise
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, mask)
     return process, line
 
 
@@ -236,8 +242,9 @@ def end_with_parent() -> None:
 def _serve(line: Connection, allowance: Allowance) -> None:
     """What runs in the child: one task after the other, until the parent hangs up."""
     end_with_parent()
-    # Ctrl+C reaches every process of a terminal; the parent alone decides what ends.
+    # From its first moment on it was blocked; what this process starts need not be deaf to it.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
     for name in _ONE_THREAD:
         os.environ[name] = "1"
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))

@@ -13,6 +13,7 @@ import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
+from multiprocessing.context import SpawnProcess
 from pathlib import Path
 
 import pytest
@@ -48,6 +49,10 @@ def never_end(*_: object) -> None:
 
 def be_killed() -> None:
     os.kill(os.getpid(), signal.SIGKILL)
+
+
+def be_told_to_end() -> None:
+    os.kill(os.getpid(), signal.SIGTERM)
 
 
 def be_killed_at_start(*_: object) -> None:
@@ -206,6 +211,26 @@ class TestRun:
         monkeypatch.setattr("app.child._serve", be_killed_at_start)
         with pytest.raises(OverloadedError, match="no process could be started"):
             Child(Allowance(300 * MEBI, 10.0, 60.0)).run(child_pid)
+
+    def test_one_that_hears_of_a_pressed_key_while_it_starts_works_all_the_same(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        start = SpawnProcess.start
+
+        def start_and_interrupt(process: SpawnProcess) -> None:
+            start(process)
+            assert process.pid is not None
+            os.kill(process.pid, signal.SIGINT)
+
+        monkeypatch.setattr(SpawnProcess, "start", start_and_interrupt)
+        child = Child(Allowance(300 * MEBI, 10.0, 60.0))
+        assert child.run(child_pid) != os.getpid()
+        child.close()
+
+    def test_one_that_is_told_to_end_did_not_crash(self, child: Child) -> None:
+        with pytest.raises(ChildEnded, match="its process was told to end") as ended:
+            child.run(be_told_to_end)
+        assert ended.value.reason == "told"
 
     def test_what_is_not_wanted_any_more_is_killed(self, child: Child) -> None:
         pid = child.run(child_pid)

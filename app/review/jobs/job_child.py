@@ -29,6 +29,7 @@ _ENDS: dict[Reason, tuple[str, str]] = {
         "was killed, most likely for want of memory",
         f"{_AGAIN} Where it happens often, give more memory.",
     ),
+    "told": ("was told to end", _AGAIN),
     "crash": ("crashed", f"{_AGAIN} Where it crashes again, report it: the log says where it was."),
     "processor": ("took too long to work out", _AGAIN),
     "silence": ("came to no next step", f"{_AGAIN} The disk or a store may not answer."),
@@ -60,7 +61,7 @@ def carry_out_apart(
         answer: What the work's questions are answered with.
 
     Raises:
-        OverloadedError: The process did not come to its end.
+        OverloadedError: The process did not come to its end, or could not be started.
         ReviewError: As the work raised it.
     """
     hears = told or progress
@@ -69,9 +70,11 @@ def carry_out_apart(
     stop = patiently(progress.check)
     try:
         return work_apart(store, kind, work, *arguments, progress=hears, stop=stop, answer=answer)
-    except ChildEnded as error:
+    except (ChildEnded, OverloadedError) as error:
         # Who ends a service may end its processes first: then the next server goes on with it.
         progress.check_within(STOP_SECONDS)
+        if isinstance(error, OverloadedError):
+            raise
         ended, hint = _ENDS[error.reason]
         raise OverloadedError(f"the process of {what} {ended}", hint=hint) from error
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import threading
 from typing import Any
 
@@ -39,6 +40,14 @@ def be_refused(_store: Store, _caller: Caller) -> None:
 
 def break_down(*_: object) -> None:
     os.abort()
+
+
+def be_told_to_end(*_: object) -> None:
+    os.kill(os.getpid(), signal.SIGTERM)
+
+
+def have_no_process(*_: object) -> None:
+    raise OverloadedError("no process could be started for this")
 
 
 @pytest.fixture
@@ -117,10 +126,18 @@ class TestCarryOutApart:
         with pytest.raises(OverloadedError, match=r"^the process of the export crashed$"):
             carry_out(store, break_down, dataset_id=None)
 
+    @pytest.mark.parametrize("end", [break_down, be_told_to_end, have_no_process])
     def test_one_that_ends_before_its_server_is_told_to_stop_goes_on_with_the_next(
-        self, store: Store
+        self, store: Store, end: Any
     ) -> None:
         closing = threading.Event()
         threading.Timer(0.5, closing.set).start()
         with pytest.raises(JobCancelled):
-            carry_out(store, break_down, dataset_id=None, progress=JobProgress(1, closing))
+            carry_out(store, end, dataset_id=None, progress=JobProgress(1, closing))
+
+    def test_one_that_was_told_to_end_is_a_sentence_that_says_so(
+        self, store: Store, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(module, "STOP_SECONDS", 0.0)
+        with pytest.raises(OverloadedError, match=r"^the process of the export was told to end$"):
+            carry_out(store, be_told_to_end, dataset_id=None)
