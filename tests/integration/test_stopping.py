@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import socket
 import subprocess
@@ -9,6 +10,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
@@ -16,6 +18,9 @@ from urllib.parse import urlsplit
 import httpx
 import pytest
 
+from app.config import Settings
+from app.review.jobs.job_records import need_job
+from app.store.store import Store
 from tests.databases import holding_the_write_lock
 from tests.e2e.service import serving
 from tests.homes import copy_home
@@ -139,6 +144,23 @@ class TestStopping:
         server.send_signal(number)
         server.wait(SECONDS)
         until(lambda: not any(map(is_alive, workers)))
+
+    def test_a_job_whose_process_is_told_to_end_before_its_server_goes_on_with_the_next_one(
+        self, server: subprocess.Popen[str], address: str, home: Path
+    ) -> None:
+        body = {"dataset": "d", "format": "soccernet-v3", "source": {"folder": "data"}}
+        with httpx.Client(base_url=address, headers={"Origin": address}, timeout=SECONDS) as client:
+            job = client.post("/api/v1/imports", json=body).json()["id"]
+            place = f"/api/v1/jobs/{job}"
+            until(lambda: client.get(place).json()["state"] == "running")
+        workers = until(lambda: len(found := children(server.pid)) >= 3 and found)
+        # As systemd does with KillMode=control-group, in whatever order.
+        for number in (*workers, server.pid):
+            os.kill(number, signal.SIGTERM)
+        server.wait(SECONDS)
+        with closing(Store.open(Settings(home=home))) as store, store.read() as session:
+            found = need_job(session, job)
+        assert (found.state, found.problem) == ("running", None)
 
     def test_nothing_stays_of_an_upload_that_stalls(
         self, server: subprocess.Popen[str], address: str, home: Path

@@ -16,6 +16,7 @@ from app.review.editing.paint import has_pictures
 from app.review.importing.folders import resolve_folder
 from app.review.importing.import_child import Outcome, import_apart
 from app.review.importing.sources import FORMATS, Source
+from app.review.jobs.job_child import left_to_the_next
 from app.review.jobs.job_run import FailedWithReportError, JobProgress, Work
 from app.review.jobs.jobs import Jobs
 from app.review.jobs.paint import PAINT
@@ -129,16 +130,17 @@ def import_work(
         if not request.dry_run and "upload" in request.source:
             # Frames are read where they are, so the file must stay from the first group on.
             keep_upload(settings, request.source["upload"])
-        outcome = import_apart(
-            store,
-            request.dataset,
-            source,
-            actor=actor,
-            dry_run=request.dry_run,
-            progress=_step(progress, sentence),
-            stop=progress.check,
-            policy=None if request.policy is None else POLICIES[request.policy],
-        )
+        with left_to_the_next(progress):
+            outcome = import_apart(
+                store,
+                request.dataset,
+                source,
+                actor=actor,
+                dry_run=request.dry_run,
+                progress=_step(progress, sentence),
+                stop=progress.check,
+                policy=None if request.policy is None else POLICIES[request.policy],
+            )
         with store.read() as session:
             found = find_dataset(session, request.dataset)
         if found is not None:

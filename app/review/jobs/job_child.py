@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any, TypeVar
 
 from app.child import ChildEnded, Reason
-from app.errors import OverloadedError
+from app.errors import OverloadedError, TooLargeError
 from app.progress import TellProgress
 from app.review.jobs.job_run import JobProgress
 from app.store.datasets import has_more_groups
@@ -69,14 +70,26 @@ def carry_out_apart(
         return work_here(store, work, *arguments, progress=hears, answer=answer)
     stop = patiently(progress.check)
     try:
-        return work_apart(store, kind, work, *arguments, progress=hears, stop=stop, answer=answer)
-    except (ChildEnded, OverloadedError) as error:
-        # Who ends a service may end its processes first: then the next server goes on with it.
-        progress.check_within(STOP_SECONDS)
-        if isinstance(error, OverloadedError):
-            raise
+        with left_to_the_next(progress):
+            return work_apart(
+                store, kind, work, *arguments, progress=hears, stop=stop, answer=answer
+            )
+    except ChildEnded as error:
         ended, hint = _ENDS[error.reason]
         raise OverloadedError(f"the process of {what} {ended}", hint=hint) from error
+
+
+@contextmanager
+def left_to_the_next(progress: JobProgress) -> Iterator[None]:
+    """Let the next server go on where a process ended because this one is about to stop.
+
+    Who ends a service may end its processes first.
+    """
+    try:
+        yield
+    except (ChildEnded, OverloadedError, TooLargeError):
+        progress.check_within(STOP_SECONDS)
+        raise
 
 
 def _is_small(store: Store, dataset_id: int) -> bool:
