@@ -320,10 +320,17 @@ class TestFlood:
             work, failing = (Background(line, home, Busy("client1", tree)) for tree in trees)
 
             async def all_of_it() -> list[int]:
-                long = (work.solve, work.export, work.freeze, work.import_, failing.import_)
+                long = (
+                    work.solve,
+                    work.export,
+                    work.freeze,
+                    work.judge,
+                    work.import_,
+                    failing.import_,
+                )
                 return [(await once(0))[0] for once in long]
 
-            assert asyncio.run(all_of_it()) == [202, 202, 202, 200, 500]
+            assert asyncio.run(all_of_it()) == [202, 202, 202, 200, 200, 500]
 
     def test_a_refusal_that_does_not_say_when_to_come_back_is_seen(self) -> None:
         async def refused(_number: int) -> tuple[int, dict[str, str]]:

@@ -1,7 +1,7 @@
 """Background: long work of one person, beside which others go on as if there were none.
 
-A dataset is solved anew, exported whole, frozen and verified, and imported from the command line, one
-after the other of its kind without a pause; each is an attack like any other (``flood``).
+A dataset is solved anew, exported whole, frozen and verified, judged all at once, and imported from the
+command line, one after the other of its kind without a pause; each is an attack like any other (``flood``).
 """
 
 from __future__ import annotations
@@ -90,6 +90,17 @@ class Background:
             job = json.loads((await self._line.ask("GET", asked.headers["location"])).body)
             path = f"{API}/versions/{job['result']['version']}/verify"
             return await self._done(await self._line.ask("POST", path))
+
+    async def judge(self, _number: int) -> tuple[int, dict[str, str]]:
+        """Every group of it is judged at once, and all of that is taken back."""
+        path = f"{API}/datasets/{self._busy.dataset}/verdicts"
+        with closing(self._line):
+            given = await self._line.ask("POST", path, _json({"q": "", "state": "deferred"}))
+            if given.status != 200:
+                return given.status, given.headers
+            batch = json.loads(given.body)["batch"]
+            taken = await self._line.ask("POST", f"{API}/verdict-batches/{batch}/undo")
+            return taken.status, taken.headers
 
     async def import_(self, _number: int) -> tuple[int, dict[str, str]]:
         """The command line brings the same groups into the home again, as another dataset."""
