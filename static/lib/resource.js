@@ -23,24 +23,27 @@ import { ApiError } from '../api/problem.js';
  * @returns {Resource<T>}
  */
 export function useResource(read, inputs) {
-	const [state, setState] = useState(
-		/** @type {{value: T | null, error: ApiError | null, waiting: boolean}} */
-		({ value: null, error: null, waiting: true }),
-	);
 	const [turn, setTurn] = useState(0);
+	const asked = [...inputs, turn];
+	const [state, setState] = useState(
+		/** @type {{value: T | null, error: ApiError | null, asked: readonly unknown[]}} */
+		({ value: null, error: null, asked: [] }),
+	);
 	useEffect(() => {
 		const controller = new AbortController();
 		const { signal } = controller;
-		setState((before) => ({ ...before, waiting: true }));
 		read(signal).then(
-			(value) => { if (!signal.aborted) setState({ value, error: null, waiting: false }); },
+			(value) => { if (!signal.aborted) setState({ value, error: null, asked }); },
 			(error) => {
 				if (signal.aborted) return;
 				if (!(error instanceof ApiError)) throw error;
-				setState({ value: null, error, waiting: false });
+				setState({ value: null, error, asked });
 			},
 		);
 		return () => controller.abort();
-	}, [...inputs, turn]);
-	return { ...state, reload: useCallback(() => setTurn((n) => n + 1), []) };
+	}, asked);
+	const { value, error } = state;
+	// Told from the first drawing on: whoever acts upon an answer must not take the last one's for it.
+	const waiting = asked.length !== state.asked.length || asked.some((one, index) => !Object.is(one, state.asked[index]));
+	return { value, error, waiting, reload: useCallback(() => setTurn((n) => n + 1), []) };
 }

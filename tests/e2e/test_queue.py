@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from urllib.parse import parse_qsl, urlencode, urlsplit
 
@@ -32,6 +33,13 @@ TYPE_WHILE_VALUES_ARRIVE = """async () => {
 }"""
 
 
+CHOSEN = """async (verb) => {
+  [...document.querySelectorAll('.choice label')].find((one) => one.textContent.startsWith(verb)).click();
+  // It is drawn, and what follows a drawing is still to come.
+  for (let turn = 0; turn < 5; turn += 1) await undefined;
+  const button = document.querySelector('dialog[open] .button--primary');
+  return [button.textContent, button.getAttribute('aria-disabled')];
+}"""
 CHOOSE_WHILE_VALUES_ARRIVE = """async () => {
   const { facets } = await import(
     document.querySelector('script[src$="main.js"]').src.replace('main.js', 'state/facets.js'));
@@ -355,6 +363,18 @@ class TestTicks:
         expect(page.locator(".bar")).to_contain_text("2 verdicts are taken back")
         expect(page.locator(".pill[data-status=deferred]")).to_have_count(0)
         until(page, lambda: statuses(page) == before)
+
+    def test_a_verdict_cannot_be_given_with_the_count_of_another_one(
+        self, open_page: OpenPage
+    ) -> None:
+        page = opened(open_page, "number<=2")
+        page.keyboard.press("b")
+        expect(page.get_by_role("button", name="Accept", exact=False).last).to_be_enabled()
+        with holding(page, re.compile(r"/verdicts\?dry_run")):
+            # As soon as it is drawn, before anything is asked.
+            drawn = page.evaluate(CHOSEN, "Defer")
+            assert drawn == ["Defer 2 groups", "true"]
+        expect(page.get_by_role("button", name="Defer 2 groups")).to_be_enabled()
 
     def test_a_click_with_shift_ticks_all_in_between_and_another_query_nothing(
         self, long_list: Page
