@@ -8,7 +8,15 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import ConsoleMessage, Page, Playwright, expect, sync_playwright
+from playwright.sync_api import (
+    Browser,
+    ConsoleMessage,
+    Error,
+    Page,
+    Playwright,
+    expect,
+    sync_playwright,
+)
 
 from tests.e2e.homes import build_film, build_sample, build_season
 from tests.e2e.install_chromium import ADVICE, find_chromium
@@ -116,10 +124,20 @@ def playwright() -> Iterator[Playwright]:
         yield running
 
 
+def _launched(playwright: Playwright, arguments: list[str]) -> Browser:
+    """A Chromium; seldom one crashes before it has opened anything, which says nothing of a page."""
+    try:
+        return playwright.chromium.launch(executable_path=_chromium(), args=arguments)
+    except Error as error:
+        if "Segmentation fault" not in error.message:
+            raise
+    return playwright.chromium.launch(executable_path=_chromium(), args=arguments)
+
+
 @contextmanager
 def windows_of(playwright: Playwright, arguments: list[str]) -> Iterator[Windows]:
     """Windows of a Chromium of their own, which know nothing of earlier tests."""
-    browser = playwright.chromium.launch(executable_path=_chromium(), args=arguments)
+    browser = _launched(playwright, arguments)
     yield Windows(browser)
     browser.close()
 

@@ -37,6 +37,8 @@ def undo_batch(
         ConflictError: It was taken back before.
     """
     number = 0
+    restored: dict[int, int] = {}
+    """Groups of each span that was taken back here, by its first verdict."""
     while True:
         with store.write() as session:
             batch = _standing(session, batch_id)
@@ -45,9 +47,14 @@ def undo_batch(
             spans = [*(batch.undo_spans or ()), *_span(verdicts)]
             update_batch(session, batch_id, undo_spans=spans)
             number += 1
+            if verdicts:
+                restored[verdicts[0].id] = len({item.group_id for item in verdicts})
             if number == len(batch.spans):
-                restored = {group for span in spans for group in judged_between(session, *span)}
-                report = UndoReport(batch_id, len(restored), batch.changed - len(restored))
+                count = sum(
+                    restored.get(first) or len(set(judged_between(session, first, last)))
+                    for first, last in spans
+                )
+                report = UndoReport(batch_id, count, batch.changed - count)
                 _close(session, batch, report, actor)
                 keep(report)(session)
                 return report
