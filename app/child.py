@@ -18,6 +18,7 @@ from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import closing, suppress
 from dataclasses import dataclass
+from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
 from pathlib import Path
@@ -197,7 +198,9 @@ def _launch(allowance: Allowance) -> tuple[BaseProcess, Connection]:
     line, far = context.Pipe()
     with closing(far):
         process = context.Process(target=_serve, args=(far, allowance), daemon=True)
-        # Ctrl+C reaches every process of a terminal; the parent alone decides what ends.
+        # Ctrl+C reaches every process of a terminal; the parent alone decides what ends. The first
+        # child would have multiprocessing start its tracker, which lets it through again.
+        resource_tracker.ensure_running()
         mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
         try:
             process.start()
@@ -242,7 +245,7 @@ def end_with_parent() -> None:
 def _serve(line: Connection, allowance: Allowance) -> None:
     """What runs in the child: one task after the other, until the parent hangs up."""
     end_with_parent()
-    # From its first moment on it was blocked; what this process starts need not be deaf to it.
+    # From its first moment on it was blocked.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
     for name in _ONE_THREAD:

@@ -10,6 +10,7 @@ import asyncio
 import time
 import uuid
 from collections.abc import Callable
+from contextvars import Context
 from math import inf
 from typing import Any
 
@@ -31,7 +32,8 @@ MOST_REFUSALS = 20
 
 
 def _in_a_second(work: Callable[[], None]) -> None:
-    asyncio.get_running_loop().call_later(1.0, work)
+    # What is told then is of no request alone.
+    asyncio.get_running_loop().call_later(1.0, work, context=Context())
 
 
 class RefusalBound:

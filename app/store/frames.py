@@ -214,11 +214,9 @@ class Frames:
 
 def refused_picture(name: str, error: ChildEnded) -> ReviewError:
     """What the end of a process over a picture says: of the picture, or of the machine."""
-    if error.reason == "killed":
-        return OverloadedError(
-            f"{name} {error}",
-            hint="Try again in a moment. Where it happens often, give more memory.",
-        )
+    if error.reason in ("killed", "told"):
+        more = " Where it happens often, give more memory." if error.reason == "killed" else ""
+        return OverloadedError(f"{name} {error}", hint=f"Try again in a moment.{more}")
     kind = ImageError if error.reason == "crash" else TooLargeError
     return kind(f"{name} {error}")
 

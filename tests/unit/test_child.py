@@ -12,8 +12,9 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor
-from multiprocessing import get_context
+from multiprocessing import get_context, resource_tracker
 from multiprocessing.context import SpawnProcess
+from multiprocessing.resource_tracker import ResourceTracker
 from pathlib import Path
 
 import pytest
@@ -223,9 +224,16 @@ class TestRun:
             os.kill(process.pid, signal.SIGINT)
 
         monkeypatch.setattr(SpawnProcess, "start", start_and_interrupt)
+        # As in a process that has no child yet: its tracker would be started with the first one.
+        tracker = ResourceTracker()
+        for name in ("ensure_running", "getfd"):
+            monkeypatch.setattr(resource_tracker, name, getattr(tracker, name))
         child = Child(Allowance(300 * MEBI, 10.0, 60.0))
-        assert child.run(child_pid) != os.getpid()
-        child.close()
+        try:
+            assert child.run(child_pid) != os.getpid()
+        finally:
+            child.close()
+            tracker._stop()
 
     def test_one_that_is_told_to_end_did_not_crash(self, child: Child) -> None:
         with pytest.raises(ChildEnded, match="its process was told to end") as ended:

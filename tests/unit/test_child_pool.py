@@ -179,9 +179,10 @@ class TestClose:
         assert not (tmp_path / "late").exists()
 
     def test_what_comes_at_the_same_moment_has_its_end_too(
-        self, figures: ChildFigures, tmp_path: Path
+        self, figures: ChildFigures, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        for _ in range(20):
+        monkeypatch.setattr("app.child_pool.PATIENCE", 0.0)
+        for _ in range(5):
             pool = ChildPool(ALLOWANCE, 1, 1000, "pictures", figures)
             with ThreadPoolExecutor(4) as threads:
                 begun = [threads.submit(submit_many, pool, tmp_path) for _ in range(3)]

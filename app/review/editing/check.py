@@ -63,9 +63,10 @@ def as_logged(
         call: What a key is called.
     """
     if isinstance(said, Mapping):
-        apart = {key for key in said.keys() | present if said.get(key) != present.get(key)}
+        keys = sorted(said.keys() | present)
+        names = [call(key) for key in keys if said.get(key) != present.get(key)]
     else:
-        apart = said ^ present
+        # Parts of what is in a set may be missing, and missing parts have no order.
+        names = sorted(map(call, said ^ present))
     whole = f"{len(present):,}, as the log says"
-    names = [call(key) for key in sorted(apart)]
     return compared(name, whole, names, "not as the log says", mend)

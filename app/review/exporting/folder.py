@@ -50,8 +50,9 @@ class ExportFolder:
     def writing(self, name: str) -> Iterator[Path]:
         """A path beside the zip of an export, for this run to call its half written files after.
 
-        What a server or a process that was killed at an export has left of it goes before; after
-        it, this run's alone: another server may have begun with it anew.
+        What a server or a process that was killed at an export has left of it goes before, also
+        under a server that is still at it: it is theirs no more. After it goes what is this run's
+        alone, for another server may have begun with it anew.
         """
         self.folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         self._clear(f"{name}.zip")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from app.child import ChildEnded
 from app.errors import NotFoundError, OverloadedError
 from app.progress import TellProgress
 from app.review.answers.keep import Keep, keep_nothing
@@ -124,8 +125,9 @@ def verify_work(store: Store, version_id: int, actor: str) -> Work:
                 progress=progress,
             )
         except OverloadedError as error:
-            # The process did not come to keeping it.
-            keep_failure(store, version_id, error.message, actor=actor)
+            # A process that ended did not come to keeping it; one that never began says nothing.
+            if isinstance(error.__cause__, ChildEnded):
+                keep_failure(store, version_id, error.message, actor=actor)
             raise
 
     return work

@@ -8,7 +8,7 @@ once more after that.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -132,7 +132,8 @@ def give_verdicts(
 ) -> BatchReport:
     """Give a verdict to all groups of a query, as each of them is when its turn comes.
 
-    Accepting a group that fails a gate overrides the policy, as it does for one group alone:
+    A run that was stopped goes on with the groups behind its place that match then; what was
+    imported since it began is not among them. Accepting a group that fails a gate overrides the policy, as it does for one group alone:
     without a note such groups are refused and counted, and so are groups without any picture.
 
     Args:
@@ -156,30 +157,42 @@ def give_verdicts(
     run = BatchRun(dataset_id, query, verdict, actor, progress=progress)
     with store.read() as session:
         begun = run.resume(session)
-        rows = Listing(session, dataset_id, conditions).columns(ASKED, by_number=True)
-    found = sort_out(rows, verdict)
+        found = sort_out(
+            Listing(session, dataset_id, conditions).columns(ASKED, by_number=True), verdict
+        )
     if begun is None:
         _require_expected(found, expected)
-        left, refused = found.change, found.refused
-        if not left:
+        places, refused = [(row.number, row.group_id) for row in found.change], found.refused
+        if not places:
             return BatchReport(None, 0, refused)
     else:
-        left = [row for row in found.change if row.number > begun["after"]]
+        places = [(row.number, row.group_id) for row in found.change if _is_left(row, begun)]
         refused = tuple(Refusal(*item) for item in begun["refused"])
-    while True:
-        chunk, left = left[:CHUNK], left[CHUNK:]
+    until = places[-1][0] if begun is None else begun.get("until")
+    told = [[item.reason, item.groups] for item in refused]
+    for start in range(0, max(len(places), 1), CHUNK):
+        chunk = places[start : start + CHUNK]
         with store.write() as session:
-            ids = [row.group_id for row in chunk]
-            rows = read_columns(session, ids, conditions, ASKED)
+            rows = read_columns(session, [group for _, group in chunk], conditions, ASKED)
             run.save(session, sort_out(rows, verdict).change)
-            if left:
-                told = [[item.reason, item.groups] for item in refused]
-                run.interrupt(session, {"after": chunk[-1].number, "refused": told})
+            if start + CHUNK < len(places):
+                run.interrupt(session, {"after": chunk[-1][0], "until": until, "refused": told})
             else:
                 run.close(session)
                 report = BatchReport(run.batch, run.changed, refused)
                 keep(report)(session)
-                return report
+    return report
+
+
+def _is_left(row: Any, begun: Mapping[str, Any]) -> bool:
+    """Whether a group is among those that a run which was stopped had left.
+
+    It remembers the numbers between which they lie, so that whatever was imported since is not
+    among them; one of an earlier version remembers each of them.
+    """
+    if "ids" in begun:
+        return row.group_id in begun["ids"]
+    return bool(begun["after"] < row.number <= begun["until"])
 
 
 def _require_expected(found: SortedOut, expected: int | None) -> None:
@@ -292,7 +305,7 @@ class BatchRun:
         save_verdicts(session, self._dataset_id, verdicts, actor=self._actor, at=at)
         self.changed += len(verdicts)
         spans = [] if given is None else given.spans
-        self._save_batch(session, at, [*spans, (verdicts[0].id, verdicts[-1].id)])
+        self._save_batch(session, at, with_span(spans, verdicts))
 
     def close(self, session: Session) -> None:
         """Say in the log that the batch is complete."""
@@ -350,6 +363,25 @@ def _verdicts(
             override=(row.gate or "unknown") if accepts and not row.passes else None,
         )
         for place, row in enumerate(rows)
+    ]
+
+
+def with_span(spans: Spans, verdicts: Sequence[StoredVerdict]) -> Spans:
+    """Spans together with that of some verdicts, which often goes on where the last one ends."""
+    if not verdicts:
+        return spans
+    first, last = verdicts[0].id, verdicts[-1].id
+    if spans and spans[-1][1] + 1 == first:
+        return [*spans[:-1], (spans[-1][0], last)]
+    return [*spans, (first, last)]
+
+
+def pieces(spans: Spans) -> list[tuple[int, int]]:
+    """The same verdicts in spans of as many as a transaction may have."""
+    return [
+        (start, min(start + CHUNK - 1, last))
+        for first, last in spans
+        for start in range(first, last + 1, CHUNK)
     ]
 
 

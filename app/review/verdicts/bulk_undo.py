@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 
 from app.errors import ConflictError, NotFoundError
 from app.review.answers.keep import Keep, keep_nothing
-from app.review.verdicts.bulk import save_verdicts
-from app.store.batches import BulkVerdict, Spans, find_batch, update_batch
+from app.review.verdicts.bulk import pieces, save_verdicts, with_span
+from app.store.batches import BulkVerdict, find_batch, update_batch
 from app.store.clock import now
 from app.store.log import Entry, append
 from app.store.session import Session
@@ -37,27 +37,27 @@ def undo_batch(
         ConflictError: It was taken back before.
     """
     number = 0
-    restored: dict[int, int] = {}
-    """Groups of each span that was taken back here, by its first verdict."""
     while True:
         with store.write() as session:
             batch = _standing(session, batch_id)
-            verdicts = _restore(session, batch, *batch.spans[number], actor)
+            left = pieces(batch.spans)[number:]
             # What another run has taken back is not taken back again: it is not the newest.
-            spans = [*(batch.undo_spans or ()), *_span(verdicts)]
-            update_batch(session, batch_id, undo_spans=spans)
+            verdicts = _restore(session, batch, *left[0], actor) if left else []
+            update_batch(session, batch_id, undo_spans=with_span(batch.undo_spans or (), verdicts))
             number += 1
-            if verdicts:
-                restored[verdicts[0].id] = len({item.group_id for item in verdicts})
-            if number == len(batch.spans):
-                count = sum(
-                    restored.get(first) or len(set(judged_between(session, first, last)))
-                    for first, last in spans
-                )
-                report = UndoReport(batch_id, count, batch.changed - count)
-                _close(session, batch, report, actor)
-                keep(report)(session)
-                return report
+        if len(left) <= 1:
+            break
+    # Nothing is given any more of what is being taken back, so that this need keep nobody waiting.
+    with store.read() as session:
+        batch = read_batch(session, batch_id)
+        groups = {
+            item for span in batch.undo_spans or () for item in judged_between(session, *span)
+        }
+    report = UndoReport(batch_id, len(groups), batch.changed - len(groups))
+    with store.write() as session:
+        _close(session, _standing(session, batch_id), report, actor)
+        keep(report)(session)
+    return report
 
 
 def _standing(session: Session, batch_id: int) -> BulkVerdict:
@@ -71,11 +71,6 @@ def _standing(session: Session, batch_id: int) -> BulkVerdict:
     if batch.undone is not None:
         raise ConflictError(f"{batch.undone_by} has taken this batch back already")
     return batch
-
-
-def _span(verdicts: Sequence[StoredVerdict]) -> Spans:
-    """First and last id of the verdicts of a chunk; nothing where there are none."""
-    return [(verdicts[0].id, verdicts[-1].id)] if verdicts else []
 
 
 def _close(session: Session, batch: BulkVerdict, report: UndoReport, actor: str) -> None:

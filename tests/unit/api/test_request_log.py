@@ -89,12 +89,13 @@ class TestRefusalBound:
     def test_the_rest_is_counted_also_where_nothing_more_is_refused(self, lines) -> None:
         async def refuse_many() -> None:
             bound = RefusalBound()
-            for _ in range(MOST_REFUSALS + 2):
-                bound.admits()
+            with structlog.contextvars.bound_contextvars(request="one of them"):
+                for _ in range(MOST_REFUSALS + 2):
+                    bound.admits()
             await asyncio.sleep(1.1)
 
         asyncio.run(refuse_many())
-        assert [line["count"] for line in lines] == [2]
+        assert [(line["count"], "request" in line) for line in lines] == [(2, False)]
 
     def test_seldom_ones_are_all_told(self, lines) -> None:
         clock = [5.0]

@@ -116,7 +116,11 @@ class TestFrames:
 
     @pytest.mark.parametrize(
         ("end", "error", "reason"),
-        [("crash", ImageError, "made the process crash"), ("be_killed", OverloadedError, "killed")],
+        [
+            ("crash", ImageError, "made the process crash"),
+            ("be_killed", OverloadedError, "killed"),
+            ("be_told_to_end", OverloadedError, "told to end"),
+        ],
     )
     def test_what_may_be_the_machines_doing_is_tried_again(
         self,
@@ -188,6 +192,10 @@ class TestFrames:
 
 def crash(*_: object) -> None:
     os.abort()
+
+
+def be_told_to_end(*_: object) -> None:
+    os.kill(os.getpid(), signal.SIGTERM)
 
 
 def be_killed(*_: object) -> None:

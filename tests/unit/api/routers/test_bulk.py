@@ -7,8 +7,12 @@ from typing import Any
 import pytest
 from sqlalchemy import text
 
+from app.review.importing.ingest import ingest
 from app.review.verdicts import bulk, bulk_undo
 from app.review.verdicts.bulk import BatchRun
+from app.soccer.frames import ImageSize
+from app.soccer.group import Group, Station, View
+from app.store.session import Session
 
 DATASET = "/api/v1/datasets/broadcast"
 VERDICTS = f"{DATASET}/verdicts"
@@ -143,6 +147,34 @@ class TestStoppedBetweenChunks:
         assert (again.content, again.headers["idempotency-replayed"]) == (done.content, "true")
         undone = api.post("/api/v1/verdict-batches/1/undo").json()
         assert (undone["restored"], undone["kept"]) == (3, 0)
+
+    def test_what_was_imported_since_it_was_stopped_is_not_judged_with_the_rest(
+        self, app, api, monkeypatch
+    ) -> None:
+        body = {"state": "deferred", "expected": 3}
+        with monkeypatch.context() as patch:
+            patch.setattr(BatchRun, "save", Stop(BatchRun.save, after=1))
+            assert api.post(VERDICTS, json=body, headers=self.KEY).status_code == 500
+        new = Group("new", (View("1.png", Station("1.png", ImageSize(1280, 720))),), "m")
+        ingest(app.state.services.store, "broadcast", [new], source="test", actor="local")
+        assert api.post(VERDICTS, json=body, headers=self.KEY).json()["changed"] == 3
+        assert statuses(api) == {"deferred", "unreviewed"}
+
+    def test_one_that_an_earlier_version_began_goes_on_with_the_groups_that_it_had_left(
+        self, api, monkeypatch
+    ) -> None:
+        interrupt = BatchRun.interrupt
+
+        def in_its_words(run: BatchRun, session: Session, left: dict[str, Any]) -> None:
+            interrupt(run, session, {"ids": [3], "refused": []})
+
+        with monkeypatch.context() as patch:
+            patch.setattr(BatchRun, "interrupt", in_its_words)
+            patch.setattr(BatchRun, "save", Stop(BatchRun.save, after=1))
+            assert api.post(VERDICTS, json=self.BODY, headers=self.KEY).status_code == 500
+        done = api.post(VERDICTS, json=self.BODY, headers=self.KEY).json()
+        assert (done["batch"], done["changed"]) == (1, 2)
+        assert api.get("/api/v1/groups/2").json()["verdict"]["state"] == "unreviewed"
 
     def test_what_was_expected_is_weighed_at_the_beginning_alone(self, api, monkeypatch) -> None:
         body = {"state": "deferred", "expected": 3}

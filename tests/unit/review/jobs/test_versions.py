@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 
+from app.child import Child
 from app.errors import JobCancelled, OverloadedError
 from app.review.jobs import job_child
 from app.review.jobs.job_run import JobProgress
@@ -56,6 +57,19 @@ class TestVerifyWork:
         assert kept is not None
         assert (kept.actor, kept.report) == ("ben", None)
         assert kept.problem is not None and kept.problem.startswith("the process of")
+
+    def test_one_whose_process_cannot_be_started_leaves_what_was_kept(
+        self, store: Store, version: Version, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        def refuse(_child: Child, *_: Any, **__: Any) -> None:
+            raise OverloadedError("no process could be started for this") from OSError(12, "memory")
+
+        verify_work(store, version.id, "ann")(JobProgress(1, threading.Event()))
+        monkeypatch.setattr("app.store.store_child.Child.run", refuse)
+        with pytest.raises(OverloadedError, match="no process"):
+            verify_work(store, version.id, "ben")(JobProgress(2, threading.Event()))
+        kept = get_version(store, version.id).verified
+        assert kept is not None and (kept.actor, kept.problem) == ("ann", None)
 
     def test_one_that_was_cancelled_leaves_what_was_kept(
         self, store: Store, version: Version

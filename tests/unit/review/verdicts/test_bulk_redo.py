@@ -42,9 +42,7 @@ def undone(store, ids) -> int:
 
 def stopped_redo(store, monkeypatch) -> int:
     """A batch of two chunks that ben was giving again when something stopped him after one."""
-    with monkeypatch.context() as patch:
-        patch.setattr(bulk, "CHUNK", 2)
-        batch = give_verdicts(store, 1, "", "rejected", "other", "blurred", actor="ben").batch
+    batch = give_verdicts(store, 1, "", "rejected", "other", "blurred", actor="ben").batch
     undo_batch(store, batch, actor="ben")
     write, turns = store.write, []
 
@@ -55,6 +53,7 @@ def stopped_redo(store, monkeypatch) -> int:
         return write()
 
     with monkeypatch.context() as patch:
+        patch.setattr(bulk, "CHUNK", 2)
         patch.setattr(store, "write", once)
         with pytest.raises(RuntimeError, match="killed"):
             redo_batch(store, batch, actor="ben")
@@ -130,7 +129,7 @@ class TestRedoBatch:
         done = redo_batch(store, batch, actor="ben")
         assert (done.batch, done.changed, done.kept) == (batch + 1, 4, 0)
         newest, _ = list_batches(store, 1)
-        assert (newest.changed, len(newest.spans), newest.done) == (4, 2, True)
+        assert (newest.changed, newest.spans, newest.done) == (4, [[9, 12]], True)
         assert undo_batch(store, done.batch, actor="ben").restored == 4
 
     def test_one_that_somebody_else_has_begun_is_theirs_to_finish(
