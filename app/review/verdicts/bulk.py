@@ -132,9 +132,10 @@ def give_verdicts(
 ) -> BatchReport:
     """Give a verdict to all groups of a query, as each of them is when its turn comes.
 
-    A run that was stopped goes on with the groups behind its place that match then; what was
-    imported since it began is not among them. Accepting a group that fails a gate overrides the policy, as it does for one group alone:
+    Accepting a group that fails a gate overrides the policy, as it does for one group alone:
     without a note such groups are refused and counted, and so are groups without any picture.
+    A run that was stopped goes on with the groups behind its place that match then; what was
+    imported since it began is not among them.
 
     Args:
         store: The database.
@@ -157,18 +158,19 @@ def give_verdicts(
     run = BatchRun(dataset_id, query, verdict, actor, progress=progress)
     with store.read() as session:
         begun = run.resume(session)
-        found = sort_out(
-            Listing(session, dataset_id, conditions).columns(ASKED, by_number=True), verdict
-        )
+        rows = Listing(session, dataset_id, conditions).columns(ASKED, by_number=True)
+    found = sort_out(rows, verdict)
     if begun is None:
         _require_expected(found, expected)
-        places, refused = [(row.number, row.group_id) for row in found.change], found.refused
-        if not places:
+        left, refused = found.change, found.refused
+        if not left:
             return BatchReport(None, 0, refused)
     else:
-        places = [(row.number, row.group_id) for row in found.change if _is_left(row, begun)]
+        left = _left(found.change, begun)
         refused = tuple(Refusal(*item) for item in begun["refused"])
-    until = places[-1][0] if begun is None else begun.get("until")
+    places = [(row.number, row.group_id) for row in left]
+    # Of a million groups, what the queue says of each is much.
+    del rows, found, left
     told = [[item.reason, item.groups] for item in refused]
     for start in range(0, max(len(places), 1), CHUNK):
         chunk = places[start : start + CHUNK]
@@ -176,7 +178,8 @@ def give_verdicts(
             rows = read_columns(session, [group for _, group in chunk], conditions, ASKED)
             run.save(session, sort_out(rows, verdict).change)
             if start + CHUNK < len(places):
-                run.interrupt(session, {"after": chunk[-1][0], "until": until, "refused": told})
+                here, end = chunk[-1][0], places[-1][0]
+                run.interrupt(session, {"after": here, "until": end, "refused": told})
             else:
                 run.close(session)
                 report = BatchReport(run.batch, run.changed, refused)
@@ -184,15 +187,16 @@ def give_verdicts(
     return report
 
 
-def _is_left(row: Any, begun: Mapping[str, Any]) -> bool:
-    """Whether a group is among those that a run which was stopped had left.
+def _left(rows: Sequence[Any], begun: Mapping[str, Any]) -> list[Any]:
+    """Those of some groups that a run which was stopped had left.
 
     It remembers the numbers between which they lie, so that whatever was imported since is not
     among them; one of an earlier version remembers each of them.
     """
     if "ids" in begun:
-        return row.group_id in begun["ids"]
-    return bool(begun["after"] < row.number <= begun["until"])
+        ids = set(begun["ids"])
+        return [row for row in rows if row.group_id in ids]
+    return [row for row in rows if begun["after"] < row.number <= begun["until"]]
 
 
 def _require_expected(found: SortedOut, expected: int | None) -> None:
