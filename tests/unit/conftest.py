@@ -44,9 +44,11 @@ def _no_setting_of_tests() -> None:
 
 ON_BOTH = frozenset(
     {
+        "review/editing/test_doctor.py",
         "review/editing/test_submit.py",
         "review/verdicts/test_verdict.py",
         "review/versions/test_freeze.py",
+        "review/versions/test_version_check.py",
         "store/test_answers.py",
         "store/test_conditions.py",
         "store/test_listing.py",
@@ -56,8 +58,8 @@ ON_BOTH = frozenset(
         "store/test_verdicts.py",
     }
 )
-"""Files whose tests always run on SQLite and on PostgreSQL: what the engines do differently, and one
-way each of edits, verdicts, versions and answers through the store."""
+"""Files whose tests always run on SQLite and on PostgreSQL: what the engines do differently, what finds
+damage, and one way each of edits, verdicts, versions and answers through the store."""
 WHEN_ALL = ON_BOTH | {
     "review/answers/test_answers.py",
     "review/datasets/test_delete.py",

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from app.errors import ConflictError, NotFoundError
 from app.review.answers.keep import Keep, keep_nothing
 from app.review.verdicts.bulk import pieces, save_verdicts, with_span
-from app.store.batches import BulkVerdict, find_batch, update_batch
+from app.store.batches import BulkVerdict, Spans, find_batch, update_batch
 from app.store.clock import now
 from app.store.log import Entry, append
 from app.store.session import Session
@@ -36,28 +36,38 @@ def undo_batch(
         NotFoundError: There is no such batch.
         ConflictError: It was taken back before.
     """
-    number = 0
+    with store.read() as session:
+        before = read_batch(session, batch_id).undo_spans or ()
+        restored = _restored(session, before)
+    known, number = _verdicts_in(before), 0
     while True:
         with store.write() as session:
             batch = _standing(session, batch_id)
             left = pieces(batch.spans)[number:]
             # What another run has taken back is not taken back again: it is not the newest.
             verdicts = _restore(session, batch, *left[0], actor) if left else []
-            update_batch(session, batch_id, undo_spans=with_span(batch.undo_spans or (), verdicts))
+            spans = with_span(batch.undo_spans or (), verdicts)
+            update_batch(session, batch_id, undo_spans=spans)
+            restored += len({item.group_id for item in verdicts})
+            known += len(verdicts)
             number += 1
-        if len(left) <= 1:
-            break
-    # Nothing is given any more of what is being taken back, so that this need keep nobody waiting.
-    with store.read() as session:
-        batch = read_batch(session, batch_id)
-        groups = {
-            item for span in batch.undo_spans or () for item in judged_between(session, *span)
-        }
-    report = UndoReport(batch_id, len(groups), batch.changed - len(groups))
-    with store.write() as session:
-        _close(session, _standing(session, batch_id), report, actor)
-        keep(report)(session)
-    return report
+            if len(left) <= 1:
+                if _verdicts_in(spans) != known:
+                    # Another run has been at it meanwhile.
+                    restored = _restored(session, spans)
+                report = UndoReport(batch_id, restored, batch.changed - restored)
+                _close(session, batch, report, actor)
+                keep(report)(session)
+                return report
+
+
+def _restored(session: Session, spans: Spans) -> int:
+    """Of how many groups these verdicts are."""
+    return len({group for span in spans for group in judged_between(session, *span)})
+
+
+def _verdicts_in(spans: Spans) -> int:
+    return sum(last - first + 1 for first, last in spans)
 
 
 def _standing(session: Session, batch_id: int) -> BulkVerdict:

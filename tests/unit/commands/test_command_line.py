@@ -27,6 +27,7 @@ from app.errors import InputError
 from tests.scenes import make_scenes
 
 Run = Callable[..., tuple[int, str, str]]
+OF_THE_FILE = pytest.mark.file_of_sqlite("backups, which are copies of it")
 
 
 @pytest.fixture
@@ -198,8 +199,8 @@ class TestNames:
         [
             ("import", "coco", "{}", "--dataset", "sn"),
             ("export", "--dataset", "sn", "--format", "sn-calibration", "--all", "{}"),
-            ("backup", "{}.zip"),
-            ("restore", "{}"),
+            pytest.param(("backup", "{}.zip"), marks=OF_THE_FILE),
+            pytest.param(("restore", "{}"), marks=OF_THE_FILE),
         ],
     )
     def test_one_that_the_system_does_not_take_is_said_with_its_beginning(

@@ -18,10 +18,8 @@ from app.review.verdicts.verdict import set_verdict
 from app.soccer.annotation import make_lines
 from app.store.dialect.dialect import dialect_of
 from app.store.store import Store
-from tests.databases import POSTGRESQL, SQLITE, said_for_sqlite
+from tests.databases import said_for_sqlite
 from tests.unit.review.conftest import OPPOSITE
-
-DATABASES = [SQLITE, POSTGRESQL]
 
 
 @pytest.fixture

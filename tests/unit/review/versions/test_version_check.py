@@ -12,9 +12,7 @@ from app.review.versions.version_check import examine_versions
 from app.store.dialect.dialect import dialect_of
 from app.store.frozen import body_of
 from app.store.store import Store
-from tests.databases import POSTGRESQL, SQLITE, said_for_sqlite
-
-DATABASES = [SQLITE, POSTGRESQL]
+from tests.databases import said_for_sqlite
 
 
 @pytest.fixture(autouse=True)
