@@ -145,7 +145,8 @@ class Target:
             # Each has a process of its own, which loads what a server does.
             Attack("exporting", 1, work.export, done, growth=600.0),
             Attack("freezing", 1, work.freeze, done, growth=600.0),
-            Attack("judging", 1, work.judge, done),
+            # What is verified goes on when nobody waits for it.
+            Attack("judging", 1, work.judge, done, growth=600.0),
             Attack("importing", 1, work.import_, done),
             # The last one, for it goes on when nobody waits; each of its processes has a solver of its own.
             Attack("solving", 1, work.solve, done, growth=1200.0),
