@@ -201,5 +201,6 @@ def export(
         report = run_export(
             store, dataset, format_, target, everything=everything, **asked, progress=progress
         )
+    # How many groups were to be written is a matter of progress; what was is in the counts.
     values = {name: value for name, value in vars(report).items() if name != "groups"}
     print_export({**values, "out": str(report.out)}, json_)

@@ -205,7 +205,7 @@ def patiently(check: Callable[[], None]) -> Callable[[], None]:
 
 def _work(
     settings: Settings,
-    spoken_of: Mapping[str, Any],
+    log_fields: Mapping[str, Any],
     work: Callable[..., Any],
     arguments: tuple[Any, ...],
     tell: Callable[[Word], Answer],
@@ -213,7 +213,7 @@ def _work(
     log_to_stderr()
     caller = Caller(tell)
     with (
-        structlog.contextvars.bound_contextvars(**spoken_of),
+        structlog.contextvars.bound_contextvars(**log_fields),
         closing(Store.open(settings, _Turn(caller))) as store,
     ):
         return _with_last_word(work, store, arguments, caller)

@@ -33,13 +33,15 @@ TYPE_WHILE_VALUES_ARRIVE = """async () => {
 }"""
 
 
-CHOSEN = """async (verb) => {
+CHOOSE_VERDICT = """async (verb) => {
   [...document.querySelectorAll('.choice label')].find((one) => one.textContent.startsWith(verb)).click();
   // It is drawn, and what follows a drawing is still to come.
   for (let turn = 0; turn < 5; turn += 1) await undefined;
   const button = document.querySelector('dialog[open] .button--primary');
   return [button.textContent, button.getAttribute('aria-disabled')];
 }"""
+
+
 CHOOSE_WHILE_VALUES_ARRIVE = """async () => {
   const { facets } = await import(
     document.querySelector('script[src$="main.js"]').src.replace('main.js', 'state/facets.js'));
@@ -372,7 +374,7 @@ class TestTicks:
         expect(page.locator(".bulk__outcome")).to_contain_text("of 2 groups")
         with holding(page, re.compile(r"/verdicts\?dry_run")):
             # As soon as it is drawn, before anything is asked.
-            words, disabled = page.evaluate(CHOSEN, "Defer")
+            words, disabled = page.evaluate(CHOOSE_VERDICT, "Defer")
             assert (words.split()[0], disabled) == ("Defer", "true")
         expect(page.get_by_role("button", name="Defer 2 groups")).to_be_enabled()
 

@@ -78,9 +78,7 @@ class TestWork:
         self, open_page: OpenPage, team: str, team_home: Path, console: Any
     ) -> None:
         console.expect(REFUSED)
-        join(team_home, "quinto", Role.REVIEWER)
-        new = NewBatch("Late", "id:10", reviewers=["quinto"], skip_given=False)
-        in_store(team_home, lambda store: make_batch(store, "sample", new, actor="local"))
+        give_to(team_home, "quinto", "Late", "id:10")
         page = open_page("/work", address=team)
         log_in(page, "quinto")
         go_on = page.get_by_role("button", name="Go on: 1 group of Late")
@@ -98,9 +96,7 @@ class TestWork:
         self, open_page: OpenPage, team: str, team_home: Path, console: Any
     ) -> None:
         console.expect(REFUSED)
-        join(team_home, "quinn", Role.REVIEWER)
-        new = NewBatch("Slow", "id:11,12", reviewers=["quinn"], skip_given=False)
-        in_store(team_home, lambda store: make_batch(store, "sample", new, actor="local"))
+        give_to(team_home, "quinn", "Slow", "id:11,12")
         page = open_page("/work", address=team)
         log_in(page, "quinn")
         page.get_by_role("button", name="Go on: 2 groups of Slow").press("Enter")
@@ -228,6 +224,13 @@ class TestWork:
         until(page, lambda: "/review/8" in page.url)
         expect(page.get_by_text("ute’s annotation is in the group now")).to_be_visible()
         assert verdict(page, 8) == {"state": "accepted", "by": "ute"}
+
+
+def give_to(home: Path, name: str, batch: str, q: str) -> None:
+    """Let somebody come who has groups to review."""
+    join(home, name, Role.REVIEWER)
+    new = NewBatch(batch, q, reviewers=[name], skip_given=False)
+    in_store(home, lambda store: make_batch(store, "sample", new, actor="local"))
 
 
 def judge_alone(page: Page, batch: str, keys: list[str], *, unseen: dict[str, int]) -> int:

@@ -100,6 +100,16 @@ def is_listening(address: str) -> bool:
     return True
 
 
+def importing(server: subprocess.Popen[str], address: str) -> tuple[int, list[int]]:
+    """Have the folder imported; the job once it runs, and the processes of the server then."""
+    body = {"dataset": "d", "format": "soccernet-v3", "source": {"folder": "data"}}
+    with httpx.Client(base_url=address, headers={"Origin": address}, timeout=SECONDS) as client:
+        job: int = client.post("/api/v1/imports", json=body).json()["id"]
+        until(lambda: client.get(f"/api/v1/jobs/{job}").json()["state"] == "running")
+    # One for the pictures, one for the import, and multiprocessing's own.
+    return job, until(lambda: len(found := children(server.pid)) >= 3 and found)
+
+
 class TestStopping:
     def test_a_change_that_is_under_way_is_answered_and_kept(
         self, filled: Path, tmp_path_factory: pytest.TempPathFactory
@@ -134,13 +144,7 @@ class TestStopping:
     def test_no_process_outlives_the_server(
         self, server: subprocess.Popen[str], address: str, number: int
     ) -> None:
-        body = {"dataset": "d", "format": "soccernet-v3", "source": {"folder": "data"}}
-        with httpx.Client(base_url=address, headers={"Origin": address}, timeout=SECONDS) as client:
-            job = client.post("/api/v1/imports", json=body).json()["id"]
-            place = f"/api/v1/jobs/{job}"
-            until(lambda: client.get(place).json()["state"] == "running")
-        # One for the pictures, one for the import, and multiprocessing's own.
-        workers = until(lambda: len(found := children(server.pid)) >= 3 and found)
+        _, workers = importing(server, address)
         server.send_signal(number)
         server.wait(SECONDS)
         until(lambda: not any(map(is_alive, workers)))
@@ -148,12 +152,7 @@ class TestStopping:
     def test_a_job_whose_process_is_told_to_end_before_its_server_goes_on_with_the_next_one(
         self, server: subprocess.Popen[str], address: str, home: Path
     ) -> None:
-        body = {"dataset": "d", "format": "soccernet-v3", "source": {"folder": "data"}}
-        with httpx.Client(base_url=address, headers={"Origin": address}, timeout=SECONDS) as client:
-            job = client.post("/api/v1/imports", json=body).json()["id"]
-            place = f"/api/v1/jobs/{job}"
-            until(lambda: client.get(place).json()["state"] == "running")
-        workers = until(lambda: len(found := children(server.pid)) >= 3 and found)
+        job, workers = importing(server, address)
         # As systemd does with KillMode=control-group, in whatever order.
         for number in (*workers, server.pid):
             os.kill(number, signal.SIGTERM)
