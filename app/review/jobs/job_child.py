@@ -21,20 +21,16 @@ SMALL = 100
 STOP_SECONDS = 2.0
 """So long after its process a server may be told to stop."""
 _AGAIN = "Start it again."
+_MEMORY = f"{_AGAIN} Where it happens often, give more memory."
 _ENDS: dict[Reason, tuple[str, str]] = {
-    "memory": (
-        "needs more memory than there is",
-        f"{_AGAIN} Where it happens often, give more memory.",
-    ),
-    "killed": (
-        "was killed, most likely for want of memory",
-        f"{_AGAIN} Where it happens often, give more memory.",
-    ),
+    "memory": ("needs more memory than there is", _MEMORY),
+    "killed": ("was killed, most likely for want of memory", _MEMORY),
     "told": ("was told to end", _AGAIN),
-    "crash": ("crashed", f"{_AGAIN} Where it crashes again, report it: the log says where it was."),
+    "crash": ("crashed", f"{_AGAIN} Where it crashes again, report it."),
     "processor": ("took too long to work out", _AGAIN),
     "silence": ("came to no next step", f"{_AGAIN} The disk or a store may not answer."),
 }
+"""How a process ended, and what to do about it."""
 
 
 def carry_out_apart(
