@@ -6,6 +6,7 @@ with threads is unsafe), kept warm between tasks, and ends with its parent, howe
 
 from __future__ import annotations
 
+import faulthandler
 import fcntl
 import math
 import multiprocessing
@@ -245,6 +246,8 @@ def end_with_parent() -> None:
 def _serve(line: Connection, allowance: Allowance) -> None:
     """What runs in the child: one task after the other, until the parent hangs up."""
     end_with_parent()
+    # A library that crashes says on stderr where it was called.
+    faulthandler.enable()
     # From its first moment on it was blocked.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})

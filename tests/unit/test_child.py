@@ -183,6 +183,13 @@ class TestRun:
             assert caught.value.reason == reason
         assert child.run(child_pid) != os.getpid()
 
+    def test_a_crash_says_on_stderr_where_it_was(self, capfd: pytest.CaptureFixture[str]) -> None:
+        with pytest.raises(ChildEnded):
+            Child(Allowance(300 * MEBI, 10.0, 60.0)).run(crash)
+        said = capfd.readouterr().err
+        assert said.startswith("Fatal Python error: Aborted")
+        assert "in crash" in said
+
     def test_one_that_died_between_two_tasks_is_replaced(self, child: Child) -> None:
         pid = child.run(child_pid)
         os.kill(pid, signal.SIGKILL)
