@@ -91,3 +91,22 @@ def _batch(row: Any) -> BulkVerdict:
 
 def _row(values: dict[str, Any]) -> dict[str, Any]:
     return {name: json_text(item) if name in _SPANS else item for name, item in values.items()}
+
+
+def with_span(spans: Spans, ids: Sequence[int]) -> Spans:
+    """Spans together with that of some ids in a row, which often go on where the last one ends."""
+    if not ids:
+        return spans
+    first, last = ids[0], ids[-1]
+    if spans and spans[-1][1] + 1 == first:
+        return [*spans[:-1], (spans[-1][0], last)]
+    return [*spans, (first, last)]
+
+
+def pieces(spans: Spans, most: int) -> list[tuple[int, int]]:
+    """The same ids in spans of at most so many."""
+    return [
+        (start, min(start + most - 1, last))
+        for first, last in spans
+        for start in range(first, last + 1, most)
+    ]

@@ -22,8 +22,10 @@ from app.store.batches import (
     Spans,
     find_batch,
     insert_batch,
+    pieces,
     read_batches,
     update_batch,
+    with_span,
 )
 from app.store.clock import now
 from app.store.listing import Listing, read_columns
@@ -309,7 +311,7 @@ class BatchRun:
         save_verdicts(session, self._dataset_id, verdicts, actor=self._actor, at=at)
         self.changed += len(verdicts)
         spans = [] if given is None else given.spans
-        self._save_batch(session, at, with_span(spans, verdicts))
+        self._save_batch(session, at, with_span(spans, [item.id for item in verdicts]))
 
     def close(self, session: Session) -> None:
         """Say in the log that the batch is complete."""
@@ -370,23 +372,9 @@ def _verdicts(
     ]
 
 
-def with_span(spans: Spans, verdicts: Sequence[StoredVerdict]) -> Spans:
-    """Spans together with that of some verdicts, which often goes on where the last one ends."""
-    if not verdicts:
-        return spans
-    first, last = verdicts[0].id, verdicts[-1].id
-    if spans and spans[-1][1] + 1 == first:
-        return [*spans[:-1], (spans[-1][0], last)]
-    return [*spans, (first, last)]
-
-
-def pieces(spans: Spans) -> list[tuple[int, int]]:
-    """The same verdicts in spans of as many as a transaction may have."""
-    return [
-        (start, min(start + CHUNK - 1, last))
-        for first, last in spans
-        for start in range(first, last + 1, CHUNK)
-    ]
+def chunks(spans: Spans) -> list[tuple[int, int]]:
+    """The verdicts of some spans in spans of as many as a transaction may have."""
+    return pieces(spans, CHUNK)
 
 
 def save_verdicts(

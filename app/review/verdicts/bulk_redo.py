@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from app.errors import ConflictError
 from app.review.answers.keep import Keep, keep_nothing
 from app.review.answers.saved_progress import SavedProgress
-from app.review.verdicts.bulk import ASKED, BatchRun, Refusal, pieces, sort_out
+from app.review.verdicts.bulk import ASKED, BatchRun, Refusal, chunks, sort_out
 from app.review.verdicts.bulk_undo import read_batch
 from app.review.verdicts.verdict import check_verdict
 from app.store.batches import BulkVerdict, Spans, update_batch
@@ -99,7 +99,7 @@ def _spans(batch: BulkVerdict) -> Spans:
             "of the groups",
             hint="Give the verdict once more in the queue.",
         )
-    return pieces(batch.undo_spans)
+    return chunks(batch.undo_spans)
 
 
 def _begun(session: Session, batch_id: int, actor: str) -> int | None:

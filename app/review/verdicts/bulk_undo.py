@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 
 from app.errors import ConflictError, NotFoundError
 from app.review.answers.keep import Keep, keep_nothing
-from app.review.verdicts.bulk import pieces, save_verdicts, with_span
-from app.store.batches import BulkVerdict, Spans, find_batch, update_batch
+from app.review.verdicts.bulk import chunks, save_verdicts
+from app.store.batches import BulkVerdict, Spans, find_batch, update_batch, with_span
 from app.store.clock import now
 from app.store.log import Entry, append
 from app.store.session import Session
@@ -43,10 +43,10 @@ def undo_batch(
     while True:
         with store.write() as session:
             batch = _standing(session, batch_id)
-            left = pieces(batch.spans)[number:]
+            left = chunks(batch.spans)[number:]
             # What another run has taken back is not taken back again: it is not the newest.
             verdicts = _restore(session, batch, *left[0], actor) if left else []
-            spans = with_span(batch.undo_spans or (), verdicts)
+            spans = with_span(batch.undo_spans or (), [item.id for item in verdicts])
             update_batch(session, batch_id, undo_spans=spans)
             restored += len({item.group_id for item in verdicts})
             known += len(verdicts)

@@ -3,9 +3,8 @@ from __future__ import annotations
 import subprocess
 import sys
 import threading
-from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import ExitStack, closing
+from contextlib import ExitStack
 from contextvars import copy_context
 from pathlib import Path
 
@@ -17,27 +16,12 @@ from structlog.testing import capture_logs
 from app.config import Settings
 from app.errors import BusyError, DamagedError, InputError, StorageError
 from app.place import hold_place
-from app.store.anchor import anchor_file, read_anchor
-from app.store.dialect.dialect import dialect_of
 from app.store.dialect.sqlite import AGAIN_S, PRAGMAS
-from app.store.first_look import log_file
 from app.store.log import Entry, append, read_log
 from app.store.migrate import KNOWN_REVISIONS, migrate, migrations_folder
 from app.store.store import Store
-from tests.databases import Databases, said_for_sqlite
-from tests.unit.store.homes import say
-
-INSERT = "INSERT INTO dataset (name, created, policy, policy_hash) VALUES ('{}', '', '', '')"
-
-
-def names(store: Store) -> list[str]:
-    with store.read() as session:
-        return list(session.scalars(text("SELECT name FROM dataset ORDER BY id")))
-
-
-def add(store: Store, name: str) -> None:
-    with store.write() as session:
-        session.execute(text(INSERT.format(name)))
+from tests.databases import said_for_sqlite
+from tests.unit.store.homes import INSERT, add, names
 
 
 class TestOpen:
@@ -335,190 +319,7 @@ class TestPeek:
             pytest.fail("it was answered")
 
 
-class TestBeforeTheCommit:
-    @pytest.mark.parametrize("times", [1, 5])
-    def test_a_log_that_has_lost_its_end_takes_no_entry_and_the_home_forgets_nothing(
-        self, store: Store, times: int
-    ) -> None:
-        say(store, 5)
-        cut_log(store, after=3)
-        with pytest.raises(DamagedError, match="ends after 3 entries, but 5 were said"):
-            say_at_once(store, times)
-        with pytest.raises(DamagedError, match="no change is taken"):
-            add(store, "late")
-        assert (log_ids(store), said(store)) == ([1, 2, 3], 5)
-
-    def test_an_end_that_another_process_wrote_counts_too(self, store: Store) -> None:
-        say(store, 2)
-        with closing(Store.open(store.settings)) as other:
-            say(other, 3)
-        cut_log(store, after=4)
-        with pytest.raises(DamagedError, match="ends after 4 entries, but 5 were said"):
-            say(store)
-
-    def test_beside_the_writes_of_another_process_the_log_grows(self, store: Store) -> None:
-        say(store, 2)
-        with closing(Store.open(store.settings)) as other:
-            say(other, 3)
-            say(store)
-            say(other)
-        assert (log_ids(store), said(store)) == ([1, 2, 3, 4, 5, 6, 7], 7)
-
-    def test_an_anchor_that_cannot_be_read_costs_no_change(
-        self, store: Store, monkeypatch: pytest.MonkeyPatch
-    ) -> None:
-        say(store)
-        with monkeypatch.context() as broken:
-            broken.setattr("app.store.store.read_anchor", refuse)
-            say(store)
-            cut_log(store, after=1)
-            # What this process has said itself it knows all the same.
-            with pytest.raises(DamagedError, match="but 2 were said"):
-                say(store)
-
-    def test_a_home_whose_anchor_was_taken_away_believes_its_database(self, store: Store) -> None:
-        say(store, 5)
-        cut_log(store, after=3)
-        anchor_file(store.settings.database_file).unlink()
-        say(store)
-        assert log_ids(store) == [1, 2, 3, 4]
-
-
-@pytest.mark.file_of_sqlite("the file that is open")
-class TestAFileThatIsTakenAway:
-    @pytest.mark.parametrize(
-        ("take", "said"),
-        [
-            (lambda file: file.rename(file.with_name("aside.db")), "moved or deleted"),
-            (lambda file: file.unlink(), "moved or deleted"),
-            (lambda file: replace_file(file, b"another"), "replaced by another file"),
-        ],
-    )
-    @pytest.mark.parametrize("lasting", [True, False])
-    def test_no_change_is_taken_before_or_within_a_transaction(
-        self, store: Store, take: Callable[[Path], None], said: str, lasting: bool
-    ) -> None:
-        add(store, "kept")
-        with pytest.raises(DamagedError, match=said), store.write(lasting=lasting) as session:
-            session.execute(text(INSERT.format("lost")))
-            take(store.settings.database_file)
-        with pytest.raises(DamagedError, match=f"no change is taken: .* {said}") as caught:
-            add(store, "late")
-        assert "Stop the server and put the file that was moved back" in str(caught.value.hint)
-        assert names(store) == ["kept"]
-
-    def test_it_is_seen_before_anything_is_asked_for(self, store: Store) -> None:
-        store.require_undamaged()
-        store.settings.database_file.unlink()
-        with pytest.raises(DamagedError, match="moved or deleted"):
-            store.require_undamaged()
-        assert store.is_damaged
-
-    def test_the_file_that_was_moved_has_all_that_was_saved_once_it_is_back(
-        self, databases: Databases, tmp_path: Path
-    ) -> None:
-        store = Store.open(databases.settings(tmp_path / "home"))
-        file = store.settings.database_file
-        say(store, 3)
-        backup = file.read_bytes()
-        file.rename(tmp_path / "aside.db")
-        replace_file(file, backup)
-        with pytest.raises(DamagedError, match="replaced"):
-            say(store)
-        store.close()
-        (tmp_path / "aside.db").replace(file)
-        with closing(Store.open(store.settings)) as again:
-            assert log_ids(again) == [1, 2, 3]
-
-    def test_a_write_ahead_log_that_is_gone_is_seen_and_costs_nothing_that_was_saved(
-        self, databases: Databases, tmp_path: Path
-    ) -> None:
-        store = Store.open(databases.settings(tmp_path / "home"))
-        say(store, 3)
-        log_file(store.settings.database_file).unlink()
-        with pytest.raises(DamagedError, match=r"touchline\.db-wal was moved or deleted") as caught:
-            say(store)
-        assert "Stop the server before" in str(caught.value.hint)
-        store.close()
-        with closing(Store.open(store.settings)) as again:
-            assert log_ids(again) == [1, 2, 3]
-
-
-def replace_file(file: Path, content: bytes) -> None:
-    other = file.with_name("other")
-    other.write_bytes(content)
-    other.replace(file)
-
-
-def cut_log(store: Store, *, after: int) -> None:
-    """Take the end of the log away, as only somebody can who changes the schema."""
-    on_file = dialect_of(store.settings).is_file
-    with store.write() as session:
-        session.execute(text(_OPENED_ON_FILE if on_file else _OPENED_ON_SERVER))
-        session.execute(text(f"DELETE FROM log WHERE id > {after}"))
-
-
-_OPENED_ON_FILE = "DROP TRIGGER log_refuses_delete"
-_OPENED_ON_SERVER = "ALTER TABLE log DISABLE TRIGGER USER"
-
-
-def say_at_once(store: Store, times: int) -> None:
-    with store.write() as session:
-        for _ in range(times):
-            append(session, [Entry("work", "ada", "2026-11-23T10:00:00+00:00", {})])
-
-
-def log_ids(store: Store) -> list[int]:
-    with store.read() as session:
-        return [entry.id for entry in read_log(session)]
-
-
-def said(store: Store) -> int:
-    anchor = read_anchor(store.settings.database_file)
-    assert anchor is not None
-    return anchor.entries
-
-
-def refuse(*_: object) -> None:
-    raise PermissionError("refused")
-
-
-class TestAfterTheCommit:
-    @pytest.mark.parametrize("error", [PermissionError, OSError])
-    def test_a_home_that_takes_no_anchor_costs_no_change_and_is_logged_once(
-        self, store: Store, monkeypatch: pytest.MonkeyPatch, error: type[OSError]
-    ) -> None:
-        def refuse(*_: object) -> None:
-            raise error("refused")
-
-        told: list[int] = []
-        store.listen(lambda: told.append(1))
-        with capture_logs() as logs:
-            for _round in range(2):
-                with monkeypatch.context() as broken:
-                    broken.setattr("app.store.store.move_anchor", refuse)
-                    say(store)
-                    say(store)
-                say(store)
-        assert [line["event"] for line in logs] == ["home.json cannot be written"] * 2
-        assert len(told) == 6
-        anchor = read_anchor(store.settings.database_file)
-        assert anchor is not None
-        assert anchor.entries == 6
-
-    def test_an_anchor_that_cannot_be_synced_costs_nothing_when_it_is_closed(
-        self, settings: Settings, monkeypatch: pytest.MonkeyPatch
-    ) -> None:
-        def refuse(*_: object) -> None:
-            raise OSError(5, "Input/output error")
-
-        monkeypatch.setattr("app.store.store.sync_anchor", refuse)
-        with capture_logs() as logs:
-            Store.open(settings).close()
-        assert [line["event"] for line in logs] == ["home.json cannot be synced"]
-        monkeypatch.undo()
-        Store.open(settings).close()
-
+class TestListen:
     def test_a_listener_that_fails_costs_neither_the_change_nor_the_others(
         self, store: Store
     ) -> None:
