@@ -16,6 +16,7 @@ function jobText(job) {
 	if (job.state === 'failed') return capital(job.problem?.detail ?? 'It failed.');
 	if (job.state === 'done') return '';
 	if (job.sentence) return job.sentence;
+	if (job.state === 'waiting') return 'Waits for its turn.';
 	return job.total ? `${count(job.done)} of ${count(job.total)}` : '';
 }
 
@@ -31,12 +32,11 @@ export function toneOf(job) {
 /** @param {{job: JobJson}} props */
 function Meter({ job }) {
 	const share = shareOf(job);
-	const state = job.state === 'failed' ? 'failed' : share === null ? 'unknown' : 'known';
 	return html`
 		<div
-			class="meter" data-state=${state} role="progressbar" aria-label=${job.title} aria-valuemin="0" aria-valuemax="100"
+			class="meter" data-state=${job.state} role="progressbar" aria-label=${job.title} aria-valuemin="0" aria-valuemax="100"
 			aria-valuenow=${share === null ? undefined : Math.round(100 * share)}
-		><span style=${share === null ? undefined : { width: `${100 * share}%` }}></span></div>
+		>${share === null ? null : html`<span style=${{ width: `${100 * share}%` }}></span>`}</div>
 	`;
 }
 

@@ -86,7 +86,7 @@ function JobCard({ job }) {
 		<li>
 			<section class="card" aria-label=${`Job ${job.id}: ${job.title}`}>
 				<${JobProgress} job=${job} />
-				<p class="note">${job.kind}${job.dataset ? html` · <a class="link" href=${pageAddress(job.dataset, 'queue')}>${job.dataset}</a>` : null}${` · ${job.actor} · begun `}<${When} at=${job.started ?? job.created} />${job.ended ? html`${' · ended '}<${When} at=${job.ended} />` : null}</p>
+				<p class="note">${job.kind}${job.dataset ? html` · <a class="link" href=${pageAddress(job.dataset, 'queue')}>${job.dataset}</a>` : null}${` · ${job.actor} · ${job.started ? 'begun' : 'asked for'} `}<${When} at=${job.started ?? job.created} />${job.ended ? html`${' · ended '}<${When} at=${job.ended} />` : null}</p>
 				${partOf(job)}
 				${job.problem?.hint ? html`<p>${job.problem.hint}</p>` : null}
 			</section>

@@ -42,3 +42,32 @@ class TestNews:
         card = page.get_by_role("region", name="Solve sample")
         expect(card.locator(".pill")).to_have_text("done")
         expect(card.locator(".meter")).to_have_count(0)
+
+
+class TestHowFar:
+    def test_nothing_looks_done_of_a_job_that_waits_or_cannot_say_how_far_it_is(
+        self, open_page: OpenPage
+    ) -> None:
+        page = open_page(None)
+        untold = {**RUNNING, "id": 4_712, "title": "Freeze sample", "done": 0, "total": None}
+        waits = {
+            **untold,
+            "id": 4_713,
+            "title": "Export sample",
+            "state": "waiting",
+            "sentence": "",
+        }
+        jobs = [RUNNING, untold, {**waits, "started": None}]
+        page.route(
+            "**/api/v1/jobs?*", lambda route: route.fulfill(json={"items": jobs, "next": None})
+        )
+        page.goto("/jobs")
+        cards = [page.get_by_role("region", name=str(job["title"])) for job in jobs]
+        shares = [card.get_by_role("progressbar") for card in cards]
+        expect(shares[0]).to_have_attribute("aria-valuenow", "33")
+        for share in shares[1:]:
+            expect(share).to_be_empty()
+            assert share.get_attribute("aria-valuenow") is None
+        expect(cards[1]).to_contain_text("begun")
+        expect(cards[2]).to_contain_text("Waits for its turn.")
+        expect(cards[2]).to_contain_text("asked for")
