@@ -64,7 +64,7 @@ PLAIN_WORDS = """
     recompute record remedies removal render reply report requests resect resource restore result
     revert reviewers rotation router row rows run runs sample save scale scene scene3d scenes score
     scoreboard sending server service session sets shadows sheet singular site smallest solve
-    solving soundness source sources sphere spill spread squares stage staging standpoints starts
+    solving soundness source sources sphere spill spread squares stacks stage staging standpoints starts
     state statistics steps storage store stream submit surface swap synloc tab table tally tables term
     terminal text textures threshold ticks tools triangulate truth types undo undrawn unknown upload uploads
     v3 v3d video viewport viewports virtual wal walk warm what when whiskers words write writer zip

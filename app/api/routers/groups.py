@@ -42,6 +42,7 @@ from app.errors import NotFoundError
 from app.review.agreement.weigh import after_hand_in
 from app.review.datasets.dataset import dataset_id
 from app.review.editing import submit
+from app.review.editing import undo as undoing
 from app.review.editing.past import history, read_step
 from app.review.editing.state import GroupState
 from app.review.people.roles import Action, may
@@ -223,7 +224,7 @@ def undo(
     group: Id, services: AppServices, actor: Actor, if_match: IfMatch, asked: AskedUnder
 ) -> Response:
     """Take the last edit back; 409 when there is none."""
-    return _step(submit.undo, services, group, actor, if_match, asked)
+    return _step(undoing.undo, services, group, actor, if_match, asked)
 
 
 @router.post(
@@ -236,7 +237,7 @@ def redo(
     group: Id, services: AppServices, actor: Actor, if_match: IfMatch, asked: AskedUnder
 ) -> Response:
     """Do again what was undone last; 409 when there is nothing."""
-    return _step(submit.redo, services, group, actor, if_match, asked)
+    return _step(undoing.redo, services, group, actor, if_match, asked)
 
 
 def _step(

@@ -12,7 +12,7 @@ from dataclasses import replace
 
 from app.review.editing.edit import Edit, SetBall, SetBalls, SetNoise, Several, need_view
 from app.review.editing.group_edits import give_edits
-from app.review.editing.undo import GROUP_KINDS
+from app.review.editing.undo_stacks import GROUP_KINDS
 from app.soccer.group import Group, View
 from app.store.clock import now
 from app.store.datasets import group_ids

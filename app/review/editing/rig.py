@@ -20,7 +20,7 @@ from app.review.editing.stations import (
     submit_stations,
     undo_stations,
 )
-from app.review.editing.undo import read_station_stacks
+from app.review.editing.undo_stacks import read_station_stacks
 from app.soccer.annotation import Lines
 from app.soccer.frames import ImagePoint
 from app.soccer.group import View

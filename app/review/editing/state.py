@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 from app.errors import NotFoundError, StaleRevisionError
 from app.review.editing.etags import group_etag, said_of, said_part
-from app.review.editing.undo import Stacks, read_stacks
+from app.review.editing.undo_stacks import Stacks, read_stacks
 from app.soccer.finding import Finding
 from app.soccer.group import Group
 from app.soccer.policy import Policy

@@ -20,7 +20,7 @@ from app.review.editing.state import (
     require_etag,
     station_etag,
 )
-from app.review.editing.undo import next_step, read_station_stacks
+from app.review.editing.undo_stacks import next_step, read_station_stacks
 from app.soccer.group import Group, Station
 from app.soccer.solution import Calibration
 from app.store.clock import now

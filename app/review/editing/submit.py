@@ -11,10 +11,10 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import NotRequired, TypedDict, Unpack
 
-from app.errors import ConflictError, NotFoundError, SharedStationError
+from app.errors import NotFoundError, SharedStationError
 from app.review.answers.keep import Keep, keep_nothing
 from app.review.editing.ball_noise import keeping_noise, with_noise
-from app.review.editing.codec import edit_from_json, step_to_json
+from app.review.editing.codec import step_to_json
 from app.review.editing.copies import require_open
 from app.review.editing.edit import STATION_EDITS, Edit, SetPaint, SetPicture, need_view
 from app.review.editing.etags import read_etags, require_said, require_unchanged
@@ -23,7 +23,6 @@ from app.review.editing.known import known_calibrations
 from app.review.editing.point_limits import require_few_points_in_all
 from app.review.editing.solve_encoded import Solve, solve_encoded
 from app.review.editing.state import GroupState, Record, need_group, read_record, read_state
-from app.review.editing.undo import next_step
 from app.soccer.group import Group
 from app.soccer.policy import Policy
 from app.soccer.solution import Calibration, Solution
@@ -41,7 +40,7 @@ from app.store.stored_json import Json
 
 
 @dataclass(frozen=True)
-class _Change:
+class GroupChange:
     """One step of a group: its kind and body in the log, and the group that it makes."""
 
     kind: str
@@ -53,7 +52,7 @@ class _Change:
 class _Outcome:
     """A change with all that is saved of it; ``painted`` is its group as it is afterwards."""
 
-    change: _Change
+    change: GroupChange
     painted: Group
     before: Record
     after: Record
@@ -61,7 +60,7 @@ class _Outcome:
     encoded: EncodedSolution
 
 
-class _How(TypedDict):
+class How(TypedDict):
     """How a step is taken.
 
     Attributes:
@@ -80,8 +79,8 @@ class _How(TypedDict):
 
 
 Solver = Callable[[Group, Policy, Mapping[str, Calibration]], Solution]
-_Find = Callable[[Session], int]
-_Plan = Callable[[Session, Record, str], _Change]
+Find = Callable[[Session], int]
+Plan = Callable[[Session, Record, str], GroupChange]
 
 
 def load(store: Store, group_id: int) -> GroupState:
@@ -111,7 +110,7 @@ def submit(
     store: Store,
     group_id: int,
     edit: Edit,
-    **how: Unpack[_How],
+    **how: Unpack[How],
 ) -> GroupState:
     """Save an edit and answer with the group as it is then, solved.
 
@@ -119,7 +118,7 @@ def submit(
         store: The database.
         group_id: The group.
         edit: What to change.
-        how: See ``_How``.
+        how: See ``How``.
 
     Raises:
         StaleRevisionError: Somebody else was faster.
@@ -127,14 +126,14 @@ def submit(
         InputError, NotFoundError: The edit does not fit the group.
         StorageError: Nothing was saved.
     """
-    return _change(store, lambda _session: group_id, _plan_edit(lambda _stored: edit), **how)
+    return take_step(store, lambda _session: group_id, _plan_edit(lambda _stored: edit), **how)
 
 
 def submit_view(
     store: Store,
     view_id: int,
     edit_of: Callable[[str], Edit],
-    **how: Unpack[_How],
+    **how: Unpack[How],
 ) -> GroupState:
     """``submit`` for a view's id: ``edit_of`` makes the edit from the view's key."""
 
@@ -144,17 +143,7 @@ def submit_view(
     def find(session: Session) -> int:
         return group_of_view(session, view_id)
 
-    return _change(store, find, _plan_edit(edit), **how)
-
-
-def undo(store: Store, group_id: int, **how: Unpack[_How]) -> GroupState:
-    """Take the last edit of a group back, whoever made it; raises ConflictError without one."""
-    return _change(store, lambda _session: group_id, _plan_step("undo"), **how)
-
-
-def redo(store: Store, group_id: int, **how: Unpack[_How]) -> GroupState:
-    """Do again what undo took back last; raises ConflictError without such an edit."""
-    return _change(store, lambda _session: group_id, _plan_step("redo"), **how)
+    return take_step(store, find, _plan_edit(edit), **how)
 
 
 def preview(
@@ -248,10 +237,10 @@ def refuse_shared(stored: StoredGroup, edit: Edit) -> None:
         raise SharedStationError(edit.view, stored.stations[edit.view].id, station.key, what)
 
 
-def _change(
+def take_step(
     store: Store,
-    find: _Find,
-    plan: _Plan,
+    find: Find,
+    plan: Plan,
     *,
     if_match: str,
     actor: str,
@@ -259,6 +248,19 @@ def _change(
     paint: PaintFollower | None = None,
     solve: Solve = solve_encoded,
 ) -> GroupState:
+    """Save a step of a group (an edit, an undo, a redo) and answer with the group as it is then.
+
+    Args:
+        store: The database.
+        find: Finds the group.
+        plan: Makes the step for the state that it builds on.
+        if_match, actor, keep, paint, solve: See ``How``.
+
+    Raises:
+        StaleRevisionError: Somebody else was faster.
+        ReviewError: As ``find`` and ``plan`` raise it.
+        StorageError: Nothing was saved.
+    """
     while True:
         with store.read() as session:
             before = read_record(session, find(session))
@@ -286,7 +288,7 @@ def _change(
 
 
 def _outcome(
-    before: Record, change: _Change, painted: Group, result: tuple[Solution, EncodedSolution]
+    before: Record, change: GroupChange, painted: Group, result: tuple[Solution, EncodedSolution]
 ) -> _Outcome:
     at = now()
     stored = next_revision(before.stored, change.group, at)
@@ -319,27 +321,13 @@ def _read_beside(outcome: _Outcome) -> Json:
     return {FOLLOWS: outcome.change.kind, **body}
 
 
-def _plan_edit(edit_of: Callable[[StoredGroup], Edit]) -> _Plan:
-    def plan(session: Session, record: Record, actor: str) -> _Change:
+def _plan_edit(edit_of: Callable[[StoredGroup], Edit]) -> Plan:
+    def plan(session: Session, record: Record, actor: str) -> GroupChange:
         edit, group = edit_of(record.stored), record.stored.group
         edit = with_noise(record.stored.factors, group, edit, actor)
         refuse_shared(record.stored, edit)
         require_few_points_in_all(group, [edit])
         body = step_to_json(edit, edit.inverse(group))
-        return _Change("edit", body, edit.apply(group))
-
-    return plan
-
-
-def _plan_step(kind: str) -> _Plan:
-    """Undo or redo."""
-
-    def plan(session: Session, record: Record, _actor: str) -> _Change:
-        body = next_step(session, record.stacks, kind, "in this group")
-        try:
-            group = edit_from_json(body["edit"]).apply(record.stored.group)
-        except NotFoundError as error:
-            raise ConflictError(f"this cannot be done any more: {error.message}") from error
-        return _Change(kind, body, group)
+        return GroupChange("edit", body, edit.apply(group))
 
     return plan

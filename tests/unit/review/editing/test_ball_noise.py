@@ -11,7 +11,8 @@ from app.review.editing.ball_noise import give_factors, read_placed, with_noise
 from app.review.editing.edit import SetBall, SetBalls, Several
 from app.review.editing.past import history
 from app.review.editing.recompute import stale_groups
-from app.review.editing.submit import load, preview, solved, submit, undo
+from app.review.editing.submit import load, preview, solved, submit
+from app.review.editing.undo import undo
 from app.review.importing.carry import carried_group
 from app.review.importing.ingest import ingest
 from app.review.queue.listing import list_groups

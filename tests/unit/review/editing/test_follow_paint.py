@@ -18,7 +18,8 @@ from app.review.editing.paint import take_back_paint
 from app.review.editing.past import history
 from app.review.editing.recompute import solve_dataset
 from app.review.editing.replay import rebuild, replay
-from app.review.editing.submit import load, preview, redo, submit, undo
+from app.review.editing.submit import load, preview, submit
+from app.review.editing.undo import redo, undo
 from app.review.policies.policy import change_policy
 from app.soccer.policy import PAPER
 from tests.unit.review.editing import test_paint

@@ -8,7 +8,8 @@ from app.review.editing.edit import SetPitch
 from app.review.editing.group_edits import give_edits
 from app.review.editing.past import history
 from app.review.editing.recompute import stale_groups
-from app.review.editing.submit import load, undo
+from app.review.editing.submit import load
+from app.review.editing.undo import undo
 
 WIDE, USUAL = SetPitch(105.0, 70.0), SetPitch(105.0, 68.0)
 

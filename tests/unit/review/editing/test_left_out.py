@@ -13,7 +13,8 @@ from app.review.editing.codec import edit_from_json
 from app.review.editing.edit import IncludeView, SetBall
 from app.review.editing.ledger import read_ledger
 from app.review.editing.replay import rebuild, replay
-from app.review.editing.submit import load, redo, submit, undo
+from app.review.editing.submit import load, submit
+from app.review.editing.undo import redo, undo
 from app.review.exporting.export import export
 from app.review.importing.carry_in import carry_in
 from app.review.importing.ingest import ingest

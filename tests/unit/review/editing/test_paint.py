@@ -21,7 +21,8 @@ from app.review.editing.paint import get_paint, read_paint, take_back_paint
 from app.review.editing.past import history
 from app.review.editing.recompute import solve_dataset, stale_groups
 from app.review.editing.replay import rebuild, replay
-from app.review.editing.submit import load, submit, undo
+from app.review.editing.submit import load, submit
+from app.review.editing.undo import undo
 from app.review.importing.carry import carried_group
 from app.review.importing.ingest import ingest
 from app.review.policies.policy import change_policy

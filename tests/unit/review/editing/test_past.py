@@ -8,7 +8,8 @@ from app.errors import NotFoundError
 from app.review.editing.edit import SetBall, SetLines, SetStationLines
 from app.review.editing.past import Step, history, read_step
 from app.review.editing.stations import load_station, submit_station
-from app.review.editing.submit import load, submit, undo
+from app.review.editing.submit import load, submit
+from app.review.editing.undo import undo
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import Box, ImagePoint
 from app.store.store import Store

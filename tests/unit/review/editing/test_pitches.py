@@ -21,7 +21,8 @@ from app.review.editing.pitches import (
 )
 from app.review.editing.recompute import solve_dataset, stale_groups
 from app.review.editing.replay import rebuild, replay
-from app.review.editing.submit import load, submit, undo
+from app.review.editing.submit import load, submit
+from app.review.editing.undo import undo
 from app.review.importing.ingest import ingest
 from app.review.queue.findings import finding_values
 from app.soccer.annotation import make_lines

@@ -15,7 +15,8 @@ from app.review.editing.pitches import change_pitches
 from app.review.editing.positions import get_positions, share_positions, take_back_positions
 from app.review.editing.recompute import solve_dataset, stale_groups
 from app.review.editing.replay import rebuild, replay
-from app.review.editing.submit import load, submit, undo
+from app.review.editing.submit import load, submit
+from app.review.editing.undo import undo
 from app.review.importing.ingest import ingest
 from app.review.policies.policy import change_policy
 from app.review.versions.freeze import FreezeRequest, freeze

@@ -28,7 +28,8 @@ from app.review.editing.proposals import (
 )
 from app.review.editing.recompute import solve_dataset
 from app.review.editing.replay import replay
-from app.review.editing.submit import load, submit, undo
+from app.review.editing.submit import load, submit
+from app.review.editing.undo import undo
 from app.review.importing.carry import carried_group
 from app.review.importing.ingest import ingest
 from app.review.queue.listing import list_groups

@@ -12,7 +12,8 @@ from app.review.editing.edit import IncludeView, SetBall, SetLines, SetStationLi
 from app.review.editing.ledger import read_ledger
 from app.review.editing.replay import rebuild, replay
 from app.review.editing.stations import load_station, submit_station, undo_station
-from app.review.editing.submit import load, redo, submit, undo
+from app.review.editing.submit import load, submit
+from app.review.editing.undo import redo, undo
 from app.review.importing.cameras import ingest_cameras
 from app.review.importing.ingest import ingest
 from app.review.importing.spare import SpareFrame, ingest_spare

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
-from contextlib import AbstractContextManager, closing, contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import replace
 from typing import Any
 
@@ -10,7 +10,6 @@ import pytest
 from sqlalchemy import text
 
 from app.errors import (
-    ConflictError,
     NotFoundError,
     SharedStationError,
     StaleRevisionError,
@@ -21,7 +20,8 @@ from app.review.editing.edit import IncludeView, SetBall, SetBalls, SetLines, Se
 from app.review.editing.past import history
 from app.review.editing.solve_encoded import solve_encoded
 from app.review.editing.state import GroupState
-from app.review.editing.submit import load, preview, redo, solved, submit, undo
+from app.review.editing.submit import load, preview, solved, submit
+from app.review.editing.undo import undo
 from app.review.policies.policy import change_policy
 from app.review.queue.listing import list_groups
 from app.soccer.annotation import BallAnnotation
@@ -191,71 +191,6 @@ class TestSubmit:
         assert row.passes is False
         assert row.gate == after.solution.first_failing.name == "ball"
         assert row.solved
-
-
-class TestUndo:
-    def test_steps_back_and_forth_across_views(self, store, state) -> None:
-        edits = [
-            SetBall("7.png", BALL),
-            SetLines("7_1.png", {"Middle line": None}),
-            IncludeView("7_1.png", False),
-            # More steps, there and back, than are read of a history at first.
-            *(IncludeView("7_1.png", included) for included in (True, False, True)),
-        ]
-        states = [state]
-        for edit in edits:
-            states.append(change(store, states[-1], edit))
-        now = states[-1]
-        for earlier in reversed(states[:-1]):
-            assert now.can_undo
-            now = undo(store, state.id, if_match=now.etag, actor="ann")
-            assert now.group == earlier.group
-            assert now.solution == earlier.solution
-        assert not now.can_undo
-        for later in states[1:]:
-            assert now.can_redo
-            now = redo(store, state.id, if_match=now.etag, actor="ann")
-            assert now.group == later.group
-        assert not now.can_redo
-
-    def test_a_fresh_edit_clears_redo(self, store, state) -> None:
-        after = change(store, state, SetBall("7.png", BALL))
-        back = undo(store, state.id, if_match=after.etag, actor="ann")
-        assert back.can_redo
-        fresh = change(store, back, SetBall("7.png", None))
-        assert fresh.can_undo
-        assert not fresh.can_redo
-        with pytest.raises(ConflictError, match="nothing to redo"):
-            redo(store, state.id, if_match=fresh.etag, actor="ann")
-
-    def test_survives_a_restart(self, store, state) -> None:
-        after = change(store, state, SetBall("7.png", BALL))
-        with closing(Store.open(store.settings)) as other:
-            back = undo(other, state.id, if_match=after.etag, actor="ben")
-        assert back.group == state.group
-        assert (back.can_undo, back.can_redo) == (False, True)
-
-    def test_without_an_edit_there_is_nothing_to_undo(self, store, state) -> None:
-        with pytest.raises(ConflictError, match="nothing to undo"):
-            undo(store, state.id, if_match=state.etag, actor="ann")
-
-    def test_is_logged_as_an_edit_of_its_own(self, store, state) -> None:
-        after = change(store, state, SetBall("7.png", BALL))
-        undo(store, state.id, if_match=after.etag, actor="ben")
-        entries = history(store, state.id)
-        assert [(item.kind, item.actor) for item in entries] == [
-            ("import", "ann"),
-            ("edit", "ann"),
-            ("undo", "ben"),
-        ]
-        assert entries[2].body["of"] == entries[1].id
-        assert entries[2].body["edit"] == entries[1].body["inverse"]
-
-    def test_several_balls_come_back(self, store, state) -> None:
-        two = change(store, state, SetBalls("7.png", (BALL, BALL)))
-        picked = change(store, two, SetBall("7.png", BALL))
-        back = undo(store, state.id, if_match=picked.etag, actor="ann")
-        assert back.group.view("7.png").balls == (BALL, BALL)
 
 
 class TestPreview:

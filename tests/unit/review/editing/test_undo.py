@@ -1,55 +1,86 @@
-"""Undo: stacks that follow from the log alone."""
-
 from __future__ import annotations
 
-from functools import reduce
+from contextlib import closing
 
-from hypothesis import given, settings
-from hypothesis import strategies as st
+import pytest
 
-from app.review.editing.undo import Stacks, _stacks_of, _upper_part
+from app.errors import ConflictError
+from app.review.editing.edit import Edit, IncludeView, SetBall, SetBalls, SetLines
+from app.review.editing.past import history
+from app.review.editing.state import GroupState
+from app.review.editing.submit import submit
+from app.review.editing.undo import redo, undo
+from app.soccer.annotation import BallAnnotation
+from app.soccer.frames import Box
+from app.store.store import Store
 
-
-def possible(kinds: list[str]) -> list[tuple[str, int]]:
-    """The steps of some kinds that can follow each other, under the ids of their entries."""
-    stacks, steps = Stacks(), []
-    for number, kind in enumerate(kinds, start=1):
-        if (kind == "undo" and not stacks.can_undo) or (kind == "redo" and not stacks.can_redo):
-            continue
-        stacks = stacks.then(kind, number)
-        steps.append((kind, number))
-    return steps
+BALL = BallAnnotation(box=Box(500.0, 300.0, 14.0, 14.0))
 
 
-class TestStacksOf:
-    @settings(deadline=None, derandomize=True)
-    @given(st.lists(st.sampled_from(["edit", "undo", "redo"])).map(possible))
-    def test_is_one_step_after_the_other(self, steps: list[tuple[str, int]]) -> None:
-        one_by_one = reduce(lambda stacks, step: stacks.then(*step), steps, Stacks())
-        assert _stacks_of(steps) == one_by_one
-
-    def test_a_fresh_edit_clears_what_was_undone(self) -> None:
-        assert _stacks_of([("edit", 1), ("edit", 2), ("undo", 3), ("edit", 4)]) == Stacks((1, 4))
+def edited(store: Store, state: GroupState, edit: Edit) -> GroupState:
+    return submit(store, state.id, edit, if_match=state.etag, actor="ann")
 
 
-class TestUpperPart:
-    @settings(deadline=None, derandomize=True)
-    @given(
-        st.lists(st.sampled_from(["edit", "undo", "redo"]), min_size=1).map(possible),
-        st.integers(1, 12),
-    )
-    def test_the_newest_steps_tell_the_same_as_all_or_nothing(
-        self, steps: list[tuple[str, int]], count: int
-    ) -> None:
-        whole, upper = _stacks_of(steps), _upper_part(steps[-count:])
-        if upper is not None:
-            assert upper.undone == whole.undone
-            assert upper.done == whole.done[-len(upper.done) :]
-            assert len(upper.done) > 1
+class TestUndo:
+    def test_steps_back_and_forth_across_views(self, store, state) -> None:
+        edits = [
+            SetBall("7.png", BALL),
+            SetLines("7_1.png", {"Middle line": None}),
+            IncludeView("7_1.png", False),
+            # More steps, there and back, than are read of a history at first.
+            *(IncludeView("7_1.png", included) for included in (True, False, True)),
+        ]
+        states = [state]
+        for edit in edits:
+            states.append(edited(store, states[-1], edit))
+        now = states[-1]
+        for earlier in reversed(states[:-1]):
+            assert now.can_undo
+            now = undo(store, state.id, if_match=now.etag, actor="ann")
+            assert now.group == earlier.group
+            assert now.solution == earlier.solution
+        assert not now.can_undo
+        for later in states[1:]:
+            assert now.can_redo
+            now = redo(store, state.id, if_match=now.etag, actor="ann")
+            assert now.group == later.group
+        assert not now.can_redo
 
-    def test_two_edits_suffice(self) -> None:
-        assert _upper_part([("redo", 7), ("edit", 8), ("edit", 9)]) == Stacks((8, 9))
+    def test_a_fresh_edit_clears_redo(self, store, state) -> None:
+        after = edited(store, state, SetBall("7.png", BALL))
+        back = undo(store, state.id, if_match=after.etag, actor="ann")
+        assert back.can_redo
+        fresh = edited(store, back, SetBall("7.png", None))
+        assert fresh.can_undo
+        assert not fresh.can_redo
+        with pytest.raises(ConflictError, match="nothing to redo"):
+            redo(store, state.id, if_match=fresh.etag, actor="ann")
 
-    def test_what_an_undo_reached_below_is_not_guessed(self) -> None:
-        assert _upper_part([("edit", 8), ("undo", 9), ("undo", 10)]) is None
-        assert _upper_part([("undo", 9), ("undo", 10)]) is None
+    def test_survives_a_restart(self, store, state) -> None:
+        after = edited(store, state, SetBall("7.png", BALL))
+        with closing(Store.open(store.settings)) as other:
+            back = undo(other, state.id, if_match=after.etag, actor="ben")
+        assert back.group == state.group
+        assert (back.can_undo, back.can_redo) == (False, True)
+
+    def test_without_an_edit_there_is_nothing_to_undo(self, store, state) -> None:
+        with pytest.raises(ConflictError, match="nothing to undo"):
+            undo(store, state.id, if_match=state.etag, actor="ann")
+
+    def test_is_logged_as_an_edit_of_its_own(self, store, state) -> None:
+        after = edited(store, state, SetBall("7.png", BALL))
+        undo(store, state.id, if_match=after.etag, actor="ben")
+        entries = history(store, state.id)
+        assert [(item.kind, item.actor) for item in entries] == [
+            ("import", "ann"),
+            ("edit", "ann"),
+            ("undo", "ben"),
+        ]
+        assert entries[2].body["of"] == entries[1].id
+        assert entries[2].body["edit"] == entries[1].body["inverse"]
+
+    def test_several_balls_come_back(self, store, state) -> None:
+        two = edited(store, state, SetBalls("7.png", (BALL, BALL)))
+        picked = edited(store, two, SetBall("7.png", BALL))
+        back = undo(store, state.id, if_match=picked.etag, actor="ann")
+        assert back.group.view("7.png").balls == (BALL, BALL)

@@ -10,7 +10,8 @@ from app.review.editing.edit import SetBall
 from app.review.editing.ledger import read_ledger
 from app.review.editing.past import history
 from app.review.editing.replay import replay
-from app.review.editing.submit import load, submit, undo
+from app.review.editing.submit import load, submit
+from app.review.editing.undo import undo
 from app.review.evaluating.accept import AcceptRequest, accept, accept_box, plan_accept
 from app.review.evaluating.group_predictions import group_predictions
 from app.review.evaluating.prediction_reader import PredictionFiles

@@ -6,7 +6,8 @@ import pytest
 
 from app.errors import NotFoundError
 from app.review.editing.edit import SetBall
-from app.review.editing.submit import load, redo, submit, undo
+from app.review.editing.submit import load, submit
+from app.review.editing.undo import redo, undo
 from app.review.evaluating.accept import accept_box
 from app.review.evaluating.group_predictions import AcceptedBall, group_predictions
 from app.review.evaluating.prediction_reader import PredictionFiles

@@ -25,7 +25,8 @@ from app.review.editing.pitches import change_pitches, read_pitches
 from app.review.editing.recompute import solve_dataset
 from app.review.editing.replay import replay
 from app.review.editing.stations import load_station, submit_station, undo_station
-from app.review.editing.submit import load, submit, undo
+from app.review.editing.submit import load, submit
+from app.review.editing.undo import undo
 from app.review.exporting.export import export
 from app.review.importing.cameras import ingest_cameras
 from app.review.importing.carry import GROUPS, STATIONS

@@ -12,7 +12,8 @@ from app.review.editing.edit import IncludeView, SetBall, SetLines, SetStationLi
 from app.review.editing.past import history
 from app.review.editing.state import GroupState
 from app.review.editing.stations import load_station, submit_station
-from app.review.editing.submit import load, submit, undo
+from app.review.editing.submit import load, submit
+from app.review.editing.undo import undo
 from app.review.importing.cameras import ingest_cameras
 from app.review.importing.ingest import ensure_dataset, ingest
 from app.soccer.annotation import BallAnnotation, make_lines

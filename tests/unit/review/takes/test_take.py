@@ -14,7 +14,8 @@ from app.review.editing.past import history
 from app.review.editing.replay import rebuild
 from app.review.editing.state import GroupState
 from app.review.editing.stations import load_station, submit_station
-from app.review.editing.submit import load, solved, submit, undo
+from app.review.editing.submit import load, solved, submit
+from app.review.editing.undo import undo
 from app.review.people.logins import read_roles
 from app.review.people.members import give_role
 from app.review.people.people import invite

@@ -10,7 +10,8 @@ from app.errors import InputError, StaleRevisionError
 from app.review.editing.edit import SetBall
 from app.review.editing.past import history
 from app.review.editing.state import GroupState
-from app.review.editing.submit import load, submit, undo
+from app.review.editing.submit import load, submit
+from app.review.editing.undo import undo
 from app.review.policies.policy import change_policy
 from app.review.queue.listing import list_groups
 from app.review.verdicts import verdict as module

@@ -12,7 +12,8 @@ from sqlalchemy import text
 from app.errors import ConflictError, InputError, NotFoundError
 from app.review.datasets.delete import delete_dataset
 from app.review.editing.edit import SetBall
-from app.review.editing.submit import submit, undo
+from app.review.editing.submit import submit
+from app.review.editing.undo import undo
 from app.review.jobs.upkeep import forget_old_deliveries
 from app.review.verdicts.verdict import set_verdict
 from app.review.webhooks import sender as module

@@ -15,7 +15,8 @@ import pytest
 from app.errors import ConflictError, OverloadedError
 from app.review.editing.edit import IncludeView, SetBall
 from app.review.editing.recompute import solve_dataset
-from app.review.editing.submit import load, submit, undo
+from app.review.editing.submit import load, submit
+from app.review.editing.undo import undo
 from app.review.policies.policy import change_policy
 from app.review.yields import gathered
 from app.review.yields.funnel import get_yield

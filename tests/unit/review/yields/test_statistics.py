@@ -13,7 +13,8 @@ import pytest
 from app.errors import ConflictError, NotFoundError
 from app.review.editing.edit import SetBall
 from app.review.editing.recompute import solve_dataset
-from app.review.editing.submit import load, submit, undo
+from app.review.editing.submit import load, submit
+from app.review.editing.undo import undo
 from app.review.policies.policy import change_policy
 from app.review.queue.statistics import statistics
 from app.review.verdicts.bulk import give_verdicts, list_batches

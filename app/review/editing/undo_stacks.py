@@ -1,0 +1,122 @@
+"""Undo stacks: what can be undone and redone of a group (or station), from the log alone."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+from app.errors import ConflictError
+from app.store.log import group_steps, newest_steps, read_entry, station_steps
+from app.store.session import Session
+from app.store.stored_json import Json
+
+GROUP_KINDS = {"edit": "edit", "undo": "undo", "redo": "redo"}
+STATION_KINDS = {"station_edit": "edit", "station_undo": "undo", "station_redo": "redo"}
+
+_FIRST_LOOK, _FURTHER = 8, 8
+"""Steps that are read of a group's history at first, and how many times more when they say too little."""
+
+
+@dataclass(frozen=True)
+class Stacks:
+    """Ids of log entries: the last of ``done`` is what undo takes back, of ``undone`` what redo
+    does again. Of a long history ``done`` may hold the newest alone, and then at least two."""
+
+    done: tuple[int, ...] = ()
+    undone: tuple[int, ...] = ()
+
+    @property
+    def can_undo(self) -> bool:
+        """Whether there is an edit to take back."""
+        return bool(self.done)
+
+    @property
+    def can_redo(self) -> bool:
+        """Whether there is an edit to do again."""
+        return bool(self.undone)
+
+    def then(self, kind: str, log_id: int = 0) -> Stacks:
+        """The stacks after one more entry: an undo moves the last edit over, a redo moves it
+        back, and a fresh edit clears what was undone."""
+        if kind == "edit":
+            return Stacks((*self.done, log_id))
+        if kind == "undo":
+            return Stacks(self.done[:-1], (*self.undone, self.done[-1]))
+        return Stacks((*self.done, self.undone[-1]), self.undone[:-1])
+
+
+def next_step(session: Session, stacks: Stacks, kind: str, where: str) -> Json:
+    """Body of the entry that an undo or a redo writes: the edit that it makes, and back.
+
+    Args:
+        session: Any session.
+        stacks: Of the group or station.
+        kind: ``undo`` or ``redo``.
+        where: What it is asked for, as people call it.
+
+    Raises:
+        ConflictError: There is nothing to undo, or to do again.
+    """
+    steps = stacks.done if kind == "undo" else stacks.undone
+    if not steps:
+        raise ConflictError(f"there is nothing to {kind} {where}")
+    body = read_entry(session, steps[-1]).body
+    made, back = ("inverse", "edit") if kind == "undo" else ("edit", "inverse")
+    return {"edit": body[made], "inverse": body[back], "of": steps[-1]}
+
+
+def read_stacks(session: Session, group_ids: Sequence[int]) -> Mapping[int, Stacks]:
+    """The stacks of each group."""
+    if len(group_ids) == 1:
+        return {group_ids[0]: _read_newest(session, group_ids[0])}
+    steps: dict[int, list[tuple[str, int]]] = {number: [] for number in group_ids}
+    for row in group_steps(session, group_ids, GROUP_KINDS):
+        steps[row.group_id].append((GROUP_KINDS[row.kind], row.id))
+    return {number: _stacks_of(taken) for number, taken in steps.items()}
+
+
+def _read_newest(session: Session, group_id: int) -> Stacks:
+    """The stacks of one group from as little of its history as tells them."""
+    most = _FIRST_LOOK
+    while True:
+        rows = newest_steps(session, group_id, GROUP_KINDS, most)
+        steps = [(GROUP_KINDS[row.kind], row.id) for row in reversed(rows)]
+        stacks = _stacks_of(steps) if len(rows) < most else _upper_part(steps)
+        if stacks is not None:
+            return stacks
+        most *= _FURTHER
+
+
+def _upper_part(steps: Sequence[tuple[str, int]]) -> Stacks | None:
+    """The stacks after the newest steps, or None where older ones must be known to tell them.
+
+    An edit leaves nothing undone, whatever was before; so all that follows from it is known, as
+    long as no undo reaches below it. Two edits on the stack also tell what is left after an undo.
+    """
+    first = next((at for at, (kind, _) in enumerate(steps) if kind == "edit"), len(steps))
+    try:
+        stacks = _stacks_of(steps[first:])
+    except IndexError:
+        return None
+    return stacks if len(stacks.done) > 1 else None
+
+
+def read_station_stacks(session: Session, station_id: int) -> Stacks:
+    """The stacks of a shared station."""
+    rows = station_steps(session, station_id, STATION_KINDS)
+    return _stacks_of((STATION_KINDS[row.kind], row.id) for row in rows)
+
+
+def _stacks_of(steps: Iterable[tuple[str, int]]) -> Stacks:
+    """The stacks after all steps (kind, id of the entry): ``Stacks.then`` of each, in one go."""
+    done: list[int] = []
+    undone: list[int] = []
+    for kind, log_id in steps:
+        if kind == "undo":
+            undone.append(done.pop())
+        elif kind == "redo":
+            done.append(undone.pop())
+        else:
+            done.append(log_id)
+            undone.clear()
+    return Stacks(tuple(done), tuple(undone))
