@@ -7,7 +7,7 @@ import signal
 import zipfile
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ProcessPoolExecutor
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from itertools import groupby
 from multiprocessing import get_context
@@ -116,7 +116,7 @@ def write_sample(
 
 @contextmanager
 def _staged(out: Path) -> Iterator[Path]:
-    """A folder beside ``out``, whose files go there when all is done; else nothing is left."""
+    """A folder beside ``out``, whose files go there when all are written; else nothing is left."""
     out = Path.cwd() / out
     above = [path for path in out.parents if not path.exists()]
     out.parent.mkdir(parents=True, exist_ok=True)
@@ -133,7 +133,9 @@ def _staged(out: Path) -> Iterator[Path]:
     finally:
         rmtree(folder, ignore_errors=True)
         for path in () if done else above:
-            path.rmdir()
+            # What was moved already stays, and must not hide why the rest was not.
+            with suppress(OSError):
+                path.rmdir()
 
 
 def _write_labels(

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import errno
 import hashlib
 import zipfile
 from pathlib import Path
@@ -105,6 +106,22 @@ class TestWriteSample:
         with pytest.raises(KeyboardInterrupt):
             write_sample(out, 20, 3, labels_only=True, workers=1, progress=interrupt)
         assert sorted(tmp_path.rglob("*")) == before
+
+    def test_a_disk_that_fills_while_files_are_moved_is_told_as_that(
+        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ):
+        move, moved = Path.replace, []
+
+        def fill(path: Path, target: Path) -> Path:
+            if moved and tmp_path / "new" in target.parents:
+                raise OSError(errno.ENOSPC, "No space left on device")
+            moved.extend([path] if target.name == "Labels-v3.json" else [])
+            return move(path, target)
+
+        monkeypatch.setattr(Path, "replace", fill)
+        with pytest.raises(OSError, match="No space left"):
+            write_sample(tmp_path / "new" / "out", 20, 3, labels_only=True, workers=1)
+        assert len(moved) == 1
 
     def test_a_file_in_the_way_is_named(self, tmp_path: Path):
         file = tmp_path / "occupied"
