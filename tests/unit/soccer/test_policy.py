@@ -12,16 +12,35 @@ from app.soccer.policy import (
     TOUCHLINE,
     CalibrationPolicy,
     Policy,
+    Threshold,
 )
 from app.soccer.solution import GATES
+
+
+def another(threshold: Threshold) -> object:
+    """A value of a threshold that the policy of the paper does not have."""
+    words = [word for word in threshold.choices if isinstance(word, str)]
+    candidates = words or [threshold.minimum, threshold.maximum]
+    if threshold.minimum is None and not words:
+        candidates = [True, False]
+    return next(value for value in candidates if value != threshold.default)
 
 
 class TestHash:
     def test_the_name_does_not_count(self):
         assert replace(PAPER, name="mine").hash == PAPER.hash
 
-    def test_every_threshold_counts(self):
-        assert replace(PAPER, tau_percent=0.9).hash != PAPER.hash
+    @pytest.mark.parametrize("threshold", THRESHOLDS, ids=lambda threshold: threshold.name)
+    def test_every_threshold_counts(self, threshold: Threshold):
+        part, _, name = threshold.name.rpartition(".")
+        values = {name: another(threshold)}
+        if part:
+            values = {CALIBRATION: replace(PAPER.calibration, **values)}
+        changed = replace(PAPER, **values)
+        assert changed.hash != PAPER.hash
+        assert (changed.calibration_hash != PAPER.calibration_hash) == bool(part)
+
+    def test_policies_of_different_names_and_thresholds_differ(self):
         assert STRICT.hash != PAPER.hash
 
     def test_a_threshold_that_came_later_changes_no_hash_until_it_asks_for_something(self):

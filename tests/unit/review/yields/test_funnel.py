@@ -272,6 +272,7 @@ class TestGetYield:
         values = {"max_height_m": 1.0, "low_parallax_degrees": 30.0, "outside_pitch_m": -10.0}
         found = get_yield(YieldStore(filled), 1, values)
         again = [solved_again(group, old, replace(PAPER, **values)) for group, old in solutions]
+        assert found.findings
         for part in found.findings:
             having = [s for s in again if part.name in {item.kind for item in s.findings}]
             assert (part.groups, part.passing) == (len(having), sum(s.passes for s in having))
