@@ -70,7 +70,7 @@ def _sentence(reason: Reason, allowance: Allowance) -> str:
         "silence": f"was at work for {allowance.silence:,.0f} seconds without a result",
         "killed": "was not finished: its process was killed, most likely for want of memory",
         "told": "was not finished: its process was told to end",
-        "crash": "made the process crash that read it",
+        "crash": "made its process crash",
     }[reason]
 
 

@@ -57,6 +57,7 @@ LOGIN = "touchline.login"
 """Where a request's scope says who is logged in."""
 RULE = "touchline.rule"
 """Where it says which row of the table has let it through."""
+UNDECIDED = "Nobody is let through. It is a fault of Touchline: report it."
 LOOK_SECONDS = 1.0
 """Between two looks whether whoever reads an endless answer still may."""
 THREADS = 8
@@ -102,7 +103,7 @@ async def require_decided(request: Request) -> None:
     own = request.scope["route"].path_format
     decided = {f"{request.scope['method']} {prefix}{own}" for prefix in ("", API)}
     if request.scope.get(RULE) not in decided:
-        raise ForbiddenError("nobody has decided who may do this")
+        raise ForbiddenError("no rule says who may ask for this address", hint=UNDECIDED)
 
 
 @dataclass(frozen=True)
@@ -250,7 +251,9 @@ class Access:
                 hint="Make one under Account, before anything else.",
             )
         if action is not Action.ACCOUNT and not _is_decided(asked.route, action):
-            raise ForbiddenError("nobody has decided which datasets this is about")
+            raise ForbiddenError(
+                "no rule says which datasets this address is about", hint=UNDECIDED
+            )
         findings = datasets_of(self._store, asked, login)
         require_allowed(asked, findings, login, action)
         return _Let(login, findings)
