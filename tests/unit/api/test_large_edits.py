@@ -96,13 +96,13 @@ def test_a_process_that_breaks_down_costs_its_large_edit_alone(
         broken.setattr("app.api.routers.views.solve_encoded", break_down)
         answer = draw(api, large_lines())
     assert (answer.status_code, "Retry-After" in answer.headers) == (503, True)
-    assert answer.json()["detail"].startswith("solving this made the process crash")
+    assert answer.json()["detail"].startswith("solving this made its process crash")
     assert api.get(f"{API}/groups/1").json() == before
     assert draw(api, large_lines()).status_code == 200
 
 
 def test_what_takes_the_place_of_one_that_broke_down_is_made_ready_too(ready) -> None:
-    with pytest.raises(OverloadedError, match="made the process crash"):
+    with pytest.raises(OverloadedError, match="made its process crash"):
         ready.run(break_down, None, None, {})
     assert ready.run(solve_here, None, None, {}) == os.getpid()
     end = time.monotonic() + SECONDS

@@ -190,7 +190,7 @@ class TestImportApart:
     ) -> None:
         monkeypatch.setattr(import_child, "import_here", break_down)
         before = FIGURES["imports"].ended["crash"]
-        with pytest.raises(TooLargeError, match="made the process crash"):
+        with pytest.raises(TooLargeError, match="made its process crash"):
             apart(store, tree)
         assert FIGURES["imports"].ended["crash"] == before + 1
 
