@@ -117,7 +117,7 @@ class TestFrames:
     @pytest.mark.parametrize(
         ("end", "error", "reason"),
         [
-            ("crash", ImageError, "made the process crash"),
+            ("crash", ImageError, "made its process crash"),
             ("be_killed", OverloadedError, "killed"),
             ("be_told_to_end", OverloadedError, "told to end"),
         ],

@@ -208,7 +208,7 @@ class TestWorkApart:
 
     def test_one_that_breaks_down_is_counted(self, store: Store) -> None:
         before = FIGURES[KIND].ended["crash"]
-        with pytest.raises(ChildEnded, match="made the process crash"):
+        with pytest.raises(ChildEnded, match="made its process crash"):
             run(store, break_down)
         assert FIGURES[KIND].ended["crash"] == before + 1
 
