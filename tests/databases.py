@@ -11,13 +11,15 @@ from typing import Any, Protocol
 
 import pysqlite3.dbapi2 as sqlite
 import pytest
-from sqlalchemy import Connection, event, inspect
+from sqlalchemy import Connection, event, inspect, select
 
 from app.config import Settings
 from app.store.dialect.dialect import dialect_in, dialect_of
 from app.store.engine import WRITE, make_engine
+from app.store.job_models import AnswerModel
 from app.store.session import Session
 from app.store.store import Store
+from app.store.tables import Base
 from tests.cluster import ADVICE, Cluster, find_programs, running_cluster
 from tests.on_postgresql import shared_cluster
 
@@ -269,3 +271,10 @@ def opened_databases(kind: str, folder: Path) -> Iterator[Databases]:
     shared = shared_cluster()
     with nullcontext(shared) if shared else running_cluster() as cluster:
         yield Server(cluster, folder)
+
+
+def content(store: Store) -> dict[str, list[str]]:
+    """Every row of the database but for the answers to requests."""
+    tables = [table for table in Base.metadata.sorted_tables if table is not AnswerModel.__table__]
+    with store.read() as session:
+        return {table.name: sorted(map(repr, session.execute(select(table)))) for table in tables}

@@ -8,15 +8,13 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from sqlalchemy import select
 from structlog.testing import capture_logs
 
 from app.api.services import Services
 from app.store import uploads
-from app.store.job_models import AnswerModel
 from app.store.session import Session
 from app.store.store import Store
-from app.store.tables import Base
+from tests.databases import content
 from tests.unit.api import dataset_requests, group_requests
 from tests.unit.api.group_requests import API, Made, ball, verdict
 
@@ -126,13 +124,6 @@ def stopped_after_a_commit(
     with patch.context() as patched, capture_logs():
         patched.setattr(store, "write", write)
         yield
-
-
-def content(store: Store) -> dict[str, list[Any]]:
-    """Every row of the database but for the answers."""
-    tables = [table for table in Base.metadata.sorted_tables if table is not AnswerModel.__table__]
-    with store.read() as session:
-        return {table.name: sorted(map(repr, session.execute(select(table)))) for table in tables}
 
 
 class TestTable:
