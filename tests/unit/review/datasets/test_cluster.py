@@ -125,11 +125,18 @@ class TestCluster:
                 executor.submit(refuse, 7).result(SECONDS)
             assert refused.value.hint == "Look elsewhere."
 
-    @pytest.mark.parametrize("work", [late, unreadable])
+    @pytest.mark.parametrize(
+        ("work", "error", "said"),
+        [(late, TimeoutError, "a task's own"), (unreadable, NotFoundError, "there is no 7")],
+    )
     def test_what_has_no_result_is_an_error_and_not_done_again_and_again(
-        self, place: SchedulerPlace, work: Callable[[int], object]
+        self,
+        place: SchedulerPlace,
+        work: Callable[[int], object],
+        error: type[Exception],
+        said: str,
     ) -> None:
-        with Cluster(place) as executor, pytest.raises((TimeoutError, NotFoundError)):
+        with Cluster(place) as executor, pytest.raises(error, match=said):
             executor.submit(work, 7).result(SECONDS)
 
     def test_what_is_lost_while_it_is_fetched_is_done_again(
