@@ -229,6 +229,23 @@ class TestFreeze:
         assert list_versions(store, "demo") == []
         frozen(store)
 
+    def test_a_version_whose_entry_cannot_be_logged_is_not_there(
+        self, store, judged, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        before = content(store)
+
+        def stop(*_: object) -> None:
+            raise KeyboardInterrupt
+
+        with monkeypatch.context() as patch:
+            patch.setattr("app.review.versions.freeze.append", stop)
+            with pytest.raises(KeyboardInterrupt):
+                frozen(store)
+        after = content(store)
+        assert (after["version"], after["log"]) == (before["version"], before["log"])
+        assert list_versions(store, "demo") == []
+        frozen(store)
+
     def test_it_is_logged_and_the_log_replays(self, store, judged) -> None:
         version = frozen(store)
         with store.read() as session:
