@@ -109,7 +109,7 @@ def assert_guarded(answer: Answer, told: object) -> None:
     assert headers["cross-origin-resource-policy"] == "same-origin", told
     assert not {name for name in headers if name.startswith("access-control-")}, told
     assert "server" not in headers, told
-    assert answer.status < 500 or answer.status == 503, (told, text)
+    assert answer.status < 500, (told, text)
     if answer.status >= 400 and answer.body and not headers["content-type"].startswith("text/html"):
         assert headers["content-type"] == PROBLEM, told
         problem = json.loads(text)

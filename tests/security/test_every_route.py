@@ -12,6 +12,7 @@ import uuid
 import warnings
 import zipfile
 from collections.abc import Iterator
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote, urlencode, urlsplit
@@ -23,7 +24,7 @@ from app.api.application import create_app
 from app.config import Settings
 from app.datasets.soccernet_v3_writer import write_soccernet_v3
 from app.store.store import Store
-from tests.databases import count_rows
+from tests.databases import content
 from tests.scenes import make_scenes
 from tests.security.asking import JSON, Answer, assert_guarded
 from tests.security.conftest import API, FORMULA, Guarded
@@ -331,10 +332,12 @@ class TestEveryRoute:
                 assert len(answer.body) <= most, told_of(row, answer, value)
 
 
-def _state(home: Path) -> dict[str, int]:
-    """How many rows each table has, and how long the log of changes is."""
-    exported = sum(path.is_file() for path in (home / "exports").rglob("*"))
-    return count_rows(home) | {"version": exported}
+def _state(home: Path) -> dict[str, object]:
+    """Every row of the database, and the files that were exported with their contents."""
+    with closing(Store.open(Settings(home=home))) as store:
+        rows = content(store)
+    files = [path for path in (home / "exports").rglob("*") if path.is_file()]
+    return {**rows, "files": {str(path): path.read_bytes() for path in files}}
 
 
 class TestFilesOfOthers:

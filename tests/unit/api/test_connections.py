@@ -172,7 +172,9 @@ class TestDeadlines:
                 time.sleep(0.2)
             assert b"200" in client.recv(65536)
 
-    def test_an_answer_may_take_its_time(self, port: int, echo: Echo) -> None:
+    def test_an_answer_may_take_longer_than_a_request(
+        self, port: int, echo: Echo, impatient: None
+    ) -> None:
         with connect(port) as client:
             client.sendall(b"GET /slow HTTP/1.1\r\nHost: a\r\n\r\n")
             time.sleep(1.0)

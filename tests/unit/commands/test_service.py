@@ -68,14 +68,23 @@ def lose(home: Path) -> None:
 
 class TestServe:
     @pytest.mark.file_of_sqlite("a file that is damaged")
-    @pytest.mark.parametrize("fault", [flip_a_page, cut, scribble, empty, lose])
+    @pytest.mark.parametrize(
+        ("fault", "mends"),
+        [
+            (flip_a_page, "touchline doctor"),
+            (cut, "touchline restore BACKUP"),
+            (scribble, "touchline restore BACKUP"),
+            (empty, "touchline restore BACKUP"),
+            (lose, "touchline restore BACKUP"),
+        ],
+    )
     def test_a_damaged_home_is_one_sentence_with_the_command_that_mends(
-        self, run: Run, home: Path, fault: Callable[[Path], None]
+        self, run: Run, home: Path, fault: Callable[[Path], None], mends: str
     ) -> None:
         fault(home)
         code, out, err = run("serve", "--port", "0")
         assert (code, out) == (1, "")
-        assert "touchline restore" in err or "touchline doctor" in err
+        assert f"Run {mends}" in err
         assert str(home / "touchline.db") in err
         # Where the file is and what SQLite says about its pages is a line of the log before it.
         lines = 3 if fault is flip_a_page else 2

@@ -117,7 +117,7 @@ class TestBundleEquations:
             moved[1][place] -= step
             ahead, back = (bundle_equations(item.reshape(-1, 8), rays, 8.0)[0] for item in moved)
             expected = (ahead - back) / (2 * step)
-            assert gradient[place] == pytest.approx(expected, rel=2e-3, abs=0.5)
+            assert gradient[place] == pytest.approx(expected, rel=1e-4)
 
     def test_the_curvature_is_that_of_the_cost_where_rays_meet(self):
         rays = rays_of()

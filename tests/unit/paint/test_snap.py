@@ -54,10 +54,11 @@ class TestSnap:
         assert field_error(found.camera, rendered.truth) < 0.12
         assert found.moved_px == pytest.approx(8.0, abs=1.0)
 
-    def test_from_the_wrong_paint_it_stays_where_it_was_and_says_so(self, rendered):
-        start = panned(rendered.truth, 60.0)
+    @pytest.mark.parametrize(("px", "reason"), [(60.0, PAINT_DISAGREES), (120.0, NO_PAINT)])
+    def test_too_far_off_it_stays_where_it_was_and_says_why(self, rendered, px, reason):
+        start = panned(rendered.truth, px)
         found = snap(rendered.image, rendered.field, start)
-        assert found.reason in (NO_PAINT, PAINT_DISAGREES)
+        assert found.reason == reason
         assert found.camera is start and found.covariance is None
 
     def test_a_start_that_is_surely_elsewhere_is_not_overruled(self, rendered):

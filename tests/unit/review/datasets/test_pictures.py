@@ -54,11 +54,15 @@ class TestCalibrateFiles:
             )
             assert np.linalg.norm(camera.position - POSITION) < 2.5
 
-    def test_pictures_as_they_were_taken_are_calibrated_as_ever(self, tmp_path: Path) -> None:
+    def test_pictures_that_are_not_stretched_get_the_same_cameras_as_without_a_guess(
+        self, tmp_path: Path
+    ) -> None:
         write(tmp_path / "lines", aspect=1.0)
         calibrate(tmp_path / "lines", tmp_path / "plain")
         calibrate(tmp_path / "lines", tmp_path / "asked", guess_picture=True)
-        for file in (tmp_path / "plain").glob("camera_*.json"):
+        cameras = sorted((tmp_path / "plain").glob("camera_*.json"))
+        assert len(cameras) == 4
+        for file in cameras:
             assert (tmp_path / "asked" / file.name).read_bytes() == file.read_bytes()
 
 

@@ -92,7 +92,11 @@ class TestBatch:
 
     def test_is_made_with_the_answer_that_is_kept_of_it_or_not_at_all(self, store, dataset):
         def keep(made):
-            raise OSError("the power went")
+            def kept(session):
+                assert read_batch(session, made.id) == made
+                raise OSError("the power went")
+
+            return kept
 
         with pytest.raises(OSError, match="power"):
             make_batch(store, dataset, NewBatch("a"), actor="lead", keep=keep)
