@@ -47,8 +47,9 @@ async def get_actor(
         ),
     ] = None,
 ) -> str:
-    """Who acts: the person who is logged in, or whose token it is; on a server without accounts its single user, or a script
-    by its name.
+    """Who acts: the person who is logged in, or whose token it is.
+
+    On a server without accounts it is the single user, or a script by its name.
 
     Raises:
         InputError: The name cannot be one, or a person is known who would hide behind it.
@@ -57,7 +58,7 @@ async def get_actor(
     if login is not None:
         if said is not None:
             raise InputError(
-                f"on a server of a team {ACTOR_HEADER} names nobody",
+                f"{ACTOR_HEADER} is not accepted where people log in",
                 hint="Leave it out: the log names the person who is logged in.",
                 pointer=f"/{ACTOR_HEADER}",
             )

@@ -138,8 +138,10 @@ async def _validation_error(request: Request, error: Exception) -> Response:
     """422 with a pointer for each field; 404 where the id in the path cannot be one."""
     assert isinstance(error, RequestValidationError)
     details = error.errors()
-    if any(detail["loc"][0] == "path" for detail in details):
-        return problem_response(make_problem(404, "there is nothing with such an id"))
+    for detail in details:
+        if detail["loc"][0] == "path":
+            missing = f"there is no {detail['loc'][1]} with this id, which cannot be one"
+            return problem_response(make_problem(404, missing))
     errors = [
         FieldProblem(pointer=_pointer(detail["loc"]), detail=_sentence(request, detail))
         for detail in details[:20]

@@ -188,7 +188,7 @@ async def _again(known: Answer, request: _Request, send: Send) -> None:
         problem = make_problem(
             409,
             "this request was answered before, and its answer is no longer kept",
-            hint="It counts, once. Load the present state.",
+            hint="It was carried out, once. Load the present state.",
         )
         await problem_response(problem, {REPLAYED: "true"})(request.scope, request.receive, send)
         return

@@ -60,7 +60,8 @@ class LargeEdits:
             found: Solved = task.future.result()
         except CancelledError as error:
             raise OverloadedError(
-                "the server stops", hint="Nothing was saved. Try it again in a moment."
+                "the server is shutting down",
+                hint="Nothing was saved. Try it again in a moment.",
             ) from error
         return found
 

@@ -141,7 +141,7 @@ class Team:
             port = f":{said.port}" if said.port not in (None, 80, 443) else ""
             return Site(name, f"{said.scheme}://{name}{port}")
         raise ConflictError(
-            "browsers know no passkeys for this address",
+            "browsers make no passkeys for this address",
             hint="They need https and a name (touchline serve --team --url), or localhost.",
         )
 

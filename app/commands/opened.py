@@ -81,9 +81,9 @@ def process_pool(workers: int) -> Iterator[Executor]:
     """
     if not os.access(".", os.X_OK):
         raise InputError(
-            "this user may not enter the folder in which the command was given, nor can the"
-            " processes that solve",
-            hint="Go to another one first (cd /), or solve with --workers 1.",
+            "this user may not enter the folder in which the command was given, which processes"
+            " that solve need",
+            hint="Change to another folder first (cd /), or solve with --workers 1.",
         )
     import multiprocessing
     from concurrent.futures import ProcessPoolExecutor

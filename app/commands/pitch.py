@@ -91,7 +91,8 @@ def _size(state: PitchState, text: str) -> Any:
         return parse_pitch(text)
     if state.previous is None:
         raise InputError(
-            f"the pitch of {state.match or 'groups without a match'} has not been changed"
+            f"the pitch of {state.match or 'groups without a match'} has no size before this one",
+            hint="It was never changed. Give a size, such as 105x68.",
         )
     return state.previous
 

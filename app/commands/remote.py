@@ -262,7 +262,9 @@ def _set(client: Client, dataset: str, source: PredictionSource) -> dict[str, An
     path = None if source.boxes is None else Path(source.boxes)
     if path is not None and not path.exists():
         if source.cameras is not None or str(path) not in known:
-            raise NotFoundError(f"there is neither a file nor a set {path}")
+            raise NotFoundError(
+                f"there is no file {path} here, and no set of predictions of that name on the server"
+            )
         return dict(known[str(path)])
     first = path or source.cameras
     assert first is not None

@@ -83,7 +83,9 @@ async def _receive(request: Request, services: Services, name: str, actor: str) 
         while not writing.done():
             await asyncio.wait({writing}, timeout=LOOK_SECONDS)
             if services.stopping.is_set():
-                raise OverloadedError("the server stops", hint="Send the file again in a while.")
+                raise OverloadedError(
+                    "the server is shutting down", hint="Send the file again in a moment."
+                )
         writing.result()
         return await _on_disk(finish_upload, writer, actor)
     except BaseException as error:

@@ -178,4 +178,6 @@ class TestValidationErrors:
 
     @pytest.mark.parametrize("view", ["0", "x", "-1", "1.5"])
     def test_an_id_that_cannot_be_one_is_not_found(self, client, view: str) -> None:
-        assert client.patch(f"/lines/{view}", json={"lines": {}}).status_code == 404
+        answer = client.patch(f"/lines/{view}", json={"lines": {}})
+        assert answer.status_code == 404
+        assert answer.json()["detail"] == "there is no view with this id, which cannot be one"

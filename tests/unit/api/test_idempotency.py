@@ -56,7 +56,7 @@ class TestRepetition:
             assert shorten_answers(session, 0) == 1
         again = accept(api)
         assert (again.status_code, again.headers["idempotency-replayed"]) == (409, "true")
-        assert "counts, once" in again.json()["hint"]
+        assert "carried out, once" in again.json()["hint"]
 
     def test_is_known_by_what_it_says_and_not_by_how_it_is_written(self, api) -> None:
         body = '{"state": "rejected", "reason": "sides_confused"}'

@@ -128,6 +128,6 @@ def test_one_that_is_not_begun_when_the_server_closes_is_told_to_come_again(read
             assert time.monotonic() < end, "it does not wait"
             time.sleep(0.02)
         ready.close()
-        with pytest.raises(OverloadedError, match="the server stops"):
+        with pytest.raises(OverloadedError, match="the server is shutting down"):
             waiting.result(SECONDS)
     assert blocking.future.done()
