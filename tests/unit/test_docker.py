@@ -45,7 +45,9 @@ class TestCompose:
             assert services[name]["network_mode"] == "service:door"
         assert "TOUCHLINE_HOST" not in services["touchline"]["environment"]
 
-    def test_what_holds_the_network_never_ends_by_itself(self, services: dict[str, Any]) -> None:
+    def test_the_service_that_owns_the_network_never_ends_by_itself(
+        self, services: dict[str, Any]
+    ) -> None:
         """Whose network ends while others live in it leaves them where nobody comes."""
         door = services["door"]
         assert door["command"] == ["tail", "-f", "/dev/null"]

@@ -165,7 +165,9 @@ class TestAdvisories:
 
 
 class TestBill:
-    def test_holds_both_halves_without_tools_and_addresses(self) -> None:
+    def test_lists_python_and_browser_packages_without_test_tools_and_registry_addresses(
+        self,
+    ) -> None:
         def component(name: str) -> dict[str, Any]:
             links = [{"type": "distribution", "url": "https://registry.example"}]
             return {"bom-ref": f"{name}@1", "name": name, "externalReferences": links}

@@ -90,7 +90,7 @@ class TestExports:
         export(imported, "league", "soccernet-v3", out, everything=True)
         assert out.store.head(out.key) != before
 
-    def test_the_manifest_of_a_folder_comes_last_and_goes_first(
+    def test_the_manifest_is_written_last_and_removed_first_when_a_folder_is_exported_again(
         self, settings: Settings, imported: Store, door: Door
     ) -> None:
         out = target_path(settings, "s3://frames/out/folder")

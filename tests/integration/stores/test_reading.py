@@ -57,7 +57,9 @@ class TestAddresses:
         assert door.asked == []
 
     @pytest.mark.parametrize("inside", ["../b", "a/../b", "a//b", "./a", "a\\b", "a\n", "x" * 1001])
-    def test_a_key_has_no_part_that_is_more_than_a_name(self, inside: str) -> None:
+    def test_an_address_whose_key_has_a_part_that_is_no_plain_name_is_refused(
+        self, inside: str
+    ) -> None:
         with pytest.raises(InputError):
             split_address(f"s3://frames/{inside}")
 

@@ -80,7 +80,9 @@ class TestSnap:
 
 class TestCircle:
     @pytest.mark.parametrize(("places", "spacing"), [(60, 4.0), (30, 8.0)])
-    def test_tells_as_much_as_two_lines_from_the_same_length_on(self, places, spacing):
+    def test_suffices_beside_one_line_from_a_certain_length_on_whatever_the_spacing(
+        self, places, spacing
+    ):
         def suffices(on_circle: int) -> bool:
             marking = np.repeat(
                 np.array([CURVED[0], MARKINGS.index("Middle line")]), (on_circle, 10)

@@ -448,7 +448,7 @@ class TestCalibrationFindings:
 
 
 class TestViewLetter:
-    def test_counts_on_after_the_alphabet(self):
+    def test_views_after_the_26th_are_numbered(self):
         assert [view_letter(index) for index in (0, 2, 25, 26)] == ["A", "C", "Z", "V27"]
 
 

@@ -37,7 +37,7 @@ class TestLeftovers:
         monkeypatch.setattr("app.store.leftovers.iglob", lambda *_, **__: ["uploads/1.part"])
         assert list(leftovers(settings)) == []
 
-    def test_what_is_gone_was_never_written(self, tmp_path: Path) -> None:
+    def test_a_file_that_is_gone_has_no_time_of_writing(self, tmp_path: Path) -> None:
         assert last_written(tmp_path / "gone") is None
 
     def test_what_a_killed_writer_of_ours_leaves_goes_whatever_it_wrote(

@@ -74,7 +74,7 @@ class TestTables:
         with pytest.raises(ValueError, match="players"):
             version.table("players")
 
-    def test_pandas_is_asked_for_where_it_is_not(
+    def test_where_pandas_is_missing_the_error_says_how_to_install_it(
         self, version: touchline.Dataset, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         monkeypatch.setitem(__import__("sys").modules, "pandas", None)

@@ -43,7 +43,7 @@ class TestDocument:
 
 
 class TestWhatShowsADataclass:
-    def test_has_its_fields_in_their_order_and_those_of_its_own_after_them(self) -> None:
+    def test_has_the_fields_of_the_dataclass_in_order_and_then_its_own(self) -> None:
         assert list(KickDocument.model_fields) == ["minute", "player", "far"]
 
     def test_says_more_of_a_field_where_it_writes_that_down(self) -> None:

@@ -349,6 +349,6 @@ class TestParsePitch:
     def test_is_length_by_width(self):
         assert parse_pitch("103x66.5") == Pitch(103.0, 66.5)
 
-    def test_says_how_it_is_written(self):
+    def test_an_error_says_how_a_size_is_written(self):
         with pytest.raises(InputError, match="write it as 105x68"):
             parse_pitch("big")

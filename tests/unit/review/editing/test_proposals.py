@@ -371,7 +371,7 @@ class TestDrawnLines:
         assert not get_group_proposals(poor, 1)[0][1]
         assert counts(poor) == (1, 0, 0, 0, 0, 0)
 
-    def test_of_a_static_camera_are_looked_at_once(self, store, asked, tmp_path: Path):
+    def test_the_views_of_a_static_camera_are_proposed_once(self, store, asked, tmp_path: Path):
         media, few = (
             draw(tmp_path / "s.png"),
             {"Side line right": lines_of(CAMERA)["Side line right"]},

@@ -90,7 +90,7 @@ class TestLogin:
         assert desk.enter() == "anna"
         assert desk.passkeys.of(1)[0].used is not None
 
-    def test_devices_that_do_not_count_are_good(self, desk: Desk) -> None:
+    def test_a_device_without_a_signature_counter_is_accepted(self, desk: Desk) -> None:
         desk.made(desk.login())
         for _ in "12":
             desk.device.count = -1
@@ -194,7 +194,9 @@ class TestMaking:
             desk.passkeys.make(login, "phone", garbage, SITE)
         assert desk.passkeys.of(1) == []
 
-    def test_there_are_several_with_names_and_none_is_two_peoples(self, desk: Desk) -> None:
+    def test_one_person_may_have_several_named_ones_and_none_has_two_owners(
+        self, desk: Desk
+    ) -> None:
         login = desk.login()
         assert len(desk.made(login)) == 10
         second = Authenticator(credential=b"a key on a ring")

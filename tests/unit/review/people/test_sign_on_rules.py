@@ -84,7 +84,9 @@ class TestReadRules:
 
 
 class TestSignOnRules:
-    def test_a_name_is_made_of_what_names_have(self, tmp_path: Path) -> None:
+    def test_a_username_keeps_only_letters_digits_and_dots_of_the_providers_name(
+        self, tmp_path: Path
+    ) -> None:
         rules = whole(tmp_path)
         said = ("Anna", "anna.b@club.example", " J\u00f6rg  M. ", "..", 7, None, "x" * 60)
         names = [rules.name_for({"preferred_username": one}) for one in said]

@@ -44,5 +44,5 @@ def test_pictures_that_place_no_camera_do_not_count(station):
     assert first_policy([group(4, **station), group(3, 4)]) == TOUCHLINE
 
 
-def test_nothing_is_judged_as_in_the_paper():
+def test_a_dataset_without_groups_gets_the_policy_of_the_paper():
     assert first_policy([]) == PAPER

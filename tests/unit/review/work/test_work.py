@@ -189,7 +189,7 @@ class TestLeases:
         assert leases.next(batch, BO, after=groups[2]).group == groups[0]
         assert leases.next(batch, BO, after=groups[0]).group is None
 
-    def test_a_verdict_ends_it_and_the_work_and_taking_it_back_brings_both(
+    def test_a_verdict_ends_the_lease_and_the_work_and_unreviewing_makes_it_work_again(
         self, store, dataset, groups, leases
     ):
         batch = make_batch(store, dataset, NewBatch("a"), actor="lead").id
