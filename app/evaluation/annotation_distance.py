@@ -175,7 +175,11 @@ def compare_lines(a: Lines, b: Lines) -> tuple[LineDistance, ...]:
 
 
 def compare_balls(a: tuple[BallAnnotation, ...], b: tuple[BallAnnotation, ...]) -> BallDistance:
-    """The balls of one view; several on either side are not told apart."""
+    """The balls of one view, in its pixels; several on either side are not told apart.
+
+    The distance is that of the centres; the difference of diameters is ``b`` less ``a``, None
+    where either is a point without a box.
+    """
     states = ball_state(a), ball_state(b)
     places = [_place(a), _place(b)]
     first, second = places

@@ -40,7 +40,11 @@ class Resamples:
         return Resamples(names, rng.multinomial(len(names), share, resamples).astype(float))
 
     def places(self, matches: Sequence[str]) -> npt.NDArray[np.int64]:
-        """Column of each match."""
+        """Column of ``counts`` of each match, shape (N,).
+
+        Raises:
+            KeyError: A match was not among those drawn from.
+        """
         place = {name: index for index, name in enumerate(self.matches)}
         return np.array([place[match] for match in matches], dtype=np.int64)
 
@@ -70,7 +74,15 @@ class Resamples:
 
 
 def interval(values: FloatArray) -> tuple[float | None, float | None]:
-    """Ends of the central 95 % of resampled values; resamples without any value do not count."""
+    """Ends of the central 95 % of resampled values: the percentile interval of the bootstrap.
+
+    Args:
+        values: One number per resample, in the statistic's unit, shape (resamples,); NaN and
+            infinity, of resamples without any value, do not count.
+
+    Returns:
+        Both ends, or None twice where no value is left (Efron & Tibshirani 1993, 13.3).
+    """
     found = values[np.isfinite(values)]
     if not len(found):
         return None, None

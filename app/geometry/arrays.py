@@ -48,5 +48,8 @@ def require_shape(array: FloatArray, shape: tuple[int | None, ...], name: str) -
 
 
 def row_by_row(covariance: FloatArray) -> tuple[float, ...]:
-    """A covariance as plain numbers, row by row: what rounding made of its two halves is one."""
+    """A covariance, shape (N, N), as N * N plain numbers, row by row.
+
+    Both halves are made equal where rounding parted them.
+    """
     return tuple(((covariance + covariance.T) / 2).ravel().tolist())

@@ -116,7 +116,15 @@ def linearize(parameters: FloatArray, points: FloatArray, rays: Rays) -> Lineari
 
 
 def nearest_points(parameters: FloatArray, rays: Rays) -> FloatArray:
-    """The points nearest to their rays in space, pitch frame, metres, shape (F, 3)."""
+    """The points nearest to their rays in space, pitch frame, metres, shape (F, 3).
+
+    The least squares of the distances to rays from C along d: the sum of (I - d d') X equals that
+    of (I - d d') C. Where rays are parallel the point is their nearest one to the origin.
+
+    Args:
+        parameters: Of the cameras, shape (K, 8).
+        rays: What was seen.
+    """
     normal, pull = np.zeros((rays.points, 3, 3)), np.zeros((rays.points, 3))
     for row in range(len(parameters)):
         mine = rays.camera == row

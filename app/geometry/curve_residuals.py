@@ -27,7 +27,12 @@ def accumulate(
     parameters, kinds, shapes, pixels, curve, weight, mean, sigma, scale, half_diagonal,
     cost, gradient, information,
 ):  # fmt: skip
-    """Cost, gradient and J^T W J of each row of parameters, written to the last three."""
+    """Cost, gradient and J^T W J of each row of parameters, written to the last three.
+
+    Parameters (B, 8); kinds and shapes of the curves as ``resection.Curves`` has them; pixels
+    (N, 2) with curve and weight (N,); mean and sigma of the prior (8,); scale of the soft-L1 loss
+    and half diagonal in pixels. Cost (B,), gradient (B, 8), information (B, 8, 8).
+    """
     offsets = np.empty((len(pixels), 2))
     jacobians = np.empty((len(pixels), 2, 8))
     arcs, ideal = arc_points(kinds, shapes), np.empty((2, len(pixels)))
@@ -83,7 +88,11 @@ def residual_rows(parameters, kinds, shapes, pixels, curve, half_diagonal, offse
 
 @compiled
 def rows_of(camera, kinds, shapes, arcs, pixels, curve, ideal, samples, place, offsets, jacobians):
-    """``residual_rows`` of a camera; ``arcs`` are ``arc_points``, the rest is room."""
+    """``residual_rows`` of a camera: pixels (N, 2) with their curve (N,).
+
+    ``arcs`` are ``arc_points``. Room: ideal (2, N), samples (5, ARC_SAMPLES + 1), place (6,).
+    Written: offsets (N, 2), pixels, and jacobians (N, 2, 8).
+    """
     ideal_pixels(camera, pixels, ideal)
     shares = np.empty((2, ARC_SAMPLES))
     last = -1

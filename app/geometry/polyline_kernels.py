@@ -27,7 +27,11 @@ def nearest_places(points, polyline, apart, nearest):
 
 @compiled
 def clipped(points, width, height, room):
-    """How many points of the clipped polyline were written to ``room``, shape (2 N, 2)."""
+    """How many points of the clipped polyline were written to ``room``, shape (2 N, 2).
+
+    ``points`` of shape (N, 2), pixels; those that are NaN are left out, and their neighbours are
+    joined. Crossings of the border are added.
+    """
     count, before, was_inside = 0, -1, False
     for n in range(len(points)):
         if np.isnan(points[n, 0]):

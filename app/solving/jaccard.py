@@ -2,6 +2,9 @@
 
 Numbers equal those of the public sn-calibration evaluator: a marking that is annotated and
 visible counts as found when every annotated point lies closer than gamma to its projection.
+
+Source: SoccerNet-v3D (arXiv 2504.10106), JaC; Magera et al., "A universal protocol to benchmark
+camera calibration for sports", 2024.
 """
 
 from __future__ import annotations
@@ -45,7 +48,16 @@ class ProjectedMarking:
 
 
 def project_markings(camera: Camera, pitch: Pitch, size: ImageSize) -> dict[str, FloatArray]:
-    """The visible markings as clipped polylines, pixels, in the order of ``MARKINGS``."""
+    """The visible markings as clipped polylines, in the order of ``MARKINGS``.
+
+    Args:
+        camera: In the pitch frame.
+        pitch: Its size, metres.
+        size: Of the picture, pixels.
+
+    Returns:
+        Of each marking that is seen its places in the picture, pixels, shape (N, 2).
+    """
     samples, limits = _samples(pitch)
     pixels = camera.project(samples, folded=True)
     seen = inside_image(pixels, size.width, size.height)
@@ -57,7 +69,12 @@ def project_markings(camera: Camera, pitch: Pitch, size: ImageSize) -> dict[str,
 
 
 def measure_markings(projected: dict[str, FloatArray], lines: Lines) -> dict[str, ProjectedMarking]:
-    """Each visible marking with the distances of its annotated points."""
+    """Each visible marking with the distances of its annotated points, pixels.
+
+    Args:
+        projected: Of ``project_markings``: a polyline, shape (N, 2), for each visible marking.
+        lines: The annotated points of each marking, pixels.
+    """
     measured = {}
     for marking, polyline in projected.items():
         apart, nearest = np.empty(0), np.empty((0, 2))

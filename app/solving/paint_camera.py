@@ -76,7 +76,20 @@ class PaintProblem:
         return max(self.resection.unit, LEAST_UNIT)
 
     def step(self, parameters: FloatArray, seen: PaintOffsets, strict: bool) -> FloatArray:
-        """Towards the paint: reweighted least squares on the offsets, made linear here."""
+        """The step towards the paint, shape (8,): iteratively reweighted least squares.
+
+        The offsets o are taken as linear in the step d, o - J d; each solve is that of
+        (J' W J + P) d = J' W o + P (mean - parameters), damped, with W the weights by residual
+        and marking over sigma squared, and P the information of prior and start.
+
+        Args:
+            parameters: Where the offsets were measured, shape (8,).
+            seen: The paint beside its markings there, pixels.
+            strict: Whether what lies far off counts little (redescending weights), or by soft-L1.
+
+        Raises:
+            numpy.linalg.LinAlgError: Nothing determines the step.
+        """
         prior = self.prior(parameters)
         information = np.diag(prior.sigma**-2.0)
         pull = (prior.mean - parameters) * prior.sigma**-2.0

@@ -69,7 +69,12 @@ class PaintNoise:
 def marking_weights(marking: IntArray, sigmas: FloatArray) -> FloatArray:
     """Weight of each point, shape (N,): many points of one marking say less than of several.
 
-    The mean of n points that share rho of their variance is worth n / (1 + rho (n - 1)) of them.
+    The mean of n points that share rho of their variance is worth n / (1 + rho (n - 1)) of them
+    (the design effect of cluster sampling, Kish 1965).
+
+    Args:
+        marking: Index into ``MARKINGS`` of each point, shape (N,).
+        sigmas: Standard deviation of each, pixels, shape (N,).
     """
     counts = np.bincount(marking)
     weights: FloatArray = 1 / (1 + _shares(sigmas) * (counts[marking] - 1))

@@ -58,7 +58,14 @@ def is_open(picture: PictureGeometry) -> bool:
 def undo_warp(
     problem: ResectionProblem, observations: Observations, warp: FloatArray
 ) -> Observations:
-    """The points where the picture as it was taken shows them."""
+    """The points where the picture as it was taken shows them.
+
+    Args:
+        problem: Whose picture it is.
+        observations: Points in the picture as it is, pixels from its middle, shape (N, 2).
+        warp: Logarithm of the aspect, and shift of the axis right and down in half diagonals,
+            shape (3,).
+    """
     half = problem.size.diagonal / 2
     pixels = observations.pixels - warp[1:] * half
     pixels[:, 0] /= np.exp(warp[0])

@@ -201,6 +201,14 @@ class ResectionProblem:
 
         Points of a circle of which little is seen can settle on its wrong side and hold the
         camera there; straight markings have no wrong side.
+
+        Args:
+            observations: N annotated points in pixels from the middle of the picture, with the
+                pitch curve (metres) on which each lies.
+
+        Returns:
+            Parameters, shape (8,), of least soft-L1 cost (pixels squared) of the distances between
+            points and projected curves, and that cost.
         """
         fit = self.search(observations)
         if self.distances(fit.parameters, observations).max() <= POOR_PX * self.unit:
@@ -291,6 +299,10 @@ class ResectionProblem:
 
         Only the distortion keeps its prior: what the lines do not determine must show.
 
+        Args:
+            parameters: At the minimum, shape (8,).
+            observations: N annotated points with their curves, pixels.
+
         Raises:
             DegenerateGeometryError: The lines leave a combination of parameters open.
         """
@@ -300,6 +312,15 @@ class ResectionProblem:
         self, parameters: FloatArray, observations: Observations
     ) -> tuple[FloatArray, FloatArray, IntArray, FloatArray]:
         """Residuals, Jacobian, marking and prior at a minimum as ``line_noise`` takes them.
+
+        Args:
+            parameters: At the minimum, shape (8,).
+            observations: N annotated points with their curves, pixels.
+
+        Returns:
+            Residuals across the lines, and along them beyond an end, pixels, shape (M,) with
+            N <= M <= 2 N; their derivatives, shape (M, 8); the marking of each, negative and its
+            own for one along, shape (M,); the prior's information, a diagonal, shape (8,).
 
         Raises:
             DegenerateGeometryError: The lines leave a combination of parameters open.
@@ -330,7 +351,7 @@ class ResectionProblem:
         return max(float(robust.sum()) / spare, (MIN_CLICK_SIGMA_PX * self.unit) ** 2)
 
     def camera(self, parameters: FloatArray) -> Camera:
-        """Camera of one row of parameters."""
+        """Camera of one row of parameters, shape (8,), in pixels of this picture and the pitch frame."""
         return camera_from_parameters(
             parameters, principal_point(self.size), self.size.diagonal / 2
         )
