@@ -16,10 +16,10 @@ from sqlalchemy import Connection, event, inspect, select
 from app.config import Settings
 from app.store.dialect.dialect import dialect_in, dialect_of
 from app.store.engine import WRITE, make_engine
-from app.store.job_models import AnswerModel
 from app.store.session import Session
 from app.store.store import Store
 from app.store.tables import Base
+from app.store.tables.jobs import AnswerModel
 from tests.cluster import ADVICE, Cluster, find_programs, running_cluster
 from tests.on_postgresql import shared_cluster
 

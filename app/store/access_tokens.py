@@ -8,10 +8,10 @@ from typing import Any
 
 from sqlalchemy import Select, bindparam, delete, func, insert, select, update
 
-from app.store.models import DatasetModel
-from app.store.people_models import AccessTokenModel, PersonModel
 from app.store.rights import with_rights
 from app.store.session import Session
+from app.store.tables.groups import DatasetModel
+from app.store.tables.people import AccessTokenModel, PersonModel
 
 _ALL = (
     select(

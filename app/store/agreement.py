@@ -7,12 +7,12 @@ from typing import Any
 
 from sqlalchemy import Select, delete, func, insert, select, update
 
-from app.store.agreement_models import AgreementLimitsModel, AgreementModel
-from app.store.models import QueueModel
 from app.store.session import Session
-from app.store.take_models import TakeModel
+from app.store.tables.agreement import AgreementLimitsModel, AgreementModel
+from app.store.tables.queue import QueueModel
+from app.store.tables.takes import TakeModel
+from app.store.tables.work import BatchModel
 from app.store.takes import INDEPENDENT
-from app.store.work_models import BatchModel
 
 AGREED, OPEN, DECIDED = "agreed", "open", "decided"
 """States of an agreement."""

@@ -9,9 +9,9 @@ from typing import Any
 from sqlalchemy import ColumnElement, func, insert, select, update
 
 from app.store.log import LogEntry
-from app.store.models import QueueModel
-from app.store.people_models import ActorAliasModel, PersonModel
 from app.store.session import Session
+from app.store.tables.people import ActorAliasModel, PersonModel
+from app.store.tables.queue import QueueModel
 
 _ALIASES = select(ActorAliasModel.actor, ActorAliasModel.at, PersonModel.name.label("shown")).join(
     PersonModel, PersonModel.id == ActorAliasModel.person_id

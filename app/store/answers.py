@@ -12,9 +12,9 @@ from zlib_ng import zlib_ng
 from app.finite import json_text
 from app.store.clock import now
 from app.store.dialect.statements import insert
-from app.store.job_models import AnswerModel
 from app.store.session import Session
 from app.store.stored_json import inflate, parse
+from app.store.tables.jobs import AnswerModel
 
 KEPT_HOURS = 24
 """How long an answer is kept; what an edit builds on (If-Match) still stops a later repetition."""

@@ -10,10 +10,11 @@ from sqlalchemy import ColumnElement, literal, or_, select
 
 from app.soccer.actors import TOKEN
 from app.store.aliases import shown_actor
-from app.store.models import DatasetModel, GroupModel, LogModel
 from app.store.session import Session
 from app.store.sight import Sight
 from app.store.stored_json import unpack
+from app.store.tables.groups import DatasetModel, GroupModel
+from app.store.tables.log import LogModel
 
 
 @dataclass(frozen=True)

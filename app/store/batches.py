@@ -12,7 +12,7 @@ from app.finite import json_text
 from app.store.group_rows import next_id
 from app.store.session import Session
 from app.store.stored_json import parse
-from app.store.view_models import VerdictBatchModel
+from app.store.tables.saved_views import VerdictBatchModel
 
 Spans = Sequence[tuple[int, int]]
 """First and last id of the verdicts of each chunk."""

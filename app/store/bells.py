@@ -9,10 +9,10 @@ from typing import Any
 from sqlalchemy import ColumnElement, delete, func, insert, literal, select, update
 
 from app.store.group_rows import next_id
-from app.store.models import DatasetModel
 from app.store.session import Session
 from app.store.sight import Sight
-from app.store.talk_models import BellModel
+from app.store.tables.groups import DatasetModel
+from app.store.tables.talk import BellModel
 
 
 @dataclass(frozen=True)

@@ -7,13 +7,13 @@ from typing import Any
 
 from sqlalchemy import Select, and_, bindparam, or_, select
 
-from app.store.job_models import JobModel
-from app.store.models import DatasetModel, GroupModel, StationModel, ViewModel
-from app.store.prediction_models import EvaluationModel, PredictionSetModel
 from app.store.session import Session
-from app.store.version_models import VersionModel
-from app.store.view_models import SavedViewModel, VerdictBatchModel
-from app.store.work_models import BatchModel
+from app.store.tables.groups import DatasetModel, GroupModel, StationModel, ViewModel
+from app.store.tables.jobs import JobModel
+from app.store.tables.predictions import EvaluationModel, PredictionSetModel
+from app.store.tables.saved_views import SavedViewModel, VerdictBatchModel
+from app.store.tables.versions import VersionModel
+from app.store.tables.work import BatchModel
 
 _ID: Any = bindparam("id")
 _DATASET_OF: Mapping[str, Select[Any]] = {

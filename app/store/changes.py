@@ -8,8 +8,10 @@ from dataclasses import dataclass
 from sqlalchemy import select
 
 from app.store.log import DEEDS
-from app.store.models import GroupModel, LogModel, SolutionModel, ViewModel
 from app.store.session import Session
+from app.store.tables.groups import GroupModel, ViewModel
+from app.store.tables.log import LogModel
+from app.store.tables.solutions import SolutionModel
 
 
 @dataclass(frozen=True)

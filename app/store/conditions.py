@@ -11,8 +11,8 @@ from sqlalchemy.orm import InstrumentedAttribute
 
 from app.store.agreement import groups_that_came_to
 from app.store.dialect.statements import numbers_in
-from app.store.models import QueueModel
 from app.store.proposals import groups_with_open
+from app.store.tables.queue import QueueModel
 from app.store.takes import groups_with_takes
 from app.store.threads import groups_that_mention, groups_with_threads
 from app.store.work import groups_in_batches

@@ -8,9 +8,9 @@ from typing import Any
 
 from sqlalchemy import insert, select
 
-from app.store.models import DatasetModel
 from app.store.session import Session
-from app.store.take_models import CopyDatasetModel
+from app.store.tables.groups import DatasetModel
+from app.store.tables.takes import CopyDatasetModel
 
 _COPIES = select(*CopyDatasetModel.__table__.columns, DatasetModel.name).join(
     DatasetModel, DatasetModel.id == CopyDatasetModel.dataset_id

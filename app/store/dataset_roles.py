@@ -8,9 +8,9 @@ from typing import Any
 from sqlalchemy import delete, insert, select
 
 from app.store.clock import now
-from app.store.models import DatasetModel
-from app.store.people_models import DatasetRoleModel, PersonModel
 from app.store.session import Session
+from app.store.tables.groups import DatasetModel
+from app.store.tables.people import DatasetRoleModel, PersonModel
 
 
 def all_dataset_roles(session: Session) -> Sequence[Any]:

@@ -11,11 +11,11 @@ from sqlalchemy import exists, func, insert, select, update
 from app.canonical import canonical
 from app.soccer.policy import Policy
 from app.store.codecs import policy_from_json, policy_to_json
-from app.store.models import DatasetModel, GroupModel
 from app.store.session import Session
 from app.store.sight import COPIES
 from app.store.stored_json import as_written, parse
-from app.store.view_models import COPIES_USED, UsedIdModel
+from app.store.tables.groups import DatasetModel, GroupModel
+from app.store.tables.saved_views import COPIES_USED, UsedIdModel
 
 MAX_ID = 2**63 - 1
 _DIGITS = 19

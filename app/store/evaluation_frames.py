@@ -8,8 +8,8 @@ from typing import Any
 from sqlalchemy import ColumnElement, and_, func, select
 from sqlalchemy.orm import InstrumentedAttribute
 
-from app.store.prediction_models import EvaluationFrameModel
 from app.store.session import Session
+from app.store.tables.predictions import EvaluationFrameModel
 
 FrameCondition = ColumnElement[bool]
 """Whether a frame is meant; made by the functions here."""

@@ -11,10 +11,10 @@ from sqlalchemy import delete, insert, select
 from app.canonical import canonical
 from app.store.aliases import columns_shown
 from app.store.group_rows import next_id
-from app.store.models import DatasetModel
-from app.store.prediction_models import EvaluationFrameModel, EvaluationModel
 from app.store.session import Session
 from app.store.stored_json import Json, pack, parse, unpack
+from app.store.tables.groups import DatasetModel
+from app.store.tables.predictions import EvaluationFrameModel, EvaluationModel
 
 _BATCH = 2000
 _MOST = 500

@@ -6,9 +6,10 @@ from sqlalchemy import false, func, not_, or_, select
 
 from app.store.listing import Listing
 from app.store.log import DEEDS
-from app.store.models import LogModel, QueueModel
 from app.store.order import Order
 from app.store.session import Session
+from app.store.tables.log import LogModel
+from app.store.tables.queue import QueueModel
 
 _NO_WORD = ("freeze", "comment", *DEEDS)
 _ACCEPTED = QueueModel.status == "accepted"

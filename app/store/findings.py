@@ -6,8 +6,8 @@ from collections.abc import Collection, Iterable
 
 from sqlalchemy import delete, insert, select
 
-from app.store.models import ImportFindingModel
 from app.store.session import Session
+from app.store.tables.groups import ImportFindingModel
 
 Noticed = tuple[str | None, str]
 """Key of a view, or None where the whole group is meant; and the sentence."""

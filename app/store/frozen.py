@@ -29,7 +29,7 @@ from app.store.codecs import (
 from app.store.session import Session
 from app.store.solutions import read_calibration_bodies
 from app.store.stored_json import Json, inflate, parse
-from app.store.version_models import FrozenModel
+from app.store.tables.versions import FrozenModel
 
 SAID, STATION, SOLUTION, CALIBRATION = "said:", "station:", "solution:", "calibration:"
 PAINT = "paint:"

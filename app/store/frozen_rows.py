@@ -8,9 +8,9 @@ from typing import Any
 from sqlalchemy import ColumnElement, exists, func, or_, select, tuple_
 
 from app.store.frozen import CALIBRATION
-from app.store.models import CalibrationModel
 from app.store.session import Session
-from app.store.version_models import FrozenModel, VersionGroupModel, VersionModel
+from app.store.tables.solutions import CalibrationModel
+from app.store.tables.versions import FrozenModel, VersionGroupModel, VersionModel
 
 _BATCH = 200
 

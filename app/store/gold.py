@@ -9,10 +9,10 @@ from sqlalchemy import delete, select
 
 from app.store.clock import now
 from app.store.dialect.statements import insert
-from app.store.models import GroupModel
 from app.store.session import Session
 from app.store.stored_json import Json, pack, unpack
-from app.store.take_models import GoldModel, TakeModel
+from app.store.tables.groups import GroupModel
+from app.store.tables.takes import GoldModel, TakeModel
 
 IMPORTED = "imported"
 WITHOUT_BALLS = "without_balls"

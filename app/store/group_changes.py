@@ -7,10 +7,11 @@ from typing import Any
 
 from sqlalchemy import func, select
 
-from app.store.change_models import GroupChangeModel
-from app.store.models import DatasetModel, GroupModel, SolutionModel
 from app.store.session import Session
 from app.store.solutions import is_current
+from app.store.tables.changes import GroupChangeModel
+from app.store.tables.groups import DatasetModel, GroupModel
+from app.store.tables.solutions import SolutionModel
 
 
 def newest_change(session: Session) -> int:

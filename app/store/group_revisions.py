@@ -22,15 +22,10 @@ from app.store.group_rows import (
     view_values,
 )
 from app.store.groups import StoredGroup, positions_of
-from app.store.models import (
-    GroupModel,
-    ImportFindingModel,
-    StationModel,
-    ViewModel,
-)
 from app.store.paint import paint_digests
 from app.store.session import Session
 from app.store.stations import save_station
+from app.store.tables.groups import GroupModel, ImportFindingModel, StationModel, ViewModel
 
 
 def next_revision(stored: StoredGroup, group: Group, at: str) -> StoredGroup:

@@ -14,10 +14,10 @@ from app.soccer.group import Group, Station, View
 from app.store import codecs
 from app.store.dialect.statements import larger
 from app.store.digest import group_inputs_hash, station_digest, view_digest
-from app.store.models import GroupModel, StationModel, ViewModel
 from app.store.session import Session
 from app.store.stored_json import pack
-from app.store.view_models import UsedIdModel
+from app.store.tables.groups import GroupModel, StationModel, ViewModel
+from app.store.tables.saved_views import UsedIdModel
 
 
 def station_values(station: Station) -> dict[str, Any]:

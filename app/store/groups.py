@@ -21,17 +21,12 @@ from app.soccer.policy import Policy
 from app.soccer.reasons import LeftOut
 from app.store import codecs
 from app.store.datasets import policy_of
-from app.store.models import (
-    DatasetModel,
-    GroupModel,
-    StationModel,
-    ViewModel,
-)
 from app.store.noise import Factors, factors_of
 from app.store.paint import paint_digests, read_readings
 from app.store.session import Session
 from app.store.stations import StoredStation, stored_station
 from app.store.stored_json import as_written, parse, unpack
+from app.store.tables.groups import DatasetModel, GroupModel, StationModel, ViewModel
 
 
 @dataclass(frozen=True)

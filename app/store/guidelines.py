@@ -10,7 +10,7 @@ from sqlalchemy import func, select
 from app.store.clock import now
 from app.store.dialect.statements import insert
 from app.store.session import Session
-from app.store.take_models import CopyDatasetModel, GuidelineModel, GuidelinePictureModel
+from app.store.tables.takes import CopyDatasetModel, GuidelineModel, GuidelinePictureModel
 
 GUIDELINE = "guideline"
 """Kind of the log's entries about them; each has the digest of a text."""

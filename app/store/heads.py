@@ -7,9 +7,10 @@ from typing import Any
 
 from sqlalchemy import bindparam, func, select
 
-from app.store.models import DatasetModel, GroupModel, SolutionModel, VerdictModel
 from app.store.session import Session
 from app.store.solutions import is_current
+from app.store.tables.groups import DatasetModel, GroupModel, VerdictModel
+from app.store.tables.solutions import SolutionModel
 
 _GROUP, _DATASET, _VERDICT = GroupModel.__table__, DatasetModel.__table__, VerdictModel.__table__
 _LAST = (

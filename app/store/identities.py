@@ -6,8 +6,8 @@ from typing import Any
 
 from sqlalchemy import delete, insert, select, update
 
-from app.store.people_models import IdentityModel
 from app.store.session import Session
+from app.store.tables.people import IdentityModel
 
 _ALL = select(*IdentityModel.__table__.columns)
 

@@ -9,9 +9,10 @@ from typing import Any
 from sqlalchemy import func, select
 
 from app.store.log import LogEntry, read_log
-from app.store.models import GroupModel, LogModel, StationModel, VerdictModel
 from app.store.session import Session
 from app.store.stations import StoredStation, stored_station
+from app.store.tables.groups import GroupModel, StationModel, VerdictModel
+from app.store.tables.log import LogModel
 
 VERDICT = (
     "actor",

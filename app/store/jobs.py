@@ -15,11 +15,11 @@ from app.store.aliases import columns_shown
 from app.store.clock import now
 from app.store.dialect.statements import member
 from app.store.group_rows import next_id
-from app.store.job_models import JobModel
-from app.store.models import DatasetModel
 from app.store.session import Session
 from app.store.sight import EVERYTHING, Sight
 from app.store.stored_json import Json, parse
+from app.store.tables.groups import DatasetModel
+from app.store.tables.jobs import JobModel
 
 WAITING, RUNNING = "waiting", "running"
 DONE, FAILED, CANCELLED = "done", "failed", "cancelled"

@@ -11,11 +11,12 @@ from sqlalchemy import select
 
 from app.soccer.solution import SOLVER_VERSION, Solution
 from app.store import value_codec
-from app.store.models import GroupModel, SolutionModel
 from app.store.session import Session
 from app.store.solutions import EncodedSolution, compress, read_summary
 from app.store.stored_json import Json, as_written, inflate, parse
 from app.store.summary import summarize_gates
+from app.store.tables.groups import GroupModel
+from app.store.tables.solutions import SolutionModel
 
 
 @dataclass(frozen=True)

@@ -10,10 +10,10 @@ from sqlalchemy import Column, ColumnElement, Select, case, func, select
 from sqlalchemy.sql.visitors import iterate
 
 from app.store.conditions import Condition
-from app.store.models import QUEUE_SCANNED, QueueModel
 from app.store.order import SORTED, Key, Order
 from app.store.policies import judged_since
 from app.store.session import Session
+from app.store.tables.queue import QUEUE_SCANNED, QueueModel
 
 _TABLE = QueueModel.__table__
 _FILE_ORDER = "queue_number"

@@ -13,9 +13,9 @@ from zlib_ng import zlib_ng
 from app.canonical import canonical
 from app.errors import DamagedError
 from app.store.dialect.dialect import dialect_in
-from app.store.models import LogModel
 from app.store.session import Session
 from app.store.stored_json import Json, unpack
+from app.store.tables.log import LogModel
 
 GENESIS = "0" * 64
 """The hash before the first row."""

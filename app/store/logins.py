@@ -8,10 +8,10 @@ from typing import Any
 
 from sqlalchemy import Select, bindparam, delete, insert, select, update
 
-from app.store.people_models import LoginModel, PersonModel
 from app.store.rights import with_rights
 from app.store.second_factors import MUST_ENROL
 from app.store.session import Session
+from app.store.tables.people import LoginModel, PersonModel
 
 _FOUND = select(
     LoginModel.id,

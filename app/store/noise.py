@@ -8,9 +8,9 @@ from typing import NamedTuple
 from sqlalchemy import select, update
 
 from app.canonical import canonical
-from app.store.models import DatasetModel
 from app.store.session import Session
 from app.store.stored_json import Json, as_written, parse
+from app.store.tables.groups import DatasetModel
 
 NOISE = "noise"
 """Kind of the log's entries on noise: what is accepted for a dataset, and one for each group."""

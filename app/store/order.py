@@ -9,7 +9,7 @@ from typing import Any
 from sqlalchemy import ColumnElement, Label, and_, case, false, func, or_
 
 from app.soccer.solution import GATES
-from app.store.models import QUEUE_NUMBERS, QueueModel
+from app.store.tables.queue import QUEUE_NUMBERS, QueueModel
 
 Key = int | float | str | None
 """What a group is sorted by; None where it has no such number."""

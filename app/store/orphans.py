@@ -13,8 +13,10 @@ from app.config import Settings
 from app.object_store.address import is_address
 from app.store.dialect.statements import items_of, texts_in
 from app.store.leftovers import DAY, last_written
-from app.store.models import CalibrationModel, QueueModel, SolutionModel, ViewModel
 from app.store.session import Session
+from app.store.tables.groups import ViewModel
+from app.store.tables.queue import QueueModel
+from app.store.tables.solutions import CalibrationModel, SolutionModel
 from app.store.uploads import list_uploads
 
 _KEY = CalibrationModel.key

@@ -11,7 +11,7 @@ from app.canonical import canonical
 from app.store.datasets import dataset_name
 from app.store.session import Session
 from app.store.stored_json import Json, parse
-from app.store.webhook_models import WebhookModel
+from app.store.tables.webhooks import WebhookModel
 from app.store.webhooks import insert_delivery
 from app.store.work import batch_of, count_work, people_of
 

@@ -13,9 +13,10 @@ from zlib_ng import zlib_ng
 from app.soccer.paint_evidence import PaintReading, reading_from_text
 from app.store.dialect.statements import any_of, insert, values_of
 from app.store.log import LogEntry, read_entries
-from app.store.models import GroupModel, LogModel, PaintEvidenceModel, StationModel, ViewModel
 from app.store.session import Session
 from app.store.stored_json import as_written, inflate, parse
+from app.store.tables.groups import GroupModel, PaintEvidenceModel, StationModel, ViewModel
+from app.store.tables.log import LogModel
 
 PAINT = "paint"
 """Kind of the log's entries that say what was read of a group's pictures."""

@@ -7,8 +7,8 @@ from typing import Any
 
 from sqlalchemy import delete, insert, select, update
 
-from app.store.people_models import PasskeyModel
 from app.store.session import Session
+from app.store.tables.people import PasskeyModel
 
 _ALL = select(*PasskeyModel.__table__.columns)
 

@@ -8,8 +8,8 @@ from typing import Any
 from sqlalchemy import delete, exists, func, insert, or_, select, update
 
 from app.store.clock import now
-from app.store.people_models import IdentityModel, LoginModel, OneTimeLinkModel, PersonModel
 from app.store.session import Session
+from app.store.tables.people import IdentityModel, LoginModel, OneTimeLinkModel, PersonModel
 
 _PEOPLE = select(*PersonModel.__table__.columns)
 _SEEN = (

@@ -8,9 +8,9 @@ from sqlalchemy import func, select
 
 from app.soccer.picture import PictureGeometry
 from app.store.codecs import picture_from_json
-from app.store.models import GroupModel, StationModel, ViewModel
 from app.store.session import Session
 from app.store.stored_json import as_written, parse
+from app.store.tables.groups import GroupModel, StationModel, ViewModel
 
 
 @dataclass(frozen=True)

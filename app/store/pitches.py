@@ -15,10 +15,11 @@ from app.store.codecs import lines_from_json, picture_from_json
 from app.store.dialect.statements import insert_or_replace
 from app.store.digest import digest
 from app.store.log import LogEntry, read_log
-from app.store.models import GroupModel, ImportFindingModel, LogModel, StationModel, ViewModel
-from app.store.pitch_models import PitchEstimateModel
 from app.store.session import Session
 from app.store.stored_json import parse
+from app.store.tables.groups import GroupModel, ImportFindingModel, StationModel, ViewModel
+from app.store.tables.log import LogModel
+from app.store.tables.pitches import PitchEstimateModel
 
 PITCH = "pitch"
 """Kind of the log's entries that say how long and wide a pitch is, one for each group."""

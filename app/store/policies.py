@@ -9,9 +9,9 @@ from sqlalchemy import select, text
 from app.soccer.policy import Policy
 from app.store.aliases import shown_actor
 from app.store.codecs import policy_from_json
-from app.store.models import LogModel
 from app.store.session import Session
 from app.store.stored_json import unpack
+from app.store.tables.log import LogModel
 
 
 @dataclass(frozen=True)

@@ -13,9 +13,10 @@ from app.soccer.group import SharedPosition
 from app.store.codecs import positions_from_json
 from app.store.digest import digest
 from app.store.log import LogEntry, read_entries
-from app.store.models import GroupModel, LogModel, StationModel, ViewModel
 from app.store.session import Session
 from app.store.stored_json import as_written, parse
+from app.store.tables.groups import GroupModel, StationModel, ViewModel
+from app.store.tables.log import LogModel
 
 POSITION = "position"
 """Kind of the log's entries that say where a match puts cameras, one for each group."""

@@ -14,14 +14,14 @@ from app.store.aliases import columns_shown
 from app.store.codecs import camera_from_json, camera_to_json
 from app.store.digest import digest
 from app.store.group_rows import next_id
-from app.store.models import ViewModel
-from app.store.prediction_models import (
+from app.store.session import Session
+from app.store.stored_json import Json, as_written, parse
+from app.store.tables.groups import ViewModel
+from app.store.tables.predictions import (
     PredictedCameraModel,
     PredictionModel,
     PredictionSetModel,
 )
-from app.store.session import Session
-from app.store.stored_json import Json, as_written, parse
 
 _BATCH = 5000
 

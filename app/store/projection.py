@@ -10,19 +10,19 @@ from sqlalchemy import delete, insert, select, text
 
 from app.store.dialect.statements import DeferReferences
 from app.store.groups import StoredGroup, read_groups
-from app.store.models import (
+from app.store.pitches import FINDING
+from app.store.session import Session
+from app.store.stations import StoredStation, stored_station
+from app.store.tables import Base
+from app.store.tables.groups import (
     GroupModel,
     ImportFindingModel,
-    QueueModel,
     SpareFrameModel,
     StationModel,
     VerdictModel,
     ViewModel,
 )
-from app.store.pitches import FINDING
-from app.store.session import Session
-from app.store.stations import StoredStation, stored_station
-from app.store.tables import Base
+from app.store.tables.queue import QueueModel
 
 _BATCH = 500
 Rows = Sequence[Mapping[str, Any]]

@@ -17,18 +17,13 @@ from app.canonical import canonical
 from app.soccer.annotation import Lines
 from app.store.codecs import lines_from_json, lines_to_json
 from app.store.dialect.statements import insert, items_of, numbers_in
-from app.store.models import (
-    DatasetModel,
-    GroupModel,
-    QueueModel,
-    SolutionModel,
-    StationModel,
-    ViewModel,
-)
-from app.store.proposal_models import ProposalModel
 from app.store.session import Session
 from app.store.solutions import is_current, undetermined
 from app.store.stored_json import as_written, parse
+from app.store.tables.groups import DatasetModel, GroupModel, StationModel, ViewModel
+from app.store.tables.proposals import ProposalModel
+from app.store.tables.queue import QueueModel
+from app.store.tables.solutions import SolutionModel
 
 _PROPOSAL = cast(Table, ProposalModel.__table__)
 _BATCH = 500

@@ -23,19 +23,19 @@ from sqlalchemy import (
 from app.store.aliases import shown_actor
 from app.store.dialect.statements import insert_or_replace
 from app.store.groups import StoredGroup
-from app.store.models import (
+from app.store.session import Session
+from app.store.solutions import is_current, read_summary
+from app.store.summary import SolutionSummary
+from app.store.tables.groups import (
     DatasetModel,
     GroupModel,
     ImportFindingModel,
-    QueueModel,
-    SolutionModel,
     StationModel,
     VerdictModel,
     ViewModel,
 )
-from app.store.session import Session
-from app.store.solutions import is_current, read_summary
-from app.store.summary import SolutionSummary
+from app.store.tables.queue import QueueModel
+from app.store.tables.solutions import SolutionModel
 from app.store.verdicts import StoredVerdict
 
 _BATCH = 1000

@@ -17,17 +17,12 @@ from sqlalchemy import (
 
 from app.store.datasets import next_dataset_id
 from app.store.dialect.statements import DeferReferences, insert_or_replace
-from app.store.models import (
-    DatasetModel,
-    GroupModel,
-    SolutionModel,
-    StationModel,
-    VerdictModel,
-)
 from app.store.session import Session
 from app.store.sight import COPIES
 from app.store.tables import Base
-from app.store.view_models import COPIES_USED, UsedIdModel
+from app.store.tables.groups import DatasetModel, GroupModel, StationModel, VerdictModel
+from app.store.tables.saved_views import COPIES_USED, UsedIdModel
+from app.store.tables.solutions import SolutionModel
 
 _TABLES = Base.metadata.tables
 _COUNTED = {

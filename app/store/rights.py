@@ -14,9 +14,9 @@ from typing import Any
 from sqlalchemy import ColumnElement, Select, or_, select
 
 from app.store.dialect.statements import pairs_of
-from app.store.people_models import DatasetRoleModel, PersonModel
 from app.store.session import Session
-from app.store.take_models import CopyDatasetModel
+from app.store.tables.people import DatasetRoleModel, PersonModel
+from app.store.tables.takes import CopyDatasetModel
 
 
 @dataclass(frozen=True)

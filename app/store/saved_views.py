@@ -11,7 +11,7 @@ from app.store.aliases import shown_actor
 from app.store.clock import now
 from app.store.group_rows import next_id
 from app.store.session import Session
-from app.store.view_models import SavedViewModel
+from app.store.tables.saved_views import SavedViewModel
 
 _SAVED = select(
     *(column for column in SavedViewModel.__table__.columns if column.name != "actor"),

@@ -10,14 +10,14 @@ from typing import Any
 
 from sqlalchemy import ColumnElement, delete, exists, func, insert, or_, select, update
 
-from app.store.people_models import (
+from app.store.session import Session
+from app.store.tables.people import (
     PasskeyModel,
     PersonModel,
     RecoveryCodeModel,
     SecondFactorModel,
     TeamSettingModel,
 )
-from app.store.session import Session
 
 REQUIRED = "require_second_factor"
 _MINE = SecondFactorModel.__table__

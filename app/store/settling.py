@@ -10,9 +10,9 @@ from app.finite import json_text
 from app.store.dialect.statements import numbers_given
 from app.store.outbox import DONE, announce_batch
 from app.store.session import Session
-from app.store.webhook_models import WebhookModel
+from app.store.tables.webhooks import WebhookModel
+from app.store.tables.work import BatchGroupModel, BatchModel, LeaseModel
 from app.store.work import OPEN
-from app.store.work_models import BatchGroupModel, BatchModel, LeaseModel
 
 _BATCH = BatchModel.__table__
 _IS_SINGLE = (_BATCH.c.state == OPEN, _BATCH.c.verdicts == 1)

@@ -7,8 +7,8 @@ from typing import cast
 from sqlalchemy import Table, delete, func, insert, select
 
 from app.store.dialect.statements import insert as insert_or_update
-from app.store.people_models import AttemptModel, BegunModel
 from app.store.session import Session
+from app.store.tables.people import AttemptModel, BegunModel
 
 KEPT_SECONDS = 3600.0
 """No limit looks back further."""

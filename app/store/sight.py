@@ -8,7 +8,7 @@ from typing import Any
 from sqlalchemy import ColumnElement, and_, or_, select, true
 
 from app.soccer.actors import TOKEN, is_of
-from app.store.models import DatasetModel
+from app.store.tables.groups import DatasetModel
 
 COPIES = 10**9
 """Ids of datasets of copies lie above it, and those of all others below: one that is made while

@@ -16,10 +16,11 @@ from app.soccer.group import Group
 from app.soccer.solution import SOLVER_VERSION, Calibration, Solution
 from app.store import value_codec
 from app.store.dialect.statements import insert
-from app.store.models import CalibrationModel, DatasetModel, GroupModel, SolutionModel
 from app.store.session import Session
 from app.store.stored_json import as_written, inflate, parse
 from app.store.summary import SolutionSummary, summarize
+from app.store.tables.groups import DatasetModel, GroupModel
+from app.store.tables.solutions import CalibrationModel, SolutionModel
 
 _ELSEWHERE = Calibration(source="", camera=None)
 """Stands in a stored solution for the calibration that is kept under its key."""

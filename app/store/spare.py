@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from sqlalchemy import select
 
 from app.store.dialect.statements import insert
-from app.store.models import SpareFrameModel
 from app.store.session import Session
+from app.store.tables.groups import SpareFrameModel
 
 BATCH = 1000
 

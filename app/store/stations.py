@@ -18,9 +18,9 @@ from app.soccer.pitch import Pitch
 from app.store import codecs
 from app.store.digest import station_digest
 from app.store.group_rows import station_values
-from app.store.models import GroupModel, StationModel, ViewModel
 from app.store.session import Session
 from app.store.stored_json import as_written, parse
+from app.store.tables.groups import GroupModel, StationModel, ViewModel
 
 
 @dataclass(frozen=True)

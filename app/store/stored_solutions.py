@@ -12,17 +12,12 @@ from sqlalchemy import Select, select
 
 from app.errors import StorageError
 from app.soccer.solution import SOLVER_VERSION, Solution
-from app.store.models import (
-    CalibrationModel,
-    DatasetModel,
-    GroupModel,
-    PaintEvidenceModel,
-    SolutionModel,
-)
 from app.store.paint import reading_of
 from app.store.session import Session
 from app.store.solutions import decode_solution, is_current, read_calibrations
 from app.store.stored_json import as_written, parse, unpack
+from app.store.tables.groups import DatasetModel, GroupModel, PaintEvidenceModel
+from app.store.tables.solutions import CalibrationModel, SolutionModel
 
 _BATCH = 100
 _SOLUTIONS = (

@@ -10,10 +10,10 @@ from sqlalchemy.orm import aliased
 
 from app.store.clock import now
 from app.store.group_rows import next_id
-from app.store.models import GroupModel
 from app.store.session import Session
-from app.store.take_models import CopyDatasetModel, TakeModel
-from app.store.work_models import BatchGroupModel
+from app.store.tables.groups import GroupModel
+from app.store.tables.takes import CopyDatasetModel, TakeModel
+from app.store.tables.work import BatchGroupModel
 
 GOLD = "gold"
 INDEPENDENT = "independent"

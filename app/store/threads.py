@@ -10,10 +10,10 @@ from sqlalchemy import Select, delete, func, insert, select, update
 
 from app.store.aliases import shown_actor
 from app.store.group_rows import next_id
-from app.store.models import DatasetModel, GroupModel, ViewModel
-from app.store.people_models import PersonModel
 from app.store.session import Session
-from app.store.talk_models import CommentMentionModel, CommentModel, ThreadModel
+from app.store.tables.groups import DatasetModel, GroupModel, ViewModel
+from app.store.tables.people import PersonModel
+from app.store.tables.talk import CommentMentionModel, CommentModel, ThreadModel
 
 
 @dataclass(frozen=True)

@@ -11,10 +11,10 @@ from sqlalchemy import Table, bindparam, case, func, insert, select
 from app.store.aliases import shown_actor
 from app.store.group_rows import next_id
 from app.store.log import Entry, append
-from app.store.models import GroupModel, VerdictModel
 from app.store.session import Session
 from app.store.settling import settle_judged
 from app.store.sight import COPIES
+from app.store.tables.groups import GroupModel, VerdictModel
 from app.store.takes import note_verdict
 
 

@@ -14,7 +14,7 @@ from app.store.dialect.statements import insert_or_replace
 from app.store.session import Session
 from app.store.store import Store
 from app.store.stored_json import Json, parse
-from app.store.version_models import VersionCheckModel
+from app.store.tables.versions import VersionCheckModel
 
 
 @dataclass(frozen=True)

@@ -10,10 +10,11 @@ from sqlalchemy import Table, func, insert, select
 
 from app.store.aliases import columns_shown
 from app.store.group_rows import next_id
-from app.store.models import DatasetModel, QueueModel, VerdictModel
 from app.store.session import Session
 from app.store.stored_json import Json, parse, unpack
-from app.store.version_models import VersionGroupModel, VersionModel
+from app.store.tables.groups import DatasetModel, VerdictModel
+from app.store.tables.queue import QueueModel
+from app.store.tables.versions import VersionGroupModel, VersionModel
 
 BATCH = 200
 _GROUPS = cast(Table, VersionGroupModel.__table__)

@@ -12,9 +12,10 @@ from app.soccer.annotation import BallAnnotation
 from app.soccer.media import Media
 from app.store.codecs import ball_from_json
 from app.store.conditions import Condition
-from app.store.models import GroupModel, QueueModel, StationModel, ViewModel
 from app.store.session import Session
 from app.store.stored_json import as_written, parse
+from app.store.tables.groups import GroupModel, StationModel, ViewModel
+from app.store.tables.queue import QueueModel
 
 
 @dataclass(frozen=True)

@@ -10,11 +10,11 @@ from sqlalchemy import ColumnElement, delete, func, select, tuple_, update
 from app.canonical import canonical
 from app.store.clock import now
 from app.store.dialect.statements import insert
-from app.store.job_models import JobModel
 from app.store.log import DEEDS
-from app.store.models import LogModel
 from app.store.session import Session
-from app.store.webhook_models import DeliveryModel, WebhookModel
+from app.store.tables.jobs import JobModel
+from app.store.tables.log import LogModel
+from app.store.tables.webhooks import DeliveryModel, WebhookModel
 
 WAITING, DELIVERED, FAILED = "waiting", "delivered", "failed"
 """States of a delivery."""

@@ -22,11 +22,13 @@ from sqlalchemy import (
 )
 
 from app.store.dialect.statements import insert as upsert
-from app.store.models import DatasetModel, LogModel, QueueModel
-from app.store.people_models import PersonModel
 from app.store.session import Session
-from app.store.take_models import TakeModel
-from app.store.work_models import BatchGroupModel, BatchModel, BatchPersonModel, LeaseModel
+from app.store.tables.groups import DatasetModel
+from app.store.tables.log import LogModel
+from app.store.tables.people import PersonModel
+from app.store.tables.queue import QueueModel
+from app.store.tables.takes import TakeModel
+from app.store.tables.work import BatchGroupModel, BatchModel, BatchPersonModel, LeaseModel
 
 OPEN, CLOSED = "open", "closed"
 """States of a batch."""

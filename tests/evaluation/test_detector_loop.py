@@ -27,8 +27,8 @@ from app.review.importing.sources import Source, import_source
 from app.sample.truth import read_truth
 from app.sample.write import write_sample
 from app.soccer.frames import Box, ImageSize
-from app.store.models import ViewModel
 from app.store.store import Store
+from app.store.tables.groups import ViewModel
 from tests.evaluation.tiny_detector import write_tiny_detector
 
 GROUPS = 4

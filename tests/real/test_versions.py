@@ -25,8 +25,8 @@ from app.review.verdicts.verdict import set_verdict
 from app.review.versions.freeze import FreezeRequest, freeze
 from app.review.versions.verify import verify
 from app.soccer.split import Split
-from app.store.models import GroupModel
 from app.store.store import Store
+from app.store.tables.groups import GroupModel
 from tests.homes import copy_home
 
 DATA = (

@@ -12,8 +12,8 @@ from sqlalchemy import delete
 from app.review.people import links
 from app.review.people.people import invite
 from app.review.people.roles import Role
-from app.store.people_models import AttemptModel
 from app.store.store import Store
+from app.store.tables.people import AttemptModel
 from tests.security.asking import Answer, Asker
 from tests.security.table import Row, rows
 

@@ -19,7 +19,7 @@ from app.review.people.access_tokens import new_text
 from app.review.people.people import change_person, find_person
 from app.review.people.roles import Role, Scope
 from app.store.jobs import NewJob, insert_job
-from app.store.people_models import AccessTokenModel
+from app.store.tables.people import AccessTokenModel
 from tests.security.asking import Answer, assert_guarded
 from tests.security.team import API, BYTES, Team
 from tests.waiting import SECONDS

@@ -57,7 +57,7 @@ PLAIN_WORDS = """
     least leftovers legend lens lesson lessons letter licence list listing live locks look loupe
     kernels profile trace
     main map markdown marks match matches matrix membership menu merge metrics migrate mini missing
-    model models modules name names navigation neighbours nested notice nudge numbers object
+    model modules name names navigation neighbours nested notice nudge numbers object
     observability onnx open openapi opened options order origin orphans output overlap page pages
     paint palette parquet parse patch pen pins pitch pitches pixel place places plain png pointer
     policies pool popover pose position preview problem progress projection props query rail reader reasons receiving
@@ -65,7 +65,7 @@ PLAIN_WORDS = """
     revert reviewers rotation router row rows run runs sample save scale scene scene3d scenes score
     scoreboard sending server service session sets shadows sheet singular site smallest solve
     solving soundness source sources sphere spill spread squares stacks stage staging standpoints starts
-    state statistics steps storage store stream submit surface swap synloc tab table tally tables term
+    state statistics steps storage store stream submit surface swap synloc tab table tally term
     terminal text textures threshold ticks tools triangulate truth types undo undrawn unknown upload uploads
     v3 v3d video viewport viewports virtual wal walk warm what when whiskers words write writer zip
 """

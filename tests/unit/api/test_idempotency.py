@@ -23,7 +23,7 @@ from app.place import leave_place
 from app.review.answers import answers
 from app.review.verdicts.verdict import set_verdict
 from app.store.answers import shorten_answers
-from app.store.job_models import AnswerModel
+from app.store.tables.jobs import AnswerModel
 from tests.waiting import SECONDS
 
 API = "/api/v1"

@@ -24,8 +24,8 @@ from app.soccer.frames import Box, ImagePoint
 from app.soccer.group import Group, Station, View
 from app.soccer.media import Media
 from app.soccer.pitch import MARKINGS, Pitch
-from app.store.models import DatasetModel
 from app.store.store import Store
+from app.store.tables.groups import DatasetModel
 from tests.balls import seen
 from tests.cameras import SIZE, looking
 from tests.databases import Databases

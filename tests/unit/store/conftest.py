@@ -20,9 +20,9 @@ from app.soccer.pitch import Pitch
 from app.soccer.policy import PAPER
 from app.store.codecs import policy_to_json
 from app.store.group_rows import NewRows
-from app.store.models import DatasetModel
 from app.store.queue import refresh_queue
 from app.store.store import Store
+from app.store.tables.groups import DatasetModel
 from tests.cameras import EVERY_COEFFICIENT
 from tests.databases import Databases
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from sqlalchemy import select, update
 
 from app.store.answers import Answer, find_answer, forget_answers, keep_answer
-from app.store.job_models import AnswerModel
 from app.store.store import Store
+from app.store.tables.jobs import AnswerModel
 
 ANSWER = Answer("digest", 201, {"etag": '"a"', "content-type": "text/plain"}, b"\x00body" * 9)
 

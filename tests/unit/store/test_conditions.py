@@ -18,7 +18,7 @@ from app.store.conditions import (
     opposite,
 )
 from app.store.listing import Listing
-from app.store.models import QueueModel
+from app.store.tables.queue import QueueModel
 
 ROW = {
     "status": "accepted",

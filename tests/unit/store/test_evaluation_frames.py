@@ -17,9 +17,9 @@ from app.store.evaluations import (
     find_evaluation,
     insert_evaluation,
 )
-from app.store.prediction_models import EvaluationFrameModel
 from app.store.session import Session
 from app.store.store import Store
+from app.store.tables.predictions import EvaluationFrameModel
 
 BARE = {
     **dict.fromkeys(EvaluationFrameModel.__table__.columns.keys()),

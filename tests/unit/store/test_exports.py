@@ -5,7 +5,7 @@ from sqlalchemy import update
 
 from app.store.exports import exported_groups, left_out_groups, newest_word
 from app.store.log import Entry, append
-from app.store.models import QueueModel
+from app.store.tables.queue import QueueModel
 
 ACCEPTED = {"status": "accepted", "solved": True, "passes": True}
 

@@ -12,10 +12,11 @@ from sqlalchemy import event, insert, select
 from app.config import Settings
 from app.store.conditions import compares
 from app.store.listing import Listing, count_states, find_place, read_columns, read_rows
-from app.store.models import GroupModel, QueueModel
 from app.store.order import Order
 from app.store.session import Session
 from app.store.store import Store
+from app.store.tables.groups import GroupModel
+from app.store.tables.queue import QueueModel
 
 SIGMA = {1: None, 2: 0.5, 3: 0.1, 4: 0.5}
 

@@ -17,7 +17,7 @@ from app.store.log import (
     station_entries,
     verify_chain,
 )
-from app.store.models import LogModel
+from app.store.tables.log import LogModel
 from tests.databases import said_for_sqlite
 
 FIRST = Entry("import", "ann", "2030-01-01T00:00:00+00:00", {"x": 0.1 + 0.2}, 1, 7)

@@ -3,11 +3,11 @@ from __future__ import annotations
 import pytest
 from sqlalchemy import insert, text
 
-from app.store.models import CalibrationModel, SolutionModel
 from app.store.orphans import delete_calibrations, spare_calibrations
 from app.store.removal import delete_solutions, solutions_of
 from app.store.solutions import known_calibrations
 from app.store.store import Store
+from app.store.tables.solutions import CalibrationModel, SolutionModel
 
 KEYS = ("a", "b", "c")
 

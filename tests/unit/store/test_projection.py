@@ -2,13 +2,6 @@ from __future__ import annotations
 
 from sqlalchemy import insert, select
 
-from app.store.models import (
-    GroupModel,
-    ImportFindingModel,
-    StationModel,
-    ViewModel,
-)
-from app.store.prediction_models import PredictionModel, PredictionSetModel
 from app.store.projection import (
     all_groups,
     all_noticed,
@@ -21,6 +14,8 @@ from app.store.proposals import Proposal, read_proposals, save_proposals
 from app.store.soundness import count_lost_references
 from app.store.spare import put_spare
 from app.store.store import Store
+from app.store.tables.groups import GroupModel, ImportFindingModel, StationModel, ViewModel
+from app.store.tables.predictions import PredictionModel, PredictionSetModel
 from app.store.verdicts import StoredVerdict, insert_verdicts
 
 VERDICT = StoredVerdict(7, 1, "ann", "t", "accepted", None, None, "h", "p", False, None)

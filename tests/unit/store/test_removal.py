@@ -2,7 +2,6 @@ from __future__ import annotations
 
 from app.store.datasets import dataset_rows
 from app.store.group_rows import next_id
-from app.store.models import GroupModel
 from app.store.removal import (
     count_contents,
     delete_rows,
@@ -10,6 +9,7 @@ from app.store.removal import (
 )
 from app.store.soundness import count_lost_references
 from app.store.store import Store
+from app.store.tables.groups import GroupModel
 
 
 class TestRemoval:

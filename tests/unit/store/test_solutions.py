@@ -22,7 +22,6 @@ from app.soccer.solution import (
     ViewSolution,
 )
 from app.store import value_codec
-from app.store.models import DatasetModel, GroupModel
 from app.store.solutions import (
     SolutionKey,
     _leaves_open,
@@ -36,6 +35,7 @@ from app.store.solutions import (
     read_summary,
 )
 from app.store.summary import summarize
+from app.store.tables.groups import DatasetModel, GroupModel
 
 THIRD = 1 / 3
 KEY = SolutionKey(1, "inputs", "policy")

@@ -1,6 +1,6 @@
 from __future__ import annotations
 
-from app.store.models import QueueModel
+from app.store.tables.queue import QueueModel
 from app.store.views import dataset_views, find_view, group_dataset, group_views, present_ids
 
 

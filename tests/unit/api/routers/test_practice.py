@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from sqlalchemy import update
 
-from app.store.models import DatasetModel
+from app.store.tables.groups import DatasetModel
 from tests.waiting import SECONDS
 
 Json = dict[str, Any]

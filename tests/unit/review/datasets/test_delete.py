@@ -30,10 +30,11 @@ from app.soccer.annotation import BallAnnotation, Extras
 from app.soccer.frames import Box
 from app.soccer.policy import PAPER
 from app.store.log import verify_chain
-from app.store.models import CalibrationModel, LogModel
 from app.store.soundness import count_lost_references
 from app.store.store import Store
 from app.store.tables import Base
+from app.store.tables.log import LogModel
+from app.store.tables.solutions import CalibrationModel
 
 
 @pytest.fixture

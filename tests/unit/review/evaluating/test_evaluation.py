@@ -25,7 +25,7 @@ from app.review.evaluating.prediction_reader import PredictionFiles
 from app.review.evaluating.predictions import add_predictions
 from app.review.verdicts.verdict import set_verdict
 from app.review.versions.freeze import FreezeRequest, freeze
-from app.store.prediction_models import (
+from app.store.tables.predictions import (
     EvaluationFrameModel,
     EvaluationModel,
     PredictionModel,

@@ -18,9 +18,9 @@ from app.review.evaluating.predictions import (
     list_predictions,
     view_predictions,
 )
-from app.store.models import ViewModel
-from app.store.prediction_models import PredictedCameraModel, PredictionModel
 from app.store.solutions import read_solutions
+from app.store.tables.groups import ViewModel
+from app.store.tables.predictions import PredictedCameraModel, PredictionModel
 
 
 def results(path: Path, *frames: str) -> PredictionFiles:

@@ -41,8 +41,8 @@ from app.soccer.frames import Box, ImagePoint
 from app.soccer.pitch import Pitch
 from app.soccer.policy import STRICT
 from app.store.findings import group_findings
-from app.store.models import LogModel
 from app.store.store import Store
+from app.store.tables.log import LogModel
 
 BALL, OTHER = (BallAnnotation(box=Box(500.0 + n, 300.0, 14.0, 14.0)) for n in (0, 9))
 

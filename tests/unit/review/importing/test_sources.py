@@ -22,8 +22,9 @@ from app.review.queue.listing import list_groups
 from app.soccer.annotation import BallAnnotation, Extras, make_lines
 from app.soccer.frames import Box, ImageSize
 from app.soccer.group import Group
-from app.store.models import GroupModel, LogModel
 from app.store.store import Store
+from app.store.tables.groups import GroupModel
+from app.store.tables.log import LogModel
 
 SIZE = ImageSize(1280, 720)
 Fill = Callable[..., list[int]]

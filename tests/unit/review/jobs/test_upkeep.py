@@ -18,9 +18,9 @@ from app.review.jobs import upkeep as module
 from app.review.jobs.jobs import Jobs
 from app.review.jobs.upkeep import Tidied, Upkeep, tidy
 from app.store.answers import Answer, find_answer, keep_answer
-from app.store.job_models import AnswerModel, JobModel
 from app.store.jobs import NewJob, insert_job, update_job
 from app.store.store import Store
+from app.store.tables.jobs import AnswerModel, JobModel
 
 OLD = time.time() - 40 * 86_400
 

@@ -18,8 +18,9 @@ from app.review.policies.policy import change_policy
 from app.soccer.policy import STRICT
 from app.store.clock import now
 from app.store.dialect.dialect import dialect_of
-from app.store.models import GroupModel, QueueModel
 from app.store.store import Store
+from app.store.tables.groups import GroupModel
+from app.store.tables.queue import QueueModel
 from tests.waiting import SECONDS
 
 

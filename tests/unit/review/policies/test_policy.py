@@ -15,8 +15,9 @@ from app.review.policies.text import policy_with
 from app.review.queue.listing import list_groups
 from app.soccer.policy import PAPER, STRICT
 from app.solving import calibrate
-from app.store.models import CalibrationModel, LogModel, SolutionModel
 from app.store.store import Store
+from app.store.tables.log import LogModel
+from app.store.tables.solutions import CalibrationModel, SolutionModel
 
 TIGHT = policy_with(PAPER, {"tau_percent": 0.1}, name="tight")
 

@@ -11,7 +11,7 @@ from app.review.queue.listing import list_groups
 from app.review.queue.progress import COLUMNS, summary
 from app.review.queue.query import NUMBERS
 from app.review.queue.statistics import MEASURES
-from app.store.models import QueueModel
+from app.store.tables.queue import QueueModel
 
 
 class TestDecades:

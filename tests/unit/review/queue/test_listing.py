@@ -15,8 +15,9 @@ from app.review.queue.progress import summary
 from app.review.queue.query import SORTS
 from app.review.verdicts.verdict import set_verdict
 from app.soccer.solution import GATES
-from app.store.models import GroupModel, QueueModel
 from app.store.store import Store
+from app.store.tables.groups import GroupModel
+from app.store.tables.queue import QueueModel
 
 COUNT = 60
 SEASON = 12_764

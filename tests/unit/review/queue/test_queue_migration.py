@@ -18,9 +18,9 @@ from app.review.editing.submit import load
 from app.review.verdicts.verdict import set_verdict
 from app.store.engine import make_engine
 from app.store.migrate import KNOWN_REVISIONS, migrate, schema_revision
-from app.store.models import QUEUE_NUMBERS
 from app.store.queue import refresh_queue
 from app.store.store import Store
+from app.store.tables.queue import QUEUE_NUMBERS
 
 pytestmark = pytest.mark.file_of_sqlite("homes of released versions, which had a file")
 

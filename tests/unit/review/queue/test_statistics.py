@@ -8,8 +8,8 @@ from app.review.importing.ingest import ensure_dataset
 from app.review.queue.listing import list_groups
 from app.review.queue.query import NUMBERS
 from app.review.queue.statistics import MEASURES, X_EDGES, Y_EDGES, statistics
-from app.store.models import QueueModel
 from app.store.store import Store
+from app.store.tables.queue import QueueModel
 
 
 @pytest.fixture

@@ -21,10 +21,11 @@ from app.review.verdicts.bulk import give_verdicts, list_batches, plan_verdicts
 from app.review.verdicts.bulk_undo import undo_batch
 from app.review.verdicts.verdict import set_verdict
 from app.store.log import verify_chain
-from app.store.models import GroupModel, QueueModel
 from app.store.queue import refresh_queue
 from app.store.session import Session
 from app.store.store import Store
+from app.store.tables.groups import GroupModel
+from app.store.tables.queue import QueueModel
 
 
 def judge(store: Store, group: int, state: str, actor: str = "ann", **more: Any) -> None:

@@ -21,8 +21,9 @@ from app.soccer.frames import Box
 from app.soccer.media import Media
 from app.soccer.policy import STRICT
 from app.soccer.split import Split
-from app.store.models import LogModel, SolutionModel
-from app.store.version_models import FrozenModel, VersionGroupModel, VersionModel
+from app.store.tables.log import LogModel
+from app.store.tables.solutions import SolutionModel
+from app.store.tables.versions import FrozenModel, VersionGroupModel, VersionModel
 from app.store.versions import read_rows
 from tests.databases import content, said_for_sqlite
 

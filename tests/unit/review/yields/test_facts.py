@@ -12,8 +12,8 @@ from app.review.yields.facts import read_tables
 from app.review.yields.table import YieldTable
 from app.solving.facts import COLUMNS, group_facts, join
 from app.store.group_changes import groups_from
-from app.store.models import SolutionModel
 from app.store.store import Store
+from app.store.tables.solutions import SolutionModel
 from tests.databases import said_for_sqlite
 
 

@@ -13,12 +13,12 @@ from app.config import Settings
 from app.errors import BusyError, InputError, StorageError
 from app.store.backup import back_up
 from app.store.dialect import postgresql
-from app.store.models import DatasetModel
-from app.store.people_models import DatasetRoleModel, PersonModel
 from app.store.restore import restore
 from app.store.rights import Rights, rights_of
 from app.store.store import Store
-from app.store.take_models import CopyDatasetModel
+from app.store.tables.groups import DatasetModel
+from app.store.tables.people import DatasetRoleModel, PersonModel
+from app.store.tables.takes import CopyDatasetModel
 from tests.databases import POSTGRESQL
 from tests.unit.store.homes import say
 

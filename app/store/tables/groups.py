@@ -1,53 +1,14 @@
-"""The tables: what people said, its append-only log, and what was computed from it.
+"""Groups: what people said of them, as it is now; the log can rebuild all but the verdicts.
 
-``dataset``, ``station``, ``groups`` and ``view`` hold the present state of what was said; the
-``log`` can rebuild them. ``verdict`` and ``log`` only grow, ``solution`` and ``calibration`` are
-inserted and never changed (triggers see to it). ``queue`` is a projection of all of these, one
-row a group, made for filters and sorts.
+``verdict`` only grows (a trigger sees to it); the last one of a group counts.
 """
 
 from __future__ import annotations
 
 from sqlalchemy import ForeignKey, Index, LargeBinary, UniqueConstraint, text
-from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column
+from sqlalchemy.orm import Mapped, mapped_column
 
-QUEUE_NUMBERS = (
-    "passes",
-    "value",
-    "margin",
-    "min_jac",
-    "agreement",
-    "error_px",
-    "error_percent",
-    "sigma_m",
-    "parallax_degrees",
-    "size_ratio",
-    "height_m",
-    "distance_m",
-)
-"""Columns of the queue with an index of their own."""
-QUEUE_SCANNED = (
-    "number",
-    "status",
-    "stale",
-    "fixed",
-    "solved",
-    "views",
-    "pictures",
-    *QUEUE_NUMBERS,
-    "box_px",
-    "x_m",
-    "y_m",
-    "gate",
-    "split",
-    "findings",
-)
-"""Columns of the queue that one index holds, in its order: what is asked of every group of a
-dataset is read from there, a third of what the rows take."""
-
-
-class Base(DeclarativeBase):
-    """Base of all tables."""
+from app.store.tables.base import Base
 
 
 class DatasetModel(Base):
@@ -210,40 +171,6 @@ class PaintEvidenceModel(Base):
     body: Mapped[bytes] = mapped_column(LargeBinary)
 
 
-class CalibrationModel(Base):
-    """A calibration under the key that the solver gives it (compressed JSON)."""
-
-    __tablename__ = "calibration"
-
-    key: Mapped[str] = mapped_column(primary_key=True)
-    body: Mapped[bytes] = mapped_column(LargeBinary)
-
-
-class SolutionModel(Base):
-    """A solution without its calibrations, which ``calibrations`` (JSON list) names.
-
-    ``summary`` (JSON) is what the queue shows of it. ``facts`` is what the gates read of the group
-    (``solving.facts_codec``), NULL for a solution from before they were kept.
-    """
-
-    __tablename__ = "solution"
-    __table_args__ = (
-        UniqueConstraint(
-            "group_id", "inputs_hash", "policy_hash", "solver_version", name="solution_key"
-        ),
-    )
-
-    id: Mapped[int] = mapped_column(primary_key=True)
-    group_id: Mapped[int] = mapped_column(ForeignKey("groups.id"))
-    inputs_hash: Mapped[str]
-    policy_hash: Mapped[str]
-    solver_version: Mapped[str]
-    calibrations: Mapped[str]
-    summary: Mapped[str]
-    body: Mapped[bytes] = mapped_column(LargeBinary)
-    facts: Mapped[bytes | None] = mapped_column(LargeBinary)
-
-
 class VerdictModel(Base):
     """One person's verdict on one state of a group; the newest is the effective one.
 
@@ -264,93 +191,3 @@ class VerdictModel(Base):
     policy_hash: Mapped[str]
     fixed: Mapped[bool]
     override: Mapped[str | None]
-
-
-class LogModel(Base):
-    """Everything that was ever said, in order; each row's hash covers the row before."""
-
-    __tablename__ = "log"
-    __table_args__ = (
-        Index("log_group", "group_id", "id"),
-        Index("log_station", "station_id"),
-        Index(
-            "log_policy",
-            "dataset_id",
-            "id",
-            sqlite_where=text("kind IN ('dataset', 'policy')"),
-            postgresql_where=text("kind IN ('dataset', 'policy')"),
-        ),
-        Index(
-            "log_deleted",
-            "dataset_id",
-            sqlite_where=text("kind = 'dataset_deleted'"),
-            postgresql_where=text("kind = 'dataset_deleted'"),
-        ),
-    )
-
-    id: Mapped[int] = mapped_column(primary_key=True)
-    at: Mapped[str]
-    actor: Mapped[str]
-    kind: Mapped[str]
-    dataset_id: Mapped[int | None]
-    group_id: Mapped[int | None]
-    station_id: Mapped[int | None]
-    body: Mapped[bytes] = mapped_column(LargeBinary)
-    hash: Mapped[str]
-
-
-class QueueModel(Base):
-    """One row a group, for lists: everything that can be filtered or sorted, in plain columns.
-
-    ``findings`` and ``view_keys`` are lists between commas: ``,low_parallax,bad_point,``.
-    ``value`` is the smallest relative distance to a gate's threshold; ``pictures`` counts the
-    views that have one.
-    """
-
-    __tablename__ = "queue"
-    __table_args__ = (
-        Index("queue_number", "dataset_id", "number"),
-        Index("queue_status", "dataset_id", "status", "number"),
-        Index("queue_scanned", "dataset_id", *QUEUE_SCANNED),
-        # Sorted by any of them, a page of a million groups is read from where it begins.
-        *(Index(f"queue_{name}", "dataset_id", name, "number") for name in QUEUE_NUMBERS),
-    )
-
-    group_id: Mapped[int] = mapped_column(ForeignKey("groups.id"), primary_key=True)
-    dataset_id: Mapped[int] = mapped_column(ForeignKey("dataset.id"))
-    number: Mapped[int]
-    key: Mapped[str]
-    label: Mapped[str]
-    match: Mapped[str]
-    split: Mapped[str]
-    changed: Mapped[str]
-    views: Mapped[int]
-    view_keys: Mapped[str]
-    pictures: Mapped[int] = mapped_column(server_default=text("0"))
-    main_view: Mapped[int | None]
-    status: Mapped[str]
-    stale: Mapped[bool]
-    reason: Mapped[str | None]
-    reviewer: Mapped[str | None]
-    override: Mapped[str | None]
-    fixed: Mapped[bool]
-    solved: Mapped[bool]
-    passes: Mapped[bool | None]
-    gate: Mapped[str | None]
-    gate_view: Mapped[str | None]
-    gate_sentence: Mapped[str | None]
-    margin: Mapped[float | None]
-    value: Mapped[float | None]
-    min_jac: Mapped[float | None]
-    error_px: Mapped[float | None]
-    error_percent: Mapped[float | None]
-    sigma_m: Mapped[float | None]
-    parallax_degrees: Mapped[float | None]
-    size_ratio: Mapped[float | None]
-    height_m: Mapped[float | None]
-    findings: Mapped[str]
-    distance_m: Mapped[float | None]
-    box_px: Mapped[float | None]
-    x_m: Mapped[float | None]
-    y_m: Mapped[float | None]
-    agreement: Mapped[float | None]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from sqlalchemy.orm import Mapped, mapped_column
 
-from app.store.models import Base
+from app.store.tables.base import Base
 
 
 class InstallationModel(Base):
