@@ -24,7 +24,7 @@ from app.api.problem import make_problem, problem_response
 from app.api.reply import ASKED, KEPT_HEADERS, Asked
 from app.api.security.access import actor_of
 from app.api.security.bodies import BYTES, VALUE
-from app.api.security.instead import HIDDEN, SENT
+from app.api.security.concealment import HIDDEN, SENT
 from app.api.security.origin import SAFE_METHODS
 from app.canonical import canonical
 from app.errors import BusyError, OverloadedError, ReviewError, StorageError

@@ -49,8 +49,8 @@ def _examine(settings: Settings) -> list[Check]:
     """Everything; where the database cannot be opened, why, and what lies around it."""
     from app.errors import StorageError
     from app.review.editing.check import Check
-    from app.review.editing.checkup import examine_home, examine_surroundings
     from app.review.editing.doctor import examine
+    from app.review.editing.home_check import examine_home, examine_surroundings
     from app.review.talk.thread_check import examine_threads
     from app.review.versions.version_check import examine_versions
     from app.review.yields.soundness import examine_yields

@@ -14,8 +14,8 @@ from app.evaluation.detection import detection_summary, precision_recall
 from app.evaluation.figure import Figure
 from app.evaluation.frame import Detection, Frame, JudgedFrame, judge
 from app.evaluation.localization import localization_table, precision_distance
+from app.evaluation.monocular import measure_frame
 from app.evaluation.overlap import iou
-from app.evaluation.place import measure_frame
 from app.evaluation.result import Evaluation, FrameResult
 from app.evaluation.table import Table
 from app.geometry.camera import Camera

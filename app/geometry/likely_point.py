@@ -93,7 +93,7 @@ def likely_points(
     pixels: FloatArray,
     chosen: IntArray,
     starts: FloatArray,
-    spreads: FloatArray,
+    noise: FloatArray,
 ) -> LikelyPoints:
     """Gauss-Newton for subsets of views, from a start each.
 
@@ -102,7 +102,7 @@ def likely_points(
         pixels: What each of them saw, shape (N, 2).
         chosen: Numbers of the views of each subset, shape (E, V).
         starts: Pitch frame, metres, shape (E, 3).
-        spreads: Covariance of each pixel, square pixels, shape (E, V, 2, 2).
+        noise: Covariance of each pixel, square pixels, shape (E, V, 2, 2).
 
     Source: Hartley & Zisserman, sec. 12.5 and result 5.10.
     """
@@ -115,7 +115,7 @@ def likely_points(
     )
     _settle_all(
         *cameras.columns,
-        *(pixels, chosen, spreads),
+        *(pixels, chosen, noise),
         *(made.points, made.covariances, made.distances, made.found),
     )
     return made
@@ -138,9 +138,7 @@ def _lens_numbers(camera: Camera) -> list[float]:
 
 
 @compiled
-def _settle_all(
-    R, C, K, kind, fold, lens, pixels, chosen, spreads, points, spans, distances, found
-):
+def _settle_all(R, C, K, kind, fold, lens, pixels, chosen, noise, points, spans, distances, found):
     views = chosen.shape[1]
     information, pull, step = np.empty((3, 3)), np.empty(3), np.empty(3)
     pixel, slope, offset, weighed = np.empty(2), np.empty((2, 3)), np.empty(2), np.empty((2, 3))
@@ -157,7 +155,7 @@ def _settle_all(
                 offset[0] = pixels[view, 0] - pixel[0]
                 offset[1] = pixels[view, 1] - pixel[1]
                 distances[row, place] = _weigh(
-                    spreads[row, place], offset, slope, weighed, information, pull
+                    noise[row, place], offset, slope, weighed, information, pull
                 )
             sound = sound and invert_symmetric(information, spans[row])
             if not sound or arrived or turn == STEPS:
@@ -176,9 +174,9 @@ def _settle_all(
 
 
 @compiled
-def _weigh(spread, offset, slope, weighed, information, pull):
+def _weigh(noise, offset, slope, weighed, information, pull):
     """Adds what a view knows to information and pull; its squared distance."""
-    a, b, c, d = spread[0, 0], spread[0, 1], spread[1, 0], spread[1, 1]
+    a, b, c, d = noise[0, 0], noise[0, 1], noise[1, 0], noise[1, 1]
     determinant = a * d - b * c
     for j in range(3):
         weighed[0, j] = (d * slope[0, j] - b * slope[1, j]) / determinant

@@ -11,7 +11,7 @@ from app.geometry.sphere import optimal_diameter, position_from_diameter, tight_
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import Box, ImagePoint, ImageSize
 from app.soccer.solution import Ball3D, BallFit, Calibration, ExpectedBall
-from app.solving.spread import calibration_spread
+from app.solving.ball_covariance import calibration_covariance
 
 
 def fit_ball(
@@ -82,11 +82,11 @@ def expect_ball(
     if not np.isfinite((x, y)).all():
         return None
     jacobian = calibration.camera.jacobian(point)
-    spread = jacobian @ np.array(ball.covariance).reshape(3, 3) @ jacobian.T
-    spread = spread + calibration_spread(calibration, size, point)
+    covariance = jacobian @ np.array(ball.covariance).reshape(3, 3) @ jacobian.T
+    covariance = covariance + calibration_covariance(calibration, size, point)
     return ExpectedBall(
         place=ImagePoint(x, y),
-        covariance=row_by_row(spread),
+        covariance=row_by_row(covariance),
         box=_exact_box(calibration.camera, point, diameter_m),
     )
 

@@ -20,7 +20,7 @@ from scipy.special import chdtri
 from app.geometry.arrays import BoolArray, FloatArray
 from app.soccer.policy import Policy
 from app.soccer.solution import Ball3D
-from app.solving.spread import CLICK_DIAGONAL, calibration_spread
+from app.solving.ball_covariance import CLICK_DIAGONAL, calibration_covariance
 from app.solving.triangulate import Sighting
 
 MIN_NUMBERS = 20
@@ -141,7 +141,7 @@ def misses_of(ball: Ball3D, sights: Sequence[Sighting]) -> tuple[Miss, ...]:
     known = np.zeros((len(offsets), len(offsets)))
     for at, sight in enumerate(seen):
         part = slice(2 * at, 2 * at + 2)
-        known[part, part] = calibration_spread(sight.calibration, sight.size, point)
+        known[part, part] = calibration_covariance(sight.calibration, sight.size, point)
     # ... turned until the cameras' errors are independent in them, as equal clicks are anyway.
     _, turn = np.linalg.eigh(normals.T @ known @ normals)
     normals = normals @ turn

@@ -12,7 +12,7 @@ from app.geometry.arrays import FloatArray, IntArray, row_by_row
 from app.geometry.likely_point import CameraTable, likely_points
 from app.soccer.policy import Policy
 from app.soccer.solution import BestBall, Pair
-from app.solving.spread import sight_spreads
+from app.solving.ball_covariance import sight_covariances
 from app.solving.triangulate import Sighting
 
 MAX_MAHALANOBIS = 13.8
@@ -63,13 +63,13 @@ def best_ball(pairs: Sequence[Pair], usable: Sequence[Sighting], policy: Policy)
     excess = max(1.0, float(estimate.distances.sum()) / freedom)
     if estimate.is_consistent:
         excess = 1.0
-    spread = excess * estimate.covariance
+    covariance = excess * estimate.covariance
     used = tuple(views.sights[number].view for number in estimate.numbers)
     x, y, z = estimate.point.tolist()
     return BestBall(
         point=(x, y, z),
-        covariance=row_by_row(spread),
-        sigma_m=float(np.sqrt(np.linalg.eigvalsh(spread)[-1])),
+        covariance=row_by_row(covariance),
+        sigma_m=float(np.sqrt(np.linalg.eigvalsh(covariance)[-1])),
         views=used,
         contradicting=tuple(sight.view for sight in usable if sight.view not in used),
         influence_m=_influence(views, estimate),
@@ -132,7 +132,7 @@ class _Views:
         views, points = np.array(chosen), np.array(starts)
         # The uncertainties hardly change on the way.
         made = likely_points(
-            self._cameras, self._centers, views, points, self._spreads(views, points)
+            self._cameras, self._centers, views, points, self._covariances(views, points)
         )
         return [
             _Estimate(tuple(numbers), made.points[row], made.covariances[row], made.distances[row])
@@ -141,11 +141,11 @@ class _Views:
             for row, numbers in enumerate(chosen)
         ]
 
-    def _spreads(self, chosen: IntArray, points: FloatArray) -> FloatArray:
+    def _covariances(self, chosen: IntArray, points: FloatArray) -> FloatArray:
         """Covariance of each click at its start, square pixels, shape (E, V, 2, 2)."""
         sights = [self.sights[view] for view in chosen.ravel().tolist()]
         places = np.repeat(points, chosen.shape[1], axis=0)
-        return sight_spreads(sights, places, self._policy).reshape(*chosen.shape, 2, 2)
+        return sight_covariances(sights, places, self._policy).reshape(*chosen.shape, 2, 2)
 
 
 def _is_behind(pair: Pair, sights: Sequence[Sighting]) -> bool:

@@ -148,13 +148,13 @@ def calibrate_picture(
         return Calibration("lines", None, reason=error.message)
     if alone.camera is None:
         return alone
-    spread, whole = _picture_spread(problem, observations, picture, found, alone.camera)
+    covariance, whole = _picture_covariance(problem, observations, picture, found, alone.camera)
     return measure(
         replace(
             alone,
             camera=found.done(alone.camera, size),
-            covariance=row_by_row(spread) if np.isfinite(spread).all() else None,
-            unobservable=_unobservable(spread),
+            covariance=row_by_row(covariance) if np.isfinite(covariance).all() else None,
+            unobservable=_unobservable(covariance),
             picture=None,
             picture_covariance=row_by_row(whole) if np.isfinite(whole).all() else None,
         ),
@@ -164,7 +164,7 @@ def calibrate_picture(
     )
 
 
-def _picture_spread(
+def _picture_covariance(
     problem: ResectionProblem,
     observations: Observations,
     prior: PictureGeometry,
@@ -185,14 +185,14 @@ def _picture_spread(
 def _found(problem: ResectionProblem, fit: Resection, observations: Observations) -> Calibration:
     """The camera and how well the lines determine it; the priors count for nothing there."""
     try:
-        spread = problem.line_noise(fit.parameters, observations).parameters
+        covariance = problem.line_noise(fit.parameters, observations).parameters
     except DegenerateGeometryError:
-        spread = np.full((PARAMETERS, PARAMETERS), np.inf)
+        covariance = np.full((PARAMETERS, PARAMETERS), np.inf)
     return Calibration(
         "lines",
         problem.camera(fit.parameters),
-        covariance=row_by_row(spread) if np.isfinite(spread).all() else None,
-        unobservable=_unobservable(spread),
+        covariance=row_by_row(covariance) if np.isfinite(covariance).all() else None,
+        unobservable=_unobservable(covariance),
     )
 
 
@@ -382,9 +382,9 @@ def _key(parts: list[str]) -> str:
     return hashlib.sha256(f"[{', '.join(parts)}]".encode()).hexdigest()[:32]
 
 
-def _unobservable(spread: FloatArray) -> tuple[str, ...]:
+def _unobservable(covariance: FloatArray) -> tuple[str, ...]:
     """Names of what the lines leave open, from the covariance of the parameters."""
-    deviations = np.sqrt(np.diag(spread))
+    deviations = np.sqrt(np.diag(covariance))
     words = []
     if not np.hypot.reduce(deviations[X : Z + 1]) <= MAX_POSITION_SIGMA_M:
         words.append("position")

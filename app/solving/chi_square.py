@@ -9,8 +9,8 @@ from scipy.special import chdtrc
 
 from app.geometry.arrays import BoolArray, FloatArray, IntArray, cross
 from app.soccer.policy import Policy
+from app.solving.ball_covariance import pixel_covariances
 from app.solving.facts import Facts
-from app.solving.spread import pixel_spreads
 
 _STEPS = 6
 
@@ -131,9 +131,9 @@ def _fitted(
 
 def _weights(facts: Facts, views: IntArray, points: FloatArray, policy: Policy) -> FloatArray:
     """Inverse covariance of each view's click and calibration, at a point each, (N, 2, 2)."""
-    spread = pixel_spreads(facts, views, points, policy)
-    (a, b), (c, d) = spread.transpose(1, 2, 0)
-    adjugate = np.empty_like(spread)
+    covariances = pixel_covariances(facts, views, points, policy)
+    (a, b), (c, d) = covariances.transpose(1, 2, 0)
+    adjugate = np.empty_like(covariances)
     adjugate[:, 0, 0], adjugate[:, 0, 1] = d, -b
     adjugate[:, 1, 0], adjugate[:, 1, 1] = -c, a
     weights: FloatArray = adjugate / (a * d - b * c)[:, None, None]

@@ -11,9 +11,9 @@ from app.geometry.arrays import BoolArray, FloatArray, IntArray
 from app.geometry.triangulation import parallax_angle
 from app.soccer.policy import Policy
 from app.soccer.solution import GATES
+from app.solving.ball_covariance import MeanCovariance, is_within
 from app.solving.chi_square import residuals_of, untestable
 from app.solving.facts import Facts
-from app.solving.spread import MeanSpread, is_within
 
 MIN_VIEWS = 2
 PASSES = len(GATES)
@@ -79,25 +79,25 @@ class Judgement:
 
 
 def judge(
-    facts: Facts, policy: Policy, spread: MeanSpread, jac: FloatArray | None = None
+    facts: Facts, policy: Policy, uncertainty: MeanCovariance, jac: FloatArray | None = None
 ) -> Judgement:
     """Judge every group by the thresholds of a policy.
 
     Args:
         facts: The groups.
         policy: The thresholds.
-        spread: Of the same facts, kept where several policies are tried one after the other.
+        uncertainty: Of the same facts, kept where several policies are tried one after the other.
         jac: ``view_jac`` at the policy's gamma, where it is known, shape (V,).
     """
     if jac is None:
         jac = view_jac(facts, policy.jac_gamma_percent)
-    return judge_standing(facts, policy, spread, jac, failures(facts, jac, policy))
+    return judge_standing(facts, policy, uncertainty, jac, failures(facts, jac, policy))
 
 
 def judge_standing(
     facts: Facts,
     policy: Policy,
-    spread: MeanSpread,
+    uncertainty: MeanCovariance,
     jac: FloatArray,
     standing: tuple[IntArray, IntArray],
     *,
@@ -108,7 +108,7 @@ def judge_standing(
     Args:
         facts: The groups.
         policy: The thresholds.
-        spread: Of the same facts.
+        uncertainty: Of the same facts.
         jac: ``view_jac`` at the policy's gamma, shape (V,).
         standing: ``failures`` of them.
         first_alone: Only the first gate that a group fails matters: what is dear is not judged
@@ -129,9 +129,9 @@ def judge_standing(
         before = np.any(failed[:_SIGMA], axis=0)
     if policy.max_sigma_m is not None:
         asked = np.flatnonzero(~before)
-        spreads = spread.covariances(pair_failed == PASSES, asked, point[asked], policy)
+        covariances = uncertainty.covariances(pair_failed == PASSES, asked, point[asked], policy)
         failed[_SIGMA] = True
-        failed[_SIGMA, asked] = ~is_within(spreads, policy.max_sigma_m)
+        failed[_SIGMA, asked] = ~is_within(covariances, policy.max_sigma_m)
     if policy.min_p_value is not None:
         used = views_of(facts, pair_failed == PASSES)
         if first_alone:

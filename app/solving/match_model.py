@@ -74,9 +74,9 @@ class PlaceEquations:
     def __init__(self, places: Sequence[FramePlace], wander_m: FloatArray):
         """``wander_m``: what a place differs from the model by itself, each axis, shape (3,)."""
         positions = np.array([place.position for place in places]).reshape(-1, 3)
-        spreads = np.array([place.covariance for place in places]).reshape(-1, 3, 3)
+        covariances = np.array([place.covariance for place in places]).reshape(-1, 3, 3)
         pans = np.array([place.pan for place in places])
-        inverses = np.linalg.inv(spreads + np.diag(wander_m**2))
+        inverses = np.linalg.inv(covariances + np.diag(wander_m**2))
         turned = np.zeros((len(positions), 3, UNKNOWNS))
         turned[:, :, :3] = np.eye(3)
         turned[:, :, 3:] = pans[:, None, None] * np.eye(3)

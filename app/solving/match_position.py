@@ -41,11 +41,11 @@ def place_of(calibration: Calibration, size: ImageSize) -> FramePlace | None:
         return None
     parameters = parameters_from_camera(calibration.camera, size.diagonal / 2)
     position = parameters[X : Z + 1]
-    spread = np.array(calibration.covariance).reshape(PARAMETERS, PARAMETERS)
-    spread = spread[X : Z + 1, X : Z + 1]
-    if not is_main_position(position) or not np.trace(spread) <= MAX_SIGMA_M**2:
+    covariance = np.array(calibration.covariance).reshape(PARAMETERS, PARAMETERS)
+    covariance = covariance[X : Z + 1, X : Z + 1]
+    if not is_main_position(position) or not np.trace(covariance) <= MAX_SIGMA_M**2:
         return None
-    return FramePlace(position, spread, float(parameters[PAN]))
+    return FramePlace(position, covariance, float(parameters[PAN]))
 
 
 def pan_of(calibration: Calibration) -> float | None:

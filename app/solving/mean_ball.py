@@ -10,9 +10,9 @@ import numpy as np
 from app.geometry.arrays import row_by_row
 from app.soccer.policy import Policy
 from app.soccer.solution import GATES, Ball3D, BestBall, Pair
+from app.solving.ball_covariance import MeanCovariance, longest_sigma
 from app.solving.facts import Facts
 from app.solving.judgement import PASSES, Judgement
-from app.solving.spread import MeanSpread, longest_sigma
 from app.solving.triangulate import Meeting
 
 
@@ -34,7 +34,11 @@ def judged_pairs(meetings: Sequence[Meeting], judgement: Judgement) -> tuple[Pai
 
 
 def mean_ball(
-    keys: Sequence[str], facts: Facts, judgement: Judgement, spread: MeanSpread, policy: Policy
+    keys: Sequence[str],
+    facts: Facts,
+    judgement: Judgement,
+    uncertainty: MeanCovariance,
+    policy: Policy,
 ) -> Ball3D | None:
     """The mean of the valid pairs with its uncertainty; None without a valid pair.
 
@@ -42,12 +46,12 @@ def mean_ball(
         keys: Of the views.
         facts: Of the one group.
         judgement: What the policy makes of them.
-        spread: Of the same facts.
+        uncertainty: Of the same facts.
         policy: How noisy a click is.
     """
     if not judgement.valid.any():
         return None
-    covariance = spread.covariances(judgement.valid, np.array([0]), judgement.point, policy)
+    covariance = uncertainty.covariances(judgement.valid, np.array([0]), judgement.point, policy)
     x, y, z = judgement.point[0].tolist()
     return Ball3D(
         point=(x, y, z),

@@ -167,19 +167,19 @@ class PictureProblem:
         """
         apart, jacobian = self.rows(unknowns)
         weight = (1 + (apart / (WIDE * self._scale)) ** 2) ** -0.25
-        spread = np.sqrt(self.click_variance(unknowns))
+        click_px = np.sqrt(self.click_variance(unknowns))
         prior = np.zeros(WIDTH)
         prior[KAPPA] = self.problem.distortion_sigma**-2
         prior[PARAMETERS:] = self.sigma**-2
-        rows = jacobian * (weight / spread)[:, None]
+        rows = jacobian * (weight / click_px)[:, None]
         require_determined(rows.T @ rows + np.diag(prior))
         known = self.problem.noise
         noise = line_noise(
-            apart * weight / spread,
+            apart * weight / click_px,
             rows,
             self.observations.marking,
             prior,
-            replace(known, sigma_px=known.sigma_px / spread, floor_px=known.floor_px / spread),
+            replace(known, sigma_px=known.sigma_px / click_px, floor_px=known.floor_px / click_px),
         )
         return noise.parameters
 
@@ -266,8 +266,8 @@ def estimate_picture(
     seen = undo_warp(problem, observations, warp_of(picture))
     search = PictureProblem.of(problem, observations, picture)
     unknowns = search.fit(problem.resect(seen).parameters)
-    spread = search.covariance(unknowns)
-    if not np.isfinite(spread).all():
+    covariance = search.covariance(unknowns)
+    if not np.isfinite(covariance).all():
         raise DegenerateGeometryError("the lines do not determine the camera")
-    sigma = np.sqrt(np.diag(spread))[PARAMETERS:]
+    sigma = np.sqrt(np.diag(covariance))[PARAMETERS:]
     return picture_of(unknowns[PARAMETERS:], tuple(sigma.tolist()))

@@ -35,8 +35,8 @@ from app.soccer.annotation import Lines
 from app.soccer.frames import ImagePoint, ImageSize
 from app.soccer.pitch import Pitch
 from app.soccer.policy import Policy
+from app.solving.ball_covariance import CLICK_DIAGONAL
 from app.solving.observations import Observations, observe, principal_point
-from app.solving.spread import CLICK_DIAGONAL
 
 MIN_BALLS = 20
 """Instants that a camera must share with others to be adjusted."""

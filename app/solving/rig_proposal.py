@@ -200,25 +200,25 @@ def _slopes(camera: RigCamera, parameters: FloatArray, points: FloatArray) -> Fl
 
 
 def _camera_change(rig: Rig, fit: RigFit, row: int, balls: FloatArray) -> CameraChange:
-    camera, parameters, spread = rig.cameras[row], fit.parameters[row], fit.covariance_of(row)
+    camera, parameters, covariance = rig.cameras[row], fit.parameters[row], fit.covariance_of(row)
     after = camera.with_parameters(parameters)
     turn = after.rotation @ camera.camera.rotation.T
     grass = grass_in_view(camera)
     moved = after.project(grass) - camera.camera.project(grass)
     slopes = _slopes(camera, parameters, grass)
-    variances = np.trace(slopes @ spread @ slopes.transpose(0, 2, 1), axis1=1, axis2=2)
+    variances = np.trace(slopes @ covariance @ slopes.transpose(0, 2, 1), axis1=1, axis2=2)
     lines = any(camera.lines.values())
     return CameraChange(
         key=camera.key,
         before=camera.camera,
         after=after,
-        covariance=row_by_row(spread),
-        covariance_before=row_by_row(spread + error_covariance(camera, parameters, balls)),
+        covariance=row_by_row(covariance),
+        covariance_before=row_by_row(covariance + error_covariance(camera, parameters, balls)),
         moved_m=float(np.linalg.norm(after.position - camera.camera.position)),
         turned_degrees=float(np.degrees(np.arccos(np.clip((np.trace(turn) - 1) / 2, -1, 1)))),
         focal_percent=100 * (after.focal_length[0] / camera.camera.focal_length[0] - 1),
         picture_px=_median(np.hypot(*moved.T)) or 0.0,
-        position_sigma_m=float(np.sqrt(np.trace(spread[X : Z + 1, X : Z + 1]))),
+        position_sigma_m=float(np.sqrt(np.trace(covariance[X : Z + 1, X : Z + 1]))),
         picture_sigma_px=_median(np.sqrt(variances)) or 0.0,
         lines_before_px=_median(line_distances(camera, rig.start[row], rig.pitch))
         if lines

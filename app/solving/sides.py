@@ -17,8 +17,8 @@ from app.geometry.camera import Camera
 from app.geometry.sphere import apparent_scale
 from app.soccer.pitch import Pitch
 from app.soccer.policy import Policy
+from app.solving.ball_covariance import pixel_covariance
 from app.solving.plausible import is_plausible
-from app.solving.spread import pixel_spread
 from app.solving.triangulate import Meeting, Sighting, meet
 
 _HALF_TURN = np.diag([-1.0, -1.0, 1.0])
@@ -191,7 +191,7 @@ def _misfit(sight: Sighting, point: FloatArray, policy: Policy) -> float:
     offset = np.array(sight.center) - sight.camera.project(point[None])[0]
     if np.isnan(offset).any():
         return WORST
-    place = float(offset @ np.linalg.solve(pixel_spread(sight, point, policy), offset))
+    place = float(offset @ np.linalg.solve(pixel_covariance(sight, point, policy), offset))
     if not sight.diameter_px:
         return place
     expected = _expected_px(sight.camera, point, policy.ball_diameter_m)

@@ -24,6 +24,7 @@ from app.soccer.solution import (
     ViewSolution,
 )
 from app.solving.ball_box import expect_ball, fit_ball
+from app.solving.ball_covariance import MeanCovariance
 from app.solving.best_ball import best_ball
 from app.solving.calibrate import calibrate_view, view_key
 from app.solving.contradiction import chi_square_of, contradiction
@@ -32,7 +33,6 @@ from app.solving.findings import find
 from app.solving.gates import JudgedView, describe
 from app.solving.judgement import PASSES, Judgement, judge
 from app.solving.mean_ball import judged_pairs, leaving_ball, mean_ball
-from app.solving.spread import MeanSpread
 from app.solving.triangulate import meet, sights_of
 
 NO_CALIBRATIONS: Mapping[str, Calibration] = MappingProxyType({})
@@ -64,14 +64,14 @@ def solve_with_facts(
     sights = sights_of(group.views, found)
     meetings = meet(combinations(sights, 2))
     facts = facts_of(group.views, found, meetings)
-    spread = MeanSpread(facts)
-    judgement = judge(facts, policy, spread)
+    uncertainty = MeanCovariance(facts)
+    judgement = judge(facts, policy, uncertainty)
     pairs = judged_pairs(meetings, judgement)
     names = [view.key for view in group.views]
     failed = _failed(group, judgement)
     left = {name for name, gate in zip(names, failed, strict=True) if gate is None}
     usable = [sight for sight in sights if sight.view in left]
-    mean = mean_ball(names, facts, judgement, spread, policy)
+    mean = mean_ball(names, facts, judgement, uncertainty, policy)
     best = best_ball(pairs, usable, policy)
     ball = leaving_ball(mean, best, policy)
     chi_square = chi_square_of(names, facts, judgement, policy)

@@ -13,7 +13,7 @@ from sqlalchemy.exc import TimeoutError as NoConnectionError
 
 from app.config import Settings
 from app.errors import EXAMINE, BusyError, DamagedError, StorageError
-from app.place import leave_place
+from app.slot import leave_slot
 from app.store.anchor import (
     Anchor,
     move_anchor,
@@ -188,7 +188,7 @@ class Store:
                 self._file.require_log()
             if lasting:
                 self.sharing.tell(session, COMMITTED)
-                leave_place()
+                leave_slot()
             session.commit()
             self._anchored(session)
         self.tell_listeners()

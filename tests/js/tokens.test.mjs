@@ -2,7 +2,7 @@ import assert from 'node:assert/strict';
 import { describe, it } from 'node:test';
 
 import { followed, tokens } from '../../static/lib/tokens.js';
-import { colourOf, readPalette } from '../../static/views/scene3d/palette.js';
+import { colourOf, readPalette } from '../../static/views/scene3d/scene_colours.js';
 
 /** What is listened to. */
 const queries = [];

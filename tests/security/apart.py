@@ -17,16 +17,16 @@ from pwdlib import PasswordHash
 from pwdlib.hashers.argon2 import Argon2Hasher
 
 from app.api.application import create_app
-from app.api.security.about import BODY, QUERY, kind_of_path
+from app.api.security.asked_datasets import BODY, QUERY, kind_of_path
 from app.config import Settings
 from app.review.editing.recompute import solve_dataset
 from app.review.importing.ingest import ingest
 from app.review.people import links, passwords
 from app.review.people.logins import Logins
 from app.review.people.members import give_role
+from app.review.people.ownership import Kind
 from app.review.people.people import invite
 from app.review.people.roles import Role
-from app.review.people.whereabouts import Kind
 from app.store.store import Store
 from tests.scenes import make_scenes
 from tests.security.table import Row

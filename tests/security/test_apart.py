@@ -8,10 +8,18 @@ from typing import Any
 
 import pytest
 
-from app.api.security.about import BODY, EVERYWHERE, FIXED, LISTS, QUERY, is_known, kind_of_path
+from app.api.security.asked_datasets import (
+    BODY,
+    EVERYWHERE,
+    FIXED,
+    LISTS,
+    QUERY,
+    is_known,
+    kind_of_path,
+)
 from app.api.security.rules import RULES
+from app.review.people.ownership import Kind
 from app.review.people.roles import Action, Role
-from app.review.people.whereabouts import Kind
 from app.store.jobs import NewJob, insert_job, update_job
 from tests.security.apart import (
     API,

@@ -34,13 +34,13 @@ PLAIN_WORDS = """
     stored tree trees safe path refusal attempt cookie fit
     compiler dialect postgresql sqlite statements transfer triggers
     attempts lived processes shared sharing short web
-    addresses messages secrets sender
+    addresses messages sender signing
     challenges enrol task
     joined turns
     proof provider identities sign
     access account join links login logins passwords roles team tokens
     bearer codes me remote rules tries users
-    about adopt aliases belonging instead needs rights sight whereabouts
+    adopt aliases asked concealment needs owning ownership rights sight
     actors
     candidate drawn proposal propose scoring search straight
     3d accept action actions address adjust adjustments advice ahead anchor annotate answers app
@@ -51,7 +51,7 @@ PLAIN_WORDS = """
     detect diagram dialog diff doctor document documents drags drawing durable editor empty
     encoded engine estimator etags evaluate event events exact examination export
     exports facets facts fan faults fields figure figures files finite first fixes fixture
-    folder folders follow form format formats frozen gathered gestures glossary grass grid guess guide header
+    folder folders follow form format formats found frozen gathered gestures glossary grass grid guess guide header
     headers heads health heat help histograms history hit home hooks idempotency identity if image images
     import imports in info init insight items jaccard json judged keep key keys known konva last latest lazy
     least leftovers legend lens lesson lessons letter licence list listing live locks look loupe
@@ -64,7 +64,7 @@ PLAIN_WORDS = """
     recompute record remedies removal render reply report requests resect resource restore result
     revert reviewers rotation router row rows run runs sample save scale scene scene3d scenes score
     scoreboard sending server service session sets shadows sheet singular site smallest solve
-    solving soundness source sources sphere spill spread squares stacks stage staging standpoints starts
+    solving soundness source sources slot sphere spill spread squares stacks stage staging standpoints starts
     state statistics steps storage store stream submit surface swap synloc tab table tally term
     terminal text textures threshold ticks tools triangulate truth types undo undrawn unknown upload uploads
     v3 v3d video viewport viewports virtual wal walk warm what when whiskers words write writer zip

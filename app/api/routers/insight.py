@@ -8,8 +8,8 @@ from app.api.deps import AppStore, Id
 from app.api.problem import responses
 from app.api.schemas.insight import Influences, Remedies
 from app.review.editing import submit
+from app.review.editing.found_view import find_view
 from app.review.editing.influence import influences
-from app.review.editing.places import find_view
 from app.review.editing.remedies import find_remedies
 
 router = APIRouter(tags=["insight"])

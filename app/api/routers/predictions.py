@@ -26,7 +26,7 @@ from app.api.schemas.prediction import (
     size_of,
 )
 from app.config import Settings
-from app.review.editing.places import find_view
+from app.review.editing.found_view import find_view
 from app.review.evaluating import predictions as review
 from app.review.evaluating.accept import AcceptReport, accept, accept_box, plan_accept
 from app.review.evaluating.group_predictions import group_predictions

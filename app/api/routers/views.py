@@ -31,7 +31,7 @@ from app.review.editing.edit import (
     SetLines,
     SetPicture,
 )
-from app.review.editing.places import FoundView, find_view
+from app.review.editing.found_view import FoundView, find_view
 from app.review.editing.solve_encoded import Solve, solve_encoded
 from app.review.editing.submit import submit_view
 from app.review.editing.view_paint import NO_FRAME_HINT

@@ -9,7 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from app.api.schemas.document import Document, ListDocument
 from app.review.people.bell import RingKind
-from app.review.people.whereabouts import MAX_ID
+from app.review.people.ownership import MAX_ID
 
 
 class RingDocument(Document):

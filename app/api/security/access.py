@@ -23,9 +23,9 @@ from starlette.routing import compile_path
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from app.api.problem import SCHEME, make_problem, problem_response
-from app.api.security.about import (
+from app.api.security.asked_datasets import (
     Asked,
-    Finding,
+    OwnedMention,
     datasets_of,
     is_hidden,
     is_known,
@@ -34,8 +34,8 @@ from app.api.security.about import (
 )
 from app.api.security.bearer import SCHEME as BEARER
 from app.api.security.bearer import bearer_of
+from app.api.security.concealment import HIDDEN, Concealment
 from app.api.security.cookie import cookie_of
-from app.api.security.instead import HIDDEN, Instead
 from app.api.security.rules import OPEN, RULES
 from app.api.team import Team
 from app.errors import (
@@ -159,7 +159,7 @@ class _Let:
     """Who asks, and where everything is that the request mentions, as far as they may know."""
 
     login: Login
-    findings: list[Finding]
+    owned: list[OwnedMention]
 
 
 class Access:
@@ -200,11 +200,11 @@ class Access:
             await problem_response(problem)(scope, receive, send)
             return
         self._note_use(let.login)
-        instead = Instead(asked, let.findings)
-        if instead:
-            told = instead.scope(scope)
-            told[HIDDEN] = partial(is_hidden, self._store, let.findings)
-            receive, send, scope = instead.receive(receive, told), instead.send(send), told
+        concealment = Concealment(asked, let.owned)
+        if concealment:
+            told = concealment.scope(scope)
+            told[HIDDEN] = partial(is_hidden, self._store, let.owned)
+            receive, send, scope = concealment.receive(receive, told), concealment.send(send), told
         scope[RULE], scope[LOGIN] = asked.route, let.login
         if asked.route in STREAMS:
             await self._stream(asked, action, scope, receive, send)
@@ -254,9 +254,9 @@ class Access:
             raise ForbiddenError(
                 "no rule says which datasets this address is about", hint=UNDECIDED
             )
-        findings = datasets_of(self._store, asked, login)
-        require_allowed(asked, findings, login, action)
-        return _Let(login, findings)
+        owned = datasets_of(self._store, asked, login)
+        require_allowed(asked, owned, login, action)
+        return _Let(login, owned)
 
     def _login(self, scope: Scope) -> Login:
         bearer = bearer_of(scope)

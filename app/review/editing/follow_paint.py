@@ -13,8 +13,8 @@ from time import monotonic
 
 from app.child import ChildEnded
 from app.errors import ReviewError
-from app.place import leave_place
 from app.review.datasets.paint_reading import PaintTask, read_view_paint
+from app.slot import leave_slot
 from app.soccer.group import Group
 from app.soccer.paint_evidence import PaintReading
 from app.soccer.policy import CalibrationPolicy
@@ -50,7 +50,7 @@ class PaintFollower:
 
     def _read(self, tasks: list[PaintTask]) -> Iterator[tuple[str, PaintReading]]:
         """By view what was read of those whose picture could be read in time."""
-        leave_place()
+        leave_slot()
         end = monotonic() + SECONDS
         try:
             asked = [(task, self._frames.ask_to(read_view_paint, task)) for task in tasks]

@@ -10,7 +10,7 @@ from typing import Any
 from app.errors import InputError, NotFoundError, StorageError
 from app.finite import quoted
 from app.review.datasets.dataset import read_dataset_head
-from app.review.people.whereabouts import MIN_HASH, versions_called
+from app.review.people.ownership import MIN_HASH, versions_called
 from app.soccer.group import Group
 from app.soccer.policy import Policy
 from app.soccer.solution import Solution

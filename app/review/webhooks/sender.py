@@ -22,7 +22,7 @@ import structlog
 from app.errors import ReviewError
 from app.review.webhooks.addresses import require_allowed
 from app.review.webhooks.messages import Message, read_messages
-from app.review.webhooks.secrets import secret_of, sign
+from app.review.webhooks.signing import secret_of, sign
 from app.review.work.stalls import tell_stalls
 from app.store.datasets import dataset_names
 from app.store.session import Session

@@ -12,7 +12,7 @@ from app.review.datasets.dataset import dataset_id
 from app.review.people.deeds import note_deed
 from app.review.webhooks.addresses import require_allowed
 from app.review.webhooks.messages import CHOSEN, Kind, ping
-from app.review.webhooks.secrets import new_salt, secret_of
+from app.review.webhooks.signing import new_salt, secret_of
 from app.store.clock import now
 from app.store.datasets import dataset_name
 from app.store.log import newest_entry

@@ -10,6 +10,7 @@ from typing import Any, ClassVar
 from app.geometry.arrays import IntArray
 from app.review.yields.figures import JAC_STEPS
 from app.review.yields.judged import noise_of
+from app.review.yields.leakage import Leak, leaks
 from app.review.yields.pool import each
 from app.review.yields.store import Block, Snapshot, YieldStore
 from app.review.yields.tally import DISTANCES, FINDINGS, Tally, sum_of
@@ -53,14 +54,6 @@ class FunnelPart:
     passing: int
     low: float | None = None
     high: float | None = None
-
-
-@dataclass(frozen=True)
-class Leak:
-    """A match that lies in several splits, with the number of groups in each."""
-
-    match: str
-    splits: tuple[tuple[str, int], ...]
 
 
 @dataclass(frozen=True)
@@ -150,7 +143,7 @@ def _answer(snapshot: Snapshot, policy: Policy, total: Tally, unanswered: tuple[
             FunnelPart(kind, groups, passing)
             for kind, (groups, passing) in zip(FINDINGS, total.findings.tolist(), strict=True)
         ),
-        leakage=_leaks(snapshot.places),
+        leakage=leaks(snapshot.places),
         gained=total.gained,
         lost=total.lost,
         needs_solving=unanswered,
@@ -193,13 +186,3 @@ def _distances(snapshot: Snapshot, total: Tally) -> tuple[FunnelPart, ...]:
         FunnelPart("", groups[bin_], passing[bin_], low, ends[bin_])
         for bin_, low in enumerate([*DISTANCES, None])
     )
-
-
-def _leaks(places: Counter[tuple[str, str]]) -> tuple[Leak, ...]:
-    """Matches in several splits, by name."""
-    found: dict[str, list[tuple[str, int]]] = {}
-    for (match, split), groups in places.items():
-        if split:
-            found.setdefault(match, []).append((split, groups))
-    several = (match for match, splits in found.items() if len(splits) > 1)
-    return tuple(Leak(match, tuple(sorted(found[match]))) for match in sorted(several))

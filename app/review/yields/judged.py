@@ -10,6 +10,7 @@ import numpy as np
 from app.geometry.arrays import BoolArray, FloatArray
 from app.soccer.policy import Policy
 from app.soccer.solution import GAMMAS_PERCENT
+from app.solving.ball_covariance import MeanCovariance, longest_sigma
 from app.solving.chi_square import residuals_of, untestable
 from app.solving.facts import Facts
 from app.solving.judgement import (
@@ -21,7 +22,6 @@ from app.solving.judgement import (
     view_jac,
     views_of,
 )
-from app.solving.spread import MeanSpread, longest_sigma
 
 _NUMBERS = ("baseline", "point", "parallax", "distance")
 
@@ -37,7 +37,7 @@ class Judged:
         judgement: What it makes of them.
         sigma: Standard deviation along the longest axis, metres, NaN without a ball, shape (G,).
         p_value: Of the residuals, infinite where it cannot be tested, shape (G,).
-        spread: Kept from the first time that another noise is tried.
+        uncertainty: Kept from the first time that another noise is tried.
     """
 
     facts: Facts
@@ -46,24 +46,26 @@ class Judged:
     judgement: Judgement
     sigma: FloatArray | None = None
     p_value: FloatArray | None = None
-    spread: MeanSpread | None = None
+    uncertainty: MeanCovariance | None = None
     lock: Lock = field(default_factory=Lock, repr=False)
 
     @staticmethod
     def by(facts: Facts, jac: FloatArray, policy: Policy) -> Judged:
         """Judge groups."""
-        spread = MeanSpread(facts)
-        judgement = judge(facts, policy, spread, _jac(facts, jac, policy))
+        uncertainty = MeanCovariance(facts)
+        judgement = judge(facts, policy, uncertainty, _jac(facts, jac, policy))
         found = Judged(facts, jac, policy, judgement)
         if policy.max_sigma_m is not None:
-            found.sigma = _sigma(facts, policy, judgement, spread)
+            found.sigma = _sigma(facts, policy, judgement, uncertainty)
         return found
 
     def complete(self) -> None:
         """Compute what somebody may ask for, so that nobody waits for it."""
         with self.lock:
             if self.sigma is None:
-                self.sigma = _sigma(self.facts, self.policy, self.judgement, MeanSpread(self.facts))
+                self.sigma = _sigma(
+                    self.facts, self.policy, self.judgement, MeanCovariance(self.facts)
+                )
             if self.p_value is None:
                 self.p_value = _p_value(self.facts, self.policy, self.judgement)
 
@@ -73,14 +75,14 @@ class Judged:
         judgement = self.judgement
         arrays = (judgement.failed, *(getattr(judgement, name) for name in _NUMBERS))
         rows = judgement.view_failed.nbytes + judgement.pair_failed.nbytes + self.jac.nbytes
-        spread = 0 if self.spread is None else self.spread.nbytes
-        return int(rows + spread + sum(array.nbytes for array in arrays))
+        uncertainty = 0 if self.uncertainty is None else self.uncertainty.nbytes
+        return int(rows + uncertainty + sum(array.nbytes for array in arrays))
 
     def under(self, policy: Policy) -> Judgement:
         """What another policy makes of the groups."""
         if _asks_more(policy) and noise_of(policy) != noise_of(self.policy):
             jac = _jac(self.facts, self.jac, policy)
-            return judge(self.facts, policy, self._spread(), jac)
+            return judge(self.facts, policy, self._uncertainty(), jac)
         return self._under(policy)[0]
 
     def moved(self, policy: Policy) -> Judged:
@@ -111,8 +113,10 @@ class Judged:
             some = facts.part(new)
             views, pairs = new[facts.view_group], new[facts.pair_group]
             standing = view_failed[views], pair_failed[pairs]
-            spread = MeanSpread(some)
-            found = judge_standing(some, policy, spread, jac[views], standing, first_alone=True)
+            uncertainty = MeanCovariance(some)
+            found = judge_standing(
+                some, policy, uncertainty, jac[views], standing, first_alone=True
+            )
             failed[:, new] = found.failed
             numbers = [array.copy() for array in numbers]
             for array, name in zip(numbers, _NUMBERS, strict=True):
@@ -124,8 +128,8 @@ class Judged:
         """Sigmas and p-values, where the policy asks for them."""
         with self.lock:
             if policy.max_sigma_m is not None and self.sigma is None:
-                spread = self.spread or MeanSpread(self.facts)
-                self.sigma = _sigma(self.facts, self.policy, self.judgement, spread)
+                uncertainty = self.uncertainty or MeanCovariance(self.facts)
+                self.sigma = _sigma(self.facts, self.policy, self.judgement, uncertainty)
             if policy.min_p_value is not None and self.p_value is None:
                 self.p_value = _p_value(self.facts, self.policy, self.judgement)
         return (
@@ -133,11 +137,11 @@ class Judged:
             None if policy.min_p_value is None else self.p_value,
         )
 
-    def _spread(self) -> MeanSpread:
+    def _uncertainty(self) -> MeanCovariance:
         with self.lock:
-            if self.spread is None:
-                self.spread = MeanSpread(self.facts)
-        return self.spread
+            if self.uncertainty is None:
+                self.uncertainty = MeanCovariance(self.facts)
+        return self.uncertainty
 
 
 def noise_of(policy: Policy) -> tuple[float, float, float]:
@@ -158,11 +162,13 @@ def _jac(facts: Facts, jac: FloatArray, policy: Policy) -> FloatArray:
     return view_jac(facts, gamma)
 
 
-def _sigma(facts: Facts, policy: Policy, judgement: Judgement, spread: MeanSpread) -> FloatArray:
+def _sigma(
+    facts: Facts, policy: Policy, judgement: Judgement, uncertainty: MeanCovariance
+) -> FloatArray:
     there = np.flatnonzero(~np.isnan(judgement.point[:, 0]))
-    spreads = spread.covariances(judgement.valid, there, judgement.point[there], policy)
+    covariances = uncertainty.covariances(judgement.valid, there, judgement.point[there], policy)
     sigma = np.full(facts.groups, np.nan)
-    sigma[there] = longest_sigma(spreads)
+    sigma[there] = longest_sigma(covariances)
     return sigma
 
 

@@ -10,7 +10,7 @@ import { segments } from './pitch.js';
 import { toWorld } from './standpoints.js';
 
 /** @import {Ellipsoid} from '../../geometry/ellipsoid.js' */
-/** @import {Palette} from './palette.js' */
+/** @import {Palette} from './scene_colours.js' */
 /** @import {SceneValues} from './values.js' */
 
 const SHADOW = 0.35;

@@ -5,12 +5,12 @@ import {
 	BufferAttribute, BufferGeometry, DoubleSide, Group, LinearFilter, Mesh, MeshBasicMaterial, SRGBColorSpace, Texture,
 } from 'three';
 
-import { colourOf } from './palette.js';
+import { colourOf } from './scene_colours.js';
 import { segments } from './pitch.js';
 import { toWorld } from './standpoints.js';
 import { seenAt } from './values.js';
 
-/** @import {Palette} from './palette.js' */
+/** @import {Palette} from './scene_colours.js' */
 /** @import {Stand} from './values.js' */
 
 /** Cells of the mesh that carries a frame: fine enough that the lens does not show. */

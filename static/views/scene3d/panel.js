@@ -12,7 +12,7 @@ import { useFrames } from '../../state/frames.js';
 import { goToPreset, lookThrough, standpoint, toggleScene } from '../../state/scene3d.js';
 import { attachOrbit } from './gestures.js';
 import { sceneKeys } from './keys.js';
-import { readPalette } from './palette.js';
+import { readPalette } from './scene_colours.js';
 import { SceneStage } from './stage.js';
 import { presetOrbit } from './standpoints.js';
 import { SceneTable } from './table.js';

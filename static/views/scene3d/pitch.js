@@ -9,7 +9,7 @@ import { LineSegmentsGeometry } from 'three/addons/lines/LineSegmentsGeometry.js
 import { pitchMarkings } from '../../geometry/pitch.js';
 import { toWorld } from './standpoints.js';
 
-/** @import {Palette} from './palette.js' */
+/** @import {Palette} from './scene_colours.js' */
 
 const STRIPES = 18;
 const SURROUND = 400;

@@ -9,7 +9,7 @@ import { pitchGroup } from './pitch.js';
 import { axesOf, between, cameraProjection, eyeOf, freeProjection, toWorld } from './standpoints.js';
 
 /** @import {Object3D} from 'three' */
-/** @import {Palette} from './palette.js' */
+/** @import {Palette} from './scene_colours.js' */
 /** @import {Orbit} from './standpoints.js' */
 /** @import {SceneValues, Stand} from './values.js' */
 

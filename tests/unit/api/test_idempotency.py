@@ -19,9 +19,9 @@ from app.api.routers import groups
 from app.api.security.lanes import EDITS
 from app.api.server import Server, listen
 from app.errors import StorageError
-from app.place import leave_place
 from app.review.answers import answers
 from app.review.verdicts.verdict import set_verdict
+from app.slot import leave_slot
 from app.store.answers import shorten_answers
 from app.store.tables.jobs import AnswerModel
 from tests.waiting import SECONDS
@@ -227,7 +227,7 @@ class TestRepetitionsThatWait:
 
         def slow(store: Any, group: int, *said: Any, **options: Any) -> Any:
             if group == 1:
-                leave_place()
+                leave_slot()
                 assert finish.wait(SECONDS)
             return set_verdict(store, group, *said, **options)
 

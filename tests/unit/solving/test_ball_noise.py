@@ -5,8 +5,8 @@ import pytest
 
 from app.soccer.policy import PAPER
 from app.soccer.solution import Ball3D, Calibration
+from app.solving.ball_covariance import CLICK_DIAGONAL
 from app.solving.ball_noise import LIMIT, TRIMMED, Miss, estimate_ball_noise, misses_of
-from app.solving.spread import CLICK_DIAGONAL
 from app.solving.triangulate import Sighting
 from tests.cameras import SIZE
 from tests.unit.solving.conftest import BEHIND_GOAL, MAIN, OPPOSITE

@@ -12,11 +12,11 @@ from hypothesis import strategies as st
 from app.soccer.annotation import BallAnnotation
 from app.soccer.policy import PAPER
 from app.soccer.solution import Calibration
+from app.solving.ball_covariance import MeanCovariance
 from app.solving.chi_square import Residuals, residuals_of, residuals_without
 from app.solving.facts import Facts, group_facts, join
 from app.solving.judgement import judge, views_of
 from app.solving.solve import solve
-from app.solving.spread import MeanSpread
 from tests.unit.solving.conftest import BEHIND_GOAL, MAIN, OPPOSITE, given_view, group
 from tests.unit.solving.random_groups import random_policy, random_views
 
@@ -102,7 +102,7 @@ class TestResidualsOf:
         parts = [group_facts(*random_views(seed)) for seed in seeds]
 
         def residuals_at_ball(of: Facts) -> Residuals:
-            judgement = judge(of, policy, MeanSpread(of))
+            judgement = judge(of, policy, MeanCovariance(of))
             return residuals_of(of, views_of(of, judgement.valid), judgement.point, policy)
 
         together, alone = (
@@ -166,7 +166,7 @@ class TestResidualsWithout:
     @settings(max_examples=25, deadline=None)
     def test_each_row_has_the_residuals_of_the_other_views_bit_by_bit(self, seed, policy_seed):
         of, policy = group_facts(*random_views(seed)), random_policy(policy_seed)
-        judgement = judge(of, policy, MeanSpread(of))
+        judgement = judge(of, policy, MeanCovariance(of))
         used = views_of(of, judgement.valid)
         rows = residuals_without(of, used, judgement.point, policy)
         assert len(rows.chi_square) == used.sum()

@@ -11,6 +11,7 @@ import pytest
 from app.soccer.annotation import BallAnnotation
 from app.soccer.policy import PAPER
 from app.soccer.solution import Calibration
+from app.solving.ball_covariance import MeanCovariance
 from app.solving.contradiction import (
     LOW_P_VALUE,
     SPEEDS,
@@ -21,7 +22,6 @@ from app.solving.contradiction import (
 )
 from app.solving.facts import facts_of
 from app.solving.judgement import judge
-from app.solving.spread import MeanSpread
 from app.solving.triangulate import meet, sights_of
 from tests.balls import seen
 from tests.unit.solving.conftest import BEHIND_GOAL, MAIN, OPPOSITE, given_view
@@ -44,7 +44,7 @@ def torn(
     calibrations = [Calibration("lines", CAMERAS[key], covariance=covariance) for key in keys]
     sights = sights_of(views, calibrations)
     facts = facts_of(views, calibrations, meet(combinations(sights, 2)))
-    judgement = judge(facts, policy, MeanSpread(facts))
+    judgement = judge(facts, policy, MeanCovariance(facts))
     chi_square = chi_square_of(keys, facts, judgement, policy)
     return chi_square, contradiction(chi_square, keys, facts, judgement, sights, policy)
 

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from app.soccer.policy import PAPER, Policy
 from app.soccer.solution import GATES
+from app.solving.ball_covariance import MeanCovariance
 from app.solving.facts import Facts, group_facts, join
 from app.solving.judgement import (
     PASSES,
@@ -22,12 +23,11 @@ from app.solving.judgement import (
     judge_standing,
     view_jac,
 )
-from app.solving.spread import MeanSpread
 from tests.unit.solving.random_groups import random_policy, random_views
 
 
 def judged(facts: Facts, policy: Policy = PAPER) -> Judgement:
-    return judge(facts, policy, MeanSpread(facts))
+    return judge(facts, policy, MeanCovariance(facts))
 
 
 def facts(views: int = 2, **changes: object) -> Facts:
@@ -120,8 +120,8 @@ class TestJudge:
         policy = random_policy(seed)
         found = join([group_facts(*random_views(seed)) for seed in seeds])
         jac = view_jac(found, policy.jac_gamma_percent)
-        standing, spread = failures(found, jac, policy), MeanSpread(found)
-        told = judge_standing(found, policy, spread, jac, standing, first_alone=True)
+        standing, uncertainty = failures(found, jac, policy), MeanCovariance(found)
+        told = judge_standing(found, policy, uncertainty, jac, standing, first_alone=True)
         assert told.first.tolist() == judged(found, policy).first.tolist()
 
     @pytest.mark.parametrize("threshold", STRICTER)

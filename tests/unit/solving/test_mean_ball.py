@@ -8,10 +8,10 @@ import pytest
 
 from app.soccer.policy import PAPER
 from app.soccer.solution import Ball3D, BestBall, Calibration
+from app.solving.ball_covariance import MeanCovariance
 from app.solving.facts import facts_of
 from app.solving.judgement import judge
 from app.solving.mean_ball import judged_pairs, leaving_ball, mean_ball
-from app.solving.spread import MeanSpread
 from app.solving.triangulate import meet, sights_of
 from tests.unit.solving.conftest import BEHIND_GOAL, MAIN, OPPOSITE, given_view
 from tests.unit.solving.test_solve import shifted
@@ -30,7 +30,7 @@ def solved(*shifts: float, policy=PAPER):
     calibrations = [Calibration("given", camera) for camera in cameras]
     meetings = meet(combinations(sights_of(views, calibrations), 2))
     facts = facts_of(views, calibrations, meetings)
-    spread = MeanSpread(facts)
+    spread = MeanCovariance(facts)
     judgement = judge(facts, policy, spread)
     return judged_pairs(meetings, judgement), mean_ball(KEYS, facts, judgement, spread, policy)
 

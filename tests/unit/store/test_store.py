@@ -15,7 +15,7 @@ from structlog.testing import capture_logs
 
 from app.config import Settings
 from app.errors import BusyError, DamagedError, InputError, StorageError
-from app.place import hold_place
+from app.slot import hold_slot
 from app.store.dialect.sqlite import AGAIN_S, PRAGMAS
 from app.store.log import Entry, append, read_log
 from app.store.migrate import KNOWN_REVISIONS, migrate, migrations_folder
@@ -191,7 +191,7 @@ class TestWrite:
         left: list[list[str]] = []
 
         def write(*, lasting: bool) -> None:
-            hold_place(lambda: left.append(names(store)))
+            hold_slot(lambda: left.append(names(store)))
             with store.write(lasting=lasting) as session:
                 session.execute(text(INSERT.format(f"lasting {lasting}")))
 

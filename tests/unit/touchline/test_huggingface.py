@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 import touchline
-from tests.readers import read_by
+from tests.foreign_readers import read_by
 from touchline.errors import MissingPackageError
 from touchline.huggingface import to_datasets
 

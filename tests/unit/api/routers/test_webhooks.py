@@ -9,7 +9,7 @@ from sqlalchemy import text
 from standardwebhooks import Webhook
 
 from app.review.importing.ingest import ingest
-from app.review.webhooks.secrets import sign
+from app.review.webhooks.signing import sign
 
 API = "/api/v1"
 URL = "https://hooks.example.org/touchline"

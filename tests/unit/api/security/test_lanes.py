@@ -37,7 +37,7 @@ from app.api.security.lanes import (
     Lanes,
     lane_of,
 )
-from app.place import leave_place
+from app.slot import leave_slot
 
 DRAG = f"{PREFIX}/groups/1/preview"
 EDIT = f"{PREFIX}/views/1/ball"
@@ -146,7 +146,7 @@ class Work:
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         self.begun.append(scope["path"])
         if self.away:
-            await asyncio.to_thread(leave_place)
+            await asyncio.to_thread(leave_slot)
         await self.may_answer.wait()
         await send({"type": "http.response.start", "status": 200, "headers": []})
         await self.may_end.wait()

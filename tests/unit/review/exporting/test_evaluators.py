@@ -16,7 +16,7 @@ from app.review.exporting.export import export
 from app.soccer.annotation import Extras
 from app.soccer.frames import ImageSize
 from app.store.store import Store
-from tests.readers import read_by
+from tests.foreign_readers import read_by
 
 FOLDERS = ["test-1280x720", "train-1280x720"]
 PERSON = {"class": "Player team left", "ID": "7"}

@@ -19,9 +19,9 @@ from app.review.policies.noise import apply_noise, read_noise, take_noise_back
 from app.soccer.annotation import BallAnnotation, make_lines
 from app.soccer.frames import ImagePoint
 from app.soccer.group import Group, Station, View
+from app.solving.ball_covariance import CLICK_DIAGONAL
 from app.solving.ball_noise import Miss
 from app.solving.resect import REFERENCE_DIAGONAL
-from app.solving.spread import CLICK_DIAGONAL
 from app.store.log import Entry, append
 from app.store.solutions import present_solutions
 from app.store.store import Store

@@ -18,8 +18,8 @@ from app.review.jobs.upkeep import forget_old_deliveries
 from app.review.verdicts.verdict import set_verdict
 from app.review.webhooks import sender as module
 from app.review.webhooks.messages import CHOSEN, Kind
-from app.review.webhooks.secrets import sign
 from app.review.webhooks.sender import AGAIN, WebhookSender
+from app.review.webhooks.signing import sign
 from app.review.webhooks.webhooks import (
     change_webhook,
     list_deliveries,

@@ -24,10 +24,10 @@ from app.soccer.frames import Box
 from app.soccer.group import Group
 from app.soccer.policy import PAPER, STRICT, THRESHOLDS, CalibrationPolicy, Policy
 from app.soccer.solution import GATES, PaintFit, Solution
+from app.solving.ball_covariance import MeanCovariance
 from app.solving.facts import group_facts, join
 from app.solving.judgement import PASSES, Judgement, judge, view_jac
 from app.solving.solve import solve
-from app.solving.spread import MeanSpread
 from app.store.store import Store
 from tests.scenes import make_scenes
 
@@ -98,7 +98,7 @@ def random_policy(seed: int) -> Policy:
 
 
 def judge_table(table: YieldTable, policy: Policy) -> Judgement:
-    return judge(table.facts, policy, MeanSpread(table.facts))
+    return judge(table.facts, policy, MeanCovariance(table.facts))
 
 
 def solved_again(group: Group, solution: Solution, policy: Policy) -> Solution:
@@ -154,7 +154,7 @@ class TestJudgeTable:
             ]
         )
         policy = replace(random_policy(seed), min_agreement=0.5, min_jac=0.5, tau_percent=1.0)
-        judged = judge(table, policy, MeanSpread(table))
+        judged = judge(table, policy, MeanCovariance(table))
         assert GATES.index("agreement") in judged.first and judged.passes.any()
         for place, (group, old) in enumerate(painted):
             failing = solved_again(group, old, policy).first_failing

@@ -1,4 +1,4 @@
-"""Secrets of webhooks: with which a receiver knows that a message is ours.
+"""Signing: the secret and the signature by which a receiver knows that a message is ours.
 
 They are made of a key in the home and a salt in the database, so that who reads the database, or a
 backup of it, can sign nothing.

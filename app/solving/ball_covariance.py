@@ -1,4 +1,4 @@
-"""Spread: how certain a ball is, from the noise of clicks and the covariance of calibrations."""
+"""Ball covariance: how certain a ball is, from the noise of clicks and the covariance of calibrations."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def click_variance(
     return np.float_power(noise * sigma, 2)
 
 
-def carried_spreads(
+def carried_covariances(
     parameters: FloatArray, covariances: FloatArray, points: FloatArray, diagonals: FloatArray
 ) -> FloatArray:
     """Covariance of the projected points due to that of the calibrations, square pixels, (N, 2, 2).
@@ -68,7 +68,7 @@ def carried_spreads(
     return carried
 
 
-def picture_spreads(
+def picture_covariances(
     parameters: FloatArray,
     covariances: FloatArray,
     points: FloatArray,
@@ -76,7 +76,7 @@ def picture_spreads(
     pictures: FloatArray,
     stretches: FloatArray,
 ) -> FloatArray:
-    """``carried_spreads`` where pictures may have been stretched or cropped, (N, 2, 2).
+    """``carried_covariances`` where pictures may have been stretched or cropped, (N, 2, 2).
 
     A wider picture moves what is beside the axis, another axis moves everything: both go together
     with the camera, so neither is known as badly as it would be alone.
@@ -84,7 +84,7 @@ def picture_spreads(
     Args:
         parameters: Of the cameras as the pictures were taken, shape (N, 8).
         covariances: Of the parameters, shape (N, 8, 8).
-        points: As in ``carried_spreads``.
+        points: As in ``carried_covariances``.
         diagonals: As there.
         pictures: Covariances of aspect and shifts with all eleven numbers, shape (N, 3, 11).
         stretches: Aspect, and how far right of the axis the point is seen, pixels, shape (N, 2).
@@ -99,11 +99,11 @@ def picture_spreads(
     whole[:, :PARAMETERS, :PARAMETERS] = covariances
     whole[:, PARAMETERS:] = pictures
     whole[:, :PARAMETERS, PARAMETERS:] = pictures[:, :, :PARAMETERS].transpose(0, 2, 1)
-    spreads: FloatArray = jacobians @ whole @ jacobians.transpose(0, 2, 1)
-    return spreads
+    found: FloatArray = jacobians @ whole @ jacobians.transpose(0, 2, 1)
+    return found
 
 
-def known_spreads(facts: Facts, views: IntArray, points: FloatArray) -> FloatArray:
+def known_covariances(facts: Facts, views: IntArray, points: FloatArray) -> FloatArray:
     """Covariance of balls' pixels due to calibrations whose covariance is known, (N, 2, 2).
 
     Args:
@@ -113,10 +113,10 @@ def known_spreads(facts: Facts, views: IntArray, points: FloatArray) -> FloatArr
     """
     numbers = facts.rows("view_parameters", views), facts.rows("view_covariance", views)
     diagonals = facts.view_diagonal[views]
-    spreads = carried_spreads(*numbers, points, diagonals)
+    found = carried_covariances(*numbers, points, diagonals)
     rows = np.flatnonzero(facts.view_changed[views])
     if len(rows):
-        spreads[rows] = picture_spreads(
+        found[rows] = picture_covariances(
             numbers[0][rows],
             numbers[1][rows],
             points[rows],
@@ -124,10 +124,10 @@ def known_spreads(facts: Facts, views: IntArray, points: FloatArray) -> FloatArr
             facts.rows("view_picture", views[rows]),
             facts.rows("view_stretch", views[rows]),
         )
-    return spreads
+    return found
 
 
-def click_spreads(facts: Facts, views: IntArray, policy: Policy) -> FloatArray:
+def click_covariances(facts: Facts, views: IntArray, policy: Policy) -> FloatArray:
     """Covariance of the ball's pixel by the click and by given cameras, square pixels, (N, 2, 2).
 
     Args:
@@ -142,12 +142,14 @@ def click_spreads(facts: Facts, views: IntArray, policy: Policy) -> FloatArray:
         facts.view_bare[views],
         facts.view_noise[views],
     )
-    spreads: FloatArray = noise[:, None, None] * np.eye(2)
-    return spreads
+    found: FloatArray = noise[:, None, None] * np.eye(2)
+    return found
 
 
-def pixel_spreads(facts: Facts, views: IntArray, points: FloatArray, policy: Policy) -> FloatArray:
-    """``pixel_spread`` of many views, square pixels, shape (N, 2, 2).
+def pixel_covariances(
+    facts: Facts, views: IntArray, points: FloatArray, policy: Policy
+) -> FloatArray:
+    """``pixel_covariance`` of many views, square pixels, shape (N, 2, 2).
 
     Args:
         facts: The groups.
@@ -155,14 +157,16 @@ def pixel_spreads(facts: Facts, views: IntArray, points: FloatArray, policy: Pol
         points: The ball of each of them, pitch frame, metres, shape (N, 3).
         policy: Holds the noises.
     """
-    spreads = click_spreads(facts, views, policy)
+    found = click_covariances(facts, views, policy)
     known = np.flatnonzero(facts.view_known[views])
     rows = views[known]
-    spreads[known] += known_spreads(facts, rows, points[known])
-    return spreads
+    found[known] += known_covariances(facts, rows, points[known])
+    return found
 
 
-def calibration_spread(calibration: Calibration, size: ImageSize, point: FloatArray) -> FloatArray:
+def calibration_covariance(
+    calibration: Calibration, size: ImageSize, point: FloatArray
+) -> FloatArray:
     """Covariance of the projected point due to that of the calibration, square pixels, (2, 2).
 
     Args:
@@ -176,27 +180,27 @@ def calibration_spread(calibration: Calibration, size: ImageSize, point: FloatAr
     known = numbers.parameters[None], numbers.covariance[None]
     where = point[None], np.array([size.diagonal])
     if numbers.picture is None:
-        spreads = carried_spreads(*known, *where)
+        found = carried_covariances(*known, *where)
     else:
         right = camera.project(point[None])[0, 0] - camera.principal_point[0]
         stretch = np.array([[camera_aspect(camera), right]])
-        spreads = picture_spreads(*known, *where, numbers.picture[None], stretch)
-    spread: FloatArray = spreads[0]
-    return spread
+        found = picture_covariances(*known, *where, numbers.picture[None], stretch)
+    alone: FloatArray = found[0]
+    return alone
 
 
-def pixel_spread(sight: Sighting, point: FloatArray, policy: Policy) -> FloatArray:
+def pixel_covariance(sight: Sighting, point: FloatArray, policy: Policy) -> FloatArray:
     """Covariance of the ball's pixel in a view, square pixels, shape (2, 2).
 
-    The noise of the click, that of a given camera, and, where the camera comes from lines, the covariance of its
-    calibration carried to the ball.
+    The noise of the click, that of a given camera, and, where the camera comes from lines, the
+    covariance of its calibration carried to the ball.
     """
-    spread: FloatArray = sight_spreads([sight], point[None], policy)[0]
-    return spread
+    found: FloatArray = sight_covariances([sight], point[None], policy)[0]
+    return found
 
 
-def sight_spreads(sights: Sequence[Sighting], points: FloatArray, policy: Policy) -> FloatArray:
-    """``pixel_spread`` of several sights at a point each, square pixels, shape (N, 2, 2).
+def sight_covariances(sights: Sequence[Sighting], points: FloatArray, policy: Policy) -> FloatArray:
+    """``pixel_covariance`` of several sights at a point each, square pixels, shape (N, 2, 2).
 
     Args:
         sights: One for each point.
@@ -211,19 +215,19 @@ def sight_spreads(sights: Sequence[Sighting], points: FloatArray, policy: Policy
         np.array([sight.is_bare for sight in sights]),
         np.array([sight.noise for sight in sights]),
     )
-    spreads: FloatArray = noise[:, None, None] * np.eye(2)
+    found: FloatArray = noise[:, None, None] * np.eye(2)
     plain: dict[int, CameraNumbers] = {}
     for row, sight in enumerate(sights):
         if sight.numbers is not None and sight.numbers.picture is None:
             plain[row] = sight.numbers
         else:
-            spreads[row] += calibration_spread(sight.calibration, sight.size, points[row])
+            found[row] += calibration_covariance(sight.calibration, sight.size, points[row])
     if plain:
         rows = [*plain]
         parameters = np.array([item.parameters for item in plain.values()])
         covariances = np.array([item.covariance for item in plain.values()])
-        spreads[rows] += carried_spreads(parameters, covariances, points[rows], diagonals[rows])
-    return spreads
+        found[rows] += carried_covariances(parameters, covariances, points[rows], diagonals[rows])
+    return found
 
 
 def longest_sigma(covariances: FloatArray) -> FloatArray:
@@ -254,7 +258,7 @@ def is_within(covariances: FloatArray, sigma_m: float) -> BoolArray:
     return within
 
 
-class MeanSpread:
+class MeanCovariance:
     """Covariances of the mean of valid pairs, for each group of some facts.
 
     The uncertainty of each view's pixel is carried through the estimator itself, by central
@@ -302,7 +306,7 @@ class MeanSpread:
             asked[groups] = True
             views = np.flatnonzero(self._used & asked[facts.view_group])
             slopes, pixels = self._slope[views], self._carried[views]
-            pixels = click_spreads(facts, views, policy) + pixels
+            pixels = click_covariances(facts, views, policy) + pixels
             parts = (slopes.transpose(0, 2, 1) @ pixels @ slopes).reshape(-1, 9)
         owner = np.searchsorted(groups, facts.view_group[views])
         total = [np.bincount(owner, part, minlength=len(groups)) for part in parts.T]
@@ -325,7 +329,7 @@ class MeanSpread:
         self._used[fresh[facts.view_group]] = False
         self._used[views], self._slope[views] = True, slopes
         known = views[facts.view_known[views]]
-        self._carried[known] = known_spreads(facts, known, place[facts.view_group[known]])
+        self._carried[known] = known_covariances(facts, known, place[facts.view_group[known]])
 
 
 def _mean_slopes(facts: Facts, pairs: IntArray) -> tuple[IntArray, FloatArray]:

@@ -1,4 +1,4 @@
-"""Places: from the id of a view to the group that it belongs to and where its frame lies."""
+"""Found view: from the id of a view to the group that it belongs to and where its frame lies."""
 
 from __future__ import annotations
 

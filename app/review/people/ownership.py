@@ -1,7 +1,7 @@
-"""Whereabouts: which dataset it is that an address names something of, and whose that is.
+"""Ownership: which dataset what an address names belongs to, or whose it is while it has none.
 
 One plain function for each kind of thing. What it does not find, the routes do not find either:
-they are asked for something else then (``api/security/about.py``).
+they are asked for something else then (``api/security/asked_datasets.py``).
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ from typing import Any
 from app.errors import NotFoundError
 from app.review.people.roles import DatasetRoles, Role, Sight
 from app.soccer.actors import is_of
-from app.store.belonging import dataset_of, owner_of_job, versions_like
 from app.store.datasets import find_dataset
+from app.store.owning_dataset import dataset_of, owner_of_job, versions_like
 from app.store.session import Session
 from app.store.store import Store
 from app.store.uploads import get_upload
@@ -48,7 +48,7 @@ class Kind(StrEnum):
 
 
 @dataclass(frozen=True)
-class Whereabouts:
+class Ownership:
     """Where something belongs.
 
     Attributes:
@@ -62,19 +62,19 @@ class Whereabouts:
     called: str | None = None
 
 
-def role_at(place: Whereabouts, roles: DatasetRoles, name: str) -> Role:
+def role_at(found: Ownership, roles: DatasetRoles, name: str) -> Role:
     """What somebody is where something belongs; ``none``: they do not see it.
 
     Args:
-        place: Where.
+        found: Where it belongs.
         roles: Their rights.
         name: Under which what they make is theirs (``Login.owner``).
     """
     if roles.is_admin:
         return Role.ADMIN
-    if place.dataset is not None:
-        return roles.role_in(place.dataset)
-    mine = any(is_of(owner, name) for owner in place.owners)
+    if found.dataset is not None:
+        return roles.role_in(found.dataset)
+    mine = any(is_of(owner, name) for owner in found.owners)
     return roles.highest if mine else Role.NONE
 
 
@@ -86,7 +86,7 @@ class Named:
     by: str | int
 
 
-def find_place(store: Store, named: Named, sight: Sight) -> Whereabouts | None:
+def find_ownership(store: Store, named: Named, sight: Sight) -> Ownership | None:
     """Where something is that an address names; None where there is nothing of that name.
 
     Args:
@@ -103,29 +103,29 @@ def find_place(store: Store, named: Named, sight: Sight) -> Whereabouts | None:
         if not isinstance(named.by, int):
             return None
         dataset = dataset_of(session, named.kind.value, named.by)
-    return None if dataset is None else Whereabouts(dataset)
+    return None if dataset is None else Ownership(dataset)
 
 
-def _dataset(session: Session, named: str | int, _sight: Sight) -> Whereabouts | None:
+def _dataset(session: Session, named: str | int, _sight: Sight) -> Ownership | None:
     row = find_dataset(session, named)
-    return None if row is None else Whereabouts(int(row.id))
+    return None if row is None else Ownership(int(row.id))
 
 
-def _job(session: Session, named: str | int, _sight: Sight) -> Whereabouts | None:
+def _job(session: Session, named: str | int, _sight: Sight) -> Ownership | None:
     number = _number(named)
     row = None if number is None else owner_of_job(session, number)
-    return None if row is None else Whereabouts(row.dataset_id, frozenset({row.actor}))
+    return None if row is None else Ownership(row.dataset_id, frozenset({row.actor}))
 
 
-def _version(session: Session, named: str | int, sight: Sight) -> Whereabouts | None:
+def _version(session: Session, named: str | int, sight: Sight) -> Ownership | None:
     """By id, name or hash, among the datasets that somebody sees."""
     rows = versions_like(session, str(named))
     every = versions_called(rows, str(named))
     seen = versions_called([row for row in rows if sight.sees(row.dataset_id)], str(named))
     if len(seen) == 1:
-        return Whereabouts(seen[0].dataset_id, called=str(seen[0].id))
+        return Ownership(seen[0].dataset_id, called=str(seen[0].id))
     # Several: the route says so, and which datasets they are of.
-    return Whereabouts(seen[0].dataset_id) if seen and len(seen) == len(every) else None
+    return Ownership(seen[0].dataset_id) if seen and len(seen) == len(every) else None
 
 
 def versions_called(rows: Sequence[Any], text: str) -> list[Any]:
@@ -137,12 +137,12 @@ def versions_called(rows: Sequence[Any], text: str) -> list[Any]:
     return fitting
 
 
-def _upload(store: Store, named: str | int) -> Whereabouts | None:
+def _upload(store: Store, named: str | int) -> Ownership | None:
     try:
         found = get_upload(store.settings, str(named))
     except NotFoundError:
         return None
-    return Whereabouts(None, frozenset(found.by))
+    return Ownership(None, frozenset(found.by))
 
 
 def _number(named: str | int) -> int | None:
@@ -151,7 +151,7 @@ def _number(named: str | int) -> int | None:
     return int(named) if named.isascii() and named.isdigit() and len(named) < 19 else None
 
 
-_FIND: Mapping[Kind, Callable[[Session, Any, Sight], Whereabouts | None]] = {
+_FIND: Mapping[Kind, Callable[[Session, Any, Sight], Ownership | None]] = {
     Kind.DATASET: _dataset,
     Kind.NEW_DATASET: _dataset,
     Kind.JOB: _job,

@@ -14,21 +14,21 @@ from app.soccer.frames import ImagePoint
 from app.soccer.picture import PictureGeometry
 from app.soccer.policy import PAPER
 from app.soccer.solution import Calibration
+from app.solving.ball_covariance import (
+    CLICK_DIAGONAL,
+    MeanCovariance,
+    calibration_covariance,
+    click_variance,
+    is_within,
+    known_covariances,
+    longest_sigma,
+    pixel_covariance,
+)
 from app.solving.facts import group_facts, join
 from app.solving.facts_codec import facts_from_bytes, facts_to_bytes
 from app.solving.judgement import judge
 from app.solving.observations import principal_point
 from app.solving.picture_camera import picture_of, warp_of
-from app.solving.spread import (
-    CLICK_DIAGONAL,
-    MeanSpread,
-    calibration_spread,
-    click_variance,
-    is_within,
-    known_spreads,
-    longest_sigma,
-    pixel_spread,
-)
 from app.solving.triangulate import Sighting
 from tests.cameras import SIZE, WIDE_LENSES, looking, wide
 from tests.unit.solving.conftest import BEHIND_GOAL, MAIN, OPPOSITE, given_view
@@ -65,22 +65,22 @@ class TestCalibrationSpread:
         covariance = np.zeros((8, 8))
         covariance[3, 3] = 0.04
         calibration = Calibration("lines", camera, covariance=tuple(covariance.ravel()))
-        spread = calibration_spread(calibration, SIZE, np.zeros(3))
+        spread = calibration_covariance(calibration, SIZE, np.zeros(3))
         # 20 cm at 20 m are 10 px for 1000 px a radian.
         assert np.allclose(spread, [[100.0, 0.0], [0.0, 0.0]])
         sight = Sighting("a", calibration, ImagePoint(639.5, 359.5), 0.0, SIZE)
         noise = (SIZE.diagonal / CLICK_DIAGONAL) ** 2
-        assert np.allclose(pixel_spread(sight, np.zeros(3), PAPER), spread + noise * np.eye(2))
+        assert np.allclose(pixel_covariance(sight, np.zeros(3), PAPER), spread + noise * np.eye(2))
 
     def test_a_given_camera_counts_as_exact_until_the_policy_knows_better(self):
         sight = Sighting("a", Calibration("given", MAIN), ImagePoint(639.5, 359.5), 0.0, SIZE)
         noise = (SIZE.diagonal / CLICK_DIAGONAL) ** 2
         blurred = replace(PAPER, given_sigma_px=7.0)
-        assert np.allclose(pixel_spread(sight, np.array(BALL), PAPER), noise * np.eye(2))
-        assert np.allclose(pixel_spread(sight, np.array(BALL), blurred), 50 * noise * np.eye(2))
+        assert np.allclose(pixel_covariance(sight, np.array(BALL), PAPER), noise * np.eye(2))
+        assert np.allclose(pixel_covariance(sight, np.array(BALL), blurred), 50 * noise * np.eye(2))
 
     def test_of_a_given_camera_nothing_is_known(self):
-        assert not calibration_spread(Calibration("given", MAIN), SIZE, np.array(BALL)).any()
+        assert not calibration_covariance(Calibration("given", MAIN), SIZE, np.array(BALL)).any()
 
 
 class TestPictureSpreads:
@@ -114,7 +114,7 @@ class TestPictureSpreads:
             np.array([self.pixel(at + step) - self.pixel(at - step) for step in steps]).T / 2e-6
         )
         expected = slopes @ whole @ slopes.T
-        found = calibration_spread(self.calibration(whole), SIZE, np.array(BALL))
+        found = calibration_covariance(self.calibration(whole), SIZE, np.array(BALL))
         np.testing.assert_allclose(found, expected, rtol=1e-4)
 
     def test_facts_say_the_same_once_they_were_kept(self):
@@ -127,9 +127,9 @@ class TestPictureSpreads:
         facts = group_facts(views, [calibration, other])
         found = facts_from_bytes([facts_to_bytes(facts)])
         points = np.array([BALL, BALL])
-        spreads = known_spreads(found, np.arange(2), points)
+        spreads = known_covariances(found, np.arange(2), points)
         for at, one in enumerate((calibration, other)):
-            alone = calibration_spread(one, SIZE, points[at])
+            alone = calibration_covariance(one, SIZE, points[at])
             np.testing.assert_allclose(spreads[at], alone, rtol=2e-3)
 
 
@@ -168,7 +168,7 @@ class TestMeanSpread:
     def covariance(self, *cameras: Camera, policy=PAPER) -> np.ndarray:
         views = [given_view(str(place), camera, BALL) for place, camera in enumerate(cameras)]
         facts = group_facts(views, [Calibration("given", camera) for camera in cameras])
-        spread = MeanSpread(facts)
+        spread = MeanCovariance(facts)
         judgement = judge(facts, policy, spread)
         return spread.covariances(judgement.valid, np.array([0]), judgement.point, policy)[0]
 
@@ -236,13 +236,13 @@ class TestMeanSpread:
     @settings(max_examples=30, deadline=None)
     def test_results_kept_for_other_policies_change_no_bit(self, seeds):
         facts = join([group_facts(*random_views(seed)) for seed in range(60)])
-        kept = MeanSpread(facts)
+        kept = MeanCovariance(facts)
         for seed in seeds:
             policy = replace(random_policy(seed), max_sigma_m=0.1)
             judgement, groups = judge(facts, policy, kept), np.arange(facts.groups)
             there = groups[~np.isnan(judgement.point[:, 0])]
             asked = (judgement.valid, there, judgement.point[there], policy)
-            fresh = MeanSpread(facts).covariances(*asked)
+            fresh = MeanCovariance(facts).covariances(*asked)
             assert np.array_equal(kept.covariances(*asked), fresh, equal_nan=True)
 
     def test_a_group_of_thirteen_views_has_more_pairs_than_are_kept(self):
@@ -253,9 +253,9 @@ class TestMeanSpread:
         ]
         views = [given_view(str(place), camera, BALL) for place, camera in enumerate(cameras)]
         facts = group_facts(views, [Calibration("given", camera) for camera in cameras])
-        kept, zero = MeanSpread(facts), np.array([0])
+        kept, zero = MeanCovariance(facts), np.array([0])
         for last in (70, 71):
             valid = np.arange(len(facts.pair_group)) <= last
             point = facts.pair_point[valid].mean(axis=0)[None]
-            fresh = MeanSpread(facts).covariances(valid, zero, point, PAPER)
+            fresh = MeanCovariance(facts).covariances(valid, zero, point, PAPER)
             assert np.array_equal(kept.covariances(valid, zero, point, PAPER), fresh)

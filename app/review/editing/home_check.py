@@ -1,4 +1,4 @@
-"""A check-up of a home beside its tables: settings, permissions, room, clock, leftovers, versions."""
+"""Home check: a home beside its tables: settings, permissions, room, clock, leftovers, versions."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Place: the 3D ball from one view, and how far that is from the ball triangulated from all."""
+"""Monocular: the 3D ball from one view, and how far that is from the ball triangulated from all."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""About: which datasets a request is about, and whether its reader may ask that of them.
+"""Asked datasets: which datasets a request is about, and whether its reader may ask that of them.
 
 A route that stands in none of these tables is refused.
 """
@@ -17,8 +17,8 @@ from starlette.types import Scope
 from app.api.security.bodies import VALUE
 from app.errors import ForbiddenError
 from app.review.people.logins import Login
+from app.review.people.ownership import MAX_ID, Kind, Named, Ownership, find_ownership, role_at
 from app.review.people.roles import EVERYTHING, Action, DatasetRoles, Role, Sight, require
-from app.review.people.whereabouts import MAX_ID, Kind, Named, Whereabouts, find_place, role_at
 from app.review.queue.fields import BLIND
 from app.store.store import Store
 
@@ -156,11 +156,11 @@ class Asked:
 
 
 @dataclass(frozen=True)
-class Finding:
-    """Where something is that a request mentions; ``place`` None: nowhere that the reader sees."""
+class OwnedMention:
+    """Where something is that a request mentions; ``ownership`` None: nowhere that the reader sees."""
 
     mention: Mention
-    place: Whereabouts | None
+    ownership: Ownership | None
 
 
 def kind_of_path(route: str) -> tuple[str, Kind] | None:
@@ -177,7 +177,7 @@ def is_known(route: str) -> bool:
     return kind_of_path(route) is not None or route in decided
 
 
-def datasets_of(store: Store, asked: Asked, login: Login) -> list[Finding]:
+def datasets_of(store: Store, asked: Asked, login: Login) -> list[OwnedMention]:
     """Where everything is that a request mentions, as far as a reader may know.
 
     Each is found by one indexed statement, and none is asked for where it decides nothing: an
@@ -185,24 +185,24 @@ def datasets_of(store: Store, asked: Asked, login: Login) -> list[Finding]:
     """
     if login.roles.is_admin:
         return []
-    found: list[Finding] = []
+    found: list[OwnedMention] = []
     sight = login.sight
     # What a query names comes first: it says which of the versions of a name is meant.
     for mention in sorted(asked.mentions, key=lambda item: item.place != "query"):
-        place = _place(store, mention.named, login, sight)
-        if mention.place == "query" and place is not None and place.dataset is not None:
-            sight = Sight(False, frozenset({place.dataset}), login.owner)
-        found.append(Finding(mention, place))
+        ownership = _ownership(store, mention.named, login, sight)
+        if mention.place == "query" and ownership is not None and ownership.dataset is not None:
+            sight = Sight(False, frozenset({ownership.dataset}), login.owner)
+        found.append(OwnedMention(mention, ownership))
     return found
 
 
-def is_hidden(store: Store, findings: list[Finding]) -> bool:
+def is_hidden(store: Store, owned: list[OwnedMention]) -> bool:
     """Whether anything that a request mentions is there, and its reader does not see it."""
     return any(
-        item.place is None
+        item.ownership is None
         and item.mention.named.kind is not Kind.NEW_DATASET
-        and find_place(store, item.mention.named, EVERYTHING) is not None
-        for item in findings
+        and find_ownership(store, item.mention.named, EVERYTHING) is not None
+        for item in owned
     )
 
 
@@ -212,7 +212,7 @@ def takes_looking(asked: Asked, login: Login) -> bool:
     return not login.roles.is_admin and any(_is_looked_for(one, login.roles) for one in named)
 
 
-def require_allowed(asked: Asked, findings: list[Finding], login: Login, action: Action) -> None:
+def require_allowed(asked: Asked, owned: list[OwnedMention], login: Login, action: Action) -> None:
     """Raise ForbiddenError unless somebody may do that wherever they see what a request names."""
     roles = login.roles
     if roles.is_admin:
@@ -223,12 +223,12 @@ def require_allowed(asked: Asked, findings: list[Finding], login: Login, action:
         require(roles.everywhere, action)
     elif not asked.mentions and not (asked.route in LISTS and action is Action.READ):
         require(roles.highest, action)
-    for item in findings:
+    for item in owned:
         if item.mention.named.kind is Kind.NEW_DATASET:
-            _require_new(item.place, roles, action)
-        elif item.place is not None:
-            here = HERE if roles.single and item.place.dataset is not None else ""
-            role = role_at(item.place, roles, login.owner)
+            _require_new(item.ownership, roles, action)
+        elif item.ownership is not None:
+            here = HERE if roles.single and item.ownership.dataset is not None else ""
+            role = role_at(item.ownership, roles, login.owner)
             require(role, action, here)
             if asks_what_is_blind(asked):
                 require(role, Action.REVIEW, here)
@@ -245,11 +245,11 @@ def _names_what_is_nobodys(asked: Asked) -> bool:
     return any(_field(asked.body, field) is not None for field in fields)
 
 
-def _require_new(place: Whereabouts | None, roles: DatasetRoles, action: Action) -> None:
+def _require_new(present: Ownership | None, roles: DatasetRoles, action: Action) -> None:
     """What is made where it is not there; whoever cannot know that it is, is not told."""
-    role = roles.everywhere if place is None else roles.role_in(place.dataset)
-    if role is not Role.NONE or place is None:
-        require(role, action, HERE if place is not None and roles.single else ALL)
+    role = roles.everywhere if present is None else roles.role_in(present.dataset)
+    if role is not Role.NONE or present is None:
+        require(role, action, HERE if present is not None and roles.single else ALL)
         return
     require(roles.everywhere, action, ALL)
     raise ForbiddenError(
@@ -257,13 +257,11 @@ def _require_new(place: Whereabouts | None, roles: DatasetRoles, action: Action)
     )
 
 
-def _place(store: Store, named: Named, login: Login, sight: Sight) -> Whereabouts | None:
+def _ownership(store: Store, named: Named, login: Login, sight: Sight) -> Ownership | None:
     roles: DatasetRoles = login.roles
     if not _is_looked_for(named, roles):
-        return (
-            None if roles.everywhere is Role.NONE else Whereabouts(None, frozenset({login.owner}))
-        )
-    found = find_place(store, named, sight)
+        return None if roles.everywhere is Role.NONE else Ownership(None, frozenset({login.owner}))
+    found = find_ownership(store, named, sight)
     if found is None or named.kind is Kind.NEW_DATASET:
         return found
     return None if role_at(found, roles, login.owner) is Role.NONE else found

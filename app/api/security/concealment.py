@@ -1,4 +1,4 @@
-"""Instead: a request asks for something else where its reader may not know what it asked for.
+"""Concealment: a request asks for something else where its reader may not know what it asked for.
 
 What somebody does not see is asked for under an id that nothing has. The answer is that of an unknown
 one by construction, whatever the route looks at first; and what nobody has found, no route finds.
@@ -14,10 +14,10 @@ from starlette.datastructures import Headers, MutableHeaders
 from starlette.types import Message, Receive, Scope, Send
 
 from app.api.schemas.problem import MEDIA_TYPE
-from app.api.security.about import TEXTS, Asked, Finding, Mention
+from app.api.security.asked_datasets import TEXTS, Asked, Mention, OwnedMention
 from app.api.security.bodies import VALUE
 from app.finite import json_text
-from app.review.people.whereabouts import MAX_ID, Kind
+from app.review.people.ownership import MAX_ID, Kind
 
 SENT = "touchline.sent"
 """Where a request's scope under other names has the one that was sent."""
@@ -28,29 +28,29 @@ _NO_UPLOAD = "0" * 32
 _NO_NAME = f"nothing-{secrets.token_hex(12)}"
 
 
-class Instead:
+class Concealment:
     """A request that names other things than it was sent with, and its answer, which does not.
 
     Args:
         asked: The request.
-        findings: Where the things are that it mentions.
+        owned: Where the things are that it mentions.
     """
 
-    def __init__(self, asked: Asked, findings: list[Finding]):
+    def __init__(self, asked: Asked, owned: list[OwnedMention]):
         self._asked = asked
         self._other: list[tuple[Mention, str | int]] = []
         self._said: dict[bytes, bytes] = {}
-        for finding in findings:
-            mention, place = finding.mention, finding.place
+        for one in owned:
+            mention, ownership = one.mention, one.ownership
             if mention.named.kind is Kind.NEW_DATASET:
                 continue
-            if place is None:
+            if ownership is None:
                 other = _without(mention.named.kind)
                 self._other.append((mention, other))
                 shown = json_text(str(mention.named.by))[1:-1]
                 self._said[str(other).encode()] = shown.encode("utf-8", "replace")
-            elif place.called is not None:
-                self._other.append((mention, place.called))
+            elif ownership.called is not None:
+                self._other.append((mention, ownership.called))
 
     def __bool__(self) -> bool:
         return bool(self._other)
