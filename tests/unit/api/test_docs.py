@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 
+from app.api.problem import TITLES
 from app.api.schemas.group import GroupDocument
 from app.api.schemas.policy import PolicyDocument
 from app.api.schemas.problem import Problem
@@ -59,3 +60,9 @@ class TestAddresses:
         wanted = re.sub(r"/(\d+|sample|[0-9a-f]{32})(?=/|$)", "/{}", f"/api/v1{address}")
         known = {re.sub(r"{\w+}", "{}", path) for path in app.openapi()["paths"]}
         assert wanted in known
+
+
+def test_every_status_of_a_problem_is_explained() -> None:
+    (listed,) = re.findall(r"^(400 .*?)\n\n", PAGE, re.S | re.M)
+    explained = {int(part.split()[0]) for part in listed.replace("\n", " ").split(" · ")}
+    assert explained == set(TITLES)
