@@ -1,7 +1,8 @@
-"""Private file: a secret that its owner alone may read, as operators give it to the service."""
+"""Private file: what its owner alone may read, such as a secret that operators give to the service."""
 
 from __future__ import annotations
 
+import os
 import stat
 from pathlib import Path
 
@@ -30,3 +31,8 @@ def read_private(path: Path, variable: str) -> str:
             f"{path}, which {variable} names, cannot be read",
             hint="Is it there, and a plain text file of whoever runs Touchline?",
         ) from error
+
+
+def keep_private() -> None:
+    """From now on this process makes no file that others than its owner may read."""
+    os.umask(0o077)

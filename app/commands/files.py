@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -23,11 +23,13 @@ from app.commands.options import (
 from app.commands.policy import read_policy_option
 from app.commands.server import connected, given_server
 from app.commands.terminal import complain, print_export, print_import, show_progress
-from app.config import Settings
 from app.datasets.format_names import ExportFormat, ImportFormat
 from app.object_store.address import is_address
 from app.object_store.path import StoredPath, find_path, target_path
 from app.soccer.frames import ImageSize
+
+if TYPE_CHECKING:
+    from app.config import Settings
 
 commands = typer.Typer()
 

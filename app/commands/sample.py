@@ -10,7 +10,7 @@ import typer
 from app.commands.opened import executor_of, opened_store
 from app.commands.options import Json, Workers, acting, read_settings
 from app.commands.terminal import print_values, show_progress
-from app.store.home import keep_private
+from app.private_file import keep_private
 
 if TYPE_CHECKING:
     from app.config import Settings

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import configparser
 import stat
+from typing import TYPE_CHECKING
 
-from app.config import StoreSettings
 from app.errors import StorageError
 from app.object_store.refusal import OPERATOR
+
+if TYPE_CHECKING:
+    from app.config import StoreSettings
 
 
 def read_keys(settings: StoreSettings) -> tuple[str, ...] | None:

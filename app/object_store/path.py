@@ -5,11 +5,14 @@ from __future__ import annotations
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import PurePosixPath
+from typing import TYPE_CHECKING
 
-from app.config import Settings, StoreSettings
 from app.errors import NotFoundError
 from app.object_store.address import SCHEME, seal, split_address
 from app.object_store.store import ObjectStore, Stored, open_configured, open_store
+
+if TYPE_CHECKING:
+    from app.config import Settings, StoreSettings
 
 AHEAD = 128 * 1024
 """Bytes that a range read takes at least: a member of a zip and its header come in one or two."""

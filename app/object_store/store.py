@@ -11,13 +11,15 @@ from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass
 from datetime import timedelta
 from functools import lru_cache
-from typing import IO, Any, cast
+from typing import IO, TYPE_CHECKING, Any, cast
 
-from app.config import Settings, StoreSettings
 from app.errors import NotFoundError, StorageError, TooLargeError
 from app.object_store.address import SCHEME
 from app.object_store.keys import read_keys
 from app.object_store.refusal import told
+
+if TYPE_CHECKING:
+    from app.config import Settings, StoreSettings
 
 PART = 8 * 1024**2
 """Bytes of a part of an upload, of which a few are on their way at once."""

@@ -12,6 +12,7 @@ from pathlib import Path
 from app.config import Settings
 from app.durable import PARTIAL
 from app.errors import DamagedError, StorageError
+from app.private_file import keep_private
 from app.store.anchor import read_anchor
 from app.store.dialect.dialect import dialect_of
 
@@ -79,11 +80,6 @@ def make_private(settings: Settings) -> int:
                 path.chmod(wanted)
                 mended += 1
     return mended
-
-
-def keep_private() -> None:
-    """From now on this process makes no file that others than its owner may read."""
-    os.umask(0o077)
 
 
 def open_to_others(settings: Settings) -> list[Path]:

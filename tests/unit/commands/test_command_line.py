@@ -60,7 +60,10 @@ class TestModule:
         assert capsys.readouterr().out.startswith("touchline ")
 
 
-HEAVY = {"numpy", "scipy", "cv2", "numba", "PIL", "fastapi", "uvicorn", "httpx", "alembic", "yaml"}
+HEAVY = {
+    *("numpy", "scipy", "cv2", "numba", "PIL", "fastapi", "uvicorn", "httpx", "alembic", "yaml"),
+    *("sqlalchemy", "pydantic"),
+}
 """What a command that answers at once has no time for."""
 
 
