@@ -22,8 +22,8 @@ from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy
 from app.soccer.solution import Calibration
 from app.solving.calibrate import calibrate_near
+from app.solving.main_position import PositionPrior, is_main_position, match_prior
 from app.solving.match_model import FramePlace, MatchModel, PlaceEquations
-from app.solving.resect import PositionPrior, is_main_position, match_prior
 
 WANDER_M = np.array([0.15, 0.15, 0.1])
 """What a camera's place differs from that of its match by itself, standard deviation of each axis."""

@@ -23,15 +23,10 @@ from app.geometry.resection import (
 from app.soccer.frames import ImageSize
 from app.soccer.paint_evidence import PaintEvidence
 from app.soccer.pitch import MARKINGS, Pitch
+from app.solving.main_position import MAIN_MEAN, STADIUM, is_main_position
 from app.solving.observations import pitch_curves, principal_point
 from app.solving.paint_noise import PaintNoise, PaintOffsets, marking_weights, paint_noise
-from app.solving.resect import (
-    MAIN_FREEDOM,
-    MAIN_MEAN,
-    MAIN_SIGMA,
-    ResectionProblem,
-    is_main_position,
-)
+from app.solving.resect import ResectionProblem
 
 ROBUST_PX = 1.0
 """Scale of the soft-L1 loss of the first rounds, at 960 x 540."""
@@ -128,14 +123,9 @@ class PaintProblem:
 
     def prior(self, parameters: FloatArray) -> Prior:
         """The calibrator's: main cameras stand where main cameras stand, others anywhere."""
-        prior = self.resection.prior()
-        if is_main_position(parameters[X : Z + 1]):
-            offset = parameters[ROLL : Z + 1] - MAIN_MEAN
-            prior.mean[ROLL : Z + 1] = MAIN_MEAN
-            prior.sigma[ROLL : Z + 1] = MAIN_SIGMA * np.sqrt(
-                1 + (offset / MAIN_SIGMA) ** 2 / MAIN_FREEDOM
-            )
-        return prior
+        if not is_main_position(parameters[X : Z + 1]):
+            return self.resection.prior()
+        return self.resection.main_prior(STADIUM, parameters[ROLL : Z + 1] - MAIN_MEAN)
 
 
 @dataclass(frozen=True)

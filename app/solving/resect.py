@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from app.errors import DegenerateGeometryError
 from app.geometry.arrays import FloatArray, IntArray
 from app.geometry.camera import Camera
 from app.geometry.least_squares import Fit, require_determined
@@ -29,13 +28,19 @@ from app.geometry.resection import (
     parameters_from_camera,
     residuals,
 )
-from app.soccer.annotation import Lines
 from app.soccer.frames import ImageSize
-from app.soccer.pitch import CIRCLES, Pitch
+from app.soccer.pitch import CIRCLES
 from app.soccer.policy import CalibrationPolicy
-from app.soccer.solution import Calibration
-from app.solving.line_noise import LineEvidence, LineNoise, LinePrior, line_evidence, line_noise
-from app.solving.observations import Observations, observe, principal_point
+from app.solving.line_noise import LineNoise, LinePrior, line_noise
+from app.solving.main_position import (
+    MAIN_FREEDOM,
+    MAIN_MEAN,
+    MAIN_SIGMA,
+    STADIUM,
+    PositionPrior,
+    is_main_position,
+)
+from app.solving.observations import Observations, principal_point
 from app.solving.starts import STANDS, stand_starts
 
 REFERENCE_DIAGONAL = float(np.hypot(960, 540))
@@ -98,16 +103,6 @@ THOROUGH = Plan(
 """For what is nearly undetermined, or fits badly: there the best of several minima is sought."""
 FEW_MEASUREMENTS = 10
 """With fewer, several cameras fit nearly as well."""
-MAIN_STAND_X_M, MAIN_STAND_Y_M, MAIN_STAND_Z_M = (-20.0, 20.0), (38.0, 110.0), (-30.0, -6.0)
-"""A camera that stands within these bounds (pitch frame) is a main camera."""
-MAIN_MEAN = np.array([0.0, 0.0, 64.5, -15.5])
-MAIN_SIGMA = np.array([np.radians(0.4), 2.0, 11.0, 4.5])
-"""Roll (radians) and position (metres) of main cameras in real stadiums."""
-MAIN_FREEDOM = 10.0
-"""Degrees of freedom of that prior's Student distribution: some stadiums are unlike the others."""
-MATCH_FREEDOM, MATCH_CLICKS = 4.0, 9.0
-"""The same of what other frames of a match say of the position. Clicks on one marking, and what the
-lens differs from its model, err together: against other frames so many of them count as one."""
 MAIN_ROUNDS = 3
 POOR_PX = 8.0
 """A fit is poor when a point lies farther than this from its marking, at 960 x 540."""
@@ -117,32 +112,6 @@ POINTS_PER_LINE, POINTS_PER_CIRCLE = 4, 8
 
 CONTRADICTION = 64.0
 """A prior of the position that costs the lines more than this, in clicks' variances, is dropped."""
-
-
-@dataclass(frozen=True)
-class PositionPrior:
-    """What is known of a camera's position: a Student distribution for each axis.
-
-    Attributes:
-        mean: Pitch frame, metres, shape (3,).
-        sigma: Metres, shape (3,).
-        freedom: Degrees of freedom: the fewer, the more it gives way.
-        clicks: How many clicks of the frame count as one against it.
-    """
-
-    mean: FloatArray
-    sigma: FloatArray
-    freedom: float
-    clicks: float = 1.0
-
-
-STADIUM = PositionPrior(MAIN_MEAN[1:], MAIN_SIGMA[1:], MAIN_FREEDOM)
-"""What is known of any main camera."""
-
-
-def match_prior(mean: FloatArray, sigma: FloatArray) -> PositionPrior:
-    """What the other frames of a match say of a main camera's position, metres, shapes (3,)."""
-    return PositionPrior(mean, sigma, MATCH_FREEDOM, MATCH_CLICKS)
 
 
 @dataclass(frozen=True)
@@ -276,7 +245,7 @@ class ResectionProblem:
         variance = self.click_variance(fit.parameters, observations)
         offset = np.zeros(len(MAIN_MEAN))
         for _ in range(MAIN_ROUNDS):
-            prior = self._main_prior(near, variance, offset)
+            prior = self.main_prior(near, offset, variance)
             found = self._run(observations, fit.parameters[None], FINAL, prior=prior)
             fit = Resection(found.parameters[0], float(found.cost[0]))
             offset = fit.parameters[ROLL : Z + 1] - prior.mean[ROLL : Z + 1]
@@ -388,11 +357,15 @@ class ResectionProblem:
         sigma = np.array([np.inf, np.inf, level, 300.0, 300.0, 60.0, 3.0, self.distortion_sigma])
         return Prior(mean, sigma)
 
-    def _main_prior(self, near: PositionPrior, variance: float, offset: FloatArray) -> Prior:
-        """Student prior of main cameras, reweighted for an offset from its mean, shape (4,).
+    def main_prior(self, near: PositionPrior, offset: FloatArray, variance: float = 1.0) -> Prior:
+        """Student prior of main cameras, reweighted for an offset from its mean.
 
-        The better the clicks fit (variance, pixels squared) and the more they insist on an
-        offset, the less it weighs.
+        The better the clicks fit and the more they insist on an offset, the less it weighs.
+
+        Args:
+            near: What is known of the position.
+            offset: Of roll (radians) and position (metres) from the mean, shape (4,).
+            variance: Of the residuals, in units of what the cost counts as one.
         """
         prior = self.prior()
         sigma = np.array([MAIN_SIGMA[0], *near.sigma])
@@ -403,46 +376,6 @@ class ResectionProblem:
         prior.sigma[[ROLL, KAPPA]] /= np.sqrt(variance)
         prior.sigma[X : Z + 1] /= np.sqrt(variance * near.clicks)
         return prior
-
-
-def is_main_position(position: FloatArray) -> bool:
-    """Whether main cameras stand there (pitch frame, metres, shape (3,))."""
-    low, high = np.transpose([MAIN_STAND_X_M, MAIN_STAND_Y_M, MAIN_STAND_Z_M])
-    return bool(((low < position) & (position < high)).all())
-
-
-def view_line_noise(
-    calibration: Calibration, lines: Lines, pitch: Pitch, size: ImageSize, policy: CalibrationPolicy
-) -> LineNoise:
-    """Noise of the clicks of a view that is calibrated from them.
-
-    Raises:
-        DegenerateGeometryError: It has no camera, or its lines leave that open.
-    """
-    problem, parameters = _at(calibration, size, policy)
-    return problem.line_noise(parameters, observe(lines, pitch, size))
-
-
-def view_line_evidence(
-    calibration: Calibration, lines: Lines, pitch: Pitch, size: ImageSize, policy: CalibrationPolicy
-) -> LineEvidence:
-    """What the clicks of a view say of the noise of its dataset, pixels at 960 x 540.
-
-    Raises:
-        DegenerateGeometryError: It has no camera, or its lines leave that open.
-    """
-    problem, parameters = _at(calibration, size, policy)
-    rows = problem.noise_rows(parameters, observe(lines, pitch, size))
-    return line_evidence(*rows).in_units(problem.unit)
-
-
-def _at(
-    calibration: Calibration, size: ImageSize, policy: CalibrationPolicy
-) -> tuple[ResectionProblem, FloatArray]:
-    if calibration.camera is None:
-        raise DegenerateGeometryError("without a camera there are no residuals")
-    problem = ResectionProblem.of(size, policy)
-    return problem, problem.parameters(calibration.camera)
 
 
 def best(fit: Fit, count: int) -> FloatArray:

@@ -16,9 +16,9 @@ from app.soccer.policy import PAPER, Policy
 from app.soccer.solution import Ball3D, BestBall, Calibration, Solution
 from app.solving.ball_noise import Miss, estimate_ball_noise, misses_of
 from app.solving.line_noise import LineEvidence, estimate_line_noise
-from app.solving.resect import view_line_evidence
 from app.solving.solve import solve
 from app.solving.triangulate import sights_of
+from app.solving.view_noise import view_line_evidence
 from tests.bench.cases import Case, Made, make_case
 from tests.bench.pitches import estimate_match
 from tests.bench.table import print_table

@@ -16,9 +16,10 @@ from app.review.policies.text import CUSTOM, policy_with
 from app.soccer.policy import CALIBRATION, POLICIES, THRESHOLDS, Policy
 from app.solving.ball_noise import BallNoise, Miss, Sigma, estimate_ball_noise, misses_of
 from app.solving.line_noise import LineEstimate, LineEvidence, estimate_line_noise
-from app.solving.resect import REFERENCE_DIAGONAL, view_line_evidence, view_line_noise
+from app.solving.resect import REFERENCE_DIAGONAL
 from app.solving.source_noise import BallSource, SourceFactors, SourceNoise, estimate_sources
 from app.solving.triangulate import sights_of
+from app.solving.view_noise import view_line_evidence, view_line_noise
 from app.store.noise import Factor, Factors, factor_of, read_factors
 from app.store.session import Session
 from app.store.solutions import present_solutions

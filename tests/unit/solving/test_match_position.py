@@ -4,9 +4,9 @@ import pytest
 from app.soccer.annotation import make_lines
 from app.soccer.policy import CalibrationPolicy
 from app.solving.calibrate import calibrate, calibrate_near
+from app.solving.main_position import PositionPrior, match_prior
 from app.solving.match_model import FramePlace
 from app.solving.match_position import NO_PLACES, Places, place_of, share_position
-from app.solving.resect import PositionPrior, match_prior
 from tests.cameras import SIZE, looking
 from tests.unit.solving.conftest import BEHIND_GOAL, BEND, PITCH, click
 
