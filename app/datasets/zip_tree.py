@@ -11,6 +11,7 @@ from typing import IO
 from app.datasets.file_tree import BROKEN, Limits, Root, read_capped
 from app.datasets.report import Report
 from app.datasets.safe_path import check_name, is_hidden
+from app.datasets.zip_end import lost_members
 from app.errors import DatasetFormatError, UnsafePathError
 from app.nested_zip import UNREADABLE, open_nested, open_zip, open_zip_elsewhere
 from app.object_store.path import StoredPath
@@ -110,6 +111,12 @@ class ZipTree:
     def _checked(self, report: Report) -> dict[str, zipfile.ZipInfo]:
         members = self._archive.infolist()
         self._check_totals(members)
+        if lost := lost_members(self._archive):
+            damage = (
+                f"has a damaged list of members: it should have {len(members) + lost:,} and has"
+                f" {len(members):,}; copy it again, or read the folder that it was made of"
+            )
+            report.note(str(self.path), None, None, damage)
         # Names that differ in case alone are one file on some disks: which one is meant?
         folded = Counter(member.filename.rstrip("/").casefold() for member in members)
         checked = {}

@@ -48,7 +48,7 @@ PLAIN_WORDS = """
     bundle body boxes bulk button buttons cache calibrate canonical canvas caption card cards cell changes chart
     child chip chooser class cli client clock codec codecs colours command comparison completion
     conditions config confirm connections contact copy cross csv cursor curve damped delete deps details
-    detect diagram dialog diff doctor document documents drags drawing durable editor empty
+    detect diagram dialog diff doctor document documents drags drawing durable editor empty end
     encoded engine estimator etags evaluate event events exact examination export
     exports facets facts fan faults fields figure figures files finite first fixes fixture
     folder folders follow form format formats found frozen gathered gestures glossary grass grid guess guide header
