@@ -82,7 +82,3 @@ class Evaluation:
     def table(self, name: str) -> Table | None:
         """The table of that name, or None."""
         return next((table for table in self.tables if table.name == name), None)
-
-    def figure(self, name: str) -> Figure | None:
-        """The figure of that name, or None."""
-        return next((figure for figure in self.figures if figure.name == name), None)

@@ -90,10 +90,6 @@ class Sigma:
     left_out: int
     """Those among them that noise does not explain."""
 
-    def agrees(self, value: float) -> bool:
-        """Whether the interval holds a value."""
-        return self.low <= value <= self.high
-
 
 @dataclass(frozen=True)
 class BallNoise:

@@ -41,8 +41,7 @@ def main() -> None:
 
 
 def _drawn(found: Evaluation, name: str) -> bytes:
-    figure = found.figure(name)
-    assert figure is not None
+    (figure,) = (one for one in found.figures if one.name == name)
     picture = cv2.imdecode(np.frombuffer(figure_png(figure), np.uint8), cv2.IMREAD_COLOR)
     # A hundred coloured lines are 400 kB as PNG, which is too much for a repository.
     done, data = cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, 88])

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from contextlib import closing
+
 import pytest
 
 from app.errors import InputError
+from app.review.editing.edit import IncludeView, SetBall, SetLines
 from app.review.editing.replay import _STEPS
-from app.review.editing.submit import load
+from app.review.editing.submit import load, submit
+from app.review.editing.undo import redo, undo
+from app.review.jobs.jobs import Jobs
 from app.review.people.audit import KINDS, Family, every_entry, read_audit
 from app.review.people.deeds import record_deed
 from app.review.people.links import use
@@ -19,6 +24,7 @@ from app.review.verdicts.verdict import set_verdict
 from app.review.work.batches import NewBatch, change_batch, make_batch, remove_batch
 from app.store.audit import AuditQuery
 from app.store.store import Store
+from tests.waiting import SECONDS
 
 ALL = AuditQuery()
 
@@ -107,6 +113,39 @@ class TestAudit:
 
     def test_every_kind_that_the_log_knows_has_its_family(self) -> None:
         assert {kind for kinds in KINDS.values() for kind in kinds} == set(_STEPS) | {"import"}
+
+    def test_edits_are_told_by_what_they_set_where_and_whether_they_were_taken_back(
+        self, store: Store, said: int
+    ) -> None:
+        state = load(store, said)
+        key = state.group.views[0].key
+        edits = (
+            SetLines(key, {"Middle line": None}),
+            SetBall(key, None),
+            IncludeView(key, False),
+            IncludeView(key, True),
+        )
+        for edit in edits:
+            state = submit(store, said, edit, if_match=state.etag, actor="anna")
+        state = undo(store, said, if_match=state.etag, actor="anna")
+        redo(store, said, if_match=state.etag, actor="anna")
+        assert lines(store)[:6] == [
+            f"anna: did again: use of view {key}",
+            f"anna: took back: leaving out of view {key}",
+            f"anna: use of view {key}",
+            f"anna: leaving out of view {key}",
+            f"anna: balls of view {key}",
+            f"anna: lines of view {key}: Middle line",
+        ]
+
+    def test_a_job_is_told_by_its_title_and_leads_to_the_jobs(
+        self, store: Store, said: int
+    ) -> None:
+        with closing(Jobs(store)) as jobs:
+            job = jobs.submit("solve", "Solve demo", lambda _: None, actor="anna")
+            jobs.wait(job.id, SECONDS)
+        (entry,) = read_audit(store, AuditQuery(kinds=("job",)), EVERYTHING).items
+        assert (entry.sentence, entry.address) == ("asked for: Solve demo", "/jobs")
 
     def test_what_became_of_a_batch_is_said_in_words(self, store: Store, said: int) -> None:
         batch = make_batch(store, "demo", NewBatch("first look"), actor="bob")
