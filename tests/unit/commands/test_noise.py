@@ -3,8 +3,19 @@
 from __future__ import annotations
 
 import json
+import re
+from contextlib import closing
+from pathlib import Path
 
+import numpy as np
+import pytest
+
+from app.config import Settings
+from app.review.editing.recompute import solve_dataset
+from app.review.importing.ingest import ingest
+from app.store.store import Store
 from tests.unit.commands.test_policy import Run, run  # noqa: F401
+from tests.unit.review.policies.test_noise import blurred
 
 
 class TestNoise:
@@ -17,3 +28,55 @@ class TestNoise:
     def test_nothing_to_apply_is_one_sentence(self, run: Run) -> None:  # noqa: F811
         code, out, err = run("noise", "--dataset", "demo", "--apply")
         assert (code, out, err.count("\n")) == (1, "", 1)
+
+
+@pytest.fixture(scope="module")
+def filled(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Balls of camera b are noisier than the others, and all than the policy thinks."""
+    home, rng = tmp_path_factory.mktemp("noise") / "home", np.random.default_rng(5)
+    with closing(Store.open(Settings(home=home))) as store:
+        groups = [blurred(str(n), rng, given=False, noisy="b") for n in range(40)]
+        ingest(store, "noisy", groups, source="test", actor="ann")
+        solve_dataset(store, "noisy")
+    return home
+
+
+class TestWhatIsUnlike:
+    def test_sentences_name_the_threshold_the_camera_and_the_lines(
+        self, home: Path, touchline: Run
+    ) -> None:
+        code, out, err = touchline("noise", "--dataset", "noisy")
+        assert (code, err) == (0, "")
+        told = out.splitlines()
+        assert re.match(
+            r"Sigma of a clicked ball: [\d.]+ px \([\d.]+ to [\d.]+\); the policy says 1 px",
+            told[0],
+        )
+        unlike = [line for line in told if line.endswith(", unlike the dataset's")]
+        assert unlike[0].startswith("Sigma of a ball of camera b: ")
+        assert re.search(r"\nSigma of a point on a line: .* share \d+ % of its variance\n", out)
+        assert told[-1].startswith(
+            "Run it again with --apply to judge by the estimates: click_sigma_px to "
+        )
+        assert told[-1].endswith("balls of cameras and people their own sigma.")
+
+    def test_estimates_are_applied_and_taken_back(self, home: Path, touchline: Run) -> None:
+        code, out, _ = touchline("noise", "--dataset", "noisy", "--apply", "--json")
+        body = json.loads(out)
+        assert code == 0
+        assert body["values"].keys() == {"click_sigma_px"}
+        shown = json.loads(touchline("policy", "show", "--dataset", "noisy", "--json")[1])
+        assert body["applied"]["hash"] == shown["hash"]
+        assert shown["values"]["click_sigma_px"] == body["values"]["click_sigma_px"]
+        assert touchline("solve", "--dataset", "noisy", "--workers", "1")[0] == 0
+        again = json.loads(touchline("noise", "--dataset", "noisy", "--json")[1])
+        assert {one["camera"] for one in again["used"]} == {None, "a", "b"}
+        assert again["used"] == again["factors"] == body["factors"]
+        out = touchline("noise", "--dataset", "noisy", "--alike")[1]
+        assert "All balls are taken to be alike; `touchline solve`" in out
+        assert json.loads(touchline("noise", "--dataset", "noisy", "--json")[1])["used"] == []
+
+    def test_to_apply_and_to_take_back_at_once_is_refused(self, home: Path, touchline: Run) -> None:
+        code, out, err = touchline("noise", "--dataset", "noisy", "--apply", "--alike")
+        assert (code, out) == (2, "")
+        assert "--apply and --alike contradict each other" in err

@@ -16,13 +16,15 @@ from typer.testing import CliRunner, Result
 
 from app.commands.command_line import app
 from app.config import Settings
-from app.errors import NotLoggedInError
+from app.errors import ConflictError, NotLoggedInError
 from app.review.importing.ingest import ensure_dataset
 from app.review.people import links, passwords
 from app.review.people.access_tokens import AccessTokens
+from app.review.people.audit import read_audit
 from app.review.people.logins import Login, Logins
-from app.review.people.roles import Role, Scope
+from app.review.people.roles import EVERYTHING, Role, Scope
 from app.review.people.second_factor import SecondFactors
+from app.store.audit import AuditQuery
 from app.store.identities import put_identity
 from app.store.store import Store
 
@@ -106,6 +108,22 @@ class TestUsers:
         assert run("users", "take", "anna", "issia").exit_code == 0
         assert found(logins, "anna").roles.role_in(1) is Role.NONE
         assert "of the whole server" in str(run("users", "grant", "anna", "1", "admin").exception)
+
+    def test_what_was_done_before_there_were_accounts_is_given_to_one_person_once(
+        self, store: Store
+    ) -> None:
+        ensure_dataset(store, "league", "local")
+        run("users", "add", "anna")
+        given = run("users", "adopt", "anna")
+        assert given.exit_code == 0
+        assert "what was done until now as local" in given.stdout
+        entries = read_audit(store, AuditQuery(), EVERYTHING).items
+        assert [one.actor for one in entries if one.kind == "dataset"] == ["anna"]
+        run("users", "add", "bob")
+        again = run("users", "adopt", "bob")
+        assert isinstance(again.exception, ConflictError)
+        assert "what local did is shown as anna's" in str(again.exception)
+        assert str(run("users", "adopt", "carl").exception) == "there is no carl"
 
     def test_a_second_factor_is_required_and_taken_away(self, store: Store) -> None:
         links.use(store, token_in(run("users", "add", "anna").stdout), SECRET)
