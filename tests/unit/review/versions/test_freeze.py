@@ -15,6 +15,7 @@ from app.review.policies.policy import change_policy
 from app.review.queue.listing import list_groups
 from app.review.verdicts.verdict import set_verdict
 from app.review.versions.freeze import FreezeRequest, freeze, plan_freeze
+from app.review.versions.manifest import version_manifest
 from app.review.versions.version import list_versions, thaw
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import Box
@@ -108,6 +109,24 @@ class TestFreeze:
         assert rows["11.png"].why == rows["10.png"].why == "unreviewed"
         assert rows["9.png"].verdict["override"] == "reprojection"
         assert (version.counts["groups"], version.counts["overrides"]) == (2, 1)
+
+    def test_its_manifest_names_verdicts_overrides_and_what_was_refused(
+        self, store, judged
+    ) -> None:
+        version = frozen(store, groups="passing", note="second try")
+        manifest = version_manifest(store, version.id)
+        assert manifest["verdicts"] == {"accepted": 2, "unreviewed": 1}
+        (override,) = manifest["overrides"]
+        assert override["group"].endswith("9.png")
+        assert (override["gate"], override["reason"]) == (
+            "reprojection",
+            "overrides reprojection: seen on video",
+        )
+        (rejected,) = manifest["frozen"]["rejected"]
+        assert rejected["group"].endswith("8.png")
+        assert (rejected["reason"], rejected["note"]) == ("bad_calibration", "look at the box")
+        assert (manifest["version"], manifest["frozen"]["note"]) == ("v1", "second try")
+        assert manifest["settings"]["policy_hash"] == version.policy.hash
 
     def test_passing_takes_what_the_policy_passes_and_nobody_refused(self, store, judged) -> None:
         version = frozen(store, groups="passing")
