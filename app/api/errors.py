@@ -140,7 +140,7 @@ async def _validation_error(request: Request, error: Exception) -> Response:
     details = error.errors()
     for detail in details:
         if detail["loc"][0] == "path":
-            missing = f"there is no {detail['loc'][1]} with this id, which cannot be one"
+            missing = f"there is no {detail['loc'][1]} with such an id"
             return problem_response(make_problem(404, missing))
     errors = [
         FieldProblem(pointer=_pointer(detail["loc"]), detail=_sentence(request, detail))

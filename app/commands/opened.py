@@ -81,8 +81,8 @@ def process_pool(workers: int) -> Iterator[Executor]:
     """
     if not os.access(".", os.X_OK):
         raise InputError(
-            "this user may not enter the folder in which the command was given, which processes"
-            " that solve need",
+            "this user may not enter the folder in which the command was given, and processes"
+            " that solve begin there",
             hint="Change to another folder first (cd /), or solve with --workers 1.",
         )
     import multiprocessing

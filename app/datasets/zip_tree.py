@@ -9,9 +9,9 @@ from dataclasses import replace
 from typing import IO
 
 from app.datasets.file_tree import BROKEN, Limits, Root, read_capped
+from app.datasets.lost_members import lost_members
 from app.datasets.report import Report
 from app.datasets.safe_path import check_name, is_hidden
-from app.datasets.zip_end import lost_members
 from app.errors import DatasetFormatError, UnsafePathError
 from app.nested_zip import UNREADABLE, open_nested, open_zip, open_zip_elsewhere
 from app.object_store.path import StoredPath

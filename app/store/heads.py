@@ -9,8 +9,9 @@ from sqlalchemy import bindparam, func, select
 
 from app.store.session import Session
 from app.store.solutions import is_current
-from app.store.tables.groups import DatasetModel, GroupModel, VerdictModel
+from app.store.tables.groups import DatasetModel, GroupModel
 from app.store.tables.solutions import SolutionModel
+from app.store.tables.verdicts import VerdictModel
 
 _GROUP, _DATASET, _VERDICT = GroupModel.__table__, DatasetModel.__table__, VerdictModel.__table__
 _LAST = (

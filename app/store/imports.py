@@ -11,8 +11,9 @@ from sqlalchemy import func, select
 from app.store.log import LogEntry, read_log
 from app.store.session import Session
 from app.store.stations import StoredStation, stored_station
-from app.store.tables.groups import GroupModel, StationModel, VerdictModel
+from app.store.tables.groups import GroupModel, StationModel
 from app.store.tables.log import LogModel
+from app.store.tables.verdicts import VerdictModel
 
 VERDICT = (
     "actor",

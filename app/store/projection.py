@@ -19,10 +19,10 @@ from app.store.tables.groups import (
     ImportFindingModel,
     SpareFrameModel,
     StationModel,
-    VerdictModel,
     ViewModel,
 )
 from app.store.tables.queue import QueueModel
+from app.store.tables.verdicts import VerdictModel
 
 _BATCH = 500
 Rows = Sequence[Mapping[str, Any]]

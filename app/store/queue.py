@@ -31,11 +31,11 @@ from app.store.tables.groups import (
     GroupModel,
     ImportFindingModel,
     StationModel,
-    VerdictModel,
     ViewModel,
 )
 from app.store.tables.queue import QueueModel
 from app.store.tables.solutions import SolutionModel
+from app.store.tables.verdicts import VerdictModel
 from app.store.verdicts import StoredVerdict
 
 _BATCH = 1000

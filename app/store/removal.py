@@ -20,9 +20,10 @@ from app.store.dialect.statements import DeferReferences, insert_or_replace
 from app.store.session import Session
 from app.store.sight import COPIES
 from app.store.tables import Base
-from app.store.tables.groups import DatasetModel, GroupModel, StationModel, VerdictModel
+from app.store.tables.groups import DatasetModel, GroupModel, StationModel
 from app.store.tables.saved_views import COPIES_USED, UsedIdModel
 from app.store.tables.solutions import SolutionModel
+from app.store.tables.verdicts import VerdictModel
 
 _TABLES = Base.metadata.tables
 _COUNTED = {

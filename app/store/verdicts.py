@@ -14,7 +14,8 @@ from app.store.log import Entry, append
 from app.store.session import Session
 from app.store.settling import settle_judged
 from app.store.sight import COPIES
-from app.store.tables.groups import GroupModel, VerdictModel
+from app.store.tables.groups import GroupModel
+from app.store.tables.verdicts import VerdictModel
 from app.store.takes import note_verdict
 
 

@@ -12,8 +12,9 @@ from app.store.aliases import columns_shown
 from app.store.group_rows import next_id
 from app.store.session import Session
 from app.store.stored_json import Json, parse, unpack
-from app.store.tables.groups import DatasetModel, VerdictModel
+from app.store.tables.groups import DatasetModel
 from app.store.tables.queue import QueueModel
+from app.store.tables.verdicts import VerdictModel
 from app.store.tables.versions import VersionGroupModel, VersionModel
 
 BATCH = 200

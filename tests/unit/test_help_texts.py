@@ -48,13 +48,13 @@ PLAIN_WORDS = """
     bundle body boxes bulk button buttons cache calibrate canonical canvas caption card cards cell changes chart
     child chip chooser class cli client clock codec codecs colours command comparison completion
     conditions config confirm connections contact copy cross csv cursor curve damped delete deps details
-    detect diagram dialog diff doctor document documents drags drawing durable editor empty end
+    detect diagram dialog diff doctor document documents drags drawing durable editor empty
     encoded engine estimator etags evaluate event events exact examination export
     exports facets facts fan faults fields figure figures files finite first fixes fixture
     folder folders follow form format formats found frozen gathered gestures glossary grass grid guess guide header
     headers heads health heat help histograms history hit home hooks idempotency identity if image images
     import imports in info init insight items jaccard json judged keep key keys known konva last latest lazy
-    least leftovers legend lens lesson lessons letter licence list listing live locks look loupe
+    least leftovers legend lens lesson lessons letter licence list listing live locks look lost loupe
     kernels profile trace
     main map markdown marks match matches matrix membership menu merge metrics migrate mini missing
     model modules name names navigation neighbours nested notice nudge numbers object

@@ -23,6 +23,7 @@ from app.store.tables import saved_views as saved_views
 from app.store.tables import solutions as solutions
 from app.store.tables import takes as takes
 from app.store.tables import talk as talk
+from app.store.tables import verdicts as verdicts
 from app.store.tables import versions as versions
 from app.store.tables import webhooks as webhooks
 from app.store.tables import work as work

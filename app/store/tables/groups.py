@@ -1,7 +1,4 @@
-"""Groups: what people said of them, as it is now; the log can rebuild all but the verdicts.
-
-``verdict`` only grows (a trigger sees to it); the last one of a group counts.
-"""
+"""Groups: datasets, their cameras, groups and views as they are now, and what imports found."""
 
 from __future__ import annotations
 
@@ -169,25 +166,3 @@ class PaintEvidenceModel(Base):
     dataset_id: Mapped[int] = mapped_column(ForeignKey("dataset.id"), primary_key=True)
     reason: Mapped[str | None]
     body: Mapped[bytes] = mapped_column(LargeBinary)
-
-
-class VerdictModel(Base):
-    """One person's verdict on one state of a group; the newest is the effective one.
-
-    ``override`` names the gate that failed when the group was accepted all the same.
-    """
-
-    __tablename__ = "verdict"
-    __table_args__ = (Index("verdict_group", "group_id", "id"),)
-
-    id: Mapped[int] = mapped_column(primary_key=True)
-    group_id: Mapped[int] = mapped_column(ForeignKey("groups.id"))
-    actor: Mapped[str]
-    at: Mapped[str]
-    state: Mapped[str]
-    reason: Mapped[str | None]
-    note: Mapped[str | None]
-    inputs_hash: Mapped[str]
-    policy_hash: Mapped[str]
-    fixed: Mapped[bool]
-    override: Mapped[str | None]

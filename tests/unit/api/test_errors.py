@@ -180,4 +180,4 @@ class TestValidationErrors:
     def test_an_id_that_cannot_be_one_is_not_found(self, client, view: str) -> None:
         answer = client.patch(f"/lines/{view}", json={"lines": {}})
         assert answer.status_code == 404
-        assert answer.json()["detail"] == "there is no view with this id, which cannot be one"
+        assert answer.json()["detail"] == "there is no view with such an id"

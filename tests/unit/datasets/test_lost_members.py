@@ -1,4 +1,4 @@
-"""Zip end: members that a damaged list hides are missed."""
+"""Lost members: those that a damaged list hides are missed."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
+from app.datasets.lost_members import lost_members
 from app.datasets.report import Report
 from app.datasets.trees import open_tree
-from app.datasets.zip_end import lost_members
 
 
 class TestDamagedListOfMembers:

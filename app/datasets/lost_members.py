@@ -1,4 +1,4 @@
-"""Zip end: how many members a zip file says that it has, in the record at its end.
+"""Lost members: how many a zip file says that it has, in the record at its end, and its list has not.
 
 ``zipfile`` believes the list of members alone. A damaged byte there, such as a length, makes it
 read over members, which would be missing without a word.
