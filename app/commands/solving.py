@@ -39,26 +39,19 @@ def solve(
     json_: Json = False,
 ) -> None:
     """Compute what is missing or out of date; Ctrl+C keeps what is done, and the next run goes on."""
-    from app.review.datasets.dataset import get_dataset_head
-    from app.review.editing.pitches import estimate_pitches
-    from app.review.editing.recompute import solve_dataset
+    from app.review.jobs.full_solve import solve_fully
     from app.review.policies.policy import change_policy
-    from app.review.yields.store import AT_ONCE, YieldStore
 
     chosen = None if policy is None else read_policy_option(policy)
     with opened_to_solve("Solving", workers, cluster) as (store, executor, progress):
         if chosen is not None:
             change_policy(store, dataset, chosen, if_match=None, actor=acting())
         with held_interrupts() as interrupted:
-            report = solve_dataset(store, dataset, executor, progress, interrupted)
+            report = solve_fully(store, dataset, executor, progress, interrupted)
             if interrupted():
                 left = report.total - report.solved - len(report.failed)
                 complain(f"stopped; {report.solved} groups are kept, {left} are left to do")
                 raise typer.Exit(INTERRUPTED)
-        estimate_pitches(store, dataset, executor)
-        if report.solved > AT_ONCE:
-            # So that the first look at the yield finds it counted.
-            YieldStore(store).keep_up(get_dataset_head(store, dataset).id)
     print_values(vars(report), json_)
 
 

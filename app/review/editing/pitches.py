@@ -7,7 +7,7 @@ a finding of the match's first group, until somebody accepts it or says another 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import asdict, dataclass, replace
 from typing import Any
@@ -128,6 +128,7 @@ def estimate_pitches(
     dataset: str | int,
     executor: Executor | None = None,
     progress: TellProgress | None = None,
+    stop: Callable[[], bool] = lambda: False,
 ) -> DatasetPitches:
     """Estimate the pitch of every match whose lines are others than when it was estimated last.
 
@@ -136,13 +137,14 @@ def estimate_pitches(
         dataset: Name or id.
         executor: Where matches are worked on; None: here, one after the other.
         progress: Called with matches done and in all; an error that it raises ends the run.
+        stop: Asked every now and then; once it says so, what is estimated is saved, and no more.
     """
     with store.read() as session:
         found = read_dataset_head(session, dataset)
         policy = found.policy.calibration
         stale = _stale(session, found.id, policy)
     tasks = (_task(store, found.id, match, inputs, policy) for match, inputs in stale)
-    for done, (match, values) in enumerate(fan_out(_estimate, tasks, executor), start=1):
+    for done, (match, values) in enumerate(fan_out(_estimate, tasks, executor, stop), start=1):
         with store.write() as session:
             save_estimate(session, found.id, match, **values)
         if progress is not None:

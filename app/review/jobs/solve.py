@@ -9,17 +9,12 @@ from typing import TypeVar
 
 from app.review.answers.keep import Keep, Kept, keep_nothing
 from app.review.datasets.dataset import get_dataset_head, list_datasets
-from app.review.editing.pitches import (
-    DatasetPitches,
-    apply_pitches,
-    estimate_pitches,
-    stale_matches,
-)
-from app.review.editing.recompute import SolveReport, solve_dataset, stale_groups
+from app.review.editing.pitches import DatasetPitches, apply_pitches, stale_matches
+from app.review.editing.recompute import SolveReport, stale_groups
+from app.review.jobs.full_solve import solve_fully
 from app.review.jobs.job_run import JobProgress, Work, counting
 from app.review.jobs.jobs import Jobs, Pool
 from app.review.policies.policy import PolicyState, apply_policy
-from app.review.yields.store import AT_ONCE, YieldStore
 from app.soccer.pitch import Pitch
 from app.soccer.policy import Policy
 from app.store.datasets import dataset_name
@@ -173,14 +168,7 @@ def solve_work(store: Store, dataset_id: int, pool: Pool = nullcontext) -> Work:
             or len(stale_matches(store, dataset_id)) >= MATCHES_WORTH_A_POOL
         )
         with pool() if large else nullcontext() as executor:
-            told = counting(progress, "groups solved")
-            report = solve_dataset(store, dataset_id, executor, told)
-            # It stays at the groups that are solved, and can be stopped all the same.
-            total = report.total
-            estimate_pitches(store, dataset_id, executor, lambda *_: told(total, total))
-        if report.solved > AT_ONCE:
-            progress(total, total, f"Counting what {found.name} yields.")
-            YieldStore(store).keep_up(dataset_id)
+            report = solve_fully(store, dataset_id, executor, counting(progress, "groups solved"))
         return {"policy": found.policy.name, **_report(report)}
 
     return work

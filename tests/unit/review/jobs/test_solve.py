@@ -12,6 +12,7 @@ import pytest
 from app.review.datasets.dataset import get_dataset
 from app.review.editing.recompute import SolveReport, stale_groups
 from app.review.importing.ingest import ensure_dataset
+from app.review.jobs import full_solve
 from app.review.jobs import solve as solve_job
 from app.review.jobs.job_run import JobProgress
 from app.review.jobs.jobs import Jobs
@@ -89,7 +90,7 @@ class TestRequestSolve:
     ) -> None:
         fill(make_group(), solved=False)
         report = SolveReport(total=1, failed=[("a/7.png", "ValueError: odd")])
-        monkeypatch.setattr(solve_job, "solve_dataset", lambda *_, **__: report)
+        monkeypatch.setattr(full_solve, "solve_dataset", lambda *_, **__: report)
         job = request_solve(jobs, store, get_dataset(store, "demo").id, actor="ann")
         result = jobs.wait(job.id, SECONDS).result
         assert result["failures"] == [{"group": "a/7.png", "problem": "ValueError: odd"}]
@@ -119,7 +120,7 @@ class TestSolveLeftovers:
         started = threading.Event()
 
         def stopping(
-            _store: Store, _id: int, _executor: None, progress: JobProgress
+            _store: Store, _id: int, _executor: None, progress: JobProgress, _stop: object
         ) -> SolveReport:
             started.set()
             while True:
@@ -127,7 +128,7 @@ class TestSolveLeftovers:
 
         first = Jobs(store)
         with monkeypatch.context() as patch:
-            patch.setattr(solve_job, "solve_dataset", stopping)
+            patch.setattr(full_solve, "solve_dataset", stopping)
             job = request_solve(first, store, get_dataset(store, "demo").id, actor="ann")
             assert started.wait(SECONDS)
             first.close()
