@@ -3,23 +3,17 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated
 
 import typer
 
-from app.commands.opened import executor_of, opened_store
+from app.commands.opened import opened_store, opened_to_solve
 from app.commands.options import Json, Workers, acting, read_settings
 from app.commands.terminal import print_values, show_progress
 from app.private_file import keep_private
-
-if TYPE_CHECKING:
-    from app.config import Settings
+from app.sample.order import GROUPS, SEED, SampleOrder
 
 commands = typer.Typer()
-
-SAMPLE = "sample"
-"""Name of the sample dataset, and of its folder in the home."""
-SAMPLE_GROUPS, SAMPLE_SEED = 60, 20_260_101
 
 
 @commands.command()
@@ -27,13 +21,11 @@ def sample(
     out: Annotated[
         Path | None, typer.Argument(help="Folder; with --dataset, by default one in the home.")
     ] = None,
-    groups: Annotated[int, typer.Option(min=1, help="How many groups.")] = SAMPLE_GROUPS,
+    groups: Annotated[int, typer.Option(min=1, help="How many groups.")] = GROUPS,
     labels_only: Annotated[
         bool, typer.Option("--labels-only", help="Write labels without frames.")
     ] = False,
-    seed: Annotated[int, typer.Option(min=0, help="Seed; another one gives other groups.")] = (
-        SAMPLE_SEED
-    ),
+    seed: Annotated[int, typer.Option(min=0, help="Seed; another one gives other groups.")] = SEED,
     no_faults: Annotated[bool, typer.Option("--no-faults", help="Plant no faults.")] = False,
     dataset: Annotated[
         str | None,
@@ -43,27 +35,29 @@ def sample(
     json_: Json = False,
 ) -> None:
     """Write a synthetic dataset with known truth in SoccerNet-v3 layout."""
-    settings = read_settings()
+    from app.review.practice.sample_dataset import SAMPLE, make_sample_dataset
+
     if out is None and dataset is None:
         raise typer.BadParameter("name a folder to write to, or a dataset to fill")
-    if dataset is not None and _is_solved(settings, dataset):
-        print_values({**_progress_of(settings, dataset), "written": False}, json_)
+    order = SampleOrder(groups, seed, labels_only, faults=not no_faults)
+    if dataset is None:
+        from app.sample.write import write_sample
+
+        assert out is not None
+        with show_progress("Drawing the sample") as progress:
+            report = write_sample(out, **vars(order), progress=progress, workers=workers)
+        print_values(vars(report), json_)
         return
     if out is None:
         keep_private()
-    folder = out or settings.home / SAMPLE
-    report = _write_sample(
-        folder,
-        groups=groups,
-        seed=seed,
-        labels_only=labels_only,
-        faults=not no_faults,
-        workers=workers,
-    )
-    if dataset is not None:
-        _fill(settings, dataset, folder, workers)
-        report = {**report, **_progress_of(settings, dataset), "written": True}
-    print_values(report, json_)
+    folder = out or read_settings().home / SAMPLE
+    with opened_to_solve("Making the sample", workers) as (store, executor, progress):
+        made = make_sample_dataset(
+            store, dataset, folder, order, executor, progress, workers=workers, actor=acting()
+        )
+    written = vars(made.written) if made.written else {}
+    values = {"dataset": made.dataset, "groups": made.groups, "solved": made.solved}
+    print_values({**written, **values, "written": made.written is not None}, json_)
 
 
 @commands.command()
@@ -81,47 +75,3 @@ def practice(
     with opened_store(settings) as store, show_progress("Making the practice groups") as progress:
         made = make_practice_dataset(store, settings, progress, again=again, actor=acting())
     print_values(made, json_)
-
-
-def ensure_sample(settings: Settings) -> None:
-    """Make the dataset ``sample`` where it is missing or not complete."""
-    if not _is_solved(settings, SAMPLE):
-        _write_sample(settings.home / SAMPLE)
-        _fill(settings, SAMPLE, settings.home / SAMPLE, None)
-
-
-def _write_sample(folder: Path, **options: Any) -> dict[str, Any]:
-    """Write the sample's files; what is not said is as ``write_sample`` has it."""
-    from app.sample.write import write_sample
-
-    with show_progress("Drawing the sample") as progress:
-        return vars(write_sample(folder, progress=progress, **options))
-
-
-def _is_solved(settings: Settings, dataset: str) -> bool:
-    """Whether a dataset of that name is there, and complete."""
-    found = _progress_of(settings, dataset)
-    return bool(0 < found["groups"] == found["solved"])
-
-
-def _progress_of(settings: Settings, dataset: str) -> dict[str, Any]:
-    """Name, groups and solved groups of a dataset; one that is not there has none."""
-    from app.review.datasets.dataset import list_datasets
-
-    with opened_store(settings) as store:
-        found = next((item for item in list_datasets(store) if item.name == dataset), None)
-    groups, solved = (found.groups, found.solved) if found else (0, 0)
-    return {"dataset": dataset, "groups": groups, "solved": solved}
-
-
-def _fill(settings: Settings, dataset: str, folder: Path, workers: int | None) -> None:
-    """Import a folder in SoccerNet-v3 layout, and solve it."""
-    from app.review.editing.recompute import solve_dataset
-    from app.review.importing.sources import Source, import_source
-
-    source = Source("soccernet-v3", folder.resolve())
-    with opened_store(settings) as store:
-        with show_progress("Importing") as progress:
-            import_source(store, dataset, source, settings, progress)
-        with executor_of(settings, workers) as executor, show_progress("Solving") as progress:
-            solve_dataset(store, dataset, executor, progress)

@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from app.commands.opened import cluster_of, opened_store, process_pool
+from app.commands.opened import cluster_of, executor_of, opened_store, process_pool
 from app.commands.options import Cluster, acting, read_settings, require_safe
-from app.commands.sample import ensure_sample
-from app.commands.terminal import say
+from app.commands.terminal import say, show_progress
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
@@ -75,7 +74,7 @@ def serve(
         if not settings.team and team is None:
             _require_no_team(settings)
         if with_sample:
-            ensure_sample(settings)
+            _make_sample(settings)
         with listen(settings.host, settings.port) as (socket, address):
             if settings.web_workers > 1:
                 _say_address(settings, address)
@@ -88,6 +87,20 @@ def serve(
             if settings.team:
                 _say_first_link(application.state.services.store, settings.url or address)
             run(application, socket)
+
+
+def _make_sample(settings: Settings) -> None:
+    """The dataset ``sample``, where it is missing or not complete."""
+    from app.review.practice.sample_dataset import SAMPLE, make_sample_dataset
+    from app.sample.order import SampleOrder
+
+    folder, order = settings.home / SAMPLE, SampleOrder()
+    with (
+        opened_store(settings) as store,
+        executor_of(settings) as executor,
+        show_progress("Making the sample") as progress,
+    ):
+        make_sample_dataset(store, SAMPLE, folder, order, executor, progress, actor=acting())
 
 
 def _require_one_process(settings: Settings) -> None:

@@ -26,12 +26,11 @@ from app.errors import InputError
 from app.finite import json_text
 from app.progress import TellProgress
 from app.sample.fixture import group_counts, make_fixture
+from app.sample.order import GROUPS, SEED
 from app.sample.render import render
 from app.sample.scenes import make_match
 from app.sample.truth import TRUTH, TruthWriter, truth_to_json
 
-SEED = 20_260_101
-GROUPS = 60
 JPEG_QUALITY = 85
 GROUPS_PER_JOB = 3
 ZIP_DATE = (1980, 1, 1, 0, 0, 0)
