@@ -8,7 +8,6 @@ import tempfile
 import zipfile
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -128,12 +127,9 @@ def export_values(
 
 
 def freeze_values(
-    client: Client, dataset: str, request: dict[str, Any], progress: TellProgress, *, dry_run: bool
+    client: Client, dataset: str, request: Mapping[str, Any], progress: TellProgress, *, dry_run: bool
 ) -> dict[str, Any]:
-    """Let the server freeze a dataset; without a name it is the next vN."""
-    if request["name"] is None:
-        names = {item["name"] for item in _versions(client, dataset)}
-        request["name"] = next(name for n in count(1) if (name := f"v{n}") not in names)
+    """Let the server freeze a dataset."""
     place = f"datasets/{_part(dataset)}/versions"
     if dry_run:
         return dict(client.post(place, {**request, "dry_run": True}))
@@ -143,12 +139,8 @@ def freeze_values(
 
 def version_values(client: Client, dataset: str) -> list[dict[str, Any]]:
     """As ``versions`` has them."""
-    return [_version(item) for item in _versions(client, dataset)]
-
-
-def _versions(client: Client, dataset: str) -> list[dict[str, Any]]:
-    items: list[dict[str, Any]] = client.get(f"datasets/{_part(dataset)}/versions")["items"]
-    return items
+    items = client.get(f"datasets/{_part(dataset)}/versions")["items"]
+    return [_version(item) for item in items]
 
 
 def _version(item: Mapping[str, Any]) -> dict[str, Any]:

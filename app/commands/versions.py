@@ -85,7 +85,6 @@ def freeze(
     """Freeze a dataset as it is now into a version that never changes."""
     from app.review.versions.freeze import MAX_LICENCE, FreezeRequest, plan_freeze
     from app.review.versions.freeze import freeze as run_freeze
-    from app.review.versions.version import next_name
     from app.soccer.split import Split
 
     cameras = tuple(f"cam{number}" for number in sorted(parse_cameras(test_cameras)))
@@ -107,8 +106,7 @@ def freeze(
         print_values(found, json_)
         return
     with opened_store() as store, show_progress("Freezing") as progress:
-        title = name or named or next_name(store, dataset)
-        request = FreezeRequest(title, note, text, chosen, groups.value)
+        request = FreezeRequest(name or named, note, text, chosen, groups.value)
         if dry_run:
             print_values(vars(plan_freeze(store, dataset, request)), json_)
             return

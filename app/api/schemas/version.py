@@ -66,7 +66,9 @@ class VersionRequest(BaseModel):
         },
     )
 
-    name: Annotated[str, Field(min_length=1, max_length=100, description="Unique in its dataset.")]
+    name: Annotated[str, Field(min_length=1, max_length=100)] | None = Field(
+        default=None, description="Unique in its dataset; null: the next free of v1, v2, ..."
+    )
     note: Annotated[str, Field(max_length=MAX_NOTE)] = ""
     licence: Annotated[
         str, Field(max_length=MAX_LICENCE, description="Empty: the terms of the sources.")

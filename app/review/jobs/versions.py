@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 from app.child import ChildEnded
@@ -14,9 +15,9 @@ from app.review.jobs.job_run import JobProgress, Work
 from app.review.jobs.jobs import Jobs
 from app.review.versions.freeze import FreezeRequest, freeze, plan_freeze
 from app.review.versions.verify import keep_failure, verify_and_keep
-from app.review.versions.version import Version, find_version, get_version
+from app.review.versions.version import Version, find_version, get_version, next_name
 from app.soccer.split import Split
-from app.store.jobs import Job
+from app.store.jobs import OPEN, Job
 from app.store.store import Store
 from app.store.stored_json import Json
 
@@ -39,6 +40,11 @@ def request_freeze(
     """
     found = get_dataset_head(store, dataset)
     plan_freeze(store, found.id, request, strict=True)
+    if request.name is None:
+        promised = jobs.find(dataset_id=found.id, kinds=(FREEZE,), states=OPEN)
+        with store.read() as session:
+            name = next_name(session, found.id, (job.request["name"] for job in promised))
+        request = replace(request, name=name)
     return jobs.submit(
         FREEZE,
         f"Freeze {found.name} as {request.name}",
@@ -76,7 +82,7 @@ def resume_versions(jobs: Jobs, store: Store) -> None:
 
         def work(progress: JobProgress) -> Json:
             # The server may have stopped between the version and the record of its job.
-            done = _frozen_since(store, dataset_id, request.name, job.created)
+            done = _frozen_since(store, dataset_id, values["name"], job.created)
             if done is not None:
                 return version_result(done)
             return freeze_work(store, dataset_id, request, job.actor)(progress)

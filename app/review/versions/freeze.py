@@ -14,11 +14,12 @@ from typing import Any
 from app.canonical import canonical
 from app.datasets.manifest import software_version
 from app.errors import ConflictError, InputError
+from app.finite import quoted
 from app.progress import TellProgress
 from app.review.datasets.dataset import DatasetHead, read_dataset_head
 from app.review.datasets.licence import licence_text
 from app.review.versions.membership import RULES, Candidate, read_candidates, require_solved
-from app.review.versions.version import Version, calibration_names, read_version
+from app.review.versions.version import Version, calibration_names, next_name, read_version
 from app.review.versions.version_hash import version_hash
 from app.soccer.group import Group
 from app.soccer.solution import SOLVER_VERSION
@@ -57,14 +58,14 @@ class FreezeRequest:
     """What to freeze.
 
     Attributes:
-        name: Of the version; unique in its dataset.
+        name: Of the version; unique in its dataset. None: the next free of v1, v2, ...
         note: What a reader of the list should know.
         licence: Text under which the version is passed on; empty: the terms of its sources.
         groups: ``accepted``: what people accepted and the policy passes, or a person overrode;
             ``passing``: whatever the policy passes, unless a person rejected or deferred it.
     """
 
-    name: str
+    name: str | None = None
     note: str = ""
     licence: str = ""
     split: Split = field(default_factory=Split)
@@ -73,14 +74,18 @@ class FreezeRequest:
     def check(self) -> None:
         """Raise InputError where it says something impossible."""
         self.split.check()
-        if not _NAME.fullmatch(self.name) or self.name.isdigit():
+        name = self.name
+        if name is not None and (not _NAME.fullmatch(name) or name.isdigit()):
             raise InputError(
-                f'"{self.name}" cannot be the name of a version',
+                f'"{name}" cannot be the name of a version',
                 hint="Use letters, digits, spaces and . _ -, up to 100, not digits alone.",
                 pointer="/name",
             )
         if self.groups not in RULES:
-            raise InputError(f'groups are "{RULES[0]}" or "{RULES[1]}"', pointer="/groups")
+            raise InputError(
+                f'groups must be "{RULES[0]}" or "{RULES[1]}", not {quoted(self.groups)}',
+                pointer="/groups",
+            )
         if len(self.note) > MAX_NOTE:
             raise InputError(f"a note has at most {MAX_NOTE} characters", pointer="/note")
         if len(self.licence) > MAX_LICENCE:
@@ -156,7 +161,8 @@ def freeze(
     values = run.values(rows, actor)
     with store.write() as session:
         _require_free(session, found, request.name)
-        return _save(session, values, rows)
+        name = request.name or next_name(session, found.id)
+        return _save(session, {**values, "name": name}, rows)
 
 
 class _Run:
@@ -196,7 +202,6 @@ class _Run:
         request, dataset = self._request, self._dataset
         return {
             "dataset_id": dataset.id,
-            "name": request.name,
             "note": request.note,
             "licence": request.licence.strip() or licence_text(self._matches(rows)),
             "created": now(),
@@ -335,8 +340,8 @@ def _reasons(candidates: Iterable[Candidate]) -> dict[str, int]:
     return dict(sorted(counts.items()))
 
 
-def _require_free(session: Session, dataset: DatasetHead, name: str) -> None:
-    if has_version(session, dataset.id, name):
+def _require_free(session: Session, dataset: DatasetHead, name: str | None) -> None:
+    if name is not None and has_version(session, dataset.id, name):
         raise ConflictError(
             f'"{dataset.name}" has a version "{name}" already',
             hint="A version never changes; choose another name.",

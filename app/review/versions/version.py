@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import count
 from typing import Any
@@ -148,9 +148,15 @@ def newest_version(store: Store, dataset: str | int) -> Version:
     return found[0]
 
 
-def next_name(store: Store, dataset: str | int) -> str:
-    """The next free name of the kind v1, v2, ..."""
-    names = {item.name for item in list_versions(store, dataset)}
+def next_name(session: Session, dataset_id: int, promised: Iterable[str] = ()) -> str:
+    """The next free name of the kind v1, v2, ...
+
+    Args:
+        session: Any session.
+        dataset_id: The dataset.
+        promised: Names that are not free either, because somebody has begun to use them.
+    """
+    names = {row.name for row in dataset_versions(session, dataset_id)} | {*promised}
     return next(name for number in count(1) if (name := f"v{number}") not in names)
 
 

@@ -44,6 +44,14 @@ class TestFreezeVersion:
         assert (document["name"], document["hash"]) == ("v1", job["result"]["hash"])
         assert (document["licence"], document["counts"]["groups"]) == ("mine", 3)
 
+    def test_without_a_name_two_at_once_become_two_versions(self, api, services, version) -> None:
+        address = f"{API}/datasets/broadcast/versions"
+        bodies = ({"groups": "passing"}, {"groups": "passing", "name": None})
+        answers = [api.post(address, json=body) for body in bodies]
+        jobs = [ended(services, answer) for answer in answers]
+        assert [job["result"]["name"] for job in jobs] == ["v2", "v3"]
+        assert jobs[0]["title"] == "Freeze broadcast as v2"
+
     def test_a_dry_run_counts_and_starts_nothing(self, api, services) -> None:
         body = {"name": "v1", "groups": "passing", "dry_run": True}
         answer = api.post(f"{API}/datasets/broadcast/versions", json=body)

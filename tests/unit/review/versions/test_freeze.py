@@ -99,6 +99,10 @@ def moved(group):
 
 
 class TestFreeze:
+    def test_without_a_name_it_is_the_next_number_that_is_free(self, store, judged) -> None:
+        frozen(store, "v2")
+        assert [frozen(store, None).name for _ in range(2)] == ["v1", "v3"]
+
     def test_policy_and_verdict_decide_and_everything_else_says_why_not(
         self, store, judged
     ) -> None:
