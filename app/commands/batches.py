@@ -7,10 +7,10 @@ from typing import Annotated, Any
 
 import typer
 
-from app.commands.batch_fields import SHOWN
 from app.commands.opened import opened_store
 from app.commands.options import Json, acting
 from app.commands.server import connected, given_server
+from app.commands.shown_fields import BATCH
 from app.commands.terminal import print_rows, print_values
 
 commands = typer.Typer(help="Groups that are given out to people.", no_args_is_help=True)
@@ -186,7 +186,7 @@ def close(batch: Number, json_: Json = False) -> None:
 
 
 def _values(batch: Any) -> dict[str, Any]:
-    return {name: getattr(batch, name) for name in SHOWN}
+    return {name: getattr(batch, name) for name in BATCH}
 
 
 def _line(value: dict[str, Any]) -> str:

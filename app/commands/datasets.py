@@ -9,6 +9,7 @@ import typer
 from app.commands.opened import opened_store
 from app.commands.options import Json, acting
 from app.commands.server import Server, connected, given_server
+from app.commands.shown_fields import DATASET
 from app.commands.terminal import print_json, print_values, say
 
 commands = typer.Typer(help="What datasets there are.", no_args_is_help=True)
@@ -34,9 +35,8 @@ def _values() -> list[dict[str, Any]]:
 
     with opened_store() as store:
         datasets = list_datasets(store)
-    names = ("id", "name", "groups", "solved", "accepted", "rejected", "deferred", "unreviewed")
     return [
-        {**{name: getattr(item, name) for name in names}, "policy": item.policy.name}
+        {**{name: getattr(item, name) for name in DATASET}, "policy": item.policy.name}
         for item in datasets
     ]
 

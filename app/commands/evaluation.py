@@ -211,12 +211,12 @@ def _evaluate_at(
     server: Server, dataset: str, request: SourcesRequest, out: Path | None, progress: TellProgress
 ) -> tuple[_Values, list[_Values]]:
     """As ``_evaluate``, by a server."""
-    from app.commands import remote
+    from app.commands import remote_files
 
     with connected(server) as client:
-        values, sets = remote.evaluate(client, dataset, request, progress)
+        values, sets = remote_files.evaluate(client, dataset, request, progress)
         if out is not None:
-            remote.write_evaluation(client, values, out)
+            remote_files.write_evaluation(client, values, out)
     return values, sets
 
 

@@ -107,7 +107,7 @@ def import_(
     """
     server = given_server()
     if server is not None:
-        from app.commands import remote
+        from app.commands import remote_files
 
         options: dict[str, Any] = {
             "calibration": calibration.value,
@@ -116,7 +116,7 @@ def import_(
             "size": None if size is None else [size.width, size.height],
         }
         with connected(server) as client, show_progress("Importing") as progress:
-            values, nothing = remote.import_values(
+            values, nothing = remote_files.import_values(
                 client, dataset, format_, path if is_address(path) else Path(path), options,
                 lines=lines, frames=frames, policy=policy, dry_run=dry_run, progress=progress,
             )  # fmt: skip
@@ -184,14 +184,14 @@ def export(
     }
     server = given_server()
     if server is not None:
-        from app.commands import remote
+        from app.commands import remote_files
 
         if images is Images.LINK:
             raise typer.BadParameter("a server copies frames, or leaves them out")
         request = {"dataset": dataset, "format": format_, "all": everything, **asked}
         with connected(server) as client, show_progress("Exporting") as progress:
             sent_to = out if is_address(out) else Path(out)
-            values = remote.export_values(client, sent_to, request, progress)
+            values = remote_files.export_values(client, sent_to, request, progress)
         print_export(values, json_)
         return
     from app.review.exporting.export import export as run_export

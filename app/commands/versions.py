@@ -19,6 +19,7 @@ from app.commands.options import (
     read_text,
 )
 from app.commands.server import connected, given_server
+from app.commands.shown_fields import VERSION
 from app.commands.terminal import (
     complain,
     print_json,
@@ -30,7 +31,6 @@ from app.commands.terminal import (
 
 if TYPE_CHECKING:
     from app.review.versions.version import Version
-    from app.soccer.split import Split
 
 commands = typer.Typer()
 
@@ -189,22 +189,10 @@ def verify(
 
 def version_values(version: Version) -> dict[str, Any]:
     """A version as plain values."""
-    split: Split = version.split
-    return {
-        "id": version.id,
-        "dataset": version.dataset,
-        "name": version.name,
-        "hash": version.hash,
-        "created": version.created,
-        "note": version.note,
-        "groups": version.groups,
-        "counts": dict(version.counts),
-        "split": split.values(),
-        "policy": version.policy.name,
-        "policy_hash": version.policy.hash,
-        "solver_version": version.solver_version,
-        "software_version": version.software_version,
-    }
+    policy = {"policy": version.policy.name, "policy_hash": version.policy.hash}
+    own = {"counts": dict(version.counts), "split": version.split.values()}
+    values = {**vars(version), **own, **policy}
+    return {name: values[name] for name in VERSION}
 
 
 def _difference(item: Any) -> str:

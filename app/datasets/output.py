@@ -8,7 +8,7 @@ import shutil
 import tempfile
 import zipfile
 import zlib
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -134,20 +134,35 @@ def _publish_zip(staging: Path, out: Path, prefix: str, progress: TellProgress |
     sync(out.parent)
 
 
-def write_zip(root: Path, file: object, progress: TellProgress | None = None) -> None:
-    """All files below ``root`` into a zip: sorted names, dated 1980-01-01."""
+def write_zip(
+    root: Path,
+    file: object,
+    progress: TellProgress | None = None,
+    stored: Collection[str] = (),
+) -> None:
+    """All files below ``root`` into a zip: sorted names, dated 1980-01-01.
+
+    Args:
+        root: The folder.
+        file: Where the zip is written: a path, or a file that is open.
+        progress: Hears how many files are in it.
+        stored: Endings of files that are not compressed, such as ``.jpg``.
+    """
     files = GatheredFiles(root)
     with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:  # type: ignore[call-overload]
         for name, content in told(files, len(files), progress, "Packing the files."):
             entry = zipfile.ZipInfo(name, _DATE)
             entry.external_attr = 0o644 << 16
             entry.create_system = 3
-            entry.compress_type = zipfile.ZIP_DEFLATED
+            packed = Path(name).suffix.lower() in stored
+            entry.compress_type = zipfile.ZIP_STORED if packed else zipfile.ZIP_DEFLATED
             if isinstance(content, Path) and content.stat().st_size <= WHOLE:
                 content = content.read_bytes()
             if isinstance(content, bytes):
                 archive.writestr(entry, content, compresslevel=LEVEL)
                 continue
+            # So that a file of more than 2 GB gets the sizes of ZIP64.
+            entry.file_size = content.stat().st_size
             with content.open("rb") as source, archive.open(entry, "w") as target:
                 shutil.copyfileobj(source, target, 1024 * 1024)
 

@@ -235,6 +235,22 @@ def safe_name(name: str) -> str:
     return short
 
 
+class UploadDigest:
+    """The id of an upload of some name, from its content chunk by chunk."""
+
+    def __init__(self, name: str):
+        self._digest = hashlib.sha256(name.encode() + b"\0")
+
+    def update(self, chunk: bytes) -> None:
+        """Add some bytes."""
+        self._digest.update(chunk)
+
+    @property
+    def id(self) -> str:
+        """The id for what was added until now."""
+        return self._digest.hexdigest()[:32]
+
+
 class UploadWriter:
     """Takes an upload chunk by chunk; it is there when ``finish`` returns, or not at all.
 
@@ -245,7 +261,7 @@ class UploadWriter:
     def __init__(self, settings: Settings, name: str):
         self._settings, self._name = settings, safe_name(name)
         self._folder = settings.uploads / f"{uuid.uuid4().hex}{PART}"
-        self._digest = hashlib.sha256(self._name.encode() + b"\0")
+        self._digest = UploadDigest(self._name)
         self.bytes = 0
         with _reported():
             _make_folder(settings)
@@ -285,7 +301,7 @@ class UploadWriter:
             self._file.flush()
             os.fsync(self._file.fileno())
             self._file.close()
-        upload = Upload(self._digest.hexdigest()[:32], self._name, self.bytes, now())
+        upload = Upload(self._digest.id, self._name, self.bytes, now())
         shared = _shared(self._settings, upload.id, by)
         if shared is not None:
             self.abort()

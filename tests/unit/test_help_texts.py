@@ -33,7 +33,7 @@ PLAIN_WORDS = """
     private kept another smaller
     stored tree trees safe path refusal attempt cookie fit
     compiler dialect postgresql sqlite statements transfer triggers
-    attempts lived processes shared sharing short web
+    attempts lived processes shared sharing short shown web
     addresses messages sender signing
     challenges enrol task
     joined turns

@@ -64,7 +64,7 @@ def add_predictions(
     actor: Actor,
     asked: AskedUnder,
 ) -> Response:
-    """Read uploaded files into a new set of predictions.
+    """Read uploaded files into a new set of predictions, or find the set that they gave before.
 
     What is wrong is left out and listed with file, record and field; frames that the dataset does
     not have are counted and listed. 400 where nothing can be used, 413 where reading takes too

@@ -45,11 +45,14 @@ class PredictionRequest(BaseModel):
         },
     )
 
-    name: Annotated[
-        str,
-        Field(min_length=1, max_length=100, description="Name of the set; unique in its dataset."),
-    ]
-    format: Literal["coco", "yolo", "csv"] = "coco"
+    name: Annotated[str, Field(min_length=1, max_length=100)] | None = Field(
+        default=None,
+        description="Name of the set; unique in its dataset. null: the set that came of the very "
+        "same reading, where there is one; else a new one, named after its file.",
+    )
+    format: Literal["auto", "coco", "yolo", "csv"] = Field(
+        default="coco", description="`auto`: as the endings of the files tell."
+    )
     upload: Upload | None = None
     images_upload: Upload | None = Field(
         default=None,

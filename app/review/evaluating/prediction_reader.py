@@ -11,7 +11,9 @@ from app.child_figures import FIGURES
 from app.child_pool import ChildPool
 from app.config import Settings
 from app.datasets.file_tree import Limits
-from app.errors import DatasetFormatError, TooLargeError
+from app.datasets.report import Report
+from app.datasets.trees import opened_tree
+from app.errors import DatasetFormatError, InputError, TooLargeError
 from app.evaluation.frame_names import FrameNames
 from app.evaluation.prediction_files import (
     ReadPredictedCameras,
@@ -31,6 +33,11 @@ LIMITS_HINT = (
     "command line (touchline evaluate), which has no limits. Nothing was kept."
 )
 
+ENDINGS = ((".csv", "csv"), (".json", "coco"), (".txt", "yolo"))
+"""Formats of predictions by the endings of their files; where several are there, the first."""
+AUTO = "auto"
+"""In place of a format: go by the endings."""
+
 
 @dataclass(frozen=True)
 class PredictionFiles:
@@ -38,7 +45,7 @@ class PredictionFiles:
 
     Attributes:
         path: File, folder or zip of ball boxes, or None.
-        format: ``coco``, ``yolo`` or ``csv``.
+        format: ``coco``, ``yolo``, ``csv``, or ``auto``.
         images: The COCO document that numbers in ``coco`` results refer to, or None.
         cameras: Folder or zip of SoccerNet camera JSON, or None.
         category: The class that is the ball, where the file has several.
@@ -53,6 +60,35 @@ class PredictionFiles:
     category: int | None = None
     size: ImageSize | None = None
     cameras_size: ImageSize | None = None
+
+    @property
+    def first(self) -> Path:
+        """The file of the boxes, or of the cameras where there are none.
+
+        Raises:
+            InputError: There is neither.
+        """
+        found = self.path or self.cameras
+        if found is None:
+            raise InputError(
+                "there is nothing to read: neither boxes nor cameras", pointer="/upload"
+            )
+        return found
+
+    def with_format(self) -> PredictionFiles:
+        """The same; ``auto`` has become the format that the endings of the files tell."""
+        if self.path is None or self.format != AUTO:
+            return self
+        return replace(self, format=guess_prediction_format(self.path))
+
+
+def guess_prediction_format(path: Path) -> str:
+    """The format of predictions by the endings of their files; ``coco`` where none tells it."""
+    with opened_tree(path, Report()) as tree:
+        if tree is None:
+            return "coco"
+        endings = {Path(item).suffix.lower() for item in tree.names()}
+    return next((format_ for ending, format_ in ENDINGS if ending in endings), "coco")
 
 
 def uploaded_files(

@@ -2,27 +2,19 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from app.datasets.report import Report
-from app.datasets.trees import opened_tree
 from app.errors import NotFoundError
 from app.progress import TellProgress
 from app.review.evaluating.evaluation_run import EvaluationRequest, run_evaluation
-from app.review.evaluating.prediction_reader import PredictionFiles
+from app.review.evaluating.prediction_reader import AUTO, PredictionFiles
 from app.review.evaluating.predictions import add_predictions, find_predictions
 from app.review.versions.version import find_version
 from app.soccer.frames import ImageSize
 from app.store.evaluations import StoredEvaluation
 from app.store.predictions import PredictionSet
 from app.store.store import Store
-
-ENDINGS = ((".csv", "csv"), (".json", "coco"), (".txt", "yolo"))
-"""Formats of predictions by the endings of their files; where several are there, the first."""
-AUTO = "auto"
-"""In place of a format: go by the endings."""
 
 
 @dataclass(frozen=True)
@@ -131,37 +123,13 @@ def prediction_set(
         if source.cameras is not None:
             raise NotFoundError(f"there is no file {path}")
         return find_predictions(store, dataset, str(source.boxes))
-    format_ = source.format
-    if path is not None and format_ == AUTO:
-        format_ = guess_format(path)
     files = PredictionFiles(
         path,
-        format_,
+        source.format,
         images=source.images,
         cameras=source.cameras,
         category=source.category,
         size=source.size,
         cameras_size=source.cameras_size,
     )
-    named = path or source.cameras
-    assert named is not None
-    return add_predictions(store, dataset, set_name(named), files, actor=actor, reuse=True)
-
-
-def guess_format(path: Path) -> str:
-    """The format of predictions by the endings of their files; ``coco`` where none tells it."""
-    with opened_tree(path, Report()) as tree:
-        if tree is None:
-            return "coco"
-        endings = {Path(item).suffix.lower() for item in tree.names()}
-    return next((format_ for ending, format_ in ENDINGS if ending in endings), "coco")
-
-
-def set_name(path: Path) -> str:
-    """A file's name as the name of a set: ASCII letters and digits, else ``-``.
-
-    Example:
-        >>> set_name(Path("runs/best model.json"))
-        'best-model'
-    """
-    return re.sub(r"[^A-Za-z0-9]", "-", path.stem).strip("-")[:80] or "predictions"
+    return add_predictions(store, dataset, None, files, actor=actor)

@@ -51,11 +51,10 @@ _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._ -]{0,99}")
 def add_predictions(
     store: Store,
     dataset: str | int,
-    name: str,
+    name: str | None,
     files: PredictionFiles,
     *,
     actor: str,
-    reuse: bool = False,
     read: Read = read_files,
     keep: Keep[PredictionSet] = keep_nothing,
 ) -> PredictionSet:
@@ -64,11 +63,10 @@ def add_predictions(
     Args:
         store: The database.
         dataset: Name or id.
-        name: Of the set; unique in its dataset.
+        name: Of the set; unique in its dataset. None: the set that came of the very same reading,
+            where there is one; else a new one under a free name after the file's.
         files: What to read.
         actor: Who brings them.
-        reuse: Answer the set that came of the very same reading, where there is one, and find
-            another name where the name is taken.
         read: Reads the files, here or in another process.
         keep: Keeps the answer with a new set.
 
@@ -77,19 +75,17 @@ def add_predictions(
             the name is impossible.
         ConflictError: There is a set of that name.
     """
-    check_name(name)
-    if files.path is None and files.cameras is None:
-        raise InputError("there is nothing to read: neither boxes nor cameras", pointer="/upload")
+    if name is not None:
+        check_name(name)
+    first, files = files.first, files.with_format()
     names = frame_names(store, dataset)
     boxes, cameras = read(files, names, Limits.of(store.settings))
     if not boxes.detections and not cameras.cameras and _is_for_another(boxes, cameras):
         raise _nothing_known(boxes, cameras)
-    first = files.path or files.cameras
-    assert first is not None
     return save_predictions(
         store,
         dataset,
-        name,
+        set_name(first) if name is None else name,
         boxes.detections,
         cameras.cameras,
         names=names,
@@ -98,7 +94,7 @@ def add_predictions(
         report=_report(boxes, cameras),
         unknown=len(boxes.unknown) + len(cameras.unknown),
         actor=actor,
-        reuse=reuse,
+        reuse=name is None,
         keep=keep,
     )
 
@@ -148,6 +144,7 @@ def save_predictions(
             own = dataset_prediction_sets(session, found.id)
             known = next((item for item in own if _same_reading(item, values)), None)
             if known is not None:
+                keep(known)(session)
                 return known
             values["name"] = name = _free_name(name, {item.name for item in own})
         require_free(session, found.id, name)
@@ -246,6 +243,16 @@ def read_set(session: Session, set_id: int) -> PredictionSet:
     if not found:
         raise NotFoundError(f"there is no set of predictions {set_id}")
     return found[0]
+
+
+def set_name(path: Path) -> str:
+    """A file's name as the name of a set: ASCII letters and digits, else ``-``.
+
+    Example:
+        >>> set_name(Path("runs/best model.json"))
+        'best-model'
+    """
+    return re.sub(r"[^A-Za-z0-9]", "-", path.stem).strip("-")[:80] or "predictions"
 
 
 def check_name(name: str) -> None:

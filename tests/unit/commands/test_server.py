@@ -9,7 +9,7 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import pytest
 from typer.testing import CliRunner, Result
@@ -18,7 +18,7 @@ from app.api.application import create_app
 from app.api.server import listen, make_server
 from app.api.team import Team
 from app.commands.command_line import app
-from app.commands.remote import write_evaluation
+from app.commands.remote_files import write_evaluation
 from app.commands.server import Server, _explained, connected, read_token
 from app.config import Settings
 from app.datasets.soccernet_v3_writer import write_soccernet_v3
@@ -262,7 +262,7 @@ class TestRefusals:
         values = {"id": 1, "tables": [], "figures": []}
         values[named] = [{"name": "../x"}] if named == "tables" else ["../x"]
         with pytest.raises(UnsafePathError):
-            write_evaluation(cast(Client, None), values, tmp_path / "out")
+            write_evaluation(Client("http://127.0.0.1:9"), values, tmp_path / "out")
         assert [file.name for file in tmp_path.iterdir()] == ["out"]
 
     def test_another_version_is_not_spoken_to(

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from app.datasets.manifest import Manifest, write_manifest
-from app.datasets.output import output_tree
+from app.datasets.output import output_tree, write_zip
 from app.errors import InputError, JobCancelled, StorageError
 
 MANIFEST = Manifest("d", "cameras", "2030-01-02", {})
@@ -164,3 +164,29 @@ class TestOutputTree:
             raise AssertionError("not reached")
         with pytest.raises(StorageError), output_tree(tmp_path / "out" / "deeper"):
             raise AssertionError("not reached")
+
+
+class TestWriteZip:
+    def test_a_file_of_more_than_two_gigabytes_gets_in(self, tmp_path, monkeypatch) -> None:
+        """The limits stand for those of the format: what goes in in pieces is larger than both."""
+        monkeypatch.setattr("app.datasets.output.WHOLE", 100)
+        monkeypatch.setattr("zipfile.ZIP64_LIMIT", 1000)
+        root = tmp_path / "root"
+        root.mkdir()
+        content = os.urandom(5000)
+        (root / "large.json").write_bytes(content)
+        write_zip(root, tmp_path / "out.zip")
+        with zipfile.ZipFile(tmp_path / "out.zip") as archive:
+            assert archive.read("large.json") == content
+
+    def test_what_is_compressed_already_is_stored(self, tmp_path) -> None:
+        root = tmp_path / "root"
+        root.mkdir()
+        for name in ("7.JPG", "a.json"):
+            (root / name).write_bytes(b"a" * 1000)
+        write_zip(root, tmp_path / "out.zip", stored=(".jpg",))
+        with zipfile.ZipFile(tmp_path / "out.zip") as archive:
+            assert [item.compress_type for item in archive.infolist()] == [
+                zipfile.ZIP_STORED,
+                zipfile.ZIP_DEFLATED,
+            ]

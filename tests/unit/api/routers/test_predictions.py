@@ -85,6 +85,16 @@ class TestAddPredictions:
         assert (answer.status_code, answer.json()["hint"]) == (413, LIMITS_HINT)
         assert api.get(f"{API}/datasets/broadcast/predictions").json()["items"] == []
 
+    def test_without_a_name_the_same_file_again_is_the_same_set(self, api, emptied) -> None:
+        content = f"image,x,y,w,h,score\n{name_of(emptied, emptied['views'][0])},1,2,14,14,0.5"
+        place = f"{API}/datasets/broadcast/predictions"
+        body = {**uploaded(api, content.encode()), "name": None, "format": "auto"}
+        first, again = (api.post(place, json=body) for _ in range(2))
+        assert (first.status_code, again.status_code) == (201, 201)
+        assert (first.json()["name"], first.json()["format"]) == ("p", "csv")
+        assert again.json() == first.json()
+        assert len(api.get(place).json()["items"]) == 1
+
 
 class TestGroupPredictions:
     def test_all_views_are_answered_at_once(self, api, emptied, predicted) -> None:

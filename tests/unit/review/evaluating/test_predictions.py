@@ -16,6 +16,7 @@ from app.review.evaluating.predictions import (
     delete_predictions,
     get_predictions,
     list_predictions,
+    set_name,
     view_predictions,
 )
 from app.store.solutions import read_solutions
@@ -73,22 +74,36 @@ class TestAddPredictions:
         with pytest.raises(ConflictError, match='"yolo" already'):
             add_predictions(store, "demo", "yolo", files, actor="ann")
         # The very same again is the same set; something else finds another name.
-        assert add_predictions(store, "demo", "yolo", files, actor="bob", reuse=True) == first
+        assert add_predictions(store, "demo", None, files, actor="bob") == first
         other = results(tmp_path / "yolo.json", "7_1.png")
-        assert add_predictions(store, "demo", "yolo", other, actor="b", reuse=True).name == "yolo-2"
+        assert add_predictions(store, "demo", None, other, actor="b").name == "yolo-2"
+
+    def test_without_a_name_the_set_is_named_after_its_file(self, store, state, tmp_path) -> None:
+        files = results(tmp_path / "best model (2).json", "7.png")
+        assert add_predictions(store, "demo", None, files, actor="ann").name == "best-model--2"
+
+    def test_auto_is_the_format_that_the_ending_tells(self, store, state, tmp_path) -> None:
+        path = tmp_path / "boxes.csv"
+        path.write_text("image,x,y,w,h,score\n7.png,600,300,14,14,0.9\n")
+        found = add_predictions(store, "demo", None, PredictionFiles(path, "auto"), actor="ann")
+        assert (found.name, found.format, found.boxes) == ("boxes", "csv", 1)
+
+    def test_neither_boxes_nor_cameras_is_refused(self, store, state) -> None:
+        with pytest.raises(InputError, match="neither boxes nor cameras"):
+            add_predictions(store, "demo", "x", PredictionFiles(None), actor="ann")
 
     def test_a_file_with_another_report_is_another_set(self, store, state, tmp_path) -> None:
         files = results(tmp_path / "yolo.json", "7.png")
-        first = add_predictions(store, "demo", "yolo", files, actor="ann", reuse=True)
+        first = add_predictions(store, "demo", None, files, actor="ann")
         # The same box again, and beside it a frame that is not known.
         more = results(tmp_path / "yolo.json", "7.png", "99.png")
-        second = add_predictions(store, "demo", "yolo", more, actor="ann", reuse=True)
+        second = add_predictions(store, "demo", None, more, actor="ann")
         assert second.digest == first.digest
         assert (second.name, second.unknown) == ("yolo-2", 1)
         assert [item["frame"] for item in second.report["unknown_frames"]] == ["99.png"]
-        assert add_predictions(store, "demo", "yolo", more, actor="a", reuse=True) == second
+        assert add_predictions(store, "demo", None, more, actor="a") == second
         renamed = results(tmp_path / "later.json", "7.png")
-        third = add_predictions(store, "demo", "later", renamed, actor="ann", reuse=True)
+        third = add_predictions(store, "demo", None, renamed, actor="ann")
         assert (third.name, third.source, third.unknown) == ("later", "later.json", 0)
         assert get_predictions(store, first.id) == first
 
@@ -136,3 +151,11 @@ class TestDeletePredictions:
                 state.view_ids["7.png"]
             ]
             assert list(session.scalars(select(PredictedCameraModel.view_id))) == []
+
+
+class TestSetName:
+    def test_letters_that_a_set_cannot_have_become_dashes(self) -> None:
+        assert set_name(Path("runs/best model (2).json")) == "best-model--2"
+
+    def test_a_name_without_a_single_letter_is_replaced(self) -> None:
+        assert set_name(Path("---.json")) == "predictions"

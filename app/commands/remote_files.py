@@ -1,0 +1,213 @@
+"""What commands send to a server as files, or fetch from it: imports, exports and evaluations."""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+import zipfile
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from app.commands.remote import part, some, time_text, told
+from app.errors import InputError, NotFoundError
+from app.object_store.address import is_address
+from app.progress import TellProgress
+
+if TYPE_CHECKING:
+    from app.review.evaluating.prediction_source import PredictionSource, SourcesRequest
+    from touchline.client import Client
+
+PACKED = frozenset({".jpg", ".jpeg", ".png", ".webp", ".mp4", ".zip", ".parquet"})
+"""Endings of files that are compressed already."""
+_CHUNK = 1 << 20
+
+
+def import_values(
+    client: Client,
+    dataset: str,
+    format_: str,
+    path: Path | str,
+    options: Mapping[str, Any],
+    *,
+    lines: Path | None,
+    frames: str | None,
+    policy: str,
+    dry_run: bool,
+    progress: TellProgress,
+) -> tuple[dict[str, Any], tuple[str, str | None] | None]:
+    """Send files, and let the server read them; a text is an address in a store of the server.
+
+    Returns:
+        The report, and why nothing was read, where nothing was.
+
+    Raises:
+        InputError: The policy is a file, which this cannot send.
+        JobError: It failed otherwise.
+    """
+    from app.soccer.policy import POLICIES
+    from touchline.errors import JobError
+
+    if policy not in POLICIES:
+        raise InputError(
+            "a policy in a file cannot be sent with an import",
+            hint=f"Name one of {', '.join(POLICIES)}, and change its thresholds in the browser.",
+        )
+    more: dict[str, Any] = {} if lines is None else {"lines": {"upload": _send(client, lines)}}
+    if frames is not None:
+        stored = is_address(frames)
+        more["frames"] = {"folder": frames} if stored else {"upload": _send(client, Path(frames))}
+    body = {
+        "dataset": dataset,
+        "format": format_,
+        "source": {"folder": path} if isinstance(path, str) else {"upload": _send(client, path)},
+        "options": {**options, **more},
+        "policy": policy,
+        "dry_run": dry_run,
+    }
+    try:
+        report = client.wait(client.post("imports", body), progress=told(progress))["result"]
+    except JobError as error:
+        report, problem = error.job["result"], error.job["problem"]
+        if not report or not problem:
+            raise
+        return _report(report), (problem["detail"], problem["hint"])
+    return _report(report), None
+
+
+def _report(result: Mapping[str, Any]) -> dict[str, Any]:
+    hidden = ("dataset", "dry_run", "solve_job", "paint_job")
+    return {name: value for name, value in result.items() if name not in hidden}
+
+
+def export_values(
+    client: Client, out: Path | str, request: Mapping[str, Any], progress: TellProgress
+) -> dict[str, Any]:
+    """Let the server write an export, and fetch it to ``out``: a folder, or a zip by its ending.
+
+    A text is an address in a store of the server, which writes it there.
+    """
+    if isinstance(out, str):
+        job = client.wait(client.post("exports", {**request, "to": out}), progress=told(progress))
+        report = _export_report(client.get(f"exports/{job['id']}"))
+        return {"out": out, "format": request["format"], **report}
+    from app.datasets.output import output_tree
+    from app.datasets.safe_path import resolve_inside
+
+    with output_tree(out) as folder, tempfile.TemporaryDirectory() as held:
+        job = client.post("exports", request)
+        client.wait(job, progress=told(progress))
+        found = client.get(f"exports/{job['id']}")
+        content = client.download(f"exports/{job['id']}/content", Path(held) / "export.zip")
+        with zipfile.ZipFile(content) as archive:
+            for name in archive.namelist():
+                target = resolve_inside(folder, name)
+                target.parent.mkdir(parents=True, exist_ok=True)
+                with archive.open(name) as source, target.open("wb") as file:
+                    shutil.copyfileobj(source, file, _CHUNK)
+    return {"out": str(out), "format": request["format"], **_export_report(found)}
+
+
+def _export_report(found: Mapping[str, Any]) -> dict[str, Any]:
+    return some(found, "counts", "left_out", "missing_images")
+
+
+def evaluate(
+    client: Client,
+    dataset: str,
+    asked: SourcesRequest,
+    progress: TellProgress,
+) -> tuple[dict[str, Any], list[dict[str, Any]]]:
+    """Send predictions, and let the server measure them.
+
+    Returns:
+        The evaluation, and the sets that were made or found for it.
+    """
+    named = {"predictions": asked.predictions, "careful": asked.careful}
+    sets = {
+        name: _set(client, dataset, source) for name, source in named.items() if not source.is_empty
+    }
+    found_sets = {name: found["id"] for name, found in sets.items()}
+    body = {**vars(asked.request), **found_sets, "version": asked.version}
+    place = f"datasets/{part(dataset)}/evaluations"
+    job = client.wait(client.post(place, body), progress=told(progress))
+    found = client.get(f"evaluations/{job['result']['evaluation']}")
+    dataset_id = client.get(f"datasets/{part(dataset)}")["id"]
+    names = {
+        "predictions": "prediction_set_id",
+        "careful": "careful_set_id",
+        "version": "version_id",
+    }
+    values = {names.get(name, name): found[name] for name in found if name != "headline"}
+    created = time_text(found["created"])
+    return {**values, "dataset_id": dataset_id, "created": created}, list(sets.values())
+
+
+def write_evaluation(client: Client, values: Mapping[str, Any], out: Path) -> None:
+    """Fetch everything of an evaluation into a folder.
+
+    Raises:
+        InputError: The folder cannot be written.
+        UnsafePathError: The server names what would lie outside of it.
+    """
+    from app.review.evaluating.folder import write_parts
+
+    place = f"evaluations/{values['id']}"
+
+    def fetch(kind: str, name: str, file: Path) -> None:
+        client.download(f"{place}/{kind}/{part(name)}", file)
+
+    write_parts(out, values, client.pages(f"{place}/frames"), fetch)
+
+
+def _set(client: Client, dataset: str, source: PredictionSource) -> dict[str, Any]:
+    """The set of a source: of its files, which are read once, or of its name."""
+    place = f"datasets/{part(dataset)}/predictions"
+    path = None if source.boxes is None else Path(source.boxes)
+    if path is not None and not path.exists():
+        known = {item["name"]: item for item in client.get(place)["items"]}
+        if source.cameras is not None or str(path) not in known:
+            raise NotFoundError(
+                f"there is no file {path} here, and no set of predictions of that name on the server"
+            )
+        return dict(known[str(path)])
+    files = {"upload": path, "images_upload": source.images, "cameras_upload": source.cameras}
+    sizes = {"size": source.size, "cameras_size": source.cameras_size}
+    body: dict[str, Any] = {
+        **{field: _send(client, file) for field, file in files.items() if file is not None},
+        **{name: [size.width, size.height] for name, size in sizes.items() if size is not None},
+        "format": source.format,
+        "category": source.category,
+    }
+    return dict(client.post(place, body))
+
+
+def _send(client: Client, path: Path) -> str:
+    """Id of an upload of a file, or of a folder as a zip; what is there already is not sent again."""
+    from app.store.uploads import UploadDigest
+    from touchline.errors import NotFoundError as NotThere
+
+    with _as_file(path) as file:
+        # The server may write the name otherwise, and then the file is sent again.
+        digest = UploadDigest(file.name)
+        with file.open("rb") as content:
+            while chunk := content.read(_CHUNK):
+                digest.update(chunk)
+        try:
+            return str(client.get(f"uploads/{digest.id}")["id"])
+        except NotThere:
+            return client.upload(file)
+
+
+@contextmanager
+def _as_file(path: Path) -> Iterator[Path]:
+    from app.datasets.output import write_zip
+
+    if not path.is_dir():
+        yield path
+        return
+    with tempfile.TemporaryDirectory() as held:
+        packed = Path(held) / f"{path.resolve().name}.zip"
+        write_zip(path, packed, stored=PACKED)
+        yield packed
