@@ -2,22 +2,15 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from app.commands.options import Json, read_settings
 from app.commands.terminal import print_json, say
 
-if TYPE_CHECKING:
-    from app.config import Settings
-
 commands = typer.Typer()
-
-_PASSWORD = re.compile(r"://[^:/@]*:[^@]*@|[?&]password=")
-"""In the address of a database, as its driver reads it."""
 
 
 @commands.command()
@@ -74,6 +67,7 @@ def transfer(
     address with a password stands in a file, or the password in ~/.pgpass.
     """
     from app.store.transfer import transfer as run_transfer
+    from app.store.transfer_ends import ends_of
 
     settings = read_settings()
     told: set[str] = set()
@@ -83,53 +77,13 @@ def transfer(
             say(f"  {table}")
         told.add(table)
 
-    begin, address = _database(source, "FROM", settings), _address(target, "TO")
-    # The files of a home that goes into a database stay in that home.
-    end = _database(target, "TO", settings if address is None else begin)
-    done = run_transfer(begin, end, tell)
+    done = run_transfer(*ends_of(source, target, settings), tell)
     if json_:
         print_json(vars(done))
         return
     say(f"{_contents(done.entries, done.rows)} are equal in both; {done.copied:,} rows were copied")
     for name, digest in done.versions.items():
         say(f"  version {name} {digest[:12]}")
-
-
-def _database(place: str, name: str, settings: Settings) -> Settings:
-    """Settings of the database that an argument of some name gives."""
-    address = _address(place, name)
-    if address is not None:
-        return settings.model_copy(update={"database_url": address})
-    return settings.model_copy(update={"home": Path(place).absolute(), "database_url": None})
-
-
-def _address(place: str, name: str) -> str | None:
-    """The address that an argument is, or that the file holds which it names; None: it is a home.
-
-    Raises:
-        InputError: The address has a password that everybody could read, or others than its owner
-            may use the file, or it holds no address.
-    """
-    from app.errors import InputError
-    from app.private_file import read_private
-
-    if "://" in place:
-        if _PASSWORD.search(place):
-            raise InputError(
-                f"everybody on this machine can read the password in {name} while this runs",
-                hint="Write the address into a file, chmod 600 it, and name that file instead.",
-            )
-        return place
-    file = Path(place)
-    if not file.is_file():
-        return None
-    address = read_private(file, name)
-    if "://" not in address:
-        raise InputError(
-            f"{file} holds no address of a database",
-            hint="Write postgresql://USER:PASSWORD@HOST/DATABASE into it, or name a home folder.",
-        )
-    return address
 
 
 @commands.command()

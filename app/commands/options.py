@@ -151,38 +151,3 @@ def _about_json(error: str) -> str:
     several = isinstance(Settings.model_fields[found[1]].get_default(), list)
     example = '["ONE", "ANOTHER"]' if several else '{"NAME": {...}}'
     return f"TOUCHLINE_{found[1].upper()} is no JSON; write it as {example}"
-
-
-def require_safe(settings: Settings) -> None:
-    """Refuse to serve where strangers could come in, or passwords would be read on their way.
-
-    Raises:
-        InputError: The settings of single sign-on are there by half.
-    """
-    from app.hosts import is_local
-    from app.review.people.sign_on_rules import read_rules
-
-    read_rules(settings)
-
-    secure = (settings.url or "").startswith("https://")
-    if not is_local(settings.host) and not settings.team:
-        raise typer.BadParameter(
-            f"{settings.host} can be reached by other machines, and without accounts everybody who "
-            "reaches it could change everything. Use 127.0.0.1, or serve a team with --team."
-        )
-    if not is_local(settings.host) and not secure:
-        raise typer.BadParameter(
-            f"{settings.host} can be reached by other machines: passwords must not travel in the "
-            "clear. Put a proxy with TLS in front, and say with --url https://NAME what people open."
-        )
-    if settings.url and not secure and not is_local(_host_of(settings.url)):
-        raise typer.BadParameter(
-            f"{settings.url} is not encrypted: passwords must not travel in the clear. "
-            "Say --url https://NAME, and let a proxy with TLS answer there."
-        )
-
-
-def _host_of(url: str) -> str:
-    from urllib.parse import urlsplit
-
-    return urlsplit(url).hostname or ""

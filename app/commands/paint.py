@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from app.commands.matches import of_match, print_sentences
+from app.commands.matches import print_sentences
 from app.commands.opened import opened_store
 from app.commands.options import Json, Workers, acting, read_settings
 from app.commands.terminal import print_json, say, show_progress
@@ -38,6 +38,7 @@ def paint(
     Pictures that were read for the lines that they have now are left alone. The policy must say
     calibration.source paint, as touchline does; `touchline solve` computes what follows.
     """
+    from app.review.datasets.match_choice import of_match
     from app.review.editing.paint import get_paint, read_paint, take_back_paint
 
     if show and undo:

@@ -7,14 +7,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from app.commands.matches import need_match
 from app.commands.opened import opened_to_solve
 from app.commands.options import Json, Size, Workers, acting
 from app.commands.terminal import print_json, print_values, say
 
 if TYPE_CHECKING:
     from app.review.editing.pictures import PictureState
-    from app.soccer.picture import PictureGeometry
 
 commands = typer.Typer()
 
@@ -72,16 +70,13 @@ def _of_dataset(
     workers: int | None,
     json_: bool,
 ) -> None:
-    from app.review.editing.pictures import change_pictures, estimate_pictures
+    from app.review.datasets.match_choice import need_match
+    from app.review.editing.pictures import change_pictures, estimate_pictures, pictures_asked
 
     with opened_to_solve("Estimating", workers) as (store, executor, progress):
         found = estimate_pictures(store, dataset, executor, progress)
         chosen = need_match(found, match, dataset)
-        wanted: dict[str, PictureGeometry | None] = {
-            item.match: item.proposed for item in chosen if accept and item.proposed
-        }
-        if as_taken:
-            wanted = {item.match: None for item in chosen}
+        wanted = pictures_asked(chosen, accept=accept, as_taken=as_taken)
         changed = change_pictures(store, dataset, wanted, actor=acting()) if wanted else 0
     if json_:
         print_json([{**_values(item), "changed": item.match in wanted} for item in chosen])

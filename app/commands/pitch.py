@@ -8,11 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from app.commands.matches import need_match, of_match
 from app.commands.opened import opened_to_solve
 from app.commands.options import Json, Size, Workers, acting
 from app.commands.terminal import print_json, print_values, say
-from app.errors import InputError
 
 if TYPE_CHECKING:
     from app.review.editing.pitches import DatasetPitches, PitchState
@@ -71,33 +69,19 @@ def pitch(
 def _of_dataset(
     dataset: str, accept: bool, match: str | None, size: str | None, workers: int | None
 ) -> DatasetPitches:
-    from app.review.editing.pitches import change_pitches, estimate_pitches
+    from app.review.editing.pitches import change_pitches, estimate_pitches, sizes_asked
 
     with opened_to_solve("Estimating", workers) as (store, executor, progress):
         found = estimate_pitches(store, dataset, executor, progress)
-        chosen = need_match(found.items, match, dataset)
-        wanted = {item.match: item.proposed for item in chosen if accept and item.proposed}
-        if size is not None:
-            wanted = {chosen[0].match: _size(chosen[0], size)}
+        wanted = sizes_asked(found, match, accept=accept, size=size)
         if not wanted:
             return found
         return change_pitches(store, dataset, wanted, if_match=found.etag, actor=acting())
 
 
-def _size(state: PitchState, text: str) -> Any:
-    from app.review.editing.pitches import parse_pitch
-
-    if text != "previous":
-        return parse_pitch(text)
-    if state.previous is None:
-        raise InputError(
-            f"the pitch of {state.match or 'groups without a match'} has no size before this one",
-            hint="It was never changed. Give a size, such as 105x68.",
-        )
-    return state.previous
-
-
 def _print(found: DatasetPitches, match: str | None, json_: bool) -> None:
+    from app.review.datasets.match_choice import of_match
+
     items = of_match(found.items, match)
     if json_:
         print_json([pitch_values(item) for item in items])

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from app.commands.matches import of_match, print_sentences
+from app.commands.matches import print_sentences
 from app.commands.opened import opened_store, opened_to_solve
 from app.commands.options import Dataset, Json, Workers, acting
 
@@ -33,6 +33,7 @@ def positions(
     Without --match it is shared where what it was estimated from has changed since. The policy
     must say calibration.share_position; `touchline solve` computes what follows.
     """
+    from app.review.datasets.match_choice import of_match
     from app.review.editing.positions import get_positions, share_positions, take_back_positions
 
     if share and undo:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from app.commands.opened import cluster_of, executor_of, opened_store, process_pool
-from app.commands.options import Cluster, acting, read_settings, require_safe
+from app.commands.options import Cluster, acting, read_settings
 from app.commands.terminal import say, show_progress
 
 if TYPE_CHECKING:
@@ -58,21 +58,23 @@ def serve(
     settings = read_settings(
         host=host, port=port, team=team, url=url, cluster=cluster, web_workers=workers
     )
-    require_safe(settings)
-    _require_one_process(settings)
+    _require_safe(settings)
     from app.api.application import create_app
     from app.api.server import listen, run
     from app.api.web_processes import serve_with
     from app.log import log_to_stderr
     from app.review.jobs.vitals import file_sizes
-    from app.store.dialect.dialect import dialect_of
+    from app.review.people.people import require_no_people
+    from app.store.dialect.dialect import dialect_of, require_processes
     from app.store.locks import server_lock
 
+    require_processes(settings, settings.web_workers)
     log_to_stderr()
     with server_lock(settings, shared=not dialect_of(settings).is_file):
         _prepare(settings)
         if not settings.team and team is None:
-            _require_no_team(settings)
+            with opened_store(settings) as store:
+                require_no_people(store)
         if with_sample:
             _make_sample(settings)
         with listen(settings.host, settings.port) as (socket, address):
@@ -89,6 +91,17 @@ def serve(
             run(application, socket)
 
 
+def _require_safe(settings: Settings) -> None:
+    """Refuse to serve where strangers could come in, or passwords would be read on their way."""
+    from app.review.people.exposure import exposure_of
+    from app.review.people.sign_on_rules import read_rules
+
+    read_rules(settings)
+    problem = exposure_of(settings)
+    if problem is not None:
+        raise typer.BadParameter(problem)
+
+
 def _make_sample(settings: Settings) -> None:
     """The dataset ``sample``, where it is missing or not complete."""
     from app.review.practice.sample_dataset import SAMPLE, make_sample_dataset
@@ -101,19 +114,6 @@ def _make_sample(settings: Settings) -> None:
         show_progress("Making the sample") as progress,
     ):
         make_sample_dataset(store, SAMPLE, folder, order, executor, progress, actor=acting())
-
-
-def _require_one_process(settings: Settings) -> None:
-    """Refuse several processes where the database is a file of one."""
-    from app.errors import InputError
-    from app.store.dialect.dialect import dialect_of
-
-    if settings.web_workers > 1 and dialect_of(settings).is_file:
-        raise InputError(
-            "several processes can serve a database on PostgreSQL alone, and this one is a file",
-            hint="Leave out --workers (TOUCHLINE_WEB_WORKERS), or set TOUCHLINE_DATABASE_URL:"
-            " docs/operations.md.",
-        )
 
 
 def _serve_part(settings: Settings, socket: socket) -> None:
@@ -139,19 +139,6 @@ def _pool_of(settings: Settings) -> Callable[[], AbstractContextManager[Executor
         return lambda: cluster_of(settings)
     # One processor is left for the requests.
     return lambda: process_pool(max(1, settings.workers - 1))
-
-
-def _require_no_team(settings: Settings) -> None:
-    """Refuse to let everybody in where people have accounts."""
-    from app.errors import InputError
-    from app.review.people.people import has_people
-
-    with opened_store(settings) as store:
-        if has_people(store):
-            raise InputError(
-                "people have accounts here: without --team nobody would be asked who they are",
-                hint="Serve with --team; or with --alone, if only you can reach this machine.",
-            )
 
 
 def _say_first_link(store: Store, base: str) -> None:

@@ -190,21 +190,13 @@ def tokens(
     json_: Json = False,
 ) -> None:
     """List the tokens with which scripts ask, or end one; they are made in the browser."""
-    from app.errors import NotFoundError
     from app.review.people.access_tokens import AccessTokens
     from app.review.people.people import find_person
 
     with opened_store() as store:
         asked = AccessTokens(store)
-        found = asked.of_person(None if name is None else find_person(store, name).id)
-        if end is not None:
-            one = next((token for token in found if token.id == end), None)
-            if one is None:
-                raise NotFoundError(
-                    f"there is no token {end}", hint="touchline users tokens lists them."
-                )
-            asked.end(one.id, find_person(store, one.person).id, actor=acting())
-            found = [one]
+        person = None if name is None else find_person(store, name).id
+        found = asked.of_person(person) if end is None else [asked.end(end, person, actor=acting())]
     _print_tokens(found, json_, ended=end is not None)
 
 
@@ -231,10 +223,13 @@ def _change(name: str, json_: bool, **change: Any) -> None:
 
 
 def _values(person: Person) -> dict[str, Any]:
-    waits = "invited" if person.invited else "without link"
-    state = "disabled" if person.disabled else "active" if person.joined else waits
     datasets = {one.dataset: str(one.role) for one in person.datasets}
-    values = {"name": person.name, "role": str(person.role), "state": state, "seen": person.seen}
+    values = {
+        "name": person.name,
+        "role": str(person.role),
+        "state": person.state,
+        "seen": person.seen,
+    }
     linked = {"sign_on": person.sign_on} if person.sign_on else {}
     return values | linked | ({"datasets": datasets} if datasets else {})
 

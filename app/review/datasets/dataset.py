@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from app.errors import InputError, NotFoundError
+from app.review.datasets.match_choice import no_match
 from app.soccer.policy import Policy
 from app.store.clock import now
 from app.store.codecs import policy_to_json
@@ -134,7 +135,7 @@ def require_matches(
     found = read_dataset_head(session, dataset)
     for match in matches or ():
         if not has_match(session, found.id, match):
-            raise NotFoundError(f'"{found.name}" has no match {match}')
+            raise no_match(found.name, match)
     return found
 
 

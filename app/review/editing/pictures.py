@@ -8,7 +8,7 @@ its own geometry, and a finding of the view offers what its own lines say.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
 
@@ -137,6 +137,21 @@ def change_pictures(
     """
     with store.write() as session:
         return apply_pictures(session, dataset, wanted, actor=actor)
+
+
+def pictures_asked(
+    chosen: Iterable[PictureState], *, accept: bool = False, as_taken: bool = False
+) -> dict[str, PictureGeometry | None]:
+    """What somebody wants the pictures of matches to be, by match.
+
+    Args:
+        chosen: The matches that are meant, as they are.
+        accept: Those that are proposed.
+        as_taken: All of them as they were taken.
+    """
+    if as_taken:
+        return {item.match: None for item in chosen}
+    return {item.match: item.proposed for item in chosen if accept and item.proposed}
 
 
 def apply_pictures(

@@ -12,10 +12,11 @@ from concurrent.futures import Executor
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
-from app.errors import GeometryError, InputError, NotFoundError
+from app.errors import GeometryError, InputError
 from app.progress import TellProgress
 from app.review.datasets.dataset import read_dataset_head
 from app.review.datasets.fan_out import fan_out
+from app.review.datasets.match_choice import need_match
 from app.review.editing.codec import edit_from_json
 from app.review.editing.edit import SetPitch
 from app.review.editing.group_edits import give_edits
@@ -200,10 +201,8 @@ def apply_pitches(
     state = _read(session, dataset)
     if if_match is not None:
         require_etag(state.etag, if_match, f'the pitches of "{state.dataset}"')
-    known = {item.match for item in state.items}
     for match, pitch in wanted.items():
-        if match not in known:
-            raise NotFoundError(f'"{state.dataset}" has no match {match}')
+        need_match(state.items, match, state.dataset)
         ids = groups_of_match(session, state.dataset_id, match)
         give_pitch(session, state.dataset_id, ids, pitch, actor)
     # What the lines show is not asked again: it does not depend on the size in use.
@@ -211,6 +210,38 @@ def apply_pitches(
     changed = _read(session, state.dataset_id, shown)
     _note(session, changed)
     return changed
+
+
+def sizes_asked(
+    found: DatasetPitches, match: str | None, *, accept: bool = False, size: str | None = None
+) -> dict[str, Pitch]:
+    """What somebody wants the pitches of matches to be, by match.
+
+    Args:
+        found: As they are.
+        match: The one that is meant; None: all.
+        accept: Those that are proposed.
+        size: A size as it is typed, or ``previous``: the one before the last change.
+
+    Raises:
+        NotFoundError: There is no such match.
+        InputError: The size is none, or there was none before.
+    """
+    chosen = need_match(found.items, match, found.dataset)
+    if size is None:
+        return {item.match: item.proposed for item in chosen if accept and item.proposed}
+    return {item.match: _size_asked(item, size) for item in chosen}
+
+
+def _size_asked(state: PitchState, text: str) -> Pitch:
+    if text != "previous":
+        return parse_pitch(text)
+    if state.previous is None:
+        raise InputError(
+            f"the pitch of {state.match or 'groups without a match'} has no size before this one",
+            hint="It was never changed. Give a size, such as 105x68.",
+        )
+    return state.previous
 
 
 def parse_pitch(text: str) -> Pitch:

@@ -192,18 +192,32 @@ class AccessTokens:
         with self._store.read() as session:
             return [self._read(row) for row in access_tokens(session, person_id)]
 
-    def end(self, token_id: int, person_id: int, *, actor: str) -> None:
+    def end(self, token_id: int, person_id: int | None, *, actor: str) -> AccessToken:
         """End a token: whoever uses it is refused from now on.
+
+        Args:
+            token_id: Which.
+            person_id: Whose it has to be; None: anybody's.
+            actor: Who ends it.
+
+        Returns:
+            The token as it was.
 
         Raises:
             NotFoundError: There is none of that id, or it is another person's.
         """
         with self._store.write() as session:
-            person = person_by_id(session, person_id)
-            name = delete_access_token(session, token_id, person_id)
-            if person is None or name is None:
-                raise NotFoundError(f"there is no token {token_id}")
-            _note(session, actor, person, "token ended", {"id": token_id, "name": name})
+            rows = access_tokens(session, person_id)
+            row = next((row for row in rows if row.id == token_id), None)
+            person = None if row is None else person_by_id(session, row.person_id)
+            if row is None or person is None:
+                raise NotFoundError(
+                    f"there is no token {token_id}",
+                    hint="Account in the browser, or touchline users tokens, lists those there are.",
+                )
+            delete_access_token(session, token_id, person.id)
+            _note(session, actor, person, "token ended", {"id": token_id, "name": row.name})
+            return self._read(row)
 
     def _read(self, row: Any) -> AccessToken:
         names = ("id", "person", "name", "start", "dataset", "created", "expires", "used")

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from typing import Any
 
-from app.errors import ConflictError, ForbiddenError, NotFoundError
+from app.errors import ConflictError, ForbiddenError, InputError, NotFoundError
 from app.review.people.links import Link, insert_new
 from app.review.people.members import SingleRole, single_roles
 from app.review.people.names import checked_name, note, require_no_token
@@ -61,6 +61,13 @@ class Person:
     datasets: tuple[SingleRole, ...] = ()
     """In which datasets they are something else than ``role``."""
 
+    @property
+    def state(self) -> str:
+        """``active``, ``disabled``, ``invited``, or ``without link``: the last one is too old."""
+        if self.disabled:
+            return "disabled"
+        return "active" if self.joined else "invited" if self.invited else "without link"
+
 
 def list_people(store: Store) -> list[Person]:
     """Everybody, by name."""
@@ -76,6 +83,19 @@ def has_people(store: Store) -> bool:
     """Whether this home belongs to a team."""
     with store.read() as session:
         return count_people(session) > 0
+
+
+def require_no_people(store: Store) -> None:
+    """Refuse to let everybody in where people have accounts.
+
+    Raises:
+        InputError: They have.
+    """
+    if has_people(store):
+        raise InputError(
+            "people have accounts here: without --team nobody would be asked who they are",
+            hint="Serve with --team; or with --alone, if only you can reach this machine.",
+        )
 
 
 def invite(store: Store, name: str, role: Role, *, actor: str) -> tuple[Person, Link]:

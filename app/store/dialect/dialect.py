@@ -134,3 +134,17 @@ def dialect_in(session: Session) -> Dialect:
 def _named(name: str) -> Dialect:
     # Only the one that is used is imported: a driver takes its time.
     return cast(Dialect, import_module(f"app.store.dialect.{name}").DIALECT)
+
+
+def require_processes(settings: Settings, count: int) -> None:
+    """Refuse several processes where the database is a file of one.
+
+    Raises:
+        InputError: It is.
+    """
+    if count > 1 and dialect_of(settings).is_file:
+        raise InputError(
+            "several processes can serve a database on PostgreSQL alone, and this one is a file",
+            hint="Leave out --workers (TOUCHLINE_WEB_WORKERS), or set TOUCHLINE_DATABASE_URL:"
+            " docs/operations.md.",
+        )

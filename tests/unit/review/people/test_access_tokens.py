@@ -9,7 +9,7 @@ from datetime import UTC, datetime, timedelta
 import pytest
 
 from app.config import Settings
-from app.errors import ConflictError, ForbiddenError, InputError, NotLoggedInError
+from app.errors import ConflictError, ForbiddenError, InputError, NotFoundError, NotLoggedInError
 from app.review.datasets.dataset import dataset_id
 from app.review.datasets.delete import delete_dataset
 from app.review.importing.ingest import ensure_dataset
@@ -151,6 +151,16 @@ class TestMake:
             tokens.make(anna, name, READ)
         with pytest.raises(ConflictError, match="2 tokens"):
             tokens.make(anna, "three", READ)
+
+    def test_an_operator_ends_anybodys_and_is_told_whose_it_was(self, tokens, anna) -> None:
+        made, text = tokens.make(anna, "deploy", READ)
+        with pytest.raises(NotFoundError):
+            tokens.end(made.id, anna.person_id + 1, actor="ada")
+        tokens.find(text)
+        ended = tokens.end(made.id, None, actor="ada")
+        assert (ended.person, ended.name) == ("anna", "deploy")
+        with pytest.raises(NotLoggedInError):
+            tokens.find(text)
 
     def test_the_log_and_the_list_of_people_know_of_it(self, home, tokens, anna) -> None:
         made, _ = tokens.make(anna, "deploy", READ)
