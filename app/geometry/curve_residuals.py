@@ -161,6 +161,26 @@ def radial_growth(u):
 
 
 @compiled
+def bent(kappa, px, py):
+    """Growth of the radius, and the derivative of the seen by the ideal pixel (xx, xy, yy).
+
+    (px, py) is the ideal pixel less the principal point.
+    """
+    rho2 = px * px + py * py
+    growth, bend = radial_growth(kappa * rho2), 2 * kappa * (1 + kappa * rho2)
+    return growth, growth + bend * px * px, bend * px * py, growth + bend * py * py
+
+
+@compiled
+def bent_step(kappa, px, py, ix, iy):
+    """Growth of the radius, and a small step (ix, iy) of the ideal pixel as it is seen."""
+    rho2 = px * px + py * py
+    growth, bend = radial_growth(kappa * rho2), 2 * kappa * (1 + kappa * rho2)
+    inward = bend * (px * ix + py * iy)
+    return growth, ix * growth + px * inward, iy * growth + py * inward
+
+
+@compiled
 def to_camera(camera, x, y, z):
     """Point of the pitch frame in the camera frame, metres."""
     dx, dy, dz = x - camera[9], y - camera[10], z - camera[11]
@@ -322,11 +342,8 @@ def nearest_on_arc(camera, shapes, m, samples, shares, pixel_x, pixel_y, place):
             break
         vx, vy, vz = turn(camera, -radius * sine, radius * cosine, 0.0)
         px, py = focal * x / z, focal * y / z
-        rho2 = px * px + py * py
-        growth, bend = radial_growth(kappa * rho2), 2 * kappa * (1 + kappa * rho2)
         gx, gy = focal * (vx - x / z * vz) / z, focal * (vy - y / z * vz) / z
-        inward = bend * (px * gx + py * gy)
-        gx, gy = gx * growth + px * inward, gy * growth + py * inward
+        growth, gx, gy = bent_step(kappa, px, py, gx, gy)
         ex, ey = pixel_x - px * growth, pixel_y - py * growth
         move = (gx * ex + gy * ey) / max(gx * gx + gy * gy, 1e-12)
         angle += min(max(move, -step), step)
@@ -356,11 +373,7 @@ def residual_at(camera, place, inside, pixel_x, pixel_y, offsets, jacobians, n):
     focal, kappa = camera[12], camera[13]
     nx, ny = ux / uz, uy / uz
     px, py = focal * nx, focal * ny
-    rho2 = px * px + py * py
-    growth = radial_growth(kappa * rho2)
-    # Derivative of the seen by the ideal pixel.
-    bend = 2 * kappa * (1 + kappa * rho2)
-    dxx, dxy, dyy = growth + bend * px * px, bend * px * py, growth + bend * py * py
+    growth, dxx, dxy, dyy = bent(kappa, px, py)
     ex, ey = pixel_x - px * growth, pixel_y - py * growth
     # Unit tangent of the projected curve: it splits the offset into normal and along.
     vx, vy, vz = turn(camera, place[3], place[4], place[5])
@@ -396,10 +409,7 @@ def derivatives_at(camera, dx, dy, dz, derivatives, n):
     focal, kappa, unit = camera[12], camera[13], camera[14]
     nx, ny = ux / uz, uy / uz
     px, py = focal * nx, focal * ny
-    rho2 = px * px + py * py
-    growth = radial_growth(kappa * rho2)
-    bend = 2 * kappa * (1 + kappa * rho2)
-    dxx, dxy, dyy = growth + bend * px * px, bend * px * py, growth + bend * py * py
+    _, dxx, dxy, dyy = bent(kappa, px, py)
     sp, cp, st, ct, sr, cr = camera[15], camera[16], camera[17], camera[18], camera[19], camera[20]
     along, across = cp * dx + sp * dy, -sp * dx + cp * dy
     lifted = -st * across + ct * dz
@@ -439,6 +449,7 @@ def derivatives_at(camera, dx, dy, dz, derivatives, n):
             dyy,
         )
     derivatives[n, 0, 6], derivatives[n, 1, 6] = dxx * px + dxy * py, dxy * px + dyy * py
+    rho2 = px * px + py * py
     share = rho2 * unit * (1 + kappa * rho2)
     derivatives[n, 0, 7], derivatives[n, 1, 7] = px * share, py * share
 

@@ -15,12 +15,9 @@ import numpy.typing as npt
 
 from app.geometry.arrays import BoolArray
 from app.geometry.camera import Camera
-from app.geometry.resection import parameters_from_camera
-from app.paint.evidence import painted_markings
 from app.paint.ridges import line_like as find_line_like
-from app.paint.trace_kernels import trace_markings
+from app.paint.tracing import trace_places
 from app.soccer.pitch import Pitch
-from app.solving.observations import pitch_curves
 
 NEAR_PX = 2.0
 """A marking has paint, and paint has a marking, within so many pixels at 960 wide."""
@@ -91,18 +88,9 @@ def _marked(
 ) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
     """Columns and rows of points along the visible markings on the field."""
     height, width = field.shape
-    curves = pitch_curves(pitch)
-    half = float(np.hypot(width, height)) / 2
-    places, pixels, normals = (np.empty((MOST_PLACES, n)) for n in (3, 2, 2))
-    widths, marking = np.empty(MOST_PLACES), np.empty(MOST_PLACES, np.int64)
-    spare = np.empty((MOST_PLACES, 8))
     spacing = SPACING_PX * max(width / REFERENCE_WIDTH, 1.0)
-    count = trace_markings(
-        parameters_from_camera(camera, half), curves.kinds, curves.shapes, painted_markings(),
-        np.array(camera.principal_point), half, width, height, spacing,
-        places, pixels, normals, widths, marking, spare,
-    )  # fmt: skip
-    columns, rows = (pixels[:count] + 0.5).astype(np.int64).T
+    pixels = trace_places(camera, pitch, width, height, spacing, MOST_PLACES).pixels
+    columns, rows = (pixels + 0.5).astype(np.int64).T
     columns, rows = np.clip(columns, 0, width - 1), np.clip(rows, 0, height - 1)
     kept = field[rows, columns]
     return columns[kept], rows[kept]

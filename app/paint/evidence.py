@@ -8,28 +8,23 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
 
 import cv2
 import numpy as np
 import numpy.typing as npt
 
-from app.geometry.arrays import BoolArray, FloatArray, IntArray
+from app.geometry.arrays import BoolArray, FloatArray
 from app.geometry.camera import Camera
-from app.geometry.resection import parameters_from_camera
 from app.paint.grass_colour import grass_colour
 from app.paint.profile_kernels import BEYOND_PX, SIDE_PX, drop_strays, find_stripes
-from app.paint.trace_kernels import trace_markings
+from app.paint.tracing import Traced, trace_places
 from app.soccer.frames import Box
 from app.soccer.paint_evidence import PaintEvidence, PaintPoint
 from app.soccer.pitch import MARKINGS, Pitch
-from app.solving.observations import pitch_curves
 
 Image = npt.NDArray[np.uint8]
 FloatImage = npt.NDArray[np.float32]
 
-PAINTED = tuple(name for name in MARKINGS if not name.startswith("Goal"))
-"""Markings that are paint on grass; a goal is none."""
 SPACING_PX = 4.0
 MOST_PLACES = 4000
 PLACES_WIDTH = 1920
@@ -86,29 +81,6 @@ class Reading:
     def half_diagonal(self) -> float:
         """Pixels, as ``geometry.resection`` wants it."""
         return float(np.hypot(self.width, self.height)) / 2
-
-
-@dataclass(frozen=True)
-class Traced:
-    """Places along the projected markings of one camera, a few pixels apart.
-
-    Attributes:
-        places: Pitch frame, metres, shape (N, 3).
-        pixels: The middle of the paint there, shape (N, 2).
-        normals: Unit normals of the markings in the picture, shape (N, 2).
-        widths: Of the paint across, pixels, shape (N,).
-        marking: Index into ``MARKINGS``, shape (N,), increasing.
-        jacobian: Derivative along the normal by the camera's parameters, shape (N, 8).
-    """
-
-    places: FloatArray
-    pixels: FloatArray
-    normals: FloatArray
-    widths: FloatArray
-    marking: IntArray
-    jacobian: FloatArray
-    visible: int
-    """Places on the field in all, those too thin to be seen too."""
 
 
 @dataclass(frozen=True)
@@ -181,28 +153,11 @@ def trace(reading: Reading, camera: Camera, pitch: Pitch, spacing_px: float = SP
     Args:
         camera: Pixels of the picture; one focal length and one radial term count.
     """
-    curves = pitch_curves(pitch)
-    parameters = parameters_from_camera(camera, reading.half_diagonal)
     spacing = spacing_px * max(reading.width / PLACES_WIDTH, 1.0)
-    places, pixels, normals = (np.empty((MOST_PLACES, n)) for n in (3, 2, 2))
-    widths, marking = np.empty(MOST_PLACES), np.empty(MOST_PLACES, np.int64)
-    rows = np.empty((MOST_PLACES, 8))
-    count = trace_markings(
-        parameters, curves.kinds, curves.shapes, painted_markings(), np.array(camera.principal_point),
-        reading.half_diagonal, reading.width, reading.height, spacing,
-        places, pixels, normals, widths, marking, rows,
-    )  # fmt: skip
-    on_field = _on_field(reading.hidden, pixels[:count])
-    found = np.flatnonzero(on_field & (widths[:count] >= THINNEST_PX))
-    return Traced(
-        places[found],
-        pixels[found],
-        normals[found],
-        widths[found],
-        marking[found],
-        rows[found],
-        int(on_field.sum()),
-    )
+    traced = trace_places(camera, pitch, reading.width, reading.height, spacing, MOST_PLACES)
+    on_field = _on_field(reading.hidden, traced.pixels)
+    found = np.flatnonzero(on_field & (traced.widths >= THINNEST_PX))
+    return traced.only(found, int(on_field.sum()))
 
 
 def seek(reading: Reading, traced: Traced, window_px: float | FloatArray) -> Evidence:
@@ -288,11 +243,6 @@ def _noise(level: FloatImage, field: BoolArray) -> float:
     if not len(apart):
         return LEAST_NOISE
     return max(float(np.median(apart) / (0.6745 * np.sqrt(2))), LEAST_NOISE)
-
-
-@lru_cache(maxsize=1)
-def painted_markings() -> BoolArray:
-    return np.array([name in PAINTED for name in MARKINGS])
 
 
 def to_paint_evidence(evidence: Evidence, camera: Camera | None = None) -> PaintEvidence:

@@ -50,25 +50,27 @@ def straight_pieces(line_like: npt.NDArray[np.bool_], most: int) -> FloatArray:
     return np.array(pieces).reshape(-1, 4)
 
 
-def _along(paint: FloatArray, end: FloatArray, unit: float) -> npt.NDArray[np.bool_]:
+def _beside(paint: FloatArray, end: FloatArray) -> tuple[FloatArray, FloatArray, float]:
+    """Where paint lies along a piece from its start, and how far from it, shapes (N,); its length."""
     start, stop = end[:2], end[2:]
     length = float(np.hypot(*(stop - start)))
     direction = (stop - start) / length
     offset = paint - start
-    along = offset @ direction
     across = np.abs(offset[:, 0] * direction[1] - offset[:, 1] * direction[0])
+    return offset @ direction, across, length
+
+
+def _along(paint: FloatArray, end: FloatArray, unit: float) -> npt.NDArray[np.bool_]:
+    """The paint beside a piece, between its ends."""
+    along, across, length = _beside(paint, end)
     near: npt.NDArray[np.bool_] = (across < NEAR_PX * unit) & (along > -2) & (along < length + 2)
     return near
 
 
 def _grown(paint: FloatArray, end: FloatArray, unit: float) -> npt.NDArray[np.bool_]:
     """The paint along a piece and, on both sides, as far as it goes on without a long gap."""
-    start, stop = end[:2], end[2:]
-    length = float(np.hypot(*(stop - start)))
-    direction = (stop - start) / length
-    offset = paint - start
-    along = offset @ direction
-    near = np.abs(offset[:, 0] * direction[1] - offset[:, 1] * direction[0]) < NEAR_PX * unit
+    along, across, length = _beside(paint, end)
+    near = across < NEAR_PX * unit
     places = np.sort(along[near])
     gaps = np.flatnonzero(np.diff(places) > GAP_PX * unit)
     before = gaps[places[gaps] < 0]

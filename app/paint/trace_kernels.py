@@ -10,6 +10,7 @@ from numba import njit
 
 from app.geometry.curve_residuals import (
     NEAR,
+    bent_step,
     projection_derivatives,
     radial_growth,
     to_camera,
@@ -119,10 +120,8 @@ def _direction(camera, place, vx, vy):
     nx, ny = ux / uz, uy / uz
     px, py = focal * nx, focal * ny
     ix, iy = focal * (wx - nx * wz) / uz, focal * (wy - ny * wz) / uz
-    rho2 = px * px + py * py
-    growth, bend = radial_growth(kappa * rho2), 2 * kappa * (1 + kappa * rho2)
-    inward = bend * (px * ix + py * iy)
-    return ix * growth + px * inward, iy * growth + py * inward
+    _, sx, sy = bent_step(kappa, px, py, ix, iy)
+    return sx, sy
 
 
 @compiled

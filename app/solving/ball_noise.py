@@ -21,6 +21,7 @@ from app.geometry.arrays import BoolArray, FloatArray
 from app.soccer.policy import Policy
 from app.soccer.solution import Ball3D
 from app.solving.ball_covariance import CLICK_DIAGONAL, calibration_covariance
+from app.solving.noise_grid import BLOCKS, STUDENT, jackknife_variance, vertex
 from app.solving.triangulate import Sighting
 
 MIN_NUMBERS = 20
@@ -50,9 +51,6 @@ SHARE_STEP = 0.01
 """Between most of them."""
 SHARE_SIGMA = 0.02
 """How far that share is expected to lie from the policy's."""
-BLOCKS = 10
-STUDENT = 2.26
-"""95 % of Student's distribution with one degree of freedom less than blocks."""
 _ROUNDS = 30
 _STEP = float(np.log(SIGMAS[1] / SIGMAS[0]))
 
@@ -204,8 +202,7 @@ def _jackknifed(rows: FloatArray, share: float) -> tuple[Sigma, float, tuple[flo
         return None
     block = np.arange(len(rows)) * BLOCKS // len(rows)
     parts = np.array([_fit(rows[block != at], share) for at in range(BLOCKS)])
-    squares = ((parts - parts.mean(axis=0)) ** 2).sum(axis=0)
-    scatter, of_share = ((BLOCKS - 1) / BLOCKS * squares).tolist()
+    scatter, of_share = jackknife_variance(parts).tolist()
     # No sample of n independent numbers says more about its variance than this.
     half = STUDENT * math.sqrt(max(scatter, 0.5 / len(rows)))
     left_out = int((~_kept(rows, share)).sum())
@@ -227,17 +224,10 @@ def _fit(rows: FloatArray, expected: float) -> tuple[float, float]:
 
 
 def _lowest(costs: FloatArray) -> tuple[float, float]:
-    """The lowest cost and the logarithm of its sigma, by the parabola through three of them."""
+    """The lowest cost and the logarithm of its sigma, between the points of the grid."""
     place = int(np.argmin(costs))
-    at = float(np.log(SIGMAS[place]))
-    if not 0 < place < len(costs) - 1:
-        return float(costs[place]), at
-    before, least, after = costs[place - 1 : place + 2].tolist()
-    bend = before - 2 * least + after
-    if bend <= 0:
-        return least, at
-    off = (before - after) / (2 * bend)
-    return least - bend * off**2 / 2, at + off * _STEP
+    off, least = vertex(costs, place)
+    return least, float(np.log(SIGMAS[place])) + off * _STEP
 
 
 def _kept(rows: FloatArray, share: float) -> BoolArray:

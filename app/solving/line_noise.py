@@ -21,6 +21,7 @@ import numpy as np
 from scipy.special import gammaln
 
 from app.geometry.arrays import FloatArray, IntArray
+from app.solving.noise_grid import BLOCKS, STUDENT, jackknife_variance, vertex
 
 SHARES = np.array([0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9])
 """Values of rho that are weighed, all alike before the residuals speak."""
@@ -32,9 +33,6 @@ FREEDOMS = np.array([4.0, 8.0, 20.0, 1000.0])
 """How much alike the variances of a dataset's images may be, as degrees of freedom."""
 SIGMAS = np.geomspace(0.1, 10.0, 93)
 """Noises of a dataset that are tried, pixels at 960 x 540."""
-BLOCKS = 10
-STUDENT = 2.26
-"""95 % of Student's distribution with one degree of freedom less than blocks."""
 
 
 @dataclass(frozen=True)
@@ -247,8 +245,7 @@ def estimate_line_noise(found: Sequence[LineEvidence]) -> LineEstimate | None:
     whole = blocks.sum(axis=0)
     log_sigma, share = _lowest(whole)
     parts = np.array([_lowest(whole - part) for part in blocks])
-    squares = ((parts - parts.mean(axis=0)) ** 2).sum(axis=0)
-    half, wide = (STUDENT * np.sqrt((BLOCKS - 1) / BLOCKS * squares)).tolist()
+    half, wide = (STUDENT * np.sqrt(jackknife_variance(parts))).tolist()
     half = max(half, STUDENT * np.sqrt(0.5 / sum(item.freedom for item in found)))
     wide = max(wide, _SHARE_STEP / 4)
     sigma = Interval(*np.exp([log_sigma, log_sigma - half, log_sigma + half]).tolist())
@@ -263,23 +260,11 @@ _SIGMA_STEP = float(np.log(SIGMAS[1] / SIGMAS[0]))
 def _lowest(cost: FloatArray) -> tuple[float, float]:
     """Logarithm of sigma and share of the lowest cost, shape (S, R), between the grid's points."""
     places = cost.argmin(axis=0).tolist()
-    vertices = [_vertex(cost[:, share], at) for share, at in enumerate(places)]
+    vertices = [vertex(cost[:, share], at) for share, at in enumerate(places)]
     off, least = np.transpose(vertices)
     sigmas = np.log(SIGMAS[places]) + _SIGMA_STEP * off
     at = int(least.argmin())
-    share = at + _vertex(least, at)[0]
+    share = at + vertex(least, at)[0]
     # Sigma goes with the share: the more a marking has in common, the noisier its points.
     sigma = np.interp(share, np.arange(len(SHARES)), sigmas)
     return float(sigma), float(np.clip(SHARES[0] + _SHARE_STEP * share, 0.0, 1.0))
-
-
-def _vertex(cost: FloatArray, at: int) -> tuple[float, float]:
-    """How far the lowest point lies from the lowest one of the grid, in steps, and its cost."""
-    if not 0 < at < len(cost) - 1:
-        return 0.0, float(cost[at])
-    before, least, after = cost[at - 1 : at + 2].tolist()
-    bend = before - 2 * least + after
-    if bend <= 0:
-        return 0.0, least
-    off = (before - after) / (2 * bend)
-    return off, least - bend * off**2 / 2

@@ -2,12 +2,8 @@
 
 What was done to the pictures of a match (or of one shot) was done to all of them alike. One frame
 seldom tells a stretched picture from another camera; many frames do. All cameras and the three
-numbers are adjusted together: what a frame says of them, whatever its camera, is what is left once
-its camera is eliminated (Schur complement), and these parts add up. A frame that contradicts the
-others fits badly, so its clicks count as noisy and it says little.
-
-Source: Hartley & Zisserman, sec. A6.3 (partitioned normal equations); White (1980) for the
-covariance, which counts frames and not clicks: the clicks of a frame err together.
+numbers are adjusted together (``many_frames``). A frame that contradicts the others fits badly, so
+its clicks count as noisy and it says little.
 """
 
 from __future__ import annotations
@@ -25,20 +21,24 @@ from app.soccer.frames import ImageSize
 from app.soccer.picture import PictureGeometry
 from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy
+from app.solving.many_frames import (
+    CERTAIN_SIGMAS,
+    MAX_FRAMES,
+    Share,
+    by_measurements,
+    shared_sigmas,
+    with_own_numbers,
+    without_camera,
+)
 from app.solving.observations import Observations, observe
 from app.solving.picture_camera import PictureProblem, picture_of, undo_warp
-from app.solving.resect import ResectionProblem, measurement_count
+from app.solving.resect import ResectionProblem
 
 MIN_FRAMES = 3
-MAX_FRAMES = 30
-"""More frames say little more; those with the most markings are taken."""
-MIN_MEASUREMENTS = 12
-"""Frames with fewer say nothing that they do not need for their camera."""
 PRIOR_SIGMA = np.array([0.12, 0.2, 0.2])
 """Of the logarithm of the aspect, and of both shifts (half diagonals), before any frame is seen."""
 FRAME_SIGMA = np.array([0.006, 0.04, 0.04])
 """What lens, pitch and annotator of one frame may add to the error of its own numbers."""
-CERTAIN_SIGMAS = 5.0
 LEAST = np.array([0.02, 0.06, 0.06])
 """A picture was changed where one of its numbers is so many sigmas, and so much, from nothing."""
 _ROUNDS, _SETTLED = 10, 3e-4
@@ -96,20 +96,15 @@ def estimate_match_picture(
             f"{len(seen)} frames show enough markings, a picture needs {MIN_FRAMES}"
         )
     warp, pull, told = _adjust(seen)
-    inverse = np.linalg.inv(told.sum(axis=0) + np.diag(PRIOR_SIGMA**-2))
-    between = inverse @ (pull.T @ pull) @ inverse * len(seen) / (len(seen) - 1)
-    aspect, right, down = np.sqrt(np.maximum(np.diag(inverse), np.diag(between))).tolist()
+    information = told.sum(axis=0) + np.diag(PRIOR_SIGMA**-2)
+    aspect, right, down = shared_sigmas(pull, information, spent=1).tolist()
     return PictureEstimate(picture_of(warp, (aspect, right, down)), len(seen))
 
 
 def choose_frames(frames: Sequence[PictureFrame]) -> list[int]:
     """Indices of the frames with the most independent measurements, ``MAX_FRAMES`` at most."""
-    rich = []
-    for index, frame in enumerate(frames):
-        count = measurement_count(observe(frame.lines, frame.pitch, frame.size))
-        if count >= MIN_MEASUREMENTS:
-            rich.append((-count, index))
-    return sorted(index for _, index in sorted(rich)[:MAX_FRAMES])
+    order = by_measurements(observe(frame.lines, frame.pitch, frame.size) for frame in frames)
+    return sorted(order[:MAX_FRAMES])
 
 
 @dataclass(frozen=True)
@@ -131,7 +126,7 @@ class _Seen:
         seen = undo_warp(self.problem, self.observations, warp)
         return replace(self, camera=self.problem.refine(seen, self.camera[None]).parameters)
 
-    def share(self, warp: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def share(self, warp: FloatArray) -> Share:
         """What the frame says of the picture, shapes (3,) and (3, 3), its camera eliminated."""
         search = PictureProblem(self.problem, self.observations, warp, np.full(3, np.inf))
         unknowns = np.append(self.camera, warp)
@@ -142,17 +137,11 @@ class _Seen:
         prior = self.problem.prior()
         gradient[:PARAMETERS] += (self.camera - prior.mean) / prior.sigma**2
         information[range(PARAMETERS), range(PARAMETERS)] += prior.sigma**-2
-        camera, picture = slice(0, PARAMETERS), slice(PARAMETERS, None)
-        carried = np.linalg.solve(information[camera, camera], information[camera, picture])
-        variance = search.click_variance(unknowns)
-        pull = (gradient[picture] - carried.T @ gradient[camera]) / variance
-        told = (information[picture, picture] - information[picture, camera] @ carried) / variance
+        pull, told = without_camera(gradient, information, search.click_variance(unknowns))
         # A frame that says nearly nothing may say a little less than nothing, by rounding.
         values, vectors = np.linalg.eigh((told + told.T) / 2)
         told = vectors * np.maximum(values, 0.0) @ vectors.T
-        # Random effects: each frame's numbers are its own, about those of the match.
-        shrunk = np.linalg.inv(np.eye(3) + told @ np.diag(FRAME_SIGMA**2))
-        return shrunk @ pull, shrunk @ told
+        return with_own_numbers((pull, told), FRAME_SIGMA)
 
 
 def _adjust(seen: Sequence[_Seen]) -> tuple[FloatArray, FloatArray, FloatArray]:

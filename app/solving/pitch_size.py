@@ -1,11 +1,7 @@
 """Pitch size: length and width of a match's pitch, estimated from many of its frames.
 
 One frame cannot tell a longer pitch from another camera; many frames of the same pitch can. All
-cameras and the two sizes are adjusted together: what a frame says of the sizes, whatever its
-camera, is what is left once its camera is eliminated (Schur complement), and these parts add up.
-
-Source: Hartley & Zisserman, sec. A6.3 (partitioned normal equations); White (1980) for the
-covariance, which counts frames and not clicks: the clicks of a frame err together.
+cameras and the two sizes are adjusted together (``many_frames``).
 """
 
 from __future__ import annotations
@@ -24,14 +20,19 @@ from app.soccer.annotation import Lines
 from app.soccer.frames import ImageSize
 from app.soccer.pitch import LENGTH_RANGE, MARKINGS, WIDTH_RANGE, Pitch
 from app.soccer.policy import CalibrationPolicy
+from app.solving.many_frames import (
+    CERTAIN_SIGMAS,
+    MAX_FRAMES,
+    Share,
+    by_measurements,
+    shared_sigmas,
+    with_own_numbers,
+    without_camera,
+)
 from app.solving.observations import Observations, observe, pitch_curves, principal_point
-from app.solving.resect import Resection, ResectionProblem, measurement_count
+from app.solving.resect import Resection, ResectionProblem
 
 MIN_FRAMES = 5
-MAX_FRAMES = 30
-"""More frames say little more; those that show most of length and width are taken."""
-MIN_MEASUREMENTS = 12
-"""Frames with fewer say nothing about the pitch that they do not need for their camera."""
 FRAME_SIGMA_M = 0.25
 """What lens and annotator of one frame may add to the error of its own sizes: no single frame
 is believed to know them better."""
@@ -42,9 +43,8 @@ MIN_VOICES = 2.0
 the other frames know the size without the loudest one, and agree with it."""
 AGREES = 2.5
 """Standard deviations by which the loudest frame and the others may differ then."""
-CERTAIN_SIGMAS = 5.0
 LEAST_DIFFERENCE_M = 0.3
-"""A size differs from another when it is this many sigmas and metres away."""
+"""A size differs from another when it certainly does, and by so many metres."""
 SEVERAL_P_VALUE = 0.001
 """Frames of one pitch disagree about a size as much as others do in less than so many cases."""
 SPEAKS = 1.0
@@ -160,12 +160,7 @@ def choose_frames(frames: Sequence[PitchFrame]) -> list[int]:
     A frame tells the length when it shows something of the middle and something of an end, and
     the width when it shows a touchline and something whose width is fixed.
     """
-    rich = []
-    for index, frame in enumerate(frames):
-        count = measurement_count(observe(frame.lines, Pitch(), frame.size))
-        if count >= MIN_MEASUREMENTS:
-            rich.append((-count, index))
-    order = [index for _, index in sorted(rich)]
+    order = by_measurements(observe(frame.lines, Pitch(), frame.size) for frame in frames)
     length = [index for index in order if _tells_length(frames[index].lines)]
     width = [index for index in order if _tells_width(frames[index].lines)]
     half = MAX_FRAMES // 2
@@ -209,21 +204,12 @@ class _Seen:
             fit=self.problem.refine(moved, self.fit.parameters[None]),
         )
 
-    def share(self) -> tuple[FloatArray, FloatArray]:
-        """What the frame says of the sizes: random effects, a variance of its own beside the clicks'.
-
-        Returns:
-            Gradient, shape (2,), and information, shape (2, 2), of length and width once the
-            camera is eliminated.
-        """
+    def share(self) -> Share:
+        """What the frame says of length and width, whatever its camera."""
         gradient, information = self._normal_equations()
-        camera, size = slice(0, PARAMETERS), slice(PARAMETERS, None)
-        carried = np.linalg.solve(information[camera, camera], information[camera, size])
         variance = self.problem.click_variance(self.fit.parameters, self.observations)
-        score = (gradient[size] - carried.T @ gradient[camera]) / variance
-        told = (information[size, size] - information[size, camera] @ carried) / variance
-        shrunk = np.linalg.inv(np.eye(2) + FRAME_SIGMA_M**2 * told)
-        return shrunk @ score, shrunk @ told
+        share = without_camera(gradient, information, variance)
+        return with_own_numbers(share, np.full(2, FRAME_SIGMA_M))
 
     def _normal_equations(self) -> tuple[FloatArray, FloatArray]:
         """Gradient and J^T W J of camera, length and width, shapes (10,) and (10, 10)."""
@@ -268,10 +254,7 @@ class _Seen:
         return moves
 
 
-_Share = tuple[FloatArray, FloatArray]
-
-
-def _adjust(pitch: Pitch, seen: Sequence[_Seen]) -> tuple[Pitch, list[_Seen], list[_Share]]:
+def _adjust(pitch: Pitch, seen: Sequence[_Seen]) -> tuple[Pitch, list[_Seen], list[Share]]:
     """Sizes and cameras adjusted together until the sizes settle."""
     for _ in range(_ROUNDS):
         seen = [item.on(pitch) for item in seen]
@@ -284,21 +267,14 @@ def _adjust(pitch: Pitch, seen: Sequence[_Seen]) -> tuple[Pitch, list[_Seen], li
     return pitch, list(seen), shares
 
 
-def _sigmas(shares: Sequence[_Share]) -> FloatArray:
-    """Standard deviations of length and width, metres, shape (2,).
-
-    The larger of two: from the clicks' variance, and from how much the frames disagree.
-    """
-    gradients = np.array([gradient for gradient, _ in shares])
+def _sigmas(shares: Sequence[Share]) -> FloatArray:
+    """Standard deviations of length and width, metres, shape (2,)."""
+    pulls = np.array([pull for pull, _ in shares])
     information = np.sum([part for _, part in shares], axis=0)
-    inverse = np.linalg.inv(information + np.eye(2) / _LOOSE_M**2)
-    count = len(shares)
-    between = inverse @ (gradients.T @ gradients) @ inverse * count / (count - 2)
-    sigmas: FloatArray = np.sqrt(np.maximum(np.diag(inverse), np.diag(between)))
-    return sigmas
+    return shared_sigmas(pulls, information + np.eye(2) / _LOOSE_M**2, spent=2)
 
 
-def _disagree(shares: Sequence[_Share]) -> bool:
+def _disagree(shares: Sequence[Share]) -> bool:
     """Whether frames differ about length or width by more than chance makes frames of one pitch.
 
     A frame's gradient is zero but for chance, with its information as variance.
@@ -311,14 +287,14 @@ def _disagree(shares: Sequence[_Share]) -> bool:
     return bool((chdtrc(freedom, squares) < SEVERAL_P_VALUE).any())
 
 
-def _voices(shares: Sequence[_Share]) -> FloatArray:
+def _voices(shares: Sequence[Share]) -> FloatArray:
     """How many frames speak of length and of width, as if all of them said as much, shape (2,)."""
     told = np.array([np.diag(information) for _, information in shares])
     voices: FloatArray = told.sum(axis=0) ** 2 / np.maximum((told**2).sum(axis=0), 1e-30)
     return voices
 
 
-def _is_confirmed(shares: Sequence[_Share]) -> npt.NDArray[np.bool_]:
+def _is_confirmed(shares: Sequence[Share]) -> npt.NDArray[np.bool_]:
     """Whether all frames but the one that says most know a size as well, and agree, shape (2,).
 
     A gradient is that of one frame at the size that all agree on: its share of the information

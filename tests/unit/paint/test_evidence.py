@@ -6,8 +6,6 @@ import numpy as np
 import pytest
 
 from app.paint.evidence import (
-    Traced,
-    painted_markings,
     read_picture,
     seek,
     shows_grass_beside,
@@ -15,6 +13,7 @@ from app.paint.evidence import (
     trace,
 )
 from app.paint.profile_kernels import find_stripes
+from app.paint.tracing import Traced, painted_markings
 from app.soccer.frames import Box
 from app.soccer.pitch import MARKINGS, Pitch
 from tests.unit.paint.test_grass import GRASS, picture

@@ -10,8 +10,9 @@ import pytest
 from app.geometry.camera import Camera
 from app.geometry.resection import parameters_from_camera
 from app.geometry.rotation import rotation_from_pan_tilt_roll
-from app.paint.evidence import Evidence, Traced, to_paint_evidence
+from app.paint.evidence import Evidence, to_paint_evidence
 from app.paint.snap import CURVED, _suffices, snap
+from app.paint.tracing import Traced
 from app.soccer.frames import ImageSize
 from app.soccer.paint_evidence import NO_PAINT, PAINT_DISAGREES, PaintReading
 from app.soccer.pitch import MARKINGS, Pitch
