@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 from typing import Any
 
@@ -21,3 +22,8 @@ def canonical(value: Any) -> str:
         '{"a":[1.5,null],"b":1}'
     """
     return _ENCODER.encode(value)
+
+
+def digest_of(content: bytes) -> str:
+    """Digest of content, 32 hexadecimal digits."""
+    return hashlib.sha256(content).hexdigest()[:32]

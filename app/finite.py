@@ -13,6 +13,9 @@ from typing import Any
 
 import msgspec
 
+MAX_ID = 2**63 - 1
+"""The largest whole number that a column of ids, and an answer, holds."""
+
 
 def finite(value: Any) -> Any:
     """A value of dicts, lists and plain values in which no number is infinite or NaN.

@@ -15,12 +15,12 @@ from app.api.errors import PreconditionRequiredError
 from app.api.security.access import login_of, sight_of
 from app.api.services import Services
 from app.errors import InputError
+from app.finite import MAX_ID
 from app.review.people.roles import Sight
 from app.soccer.actors import LOCAL_USER, script_name
 from app.store.store import Store
 
 ACTOR_HEADER = "X-Actor"
-MAX_ID = 2**63 - 1
 _STRONG_ETAG = re.compile(r'"[\x21\x23-\x7e]*"')
 
 

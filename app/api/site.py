@@ -11,6 +11,7 @@ from pathlib import Path
 
 from app.api.joined_modules import JoinedModules
 from app.api.security.headers import content_security_policy
+from app.canonical import digest_of
 from app.folders import own_folder
 
 STATIC = own_folder("static")
@@ -70,7 +71,7 @@ class IndexPage:
         html = html.replace(b'"/static/', f'"/assets/{version}/'.encode())
         if team:
             html = html.replace(b"<html ", b"<html data-team ", 1)
-        etag = f'"{hashlib.sha256(html).hexdigest()[:32]}"'
+        etag = f'"{digest_of(html)}"'
         return IndexPage(html, etag, content_security_policy(script_hashes(html)), styles, modules)
 
 

@@ -32,7 +32,7 @@ from app.datasets.sn_calibration_writer import lines_to_json
 from app.errors import InputError
 from app.finite import json_text
 from app.geometry.camera import Camera
-from app.soccer.annotation import BallAnnotation
+from app.soccer.annotation import CORNERS, BallAnnotation
 from app.soccer.group import Group, View
 from app.soccer.pitch import MARKINGS
 from app.soccer.policy import PAPER
@@ -65,7 +65,6 @@ _PITCH_BOX = tuple(
 )
 _PLACE_DIGITS = 9
 """Decimals of a metre: of what is computed on the grass a nanometre is enough."""
-_CORNERS = ("x1", "y1", "x2", "y2")
 _FIRST_OF_OURS = 100_001
 """Track in a sequence that brings tracks of its own."""
 
@@ -337,7 +336,7 @@ def _person(box: Mapping[str, Any]) -> dict[str, Any] | None:
     """A person of SoccerNet-v3 (``Player team left``, ``Main referee``); None without corners."""
     corners = box.get("points")
     try:
-        x1, y1, x2, y2 = [fields.number(corners[name]) for name in _CORNERS]  # type: ignore[index]
+        x1, y1, x2, y2 = [fields.number(corners[name]) for name in CORNERS]  # type: ignore[index]
     except (TypeError, KeyError, ValueError):
         return None
     role, team = _role_and_team(str(box.get("class") or ""))

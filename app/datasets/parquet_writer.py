@@ -11,7 +11,7 @@ from typing import Any
 from app.datasets.export_record import ExportRecord, chosen_box, frame_name
 from app.datasets.manifest import software_version
 from app.datasets.parquet import pyarrow_modules
-from app.datasets.view_state import extras_to_json, view_to_json
+from app.datasets.view_state import view_to_json
 from app.finite import finite
 from app.finite import json_text as finite_text
 from app.geometry.camera import Camera
@@ -298,7 +298,7 @@ COLUMNS: tuple[tuple[str, str, Getter], ...] = (
     ("given_covariance", LIST, lambda row: row.said.get("given_covariance")),
     ("picture", TEXT, _if_said("picture")),
     ("proposed", TEXT, _if_said("proposed")),
-    ("extras", TEXT, lambda row: json_text(extras_to_json(row.view.extras))),
+    ("extras", TEXT, lambda row: json_text(row.view.extras.values())),
     *((name, TEXT, lambda row, name=name: row.provenance.get(name)) for name in PROVENANCE),
     ("solver_version", TEXT, lambda row: _solver(row)),
     ("software", TEXT, lambda row: software_version()),

@@ -11,7 +11,7 @@ from app.datasets.exact import exact_inverse
 from app.datasets.report import Report
 from app.datasets.sn_calibration import spelling
 from app.errors import DatasetFormatError, UnknownMarkingError
-from app.soccer.annotation import BallAnnotation, Extras, Lines, make_lines
+from app.soccer.annotation import CORNERS, BallAnnotation, Extras, Lines, make_lines
 from app.soccer.frames import Box, ImagePoint, ImageSize
 from app.soccer.group import View
 from app.soccer.pitch import WITHOUT_GEOMETRY, canonical_marking
@@ -30,7 +30,6 @@ OTHERS = (RECORD, BALLS, GAME, REST)
 
 _LINKS = ("linked_replays", "linked_action")
 _OURS = (IMAGE, "bboxes", "lines", *_LINKS)
-_CORNERS = ("x1", "y1", "x2", "y2")
 
 
 @dataclass
@@ -145,10 +144,10 @@ def _add_box(item: Any, where: str, builder: _Builder) -> None:
 def _ball(item: Mapping[str, Any]) -> BallAnnotation:
     """The ball of a box; corners in any order; a box without area is its centre alone."""
     points = fields.mapping(item.get("points"))
-    missing = [corner for corner in _CORNERS if corner not in points]
+    missing = [corner for corner in CORNERS if corner not in points]
     if missing:
         raise ValueError(f"has no {missing[0]}")
-    x1, y1, x2, y2 = (fields.pixel(points[corner]) for corner in _CORNERS)
+    x1, y1, x2, y2 = (fields.pixel(points[corner]) for corner in CORNERS)
     box = Box(min(x1, x2), min(y1, y2), abs(x2 - x1), abs(y2 - y1))
     occluded = item.get("occluded") is True
     if box.width == 0 or box.height == 0:

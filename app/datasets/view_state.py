@@ -18,14 +18,13 @@ from app.errors import DatasetFormatError, InputError, UnknownMarkingError, Unsa
 from app.geometry.camera import camera_covariance
 from app.soccer.annotation import BallAnnotation, Extras, Lines, make_lines
 from app.soccer.frames import Box, ImagePoint, ImageSize
-from app.soccer.group import Group, Station, View
+from app.soccer.group import CALIBRATIONS, Group, Station, View
 from app.soccer.picture import PictureGeometry
 from app.soccer.pitch import Pitch, canonical_marking
 from app.soccer.reasons import LeftOut, left_out
 
 MAX_TEXT = 1000
 """Longest key or label, characters."""
-CALIBRATIONS = ("given", "lines")
 
 
 @dataclass(frozen=True)
@@ -102,17 +101,6 @@ def ball_to_json(ball: BallAnnotation) -> dict[str, Any]:
         "out_of_view": ball.out_of_view,
         **({"predicted_by": ball.predicted_by} if ball.predicted_by else {}),
         **({"inferred": True} if ball.inferred else {}),
-    }
-
-
-def extras_to_json(extras: Extras) -> dict[str, Any] | None:
-    """What the ball pipeline does not use; None when there is nothing."""
-    if not (extras.boxes or extras.lines or extras.metadata):
-        return None
-    return {
-        "boxes": [dict(box) for box in extras.boxes],
-        "lines": [dict(line) for line in extras.lines],
-        "metadata": dict(extras.metadata),
     }
 
 
@@ -317,7 +305,7 @@ class StateReader:
 
 
 def extras_from_json(value: Any) -> Extras:
-    """Back from ``extras_to_json``; what is none of it is left out."""
+    """Back from ``Extras.values``; what is none of it is left out."""
     if not isinstance(value, dict):
         return Extras()
     boxes, lines = (

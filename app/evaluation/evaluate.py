@@ -28,7 +28,7 @@ class Options:
     """How predictions are judged; a run keeps them beside its result.
 
     Attributes:
-        boxes: Which of a dataset's boxes is the truth, one of ``frame.BOX_KINDS``.
+        boxes: Which of a dataset's boxes is the truth, one of ``ball_boxes.BOX_KINDS``.
         min_score: Detections below take no part in localisation; average precision has them all.
         ball_diameter_m: True diameter.
         min_jac: The threshold that the JaC figure marks.

@@ -10,9 +10,6 @@ from app.soccer.annotation import Lines
 from app.soccer.frames import Box, ImageSize
 from app.soccer.pitch import Pitch
 
-BOX_KINDS = ("optimized", "annotated", "exact")
-"""Which of a dataset's ball boxes predictions are held against."""
-
 
 @dataclass(frozen=True)
 class Frame:
@@ -20,7 +17,7 @@ class Frame:
 
     Attributes:
         id: Of the view, opaque; predictions refer to it.
-        boxes: The ball's boxes by kind, those of ``BOX_KINDS`` that exist.
+        boxes: The ball's boxes by kind, those of ``ball_boxes.BOX_KINDS`` that exist.
         absent: Somebody said that the ball is out of view: whatever is found here is wrong.
         camera: The dataset's own camera, the oracle; None when it is not calibrated.
         point: The triangulated ball, pitch frame, metres; only where this view is in a valid
@@ -78,7 +75,7 @@ def judge(
     Args:
         frames: Of the dataset.
         detections: By id of the frame; frames without any were looked at in vain.
-        boxes: One of ``BOX_KINDS``.
+        boxes: One of ``ball_boxes.BOX_KINDS``.
     """
     judged = []
     for frame in frames:

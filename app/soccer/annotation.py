@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -21,6 +21,11 @@ def make_lines(lines: Mapping[str, Any]) -> Lines:
         marking: tuple(ImagePoint(float(x), float(y)) for x, y in lines[marking])
         for marking in sorted(lines)
     }
+
+
+def lines_without(lines: Lines, markings: Collection[str]) -> Lines:
+    """The lines but for some markings."""
+    return make_lines({name: points for name, points in lines.items() if name not in markings})
 
 
 @dataclass(frozen=True)
@@ -58,6 +63,16 @@ class Extras:
     boxes: tuple[Mapping[str, Any], ...] = ()
     lines: tuple[Mapping[str, Any], ...] = ()
     metadata: Mapping[str, Any] = field(default_factory=dict)
+
+    def values(self) -> dict[str, Any] | None:
+        """As plain values; None where there is nothing."""
+        if not (self.boxes or self.lines or self.metadata):
+            return None
+        return {
+            "boxes": [dict(box) for box in self.boxes],
+            "lines": [dict(line) for line in self.lines],
+            "metadata": dict(self.metadata),
+        }
 
     @property
     def places(self) -> tuple[Box, ...]:

@@ -15,6 +15,9 @@ from app.soccer.picture import PictureGeometry
 from app.soccer.pitch import Pitch
 from app.soccer.reasons import LeftOut
 
+CALIBRATIONS = ("given", "lines")
+"""Which calibration of a camera can count: the one that came with the data, or that of its lines."""
+
 
 @dataclass(frozen=True)
 class Station:
@@ -25,7 +28,7 @@ class Station:
     Attributes:
         key: Unique in the dataset, ``cam3`` or the key of its only view.
         given: Calibration that came with the data, or None.
-        calibration: Which one counts when both exist: ``given`` or ``lines``.
+        calibration: Which one counts when both exist, one of ``CALIBRATIONS``.
         given_covariance: Of the given camera's parameters (``geometry.resection``), 8 x 8, row by
             row; None where nothing is known of it.
         picture: What was done to its pictures since they were taken; None: nothing. The camera

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 import math
 from collections.abc import Mapping
@@ -12,6 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from app.canonical import digest_of
 from app.errors import InputError
 from app.soccer.annotation import Lines, make_lines
 from app.soccer.frames import ImagePoint
@@ -105,7 +105,7 @@ class PaintReading:
     @cached_property
     def digest(self) -> str:
         """Digest of all of it, 32 hexadecimal digits."""
-        return hashlib.sha256(self.text.encode()).hexdigest()[:32]
+        return digest_of(self.text.encode())
 
 
 def reading_to_json(reading: PaintReading) -> dict[str, Any]:

@@ -36,9 +36,7 @@ def left_out(reason: str | None, note: str | None) -> LeftOut | None:
     Raises:
         InputError: The reason is none, or a note is missing, stands alone or is too long.
     """
-    note = (note or "").strip() or None
-    if note is not None and len(note) > MAX_NOTE:
-        raise InputError(f"a note has at most {MAX_NOTE} characters", pointer="/note")
+    note = checked_note(note)
     if reason is None and note is None:
         return None
     if reason not in REASONS:
@@ -47,6 +45,26 @@ def left_out(reason: str | None, note: str | None) -> LeftOut | None:
             "a note needs a reason beside it" if reason is None else f'"{reason}" is not a reason'
         )
         raise InputError(f"{said}; reasons are {known}", pointer="/reason")
+    require_words(reason, note)
+    return LeftOut(reason, note)
+
+
+def checked_note(note: str | None) -> str | None:
+    """A note without white space around it; None where nothing is left.
+
+    Raises:
+        InputError: It is too long.
+    """
+    note = (note or "").strip() or None
+    if note is not None and len(note) > MAX_NOTE:
+        raise InputError(
+            f"a note has at most {MAX_NOTE:,} characters, and this one has {len(note):,}",
+            pointer="/note",
+        )
+    return note
+
+
+def require_words(reason: str | None, note: str | None) -> None:
+    """Raise InputError where a reason says nothing by itself, and no note does."""
     if reason == "other" and note is None:
         raise InputError('the reason "other" needs a note', pointer="/note")
-    return LeftOut(reason, note)

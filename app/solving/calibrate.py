@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Mapping
 from dataclasses import replace
 from types import MappingProxyType
 
 import numpy as np
 
+from app.canonical import digest_of
 from app.errors import DegenerateGeometryError
 from app.geometry.arrays import FloatArray, row_by_row
 from app.geometry.camera import Camera
@@ -291,7 +291,7 @@ def view_keys(group: Group, view: View, policy: CalibrationPolicy) -> tuple[str,
     reading = wanted_paint(group, view, policy)
     if reading is None or reading.sought_for != key:
         return (key,)
-    painted = hashlib.sha256(f"{key} {reading.digest}".encode()).hexdigest()[:32]
+    painted = digest_of(f"{key} {reading.digest}".encode())
     return painted, key
 
 
@@ -374,7 +374,7 @@ def calibration_key(
 
 
 def _key(parts: list[str]) -> str:
-    return hashlib.sha256(f"[{', '.join(parts)}]".encode()).hexdigest()[:32]
+    return digest_of(f"[{', '.join(parts)}]".encode())
 
 
 def _unobservable(covariance: FloatArray) -> tuple[str, ...]:

@@ -198,19 +198,8 @@ def station_from_json(value: Mapping[str, Any]) -> Station:
     )
 
 
-def extras_to_json(extras: Extras) -> Json:
-    """None when there is nothing."""
-    if not (extras.boxes or extras.lines or extras.metadata):
-        return None
-    return {
-        "boxes": [dict(box) for box in extras.boxes],
-        "lines": [dict(line) for line in extras.lines],
-        "metadata": dict(extras.metadata),
-    }
-
-
 def extras_from_json(value: Mapping[str, Any] | None) -> Extras:
-    """Back from ``extras_to_json``."""
+    """Back from ``Extras.values``."""
     if value is None:
         return Extras()
     return Extras(tuple(value["boxes"]), tuple(value["lines"]), value["metadata"])
@@ -249,7 +238,7 @@ def view_to_json(view: View, station: Json | None = None) -> Json:
         "balls": [ball_to_json(ball) for ball in view.balls],
         "media": media_to_json(view.media),
         "included": view.included,
-        "extras": extras_to_json(view.extras),
+        "extras": view.extras.values(),
         **({} if why is None else {"left_out": why}),
         **({} if view.noise == 1 else {"noise": float(view.noise)}),
     }

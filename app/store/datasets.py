@@ -9,6 +9,7 @@ from typing import Any
 from sqlalchemy import exists, func, insert, select, update
 
 from app.canonical import canonical
+from app.finite import MAX_ID
 from app.soccer.policy import Policy
 from app.store.codecs import policy_from_json, policy_to_json
 from app.store.session import Session
@@ -17,7 +18,6 @@ from app.store.stored_json import as_written, parse
 from app.store.tables.groups import DatasetModel, GroupModel
 from app.store.tables.saved_views import COPIES_USED, UsedIdModel
 
-MAX_ID = 2**63 - 1
 _DIGITS = 19
 """No id has more."""
 _ROWS = select(*DatasetModel.__table__.columns)

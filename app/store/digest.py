@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Iterable, Mapping
 
-from app.canonical import canonical
+from app.canonical import canonical, digest_of
 from app.soccer.group import Group, SharedPosition, Station, View
 from app.soccer.pitch import Pitch
 from app.store.codecs import (
@@ -21,7 +20,7 @@ from app.store.stored_json import Json
 
 def digest(value: Json) -> str:
     """Digest of a JSON value, 32 hexadecimal digits."""
-    return hashlib.sha256(canonical(value).encode()).hexdigest()[:32]
+    return digest_of(canonical(value).encode())
 
 
 def station_digest(station: Station) -> str:

@@ -6,7 +6,6 @@ crash; then one process ends, one request is refused, and the service goes on.
 
 from __future__ import annotations
 
-import hashlib
 import threading
 from collections import OrderedDict
 from collections.abc import Callable
@@ -16,6 +15,7 @@ from math import inf
 from time import monotonic
 from typing import Any
 
+from app.canonical import digest_of
 from app.child import Allowance, ChildEnded
 from app.child_figures import FIGURES
 from app.child_pool import ChildPool, PoolTask
@@ -63,7 +63,7 @@ class SentPicture:
     @staticmethod
     def of(kind: str, data: bytes) -> SentPicture:
         """The picture of these bytes."""
-        return SentPicture(kind, data, hashlib.sha256(data).hexdigest()[:32])
+        return SentPicture(kind, data, digest_of(data))
 
 
 class Frames:

@@ -6,7 +6,6 @@ to machine, and the digest must not.
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, cast
@@ -14,7 +13,7 @@ from typing import Any, cast
 from sqlalchemy import Table, insert, select
 from zlib_ng import zlib_ng
 
-from app.canonical import canonical
+from app.canonical import canonical, digest_of
 from app.soccer.group import Group, Station, View
 from app.soccer.paint_evidence import reading_from_json
 from app.soccer.pitch import Pitch
@@ -130,11 +129,6 @@ def frames_of(group: Group, facts: Mapping[str, Mapping[str, int]]) -> Frames | 
         if value:
             frames[view.key] = value
     return frames or None
-
-
-def digest_of(content: bytes) -> str:
-    """Digest of content, 32 hexadecimal digits."""
-    return hashlib.sha256(content).hexdigest()[:32]
 
 
 def known_frozen(session: Session, dataset_id: int, keys: Iterable[str]) -> set[str]:

@@ -42,7 +42,7 @@ def station_values(station: Station) -> dict[str, Any]:
 
 def view_values(view: View, position: int) -> dict[str, Any]:
     """Columns of a view that follow from its value."""
-    media, extras = view.media, codecs.extras_to_json(view.extras)
+    media, extras = view.media, view.extras.values()
     why = codecs.left_out_to_json(view.left_out)
     return {
         "key": view.key,

@@ -13,6 +13,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from app.canonical import digest_of
 from app.config import Settings
 from app.durable import replace_file
 from app.errors import ImageError, NotFoundError, StorageError, TooLargeError
@@ -82,19 +83,15 @@ def read_pixels(
     _require_contained(media, settings)
     if media.frame is not None:
         picture = _video_frame(Path(media.path), media.frame, settings)
-        digest = _digest(np.ascontiguousarray(picture).tobytes())
+        digest = digest_of(np.ascontiguousarray(picture).tobytes())
     else:
         data = _source(media, settings)
-        digest = _digest(data)
+        digest = digest_of(data)
         if digest != known:
             picture = _pixels(data, settings, frame_name(media))
     if digest == known:
         return digest, None
     return digest, _as_annotated(picture, flipped)
-
-
-def _digest(data: bytes) -> str:
-    return hashlib.sha256(data).hexdigest()[:32]
 
 
 def cached_frame(

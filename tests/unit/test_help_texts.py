@@ -28,7 +28,7 @@ PLAIN_WORDS = """
     take takes gold guidelines mixing copying copies own errors parts guideline datasets
     adjudicate compare differences distance limits other panel rater summary weigh workspace
     comment comments talk threads mentions bells past deeds window before after
-    full tall scroll stalls settling exposure ends many tracing
+    full tall scroll stalls settling exposure ends many naming tracing
     cluster serving hosts
     private kept another smaller
     stored tree trees safe path refusal attempt cookie fit

@@ -6,7 +6,7 @@ from typing import Annotated
 
 from fastapi import APIRouter, Query, Response
 
-from app.api.deps import MAX_ID, Actor, AppServices, AppStore, DatasetPath, Id
+from app.api.deps import Actor, AppServices, AppStore, DatasetPath, Id
 from app.api.problem import responses
 from app.api.reply import AskedUnder, Reply, document, nothing
 from app.api.routers.groups import ETAG, group_answer
@@ -22,6 +22,7 @@ from app.api.schemas.agreement import (
 from app.api.schemas.group import GroupDocument
 from app.api.schemas.take import TakeHandBack
 from app.evaluation.agreement_limits import AgreementLimits
+from app.finite import MAX_ID
 from app.review.agreement import adjudicate, limits
 from app.review.agreement.compare import compare_groups
 from app.review.agreement.summary import agreement_csv, agreement_of

@@ -10,11 +10,12 @@ from fastapi import APIRouter, Depends, Query, Request
 from fastapi.responses import StreamingResponse
 from starlette.responses import Response
 
-from app.api.deps import MAX_ID, AppStore
+from app.api.deps import AppStore
 from app.api.problem import responses
 from app.api.schemas.audit import AuditDocument, AuditEntryDocument
 from app.api.security.access import login_of
 from app.datasets.csv_text import csv_line
+from app.finite import MAX_ID
 from app.review.datasets.dataset import dataset_id
 from app.review.people import audit
 from app.review.people.audit import KINDS, AuditEntry, AuditPage, AuditQuery, Family

@@ -6,12 +6,13 @@ from typing import Annotated
 
 from fastapi import APIRouter, Query, Response
 
-from app.api.deps import MAX_ID, AppStore
+from app.api.deps import AppStore
 from app.api.problem import responses
 from app.api.reply import AskedUnder, Reply, document
 from app.api.routers.sessions import Me
 from app.api.schemas.bell import BellDocument, BellRead
 from app.api.team import AppTeam
+from app.finite import MAX_ID
 from app.review.people import bell
 from app.review.people.bell import Bell
 

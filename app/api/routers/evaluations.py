@@ -9,7 +9,7 @@ from fastapi import APIRouter, Query, Response
 from pydantic import BaseModel
 
 from app.api.cursor import parse_cursor
-from app.api.deps import MAX_ID, Actor, AppServices, AppStore, DatasetPath, Id
+from app.api.deps import Actor, AppServices, AppStore, DatasetPath, Id
 from app.api.jobs import by_job, job_answer
 from app.api.problem import Responses, responses
 from app.api.reply import AskedUnder, Reply, nothing
@@ -29,6 +29,7 @@ from app.evaluation.figure_csv import figure_csv, table_csv
 from app.evaluation.figure_png import figure_png
 from app.evaluation.result import NUMBERS
 from app.evaluation.table import TABLES
+from app.finite import MAX_ID
 from app.review.evaluating import evaluation as review
 from app.review.jobs.evaluations import request_evaluation
 from app.review.versions.version import version_called

@@ -11,7 +11,6 @@ from fastapi import APIRouter, Query, Request, Response
 from app.api.conflicts import current_state
 from app.api.cursor import foreign_cursor
 from app.api.deps import (
-    MAX_ID,
     Actor,
     AppServices,
     AppStore,
@@ -39,6 +38,7 @@ from app.api.schemas.verdict import VerdictEdit
 from app.api.security.access import login_of
 from app.api.services import Services
 from app.errors import NotFoundError
+from app.finite import MAX_ID
 from app.review.agreement.weigh import after_hand_in
 from app.review.datasets.dataset import dataset_id
 from app.review.editing import submit

@@ -9,7 +9,7 @@ from typing import Annotated
 from fastapi import APIRouter, Query, Response
 
 from app.api.conflicts import current_state
-from app.api.deps import MAX_ID, Actor, AppServices, AppStore, Id, IfMatch
+from app.api.deps import Actor, AppServices, AppStore, Id, IfMatch
 from app.api.problem import Responses, responses
 from app.api.reply import Asked, AskedUnder, Reply
 from app.api.routers.groups import CHANGED, CONFLICTS, group_answer, load_document
@@ -19,6 +19,7 @@ from app.api.schemas.station import StationDetail
 from app.api.schemas.view import StationEdit
 from app.api.services import Services
 from app.errors import NotFoundError
+from app.finite import MAX_ID
 from app.review.editing.edit import SetStationCalibration, SetStationLines
 from app.review.editing.stations import (
     StationState,

@@ -6,7 +6,7 @@ from typing import Annotated
 
 from fastapi import APIRouter, Query
 
-from app.api.deps import MAX_ID, Actor, AppStore, DatasetPath, Id
+from app.api.deps import Actor, AppStore, DatasetPath, Id
 from app.api.problem import responses
 from app.api.schemas.webhook import (
     DeliveryDocument,
@@ -17,6 +17,7 @@ from app.api.schemas.webhook import (
     WebhookList,
     WebhookWithSecret,
 )
+from app.finite import MAX_ID
 from app.review.webhooks import webhooks
 from app.review.webhooks.messages import CHOSEN
 from app.review.webhooks.webhooks import Delivery, Webhook

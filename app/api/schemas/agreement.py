@@ -7,11 +7,11 @@ from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from app.api.deps import MAX_ID
 from app.api.schemas.document import Document, ListDocument
 from app.api.schemas.group import GroupDocument
 from app.evaluation.agreement_limits import Disagreement, Spread
 from app.evaluation.annotation_distance import Ball3DDistance, LineDistance, ViewDistance
+from app.finite import MAX_ID
 from app.review.agreement.adjudicate import Case, Waiting
 from app.review.agreement.compare import AnnotationPair, Comparison
 from app.review.agreement.summary import GroupAgreement, PeopleAgreement

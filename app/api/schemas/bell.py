@@ -8,8 +8,8 @@ from typing import Annotated
 from pydantic import BaseModel, ConfigDict, Field
 
 from app.api.schemas.document import Document, ListDocument
+from app.finite import MAX_ID
 from app.review.people.bell import RingKind
-from app.review.people.ownership import MAX_ID
 
 
 class RingDocument(Document):

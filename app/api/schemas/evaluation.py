@@ -13,10 +13,11 @@ from app.evaluation.comparison import Difference
 from app.evaluation.figure import Axis, Mark
 from app.evaluation.result import FrameResult
 from app.evaluation.table import Cell, Column, FrameRange, Row
+from app.finite import MAX_ID
 from app.review.evaluating.evaluation import Comparison, read_tables
 from app.review.evaluating.evaluation_run import EvaluationRequest
 
-SetId = Annotated[int, Field(strict=True, ge=1, le=2**63 - 1)]
+SetId = Annotated[int, Field(strict=True, ge=1, le=MAX_ID)]
 
 
 class EvaluationBody(BaseModel):

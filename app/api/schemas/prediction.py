@@ -18,6 +18,7 @@ from pydantic import (
 )
 
 from app.api.schemas.document import Document, ListDocument
+from app.finite import MAX_ID
 from app.review.evaluating.accept import SHOWN, AcceptPlan, AcceptReport, AcceptRequest
 from app.review.evaluating.group_predictions import GroupPredictions
 from app.review.evaluating.predictions import PredictedBox, PredictionSet
@@ -26,7 +27,7 @@ from app.soccer.frames import ImageSize
 Upload = Annotated[str, Field(min_length=1, max_length=64, description="Id of an upload.")]
 Side = Annotated[int, Field(strict=True, ge=2, le=16_384)]
 Size = tuple[Side, Side]
-ViewId = Annotated[int, Field(strict=True, ge=1, le=2**63 - 1)]
+ViewId = Annotated[int, Field(strict=True, ge=1, le=MAX_ID)]
 MAX_VIEWS = 200
 StoredBox = Annotated[
     tuple[float, float, float, float],
@@ -209,7 +210,7 @@ class AcceptBody(BaseModel):
     )
 
     dataset: Annotated[str, Field(max_length=200, description="Name or id.")]
-    predictions: Annotated[int, Field(strict=True, ge=1, le=2**63 - 1)]
+    predictions: Annotated[int, Field(strict=True, ge=1, le=MAX_ID)]
     q: Annotated[str, Field(max_length=1000)] | None = Field(
         default=None, description="Query of the queue that chooses groups; a job accepts them."
     )

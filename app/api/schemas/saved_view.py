@@ -8,7 +8,7 @@ from typing import Annotated
 from pydantic import BaseModel, ConfigDict, Field
 
 from app.api.schemas.document import Document, ListDocument
-from app.review.queue.saved_views import MAX_NAME
+from app.review.datasets.naming import MAX_TITLE
 from app.review.verdicts.reviewers import Reviewer
 
 
@@ -20,7 +20,7 @@ class NewSavedView(BaseModel):
         json_schema_extra={"examples": [{"name": "Nearly there", "q": "jac<0.8 jac>0.75"}]},
     )
 
-    name: Annotated[str, Field(min_length=1, max_length=MAX_NAME)]
+    name: Annotated[str, Field(min_length=1, max_length=MAX_TITLE)]
     q: Annotated[str, Field(max_length=1000)]
 
 

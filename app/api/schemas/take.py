@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 from app.api.schemas.document import Document, ListDocument
+from app.finite import MAX_ID
 from app.review.queue.query import MAX_LISTED_LENGTH
 from app.review.takes.gold import GoldGroup, GoldResult, Middle, PersonResults
 from app.review.takes.guidelines import MAX_LETTERS, GuidelineVersion
@@ -47,7 +48,7 @@ class TakeHandBack(HandBack):
         json_schema_extra={"examples": [{"take": 7, "reason": "The ball in B is the spot."}]},
     )
 
-    take: Annotated[int, Field(ge=1, le=2**63 - 1)]
+    take: Annotated[int, Field(ge=1, le=MAX_ID)]
 
 
 class TakeDocument(Document, shows=TakeView):

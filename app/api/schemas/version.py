@@ -17,17 +17,19 @@ from pydantic import (
 
 from app.api.schemas.document import Document, ListDocument
 from app.api.schemas.policy import PolicyDocument
+from app.finite import MAX_ID
 from app.review.versions.diff import Move, Passage, Setting
-from app.review.versions.freeze import MAX_LICENCE, MAX_NOTE, FreezeRequest
+from app.review.versions.freeze import MAX_LICENCE, FreezeRequest
 from app.review.versions.verify import Difference
 from app.review.versions.version import Verification
+from app.soccer.reasons import MAX_NOTE
 from app.soccer.split import TEST_CAMERAS, Split
 
 Point = Annotated[list[float], Field(min_length=3, max_length=3)]
 SHOWN_DIFFERENCES = 40
 """Differences that a version's document names; all are counted."""
 VersionId = (
-    Annotated[int, Field(strict=True, ge=1, le=2**63 - 1)]
+    Annotated[int, Field(strict=True, ge=1, le=MAX_ID)]
     | Annotated[str, Field(min_length=1, max_length=100)]
 )
 """A version by its id, its name or its hash."""

@@ -7,15 +7,16 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from app.api.deps import MAX_ID
 from app.api.schemas.document import Document, ListDocument
 from app.api.schemas.event import PresenceDocument
 from app.api.schemas.take import HandedBackDocument
+from app.finite import MAX_ID
+from app.review.datasets.naming import MAX_TITLE
 from app.review.queue.query import MAX_LISTED_LENGTH
-from app.review.work.batches import MAX_NAME, MOST_GROUPS, MOST_VERDICTS, Part
+from app.review.work.batches import MOST_GROUPS, MOST_VERDICTS, Part
 from app.review.work.progress import Pace
 
-Name = Annotated[str, Field(min_length=1, max_length=MAX_NAME)]
+Name = Annotated[str, Field(min_length=1, max_length=MAX_TITLE)]
 People = Annotated[list[Annotated[str, Field(max_length=60)]], Field(max_length=200)]
 
 

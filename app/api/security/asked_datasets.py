@@ -16,8 +16,9 @@ from starlette.types import Scope
 
 from app.api.security.bodies import VALUE
 from app.errors import ForbiddenError
+from app.finite import MAX_ID
 from app.review.people.logins import Login
-from app.review.people.ownership import MAX_ID, Kind, Named, Ownership, find_ownership, role_at
+from app.review.people.ownership import Kind, Named, Ownership, find_ownership, role_at
 from app.review.people.roles import EVERYTHING, Action, DatasetRoles, Role, Sight, require
 from app.review.queue.fields import BLIND
 from app.store.store import Store

@@ -16,8 +16,8 @@ from starlette.types import Message, Receive, Scope, Send
 from app.api.schemas.problem import MEDIA_TYPE
 from app.api.security.asked_datasets import TEXTS, Asked, Mention, OwnedMention
 from app.api.security.bodies import VALUE
-from app.finite import json_text
-from app.review.people.ownership import MAX_ID, Kind
+from app.finite import MAX_ID, json_text
+from app.review.people.ownership import Kind
 
 SENT = "touchline.sent"
 """Where a request's scope under other names has the one that was sent."""

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import re
 from collections import Counter
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from app.errors import InputError, NotFoundError
+from app.errors import NotFoundError
 from app.review.datasets.match_choice import no_match
+from app.review.datasets.naming import require_name
 from app.soccer.policy import Policy
 from app.store.clock import now
 from app.store.codecs import policy_to_json
@@ -29,8 +29,6 @@ from app.store.queue import refresh_queue
 from app.store.session import Session
 from app.store.sight import COPIES, EVERYTHING, Sight
 from app.store.store import Store
-
-_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._ -]{0,99}")
 
 
 @dataclass(frozen=True)
@@ -63,7 +61,7 @@ def insert_dataset(
     session: Session, name: str, policy: Policy, actor: str, copies: CopiesOf | None = None
 ) -> int:
     """Insert a dataset and its log entry; returns its id. ``copies``: of what it holds copies."""
-    require_name(name)
+    require_name(name, "a dataset")
     at = now()
     identity = insert_dataset_row(session, name, policy, at, copies=copies is not None)
     body = {"name": name, "policy": policy_to_json(policy)}
@@ -72,16 +70,6 @@ def insert_dataset(
         body["copies"] = vars(copies)
     append(session, [Entry("dataset", actor, at, body, dataset_id=identity)])
     return identity
-
-
-def require_name(name: str, pointer: str = "/name") -> None:
-    """Raise InputError where a dataset cannot be called so."""
-    if not _NAME.fullmatch(name) or name.isdigit():
-        raise InputError(
-            f'"{name}" cannot be the name of a dataset',
-            hint="Use letters, digits, spaces and . _ -, up to 100, not digits alone.",
-            pointer=pointer,
-        )
 
 
 def list_datasets(store: Store, sight: Sight = EVERYTHING) -> list[Dataset]:

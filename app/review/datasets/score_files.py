@@ -15,7 +15,7 @@ from app.datasets.sn_calibration_reader import read_line_files
 from app.errors import DatasetFormatError
 from app.geometry.camera import Camera
 from app.progress import TellProgress
-from app.soccer.annotation import Lines, make_lines
+from app.soccer.annotation import lines_without
 from app.soccer.frames import ImageSize
 from app.soccer.pitch import Pitch
 from app.solving.score import score, score_frame
@@ -49,7 +49,9 @@ def score_files(
     pitch = Pitch()
     scores = []
     for file in read_line_files(lines, size, report, by_folder=True):
-        kept = _without(file.lines, {marking for stem, marking in dropped if stem == file.stem})
+        kept = lines_without(
+            file.lines, {marking for stem, marking in dropped if stem == file.stem}
+        )
         camera = found.get(file.stem)
         scores.append(None if camera is None else score_frame(camera, kept, pitch, file.size))
         if progress is not None:
@@ -89,10 +91,6 @@ def _wrong_labels(findings: Path) -> set[tuple[str, str]]:
         raise DatasetFormatError(str(findings), None, None, "is not a list of findings")
     rows = [item for item in value if isinstance(item, dict) and item.get("kind") == "wrong_label"]
     return {(str(item.get("frame")), str(item.get("marking"))) for item in rows}
-
-
-def _without(lines: Lines, markings: set[str]) -> Lines:
-    return make_lines({name: points for name, points in lines.items() if name not in markings})
 
 
 def _times(cameras: Path) -> dict[str, Any]:

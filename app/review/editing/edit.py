@@ -14,13 +14,12 @@ from app.errors import InputError, NotFoundError
 from app.geometry.camera import Camera
 from app.soccer.annotation import BallAnnotation, Lines, make_lines
 from app.soccer.frames import ImagePoint
-from app.soccer.group import Group, SharedPosition, Station, View
+from app.soccer.group import CALIBRATIONS, Group, SharedPosition, Station, View
 from app.soccer.paint_evidence import PaintReading
 from app.soccer.picture import PictureGeometry
 from app.soccer.pitch import Pitch, canonical_marking
 from app.soccer.reasons import left_out
 
-CALIBRATIONS = ("given", "lines")
 MAX_POINTS = 1000
 """Most points of one marking."""
 MAX_COORDINATE = 1e6

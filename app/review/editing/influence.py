@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from app.geometry.camera import Camera
-from app.soccer.annotation import Lines, make_lines
+from app.soccer.annotation import lines_without
 from app.soccer.group import Station
 from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy
@@ -50,7 +50,7 @@ def influences(station: Station, pitch: Pitch, policy: CalibrationPolicy) -> lis
     trusting = replace(policy, check_labels=False)
     found = []
     for marking in station.lines:
-        used = _without(station.lines, {marking, *doubted})
+        used = lines_without(station.lines, {marking, *doubted})
         rest = calibrate_station(replace(station, lines=used), pitch, trusting).camera
         jac, error = (None, None) if rest is None else _seen_by(rest, marking, station, pitch)
         found.append(Influence(marking, whole.jac, jac, largest.get(marking), error))
@@ -69,7 +69,3 @@ def _seen_by(
         values.append(jaccard(found))
     seen = measured.get(marking)
     return tuple(values), None if seen is None else float(seen.distances.max())
-
-
-def _without(lines: Lines, markings: set[str]) -> Lines:
-    return make_lines({name: at for name, at in lines.items() if name not in markings})

@@ -16,7 +16,6 @@ from app.soccer.group import Group, Station, View
 from app.soccer.pitch import Pitch
 from app.store.codecs import (
     camera_from_json,
-    extras_to_json,
     group_head_to_json,
     station_from_json,
     view_from_json,
@@ -63,7 +62,7 @@ def base_digest(group: Group) -> str:
         [
             view_digest(view),
             view.station.key if view.station.shared else station_digest(view.station),
-            extras_to_json(view.extras),
+            view.extras.values(),
         ]
         for view in group.views
     ]

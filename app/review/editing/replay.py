@@ -21,7 +21,6 @@ from app.soccer.pitch import Pitch
 from app.store.codecs import (
     camera_from_json,
     extras_from_json,
-    extras_to_json,
     policy_from_json,
     positions_from_json,
     station_from_json,
@@ -308,7 +307,7 @@ def _group_row(ledger: Ledger, group_id: int) -> dict[str, Any]:
 
 
 def _packed(extras: Any) -> bytes:
-    return pack(extras_to_json(extras))
+    return pack(extras.values())
 
 
 _STEPS: dict[str, Callable[[Ledger, LogEntry], None]] = {

@@ -13,10 +13,10 @@ from app.errors import ImageError, InputError, NotFoundError, StorageError, TooL
 from app.evaluation.frame import Detection
 from app.progress import TellProgress
 from app.review.datasets.dataset import read_dataset_head
+from app.review.datasets.naming import require_name
 from app.review.evaluating.onnx_model import OnnxModel
 from app.review.evaluating.predictions import (
     LISTED,
-    check_name,
     frame_names,
     require_free,
     save_predictions,
@@ -69,7 +69,7 @@ def detect(
             could be read.
         ConflictError: There is a set of that name.
     """
-    check_name(request.name)
+    require_name(request.name, "a set of predictions", digits=True)
     with store.read() as session:
         found = read_dataset_head(session, dataset)
         require_free(session, found.id, request.name)

@@ -8,7 +8,7 @@ from typing import Any
 
 from app.errors import InputError, NotFoundError
 from app.evaluation.evaluate import Inputs, Options, evaluate
-from app.evaluation.frame import BOX_KINDS, Detection
+from app.evaluation.frame import Detection
 from app.evaluation.result import Evaluation
 from app.progress import TellProgress
 from app.review.datasets.dataset import DatasetHead, read_dataset_head
@@ -18,6 +18,7 @@ from app.review.evaluating.frames import LIVE_RULES, Truth, live_truth, version_
 from app.review.evaluating.predictions import read_set
 from app.review.evaluating.truth import AcceptedTruth
 from app.review.versions.version import Version, read_version
+from app.soccer.ball_boxes import BOX_KINDS
 from app.soccer.frames import Box
 from app.store.clock import now
 from app.store.evaluations import (
@@ -49,7 +50,7 @@ class EvaluationRequest:
         version: Frozen version; None: the dataset as it is now.
         groups: Without a version: ``passing``, ``accepted`` or ``all``.
         split: Frames of this split alone; None: all.
-        boxes: Which box of the dataset is the truth, one of ``frame.BOX_KINDS``.
+        boxes: Which box of the dataset is the truth, one of ``ball_boxes.BOX_KINDS``.
         min_score: Detections below take no part in localisation.
     """
 

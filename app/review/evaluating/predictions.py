@@ -23,6 +23,7 @@ from app.evaluation.prediction_run import ReadPredictions, listed
 from app.geometry.camera import Camera
 from app.review.answers.keep import Keep, keep_nothing
 from app.review.datasets.dataset import read_dataset_head
+from app.review.datasets.naming import require_name
 from app.review.evaluating.prediction_reader import PredictionFiles, Read, read_files
 from app.review.people.deeds import note_deed
 from app.soccer.frames import ImageSize
@@ -45,7 +46,6 @@ from app.store.views import dataset_views
 
 LISTED = 100
 """Unknown frames and problems that a report names; all are counted."""
-_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._ -]{0,99}")
 
 
 def add_predictions(
@@ -76,7 +76,7 @@ def add_predictions(
         ConflictError: There is a set of that name.
     """
     if name is not None:
-        check_name(name)
+        require_name(name, "a set of predictions", digits=True)
     first, files = files.first, files.with_format()
     names = frame_names(store, dataset)
     boxes, cameras = read(files, names, Limits.of(store.settings))
@@ -253,16 +253,6 @@ def set_name(path: Path) -> str:
         'best-model'
     """
     return re.sub(r"[^A-Za-z0-9]", "-", path.stem).strip("-")[:80] or "predictions"
-
-
-def check_name(name: str) -> None:
-    """Raise InputError where a set cannot have that name."""
-    if not _NAME.fullmatch(name):
-        raise InputError(
-            f'"{name}" cannot be the name of a set of predictions',
-            hint="Use letters, digits, spaces and . _ -, up to 100.",
-            pointer="/name",
-        )
 
 
 def require_free(session: Session, dataset_id: int, name: str) -> None:

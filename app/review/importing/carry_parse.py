@@ -10,14 +10,13 @@ from app.datasets.file_tree import BROKEN, FileTree
 from app.datasets.json_text import read_json
 from app.datasets.report import Report
 from app.errors import DatasetFormatError, InputError, ReviewError
-from app.review.editing.edit import CALIBRATIONS
 from app.review.editing.lineage import logged_group, pitch_size
 from app.review.importing.carry import EDIT_KINDS, FORMAT, FORMAT_VERSION, HEAD
 from app.review.importing.group_limits import MAX_POINTS, MAX_VIEWS, points_of
 from app.review.policies.text import CUSTOM, policy_values, policy_with
 from app.review.verdicts.verdict import STATES
 from app.soccer.annotation import Extras
-from app.soccer.group import Group, Station, View
+from app.soccer.group import CALIBRATIONS, Group, Station, View
 from app.soccer.pitch import canonical_marking
 from app.soccer.policy import PAPER, Policy
 from app.soccer.reasons import MAX_NOTE, REASONS, left_out

@@ -12,7 +12,7 @@ from app.review.datasets.dataset import read_dataset_head
 from app.review.importing.ingest import IngestReport, ensure_dataset
 from app.soccer.annotation import Extras
 from app.store.clock import now
-from app.store.codecs import extras_from_json, extras_to_json
+from app.store.codecs import extras_from_json
 from app.store.log import Entry, append
 from app.store.session import Session
 from app.store.spare import known_spare, put_spare, spare_rows
@@ -73,7 +73,7 @@ def _keep(
     known = known_spare(session, dataset_id, {item.frame for item in batch})
     fresh = {}
     for item in batch:
-        place, body = (item.camera, item.frame), pack(extras_to_json(item.extras))
+        place, body = (item.camera, item.frame), pack(item.extras.values())
         if known.get(place) == body:
             report.unchanged += 1
         else:

@@ -11,7 +11,8 @@ from app.datasets.file_tree import Root
 from app.errors import InputError
 from app.progress import TellProgress
 from app.review.answers.keep import Keep, keep_nothing
-from app.review.datasets.dataset import get_dataset_head, require_name
+from app.review.datasets.dataset import get_dataset_head
+from app.review.datasets.naming import require_name
 from app.review.editing.paint import has_pictures
 from app.review.importing.folders import resolve_folder
 from app.review.importing.import_child import Outcome, import_apart
@@ -96,7 +97,7 @@ def request_import(
     with store.read() as session:
         row = find_dataset(session, request.dataset)
     if row is None:
-        require_name(request.dataset, "/dataset")
+        require_name(request.dataset, "a dataset", pointer="/dataset")
     would = "Look at" if request.dry_run else "Import"
     return jobs.submit(
         KIND,

@@ -22,7 +22,6 @@ from app.store.uploads import get_upload
 
 MIN_HASH = 8
 """So many digits of a hash name a version."""
-MAX_ID = 2**63 - 1
 
 
 class Kind(StrEnum):

@@ -9,11 +9,10 @@ from collections.abc import Sequence
 from typing import Any
 
 from app.errors import InputError
-from app.finite import json_text
+from app.finite import MAX_ID, json_text
 from app.review.queue.query import Query
 from app.store.order import Key
 
-_LARGEST = 2**63 - 1
 """No key of a row is beyond; NaN is not below it either."""
 
 
@@ -52,4 +51,4 @@ def _is_key(value: Any) -> bool:
         return True
     if not isinstance(value, (int, float)):
         return False
-    return abs(value) <= _LARGEST
+    return abs(value) <= MAX_ID

@@ -20,6 +20,7 @@ from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 
 from app.errors import InputError
+from app.finite import MAX_ID
 from app.review.queue.fields import BY_NAME, FIELDS, ORDERS
 from app.store import conditions
 from app.store.conditions import Condition
@@ -30,7 +31,6 @@ MAX_LENGTH = 1000
 MAX_LISTED_LENGTH = 100_000
 """Of a query that comes in a body and lists groups one by one: about 15,000 ids."""
 MAX_TERMS = 30
-MAX_ID = 2**63 - 1
 
 NUMBERS = {name: item.column for name, item in BY_NAME.items() if item.column}
 """Fields that compare with < <= > >= = and with :, which is =, by the column that they mean;

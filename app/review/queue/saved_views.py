@@ -7,6 +7,7 @@ from typing import Any
 
 from app.errors import ConflictError, InputError, NotFoundError
 from app.review.answers.keep import Keep, keep_nothing
+from app.review.datasets.naming import checked_title
 from app.review.queue.query import parse_query
 from app.store.listing import Listing
 from app.store.saved_views import (
@@ -18,7 +19,6 @@ from app.store.saved_views import (
 from app.store.session import Session
 from app.store.store import Store
 
-MAX_NAME = 80
 MAX_VIEWS = 200
 """Of one dataset: a list that people read."""
 
@@ -57,7 +57,7 @@ def save_view(
         InputError: There is no name, or the query cannot be understood.
         ConflictError: The name is taken; nobody's view is replaced unseen.
     """
-    name = _checked(name)
+    name = checked_title(name, "a saved view")
     parse_query(query)
     with store.write() as session:
         names = [row.name for row in dataset_saved_views(session, dataset_id)]
@@ -97,13 +97,6 @@ def _read(session: Session, view_id: int) -> SavedView:
     if row is None:
         raise NotFoundError(f"there is no saved view {view_id}")
     return _saved_view(row, _matching(session, row))
-
-
-def _checked(name: str) -> str:
-    name = name.strip()
-    if not name or len(name) > MAX_NAME or not name.isprintable():
-        raise InputError(f"a saved view has a name of 1 to {MAX_NAME} letters", pointer="/name")
-    return name
 
 
 def _matching(session: Session, row: Any) -> int:

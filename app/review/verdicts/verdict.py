@@ -11,7 +11,7 @@ from app.review.editing.etags import require_said, require_unchanged
 from app.review.editing.state import GroupState
 from app.review.editing.submit import read_solved
 from app.soccer.group import Group
-from app.soccer.reasons import MAX_NOTE, REASONS
+from app.soccer.reasons import REASONS, checked_note, require_words
 from app.soccer.solution import Solution
 from app.store.clock import now
 from app.store.groups import StoredGroup
@@ -80,19 +80,16 @@ def check_verdict(state: str, reason: str | None, note: str | None) -> Verdict:
     Raises:
         InputError: Unknown state or reason, or a note is missing or too long.
     """
-    note = (note or "").strip() or None
+    note = checked_note(note)
     if state not in STATES:
         known = ", ".join(STATES)
         raise InputError(f'"{state}" is not a verdict; verdicts are {known}', pointer="/state")
-    if note is not None and len(note) > MAX_NOTE:
-        raise InputError(f"a note has at most {MAX_NOTE} characters", pointer="/note")
     if state != "rejected" and reason is not None:
         raise InputError("only a rejection has a reason", pointer="/reason")
     if state == "rejected" and reason not in REASONS:
         known = ", ".join(REASONS)
         raise InputError(f"a rejection needs a reason: {known}", pointer="/reason")
-    if reason == "other" and note is None:
-        raise InputError('the reason "other" needs a note', pointer="/note")
+    require_words(reason, note)
     return Verdict(state, reason, note)
 
 

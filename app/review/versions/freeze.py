@@ -6,22 +6,23 @@ version's own row come last, in one. Killed anywhere and started again it ends i
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from app.canonical import canonical
+from app.canonical import canonical, digest_of
 from app.datasets.manifest import software_version
 from app.errors import ConflictError, InputError
 from app.finite import quoted
 from app.progress import TellProgress
 from app.review.datasets.dataset import DatasetHead, read_dataset_head
 from app.review.datasets.licence import licence_text
+from app.review.datasets.naming import require_name
 from app.review.versions.membership import RULES, Candidate, read_candidates, require_solved
 from app.review.versions.version import Version, calibration_names, next_name, read_version
 from app.review.versions.version_hash import version_hash
 from app.soccer.group import Group
+from app.soccer.reasons import checked_note
 from app.soccer.solution import SOLVER_VERSION
 from app.soccer.split import Split, Splitter
 from app.store.clock import now
@@ -30,7 +31,6 @@ from app.store.frozen import (
     CALIBRATION,
     SOLUTION,
     body_of,
-    digest_of,
     frames_of,
     freeze_said,
     insert_frozen,
@@ -46,11 +46,9 @@ from app.store.store import Store
 from app.store.stored_json import Json, pack
 from app.store.versions import BATCH, has_version, insert_version
 
-MAX_NOTE = 2000
 MAX_LICENCE = 100_000
 NO_SPLIT = "none"
 """What counts call groups and views that are in no split, or in two."""
-_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._ -]{0,99}")
 
 
 @dataclass(frozen=True)
@@ -74,20 +72,14 @@ class FreezeRequest:
     def check(self) -> None:
         """Raise InputError where it says something impossible."""
         self.split.check()
-        name = self.name
-        if name is not None and (not _NAME.fullmatch(name) or name.isdigit()):
-            raise InputError(
-                f'"{name}" cannot be the name of a version',
-                hint="Use letters, digits, spaces and . _ -, up to 100, not digits alone.",
-                pointer="/name",
-            )
+        if self.name is not None:
+            require_name(self.name, "a version")
         if self.groups not in RULES:
             raise InputError(
                 f'groups must be "{RULES[0]}" or "{RULES[1]}", not {quoted(self.groups)}',
                 pointer="/groups",
             )
-        if len(self.note) > MAX_NOTE:
-            raise InputError(f"a note has at most {MAX_NOTE} characters", pointer="/note")
+        checked_note(self.note)
         if len(self.licence) > MAX_LICENCE:
             raise InputError(f"a licence has at most {MAX_LICENCE} characters", pointer="/licence")
 

@@ -12,6 +12,7 @@ from typing import Any
 from app.errors import ConflictError, InputError, NotFoundError
 from app.review.answers.keep import Keep, keep_nothing
 from app.review.datasets.dataset import dataset_id
+from app.review.datasets.naming import checked_title
 from app.review.people.bell import RingKind, tell
 from app.review.people.members import list_members
 from app.review.people.roles import Action, may
@@ -46,7 +47,6 @@ MOST_BATCHES = 500
 """Of one dataset: a list that people read."""
 MOST_VERDICTS = 5
 """So many independent verdicts can a batch ask for."""
-MAX_NAME = 80
 WORK = "work"
 """Kind of the log's entries about batches; they change no group."""
 
@@ -273,7 +273,7 @@ def change_batch(
     before = get_batch(store, batch_id)
     values: dict[str, Any] = {}
     if name is not None:
-        values["name"] = _checked_name(name)
+        values["name"] = checked_title(name, "a batch")
     if due is not None or never_due:
         values["due"] = None if due is None else due.isoformat()
     if state is not None:
@@ -379,18 +379,11 @@ def _ids(store: Store, dataset: int, part: Part, names: Iterable[str]) -> list[i
 
 
 def _check(new: NewBatch) -> None:
-    _checked_name(new.name)
+    checked_title(new.name, "a batch")
     if not 1 <= new.verdicts <= MOST_VERDICTS:
         raise InputError(
             f"a batch asks for 1 to {MOST_VERDICTS} verdicts on each group", pointer="/verdicts"
         )
-
-
-def _checked_name(name: str) -> str:
-    name = name.strip()
-    if not name or len(name) > MAX_NAME or not name.isprintable():
-        raise InputError(f"a batch has a name of 1 to {MAX_NAME} letters", pointer="/name")
-    return name
 
 
 def _nothing(found: Sequence[int]) -> InputError:
