@@ -187,7 +187,7 @@ def export(
         from app.commands import remote_files
 
         if images is Images.LINK:
-            raise typer.BadParameter("a server copies frames, or leaves them out")
+            raise typer.BadParameter("a server cannot link to frames here; choose copy or none")
         request = {"dataset": dataset, "format": format_, "all": everything, **asked}
         with connected(server) as client, show_progress("Exporting") as progress:
             sent_to = out if is_address(out) else Path(out)

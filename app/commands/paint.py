@@ -77,7 +77,9 @@ def snap(
     from app.review.datasets.paint_files import snap_files
 
     if size != "native":
-        raise typer.BadParameter("the size of each picture is its own", param_hint="--size")
+        raise typer.BadParameter(
+            "each picture is read in its own size; leave this out", param_hint="--size"
+        )
     with show_progress("Snapping") as progress:
         rows = snap_files(lines, images, out, settings=read_settings(), progress=progress)
     _print_rows(rows, json_)

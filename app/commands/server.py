@@ -142,7 +142,7 @@ def _require_version(server: Server, client: Client) -> None:
     if theirs.split(".")[:2] != mine.split(".")[:2]:
         raise InputError(
             f"{server.url} runs Touchline {theirs}, and this is {mine}",
-            hint=f"Install that version: pip install 'touchline=={theirs}'.",
+            hint=f"Install the wheel of Touchline {theirs} here, or name another server.",
         )
 
 

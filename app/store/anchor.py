@@ -171,7 +171,8 @@ def _require_anchored(connection: Connection, anchor: Anchor, database: str, hin
     tables = inspect(connection).get_table_names()
     if "log" not in tables:
         raise DamagedError(
-            f"{database} is empty, but {anchor.entries:,} entries were said in this home", hint=hint
+            f"{database} is empty, but this home has noted {anchor.entries:,} entries of a log",
+            hint=hint,
         )
     if "installation" in tables:
         own = connection.execute(text("SELECT key FROM installation")).scalar()
@@ -180,8 +181,8 @@ def _require_anchored(connection: Connection, anchor: Anchor, database: str, hin
     entries = connection.execute(text("SELECT coalesce(max(id), 0) FROM log")).scalar_one()
     if entries < anchor.entries:
         raise DamagedError(
-            f"the log in {database} ends after {entries:,} entries, but {anchor.entries:,} were"
-            " said in this home",
+            f"the log in {database} ends after {entries:,} entries, but this home has noted"
+            f" {anchor.entries:,}",
             hint=hint,
         )
     if anchor.entries:
@@ -189,7 +190,7 @@ def _require_anchored(connection: Connection, anchor: Anchor, database: str, hin
         found = connection.execute(query, {"id": anchor.entries}).scalar()
         if found != anchor.hash:
             raise DamagedError(
-                f"entry {anchor.entries:,} of the log in {database} is not the one that was said"
-                " in this home",
+                f"entry {anchor.entries:,} of the log in {database} is not the one that this home"
+                " has noted",
                 hint=hint,
             )

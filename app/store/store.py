@@ -213,7 +213,7 @@ class Store:
         """
         if self._damage is not None:
             message, hint = self._damage
-            raise DamagedError(f"no change is taken: {message}", hint=hint)
+            raise DamagedError(f"nothing can be changed now: {message}", hint=hint)
         if self._file is not None:
             with self._watched():
                 self._file.require_there()
@@ -260,8 +260,7 @@ class Store:
         said = max(there.entries, self._anchor.entries)
         if session.log_before < said:
             raise DamagedError(
-                f"the log ends after {session.log_before:,} entries, but {said:,} were said in this"
-                " home",
+                f"the log ends after {session.log_before:,} entries, but this home has noted {said:,}",
                 hint=EXAMINE,
             )
 

@@ -131,7 +131,7 @@ def work_apart(
 
     Raises:
         ReviewError: As the work raised it; ``JobCancelled`` likewise.
-        DamagedError: It met damage; no change is taken from then on, here either.
+        DamagedError: It met damage; nothing can be changed now from then on, here either.
         ChildEnded: It went beyond the allowance, or the process was killed or crashed.
     """
     with ExitStack() as turn, closing(Child(allowance)) as child:

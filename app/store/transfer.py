@@ -98,7 +98,10 @@ def _transfer(
 ) -> Transferred:
     anchor = anchor_of(session)
     if anchor is None:
-        raise InputError("the database has no installation yet", hint="Run touchline migrate.")
+        raise InputError(
+            "the database that is copied was never set up by Touchline",
+            hint="Run touchline migrate.",
+        )
     _begin(target, dialect, anchor.installation)
     copied = 0
     for tables in _steps():

@@ -36,7 +36,7 @@ const isReady = computed(() => {
 export const frozen = computed(() => {
 	const one = take.value;
 	if (one === null || one.group !== groupDocument.value?.id) return '';
-	if (one.settled !== null) return 'It was decided about this annotation; it changes no more.';
+	if (one.settled !== null) return 'This annotation was decided about already; it changes no more.';
 	const mine = !isTeam || one.person === myName.value;
 	if (one.handed_in !== null) return mine ? '' : `${one.person} has handed this in; hand it back, or take it over.`;
 	return mine ? '' : `${one.person} judges this annotation.`;

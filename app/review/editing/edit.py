@@ -117,7 +117,10 @@ class SetStationCamera:
     def apply(self, station: Station) -> Station:
         """The station with that camera."""
         if self.given is None and self.covariance is not None:
-            raise InputError("a covariance is that of a camera", pointer="/covariance")
+            raise InputError(
+                "a covariance needs the camera that it belongs to, in `given`",
+                pointer="/covariance",
+            )
         return replace(
             station,
             given=self.given,

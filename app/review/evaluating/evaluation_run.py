@@ -10,11 +10,12 @@ from app.errors import InputError, NotFoundError
 from app.evaluation.evaluate import Inputs, Options, evaluate
 from app.evaluation.frame import Detection
 from app.evaluation.result import Evaluation
+from app.finite import quoted
 from app.progress import TellProgress
 from app.review.datasets.dataset import DatasetHead, read_dataset_head
 from app.review.evaluating.careful_boxes import careful_boxes
 from app.review.evaluating.evaluation import read_evaluation
-from app.review.evaluating.frames import LIVE_RULES, Truth, live_truth, version_truth
+from app.review.evaluating.frames import LIVE_RULES, Truth, live_truth, unknown_rule, version_truth
 from app.review.evaluating.predictions import read_set
 from app.review.evaluating.truth import AcceptedTruth
 from app.review.versions.version import Version, read_version
@@ -68,9 +69,15 @@ class EvaluationRequest:
         if self.predictions is None and self.careful is None:
             raise InputError("there is nothing to evaluate", pointer="/predictions")
         if self.boxes not in BOX_KINDS:
-            raise InputError(f"boxes are {', '.join(BOX_KINDS)}", pointer="/boxes")
+            raise InputError(
+                f"boxes must be one of {', '.join(BOX_KINDS)}, not {quoted(self.boxes)}",
+                pointer="/boxes",
+            )
         if not 0 <= self.min_score <= 1:
-            raise InputError("a score lies between 0 and 1", pointer="/min_score")
+            raise InputError(
+                f"a score lies between 0 and 1, and min_score is {self.min_score:g}",
+                pointer="/min_score",
+            )
         if len(self.name) > MAX_NAME:
             raise InputError(f"a name has at most {MAX_NAME} characters", pointer="/name")
 
@@ -146,7 +153,7 @@ def check_evaluation(store: Store, dataset: str | int, request: EvaluationReques
         if request.version is not None:
             _own_version(session, found, request.version)
         elif request.groups not in LIVE_RULES:
-            raise InputError(f"groups are {', '.join(LIVE_RULES)}", pointer="/groups")
+            raise unknown_rule(request.groups)
 
 
 def _truth(session: Session, dataset: DatasetHead, request: EvaluationRequest) -> Truth:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from app.datasets.manifest import software_version
 from app.errors import ConflictError, InputError
 from app.evaluation.frame import Frame
+from app.finite import quoted
 from app.review.datasets.dataset import DatasetHead
 from app.review.editing.state import read_states
 from app.review.versions.membership import RULES, read_candidates, require_solved
@@ -75,7 +76,7 @@ def live_truth(session: Session, dataset: DatasetHead, rule: str, split: str | N
         ConflictError: Groups that might take part have no solution.
     """
     if rule not in LIVE_RULES:
-        raise InputError(f"groups are {', '.join(LIVE_RULES)}", pointer="/groups")
+        raise unknown_rule(rule)
     candidates = read_candidates(session, dataset.id, "passing" if rule == "all" else rule)
     require_solved(candidates)
     ids = [item.id for item in candidates if item.why is None or rule == "all"]
@@ -158,3 +159,9 @@ def _pins(policy: Policy, solver_version: str) -> dict[str, Json]:
         "solver_version": solver_version,
         "software_version": software_version(),
     }
+
+
+def unknown_rule(rule: str) -> InputError:
+    """The error where somebody wants groups by a rule that is none of ``LIVE_RULES``."""
+    known = ", ".join(LIVE_RULES)
+    return InputError(f"groups must be one of {known}, not {quoted(rule)}", pointer="/groups")

@@ -10,6 +10,7 @@ from app.datasets.file_tree import BROKEN, FileTree
 from app.datasets.json_text import read_json
 from app.datasets.report import Report
 from app.errors import DatasetFormatError, InputError, ReviewError
+from app.finite import json_text
 from app.review.editing.lineage import logged_group, pitch_size
 from app.review.importing.carry import EDIT_KINDS, FORMAT, FORMAT_VERSION, HEAD
 from app.review.importing.group_limits import MAX_POINTS, MAX_VIEWS, points_of
@@ -127,7 +128,7 @@ def parse_station(value: Json) -> CarriedStation:
         station = _station(_mapping(value)["station"])
         base = station if value["base"] is None else _station(value["base"])
         if not (station.shared and base.shared and station.key == base.key):
-            raise InputError("names two static cameras, or one that is not static")
+            raise InputError("has a `base` that is another camera, or no static one")
         return CarriedStation(station, base, _states(value["states"]), _log(value["log"]))
     except _MISSHAPEN as error:
         raise _problem(error) from error
@@ -143,7 +144,7 @@ def parse_group(value: Json, shared: Mapping[str, Station]) -> CarriedGroup:
         group = _group(_mapping(value)["group"], shared)
         base = group if value["base"] is None else _group(value["base"], shared)
         if group.key != base.key:
-            raise InputError("names two groups")
+            raise InputError("has a `base` that is another group")
         return CarriedGroup(
             group=group,
             base=base,
@@ -282,19 +283,28 @@ def _states(value: Json) -> tuple[str, ...]:
     return tuple(_text(item) for item in _list(value, MAX_STATES))
 
 
+def _kind(value: Json) -> str:
+    """What a value is, for a sentence."""
+    if isinstance(value, str):
+        return f"a text of {len(value)} letters"
+    if isinstance(value, list):
+        return f"a list of {len(value)}"
+    return "an object" if isinstance(value, dict) else json_text(value)
+
+
 def _mapping(value: Json) -> dict[str, Json]:
     if not isinstance(value, dict):
-        raise InputError("has another value where an object is expected")
+        raise InputError(f"has {_kind(value)} where an object is expected")
     return value
 
 
 def _list(value: Json, most: int) -> list[Json]:
     if not isinstance(value, list) or len(value) > most:
-        raise InputError(f"has another value where a list is expected, of at most {most}")
+        raise InputError(f"has {_kind(value)} where a list of at most {most} is expected")
     return value
 
 
 def _text(value: Json, *, empty: bool = False, most: int = MAX_TEXT) -> str:
     if not isinstance(value, str) or len(value) > most or not (value or empty):
-        raise InputError("has another value where a text is expected")
+        raise InputError(f"has {_kind(value)} where a text of at most {most} letters is expected")
     return value

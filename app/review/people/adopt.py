@@ -34,7 +34,10 @@ def adopt(store: Store, person_id: int, *, actor: str) -> str:
             raise NotFoundError(f"there is nobody with id {person_id}")
         before = find_alias(session, LOCAL_USER)
         if before is not None:
-            raise ConflictError(f"what {LOCAL_USER} did is shown as {before}'s; it is given once")
+            raise ConflictError(
+                f"what was done as {LOCAL_USER} is shown as {before}'s already",
+                hint="It can be given to one person, and only once.",
+            )
         at = now()
         body = {"person": person.name, "did": "adopted", "role": person.role, "from": LOCAL_USER}
         append(session, [Entry(PERSON, actor, at, body)])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 
 from app.errors import ForbiddenError, InputError
+from app.finite import quoted
 from app.soccer.actors import LOCAL_USER, person_of
 from app.store.clock import now
 from app.store.log import Entry, append
@@ -25,8 +26,9 @@ def checked_name(said: str) -> str:
     name = said.strip().lower()
     if not _NAME.fullmatch(name) or name in _TAKEN:
         raise InputError(
-            "a name is up to 40 small letters, digits and . _ - , and none that the log knows"
-            " otherwise",
+            f"{quoted(name)} cannot be the name of a person",
+            hint="Use up to 40 small letters, digits and . _ -, with a letter or digit at both ends;"
+            f" {', '.join(sorted(_TAKEN))} mean something else here.",
             pointer="/name",
         )
     return name

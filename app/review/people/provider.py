@@ -229,7 +229,7 @@ class Provider:
 
     def _other(self) -> ConflictError:
         return ConflictError(
-            f"{self._rules.label} is not what this server was told",
+            f"{self._rules.label} answers as another provider than the one in this server's settings",
             hint="Whoever runs this server can ask touchline doctor.",
         )
 

@@ -196,12 +196,12 @@ def _of_version(
 def _nothing(source: TruthSource) -> InputError:
     if source is TruthSource.SAMPLE:
         return InputError(
-            "nothing is known of these groups",
+            "the truth of none of these groups is known",
             hint=f"Their frames have to lie where the sample was written, beside its {TRUTH}.",
             pointer="/source",
         )
     return InputError(
-        "this version holds none of these groups upon which people agreed or somebody decided",
+        "this version holds none of these groups as several people agreed on it, or as somebody decided",
         hint="Let several people annotate them in a batch first.",
         pointer="/version",
     )

@@ -95,7 +95,7 @@ def begin_thread(
     """
     text = _checked(text)
     if at is not None and view is None:
-        raise InputError("a place is one of a view", pointer="/view")
+        raise InputError("a place in a picture needs the view that it is in", pointer="/view")
     with store.write() as session:
         group = _need_group(session, group_id)
         if view is not None and view not in group.views:

@@ -153,7 +153,7 @@ class TestApart:
     ) -> None:
         monkeypatch.setattr("app.api.previews.solve_apart", see_damage)
         assert preview(api).status_code == 503
-        with pytest.raises(DamagedError, match="no change is taken: a row is torn"):
+        with pytest.raises(DamagedError, match="nothing can be changed now: a row is torn"):
             app.state.services.store.require_undamaged()
 
     def test_one_that_broke_down_is_said_and_another_takes_its_place(

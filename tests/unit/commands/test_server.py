@@ -155,7 +155,7 @@ def test_what_is_imported_frozen_exported_and_measured_there_is_as_here(
     for run, every in ((remote, "5"), (local, "7")):
         run("batch", "change", rest, "--gold-every", every)
         assert get_batch(place.store, int(rest)).gold_every == int(every)
-        assert "nothing is known" in str(run("batch", "gold", "small").exception)
+        assert "the truth of none" in str(run("batch", "gold", "small").exception)
     remote("batch", "change", rest, "--no-gold")
     assert get_batch(place.store, int(rest)).gold_every is None
     assert remote("batch", "change", rest).exit_code == 2

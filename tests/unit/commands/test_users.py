@@ -122,7 +122,7 @@ class TestUsers:
         run("users", "add", "bob")
         again = run("users", "adopt", "bob")
         assert isinstance(again.exception, ConflictError)
-        assert "what local did is shown as anna's" in str(again.exception)
+        assert "what was done as local is shown as anna's" in str(again.exception)
         assert str(run("users", "adopt", "carl").exception) == "there is no carl"
 
     def test_a_second_factor_is_required_and_taken_away(self, store: Store) -> None:

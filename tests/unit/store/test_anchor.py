@@ -117,9 +117,9 @@ class TestBeforeTheCommit:
     ) -> None:
         say(store, 5)
         cut_log(store, after=3)
-        with pytest.raises(DamagedError, match="ends after 3 entries, but 5 were said"):
+        with pytest.raises(DamagedError, match="ends after 3 entries, but this home has noted 5"):
             say_at_once(store, times)
-        with pytest.raises(DamagedError, match="no change is taken"):
+        with pytest.raises(DamagedError, match="nothing can be changed now"):
             say(store)
         assert (log_ids(store), anchored(store).entries) == ([1, 2, 3], 5)
 
@@ -128,7 +128,7 @@ class TestBeforeTheCommit:
         with closing(Store.open(store.settings)) as other:
             say(other, 3)
         cut_log(store, after=4)
-        with pytest.raises(DamagedError, match="ends after 4 entries, but 5 were said"):
+        with pytest.raises(DamagedError, match="ends after 4 entries, but this home has noted 5"):
             say(store)
 
     def test_beside_the_writes_of_another_process_the_log_grows(self, store: Store) -> None:
@@ -148,7 +148,7 @@ class TestBeforeTheCommit:
             say(store)
             cut_log(store, after=1)
             # What this process has said itself it knows all the same.
-            with pytest.raises(DamagedError, match="but 2 were said"):
+            with pytest.raises(DamagedError, match="but this home has noted 2"):
                 say(store)
 
     def test_a_home_whose_anchor_was_taken_away_believes_its_database(self, store: Store) -> None:

@@ -139,7 +139,7 @@ class TestRequireSound:
         log = log_file(settings.database_file)
         whole = log.read_bytes()
         log.write_bytes(damage(whole))
-        refused(settings, r"the log .* ends after \d+ entries, but 43 were said")
+        refused(settings, r"the log .* ends after \d+ entries, but this home has noted 43")
         log.write_bytes(whole)
         assert entries(settings) == 43
 
@@ -169,7 +169,7 @@ class TestRequireSound:
         settings = killed(store, tmp_path / "50% of #1")
         log = log_file(settings.database_file)
         log.write_bytes(cut(log.read_bytes()))
-        refused(settings, "but 40 were said")
+        refused(settings, "but this home has noted 40")
 
     def test_a_database_that_is_cut_short_is_refused(self, store: Store, tmp_path: Path) -> None:
         say(store, 20)
@@ -209,7 +209,7 @@ class TestAnchor:
         early = killed(store, tmp_path / "left", "touchline.db")
         say(store, 1)
         killed(store, tmp_path / "left", "home.json")
-        refused(early, "ends after 5 entries, but 6 were said")
+        refused(early, "ends after 5 entries, but this home has noted 6")
 
     def test_a_log_that_says_something_else_is_refused(self, store: Store, tmp_path: Path) -> None:
         checkpoint(store)
@@ -226,7 +226,7 @@ class TestAnchor:
         with closing(sqlite.connect(str(settings.database_file))) as empty:
             empty.execute("PRAGMA journal_mode = WAL")
             empty.execute("CREATE TABLE something (id)")
-        refused(settings, "is empty, but 4 entries")
+        refused(settings, "is empty, but this home has noted 4 entries")
 
     def test_the_database_of_another_installation_is_refused(
         self, store: Store, tmp_path: Path

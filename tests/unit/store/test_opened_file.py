@@ -38,7 +38,7 @@ class TestAFileThatIsTakenAway:
         with pytest.raises(DamagedError, match=said), store.write(lasting=lasting) as session:
             session.execute(text(INSERT.format("lost")))
             take(store.settings.database_file)
-        with pytest.raises(DamagedError, match=f"no change is taken: .* {said}") as caught:
+        with pytest.raises(DamagedError, match=f"nothing can be changed now: .* {said}") as caught:
             add(store, "late")
         assert "Stop the server and put the file that was moved back" in str(caught.value.hint)
         assert names(store) == ["kept"]

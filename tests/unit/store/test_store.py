@@ -105,7 +105,7 @@ class TestRequireWhole:
         monkeypatch.setattr("app.store.store.file_faults", lambda *_: ["Tree 5 is torn"])
         with pytest.raises(DamagedError, match=r"touchline\.db is damaged$"):
             store.require_whole()
-        with pytest.raises(DamagedError, match="no change is taken"):
+        with pytest.raises(DamagedError, match="nothing can be changed now"):
             add(store, "late")
 
     @pytest.mark.file_of_sqlite("what is in the file")

@@ -143,7 +143,7 @@ class TestDamage:
             problem = answer.json()
             assert "touchline doctor" in problem["hint"]
             assert answer.headers["content-type"] == "application/problem+json"
-        said = f"no change is taken: {first.json()['detail']}"
+        said = f"nothing can be changed now: {first.json()['detail']}"
         assert [answer.json()["detail"] for answer in (refused, ready)] == [said, said]
         assert api.get(f"{API}/pitch").status_code == 200
 

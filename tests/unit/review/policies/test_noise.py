@@ -225,5 +225,5 @@ class TestApplyNoise:
         again = read_noise(store, "demo")
         assert all(item.agrees for item in again.advice)
         assert (again.values, again.notices) == ({}, ())
-        with pytest.raises(InputError, match="need not change"):
+        with pytest.raises(InputError, match="shows no other noise"):
             apply_noise(store, again, actor="ben")

@@ -111,10 +111,10 @@ class TestSample:
     def test_other_groups_of_the_same_names_have_no_truth(self, store, scenes, tmp_path) -> None:
         truth = tmp_path / TRUTH
         truth.rename(tmp_path / "elsewhere.json")
-        with pytest.raises(InputError, match="nothing is known"):
+        with pytest.raises(InputError, match="the truth of none"):
             mark_known(store, "demo", SAMPLE, actor="lea")
         truth.symlink_to(tmp_path / "elsewhere.json")
-        with pytest.raises(InputError, match="nothing is known"):
+        with pytest.raises(InputError, match="the truth of none"):
             mark_known(store, "demo", SAMPLE, actor="lea")
 
 
