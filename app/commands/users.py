@@ -111,7 +111,7 @@ def take(name: Name, dataset: Dataset, json_: Json = False) -> None:
 @commands.command()
 def adopt(name: Name, json_: Json = False) -> None:
     """Show what was done before there were accounts as somebody's; once. The log keeps its names."""
-    from app.review.people.adopt import adopt as give
+    from app.review.people.local_deeds import adopt as give
     from app.review.people.people import find_person
 
     with opened_store() as store:

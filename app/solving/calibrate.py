@@ -38,8 +38,8 @@ from app.solving.labels import find_suspects
 from app.solving.main_position import PositionPrior, match_prior
 from app.solving.observations import Observations, observe
 from app.solving.paint_camera import PaintProblem, solve_paint
-from app.solving.picture import find_picture
 from app.solving.picture_camera import WIDTH, PictureProblem, estimate_picture, warp_of
+from app.solving.picture_findings import find_picture
 from app.solving.resect import Resection, ResectionProblem, measurement_count
 
 MIN_MEASUREMENTS = 7

@@ -10,7 +10,7 @@ from app.soccer.finding import Finding, Fix
 from app.soccer.frames import ImageSize, height_above_grass
 from app.soccer.solution import Calibration
 from app.solving.calibrate import MAX_POSITION_SIGMA_M
-from app.solving.picture import BELIEVED, MIN_SHIFT, MIN_STRETCH
+from app.solving.picture_findings import BELIEVED, MIN_SHIFT, MIN_STRETCH
 
 MAX_CAMERA_HEIGHT_M = 100.0
 MAX_CAMERA_DISTANCE_M = 250.0

@@ -8,10 +8,10 @@ from sqlalchemy import bindparam, delete, exists, select, update
 
 from app.finite import json_text
 from app.store.dialect.statements import numbers_given
-from app.store.outbox import DONE, announce_batch
 from app.store.session import Session
 from app.store.tables.webhooks import WebhookModel
 from app.store.tables.work import BatchGroupModel, BatchModel, LeaseModel
+from app.store.webhook_outbox import DONE, announce_batch
 from app.store.work import OPEN
 
 _BATCH = BatchModel.__table__

@@ -19,7 +19,7 @@ from app.store.tables.webhooks import DeliveryModel, WebhookModel
 WAITING, DELIVERED, FAILED = "waiting", "delivered", "failed"
 """States of a delivery."""
 _TOLD_APART = ("work",)
-"""Kinds of entries of which ``app.store.outbox`` tells."""
+"""Kinds of entries of which ``app.store.webhook_outbox`` tells."""
 _WEBHOOKS = select(*WebhookModel.__table__.columns)
 _DELIVERIES = select(*DeliveryModel.__table__.columns)
 

@@ -1,7 +1,7 @@
 // @ts-check
 /** The colours of tokens.css for canvases, which cannot read custom properties themselves. */
 
-import { followed, tokens } from './tokens.js';
+import { followed, tokens } from './css_values.js';
 
 const NAMES = /** @type {const} */ ([
 	'ok', 'warn', 'bad', 'muted', 'ink', 'halo', 'point', 'human', 'optimised', 'reprojected', 'predicted',

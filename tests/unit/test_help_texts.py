@@ -28,7 +28,7 @@ PLAIN_WORDS = """
     take takes gold guidelines mixing copying copies own errors parts guideline datasets
     adjudicate compare differences distance limits other panel rater summary weigh workspace
     comment comments talk threads mentions bells past deeds window before after
-    full tall scroll stalls settling exposure ends many naming tracing
+    full tall scroll stalls settling exposure ends many naming tracing local lookup css
     cluster serving hosts
     private kept another smaller
     stored tree trees safe path refusal attempt cookie fit
@@ -40,7 +40,7 @@ PLAIN_WORDS = """
     proof provider identities sign
     access account join links login logins passwords roles team tokens
     bearer codes me remote rules tries users
-    adopt aliases asked concealment needs owning ownership rights sight
+    adopt aliases asked concealment needs ownership rights sight
     actors
     candidate drawn proposal propose scoring search straight
     3d accept action actions address adjust adjustments advice ahead anchor annotate answers app

@@ -11,8 +11,8 @@ from app.api.schemas.access_token import AccessTokenList
 from app.api.schemas.people import NewUser, UserDocument, UserEdit, UserList, UserWithLink
 from app.api.team import AppTeam, Team
 from app.review.people import people
-from app.review.people.adopt import adopt, adopted_by
 from app.review.people.links import Link
+from app.review.people.local_deeds import adopt, adopted_by
 from app.review.people.people import Person
 
 router = APIRouter(prefix="/users", tags=["users"])

@@ -32,13 +32,13 @@ from app.store.agreement import (
 )
 from app.store.clock import now
 from app.store.log import Entry, append
-from app.store.outbox import DISPUTED, announce, stamp
 from app.store.session import Session
 from app.store.settling import settle_in_batch
 from app.store.store import Store
 from app.store.stored_json import pack
 from app.store.takes import INDEPENDENT, takes_of_group
 from app.store.value_codec import to_json
+from app.store.webhook_outbox import DISPUTED, announce, stamp
 
 log = structlog.get_logger("touchline.agreement")
 

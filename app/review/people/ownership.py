@@ -14,8 +14,8 @@ from typing import Any
 from app.errors import NotFoundError
 from app.review.people.roles import DatasetRoles, Role, Sight
 from app.soccer.actors import is_of
+from app.store.dataset_lookup import dataset_of, owner_of_job, versions_like
 from app.store.datasets import find_dataset
-from app.store.owning_dataset import dataset_of, owner_of_job, versions_like
 from app.store.session import Session
 from app.store.store import Store
 from app.store.uploads import get_upload

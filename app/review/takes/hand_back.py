@@ -13,10 +13,10 @@ from app.soccer.actors import person_of
 from app.store.clock import now
 from app.store.groups import StoredGroup
 from app.store.log import Entry, append
-from app.store.outbox import HANDED_BACK, announce, stamp
 from app.store.session import Session
 from app.store.store import Store
 from app.store.takes import take_of_copy
+from app.store.webhook_outbox import HANDED_BACK, announce, stamp
 
 MAX_REASON = 500
 """Letters of the sentence that says why."""

@@ -1,7 +1,7 @@
 """Messages: what happened in a dataset, as webhooks are told it.
 
 They name what changed and not what it is now: who hears of it asks for that with their own rights.
-Those about work that is given out are written down where it happens (``app.store.outbox``).
+Those about work that is given out are written down where it happens (``app.store.webhook_outbox``).
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from itertools import groupby
 from typing import Any
 
 from app.canonical import canonical
-from app.store import outbox
+from app.store import webhook_outbox
 from app.store.jobs import DONE, FAILED
 from app.store.session import Session
 from app.store.stored_json import Json
@@ -31,17 +31,17 @@ class Kind(StrEnum):
     """Somebody said something about a group, or a thread was settled; the message has no text."""
     DATASET = "dataset.changed"
     """What concerns a whole dataset: an import, thresholds, static cameras, pitches, positions."""
-    GIVEN_OUT = outbox.GIVEN_OUT
+    GIVEN_OUT = webhook_outbox.GIVEN_OUT
     """A batch was made."""
-    HANDED_ON = outbox.HANDED_ON
+    HANDED_ON = webhook_outbox.HANDED_ON
     """A batch has other people."""
-    DONE = outbox.DONE
+    DONE = webhook_outbox.DONE
     """The work on the last group of a batch is over."""
-    STALLED = outbox.STALLED
+    STALLED = webhook_outbox.STALLED
     """Nobody does anything in a batch any more, or its due day is over."""
-    DISPUTED = outbox.DISPUTED
+    DISPUTED = webhook_outbox.DISPUTED
     """Annotations of a group do not agree: somebody has to decide."""
-    HANDED_BACK = outbox.HANDED_BACK
+    HANDED_BACK = webhook_outbox.HANDED_BACK
     """Somebody has work back that they had handed in; the message does not say why."""
     FROZEN = "version.frozen"
     JOB_DONE = "job.done"

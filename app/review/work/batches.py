@@ -21,9 +21,9 @@ from app.soccer.actors import person_of
 from app.store.clock import now
 from app.store.listing import Listing
 from app.store.log import Entry, append
-from app.store.outbox import GIVEN_OUT, HANDED_ON, announce_batch
 from app.store.session import Session
 from app.store.store import Store
+from app.store.webhook_outbox import GIVEN_OUT, HANDED_ON, announce_batch
 from app.store.work import (
     CLOSED,
     OPEN,

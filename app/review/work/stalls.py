@@ -7,9 +7,9 @@ from datetime import datetime, timedelta
 from enum import StrEnum
 
 from app.review.work.batches import Batch, read_batch
-from app.store.outbox import STALLED, announce, listeners, stamp
 from app.store.session import Session
 from app.store.store import Store
+from app.store.webhook_outbox import STALLED, announce, listeners, stamp
 from app.store.webhooks import webhooks_on
 from app.store.work import batches_that_wait, last_work
 

@@ -1,7 +1,7 @@
 // @ts-check
 /** The colours of tokens.css that the 3D view needs. */
 
-import { tokens } from '../../lib/tokens.js';
+import { tokens } from '../../lib/css_values.js';
 
 const NAMES = /** @type {const} */ ([
 	'sky', 'ground', 'grass', 'grass-stripe', 'line', 'goal', 'shadow', 'ball', 'best', 'ellipsoid', 'stem', 'valid', 'invalid',

@@ -11,7 +11,7 @@ from app.review.datasets.delete import delete_dataset
 from app.review.editing.check import Check
 from app.review.editing.doctor import examine
 from app.review.importing.ingest import ensure_dataset
-from app.review.people.adopt import adopt
+from app.review.people.local_deeds import adopt
 from app.review.people.members import give_role
 from app.review.people.people import change_person, find_person, invite
 from app.review.people.roles import Role

@@ -6,7 +6,7 @@ import pytest
 from sqlalchemy import text
 
 from app.review.datasets.delete import delete_dataset
-from app.review.people.adopt import adopt
+from app.review.people.local_deeds import adopt
 from app.review.people.people import invite
 from app.review.people.roles import Role
 from app.review.talk import comments

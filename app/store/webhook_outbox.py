@@ -1,4 +1,4 @@
-"""Outbox: messages to webhooks that are written down in the transaction of what they tell of."""
+"""Webhook outbox: messages to webhooks that are written down in the transaction of what they tell of."""
 
 from __future__ import annotations
 

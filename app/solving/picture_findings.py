@@ -1,4 +1,4 @@
-"""Picture: is it as the camera took it? Pixels that are not square, a centre that was cut off.
+"""Picture findings: is it as the camera took it? Pixels that are not square, a centre that was cut off.
 
 A camera with square pixels and its principal point in the middle fits a stretched or cropped
 picture badly, and stands in a wrong place. Where the residuals allow it, three numbers more are

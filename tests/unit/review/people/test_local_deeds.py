@@ -11,7 +11,7 @@ from app.review.editing.recompute import solve_dataset
 from app.review.editing.replay import replay
 from app.review.editing.submit import load
 from app.review.importing.ingest import ingest
-from app.review.people.adopt import adopt, adopted_by
+from app.review.people.local_deeds import adopt, adopted_by
 from app.review.people.people import find_person, invite
 from app.review.people.roles import Role
 from app.review.queue.listing import list_groups
@@ -65,7 +65,7 @@ def test_the_work_of_before_is_shown_as_theirs_and_the_log_keeps_its_name(store:
 
     with store.read() as session:
         assert replay(session) == read_ledger(session), "the log, its chain and the tables"
-    with pytest.raises(ConflictError, match="shown as .* already"):
+    with pytest.raises(ConflictError, match=r"shown as .* already"):
         adopt(store, anna, actor="ada")
     assert adopted_by(store) == "anna"
 

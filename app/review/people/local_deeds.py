@@ -1,5 +1,7 @@
-"""Adopt: what was done before there were accounts is shown as a person's; once, and without a change to
-the log, whose entries keep the name that they were written under."""
+"""Local deeds: what was done before there were accounts is shown as a person's; once.
+
+The log does not change: its entries keep the name that they were written under.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Belonging: from what an address names to the dataset that it belongs to, by one statement each."""
+"""Dataset lookup: from what an address names to the dataset that it belongs to, by one statement each."""
 
 from __future__ import annotations
 

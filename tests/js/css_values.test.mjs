@@ -1,7 +1,7 @@
 import assert from 'node:assert/strict';
 import { describe, it } from 'node:test';
 
-import { followed, tokens } from '../../static/lib/tokens.js';
+import { followed, tokens } from '../../static/lib/css_values.js';
 import { colourOf, readPalette } from '../../static/views/scene3d/scene_colours.js';
 
 /** What is listened to. */
@@ -11,7 +11,7 @@ globalThis.document = { documentElement: 'root' };
 globalThis.getComputedStyle = (element) => ({ getPropertyValue: (name) => ` ${element} ${name} ` });
 globalThis.matchMedia = (query) => ({ addEventListener: (kind, hear) => queries.push({ query, kind, hear }) });
 
-describe('tokens', () => {
+describe('css values', () => {
 	it('are read by their names behind what they share, without blanks around them', () => {
 		assert.deepEqual(tokens(['ink', 'bad'], 'canvas-'), { ink: 'root --canvas-ink', bad: 'root --canvas-bad' });
 		assert.deepEqual(tokens(['line']), { line: 'root --line' });
