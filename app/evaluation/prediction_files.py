@@ -44,6 +44,10 @@ from app.geometry.camera import Camera
 from app.soccer.frames import Box, ImageSize
 
 FORMATS = ("coco", "yolo", "csv")
+AUTO = "auto"
+"""In the place of a format: as the endings of the files tell."""
+ENDINGS = ((".csv", "csv"), (".json", "coco"), (".txt", "yolo"))
+"""Formats by the endings of their files; where several are there, the first."""
 _SCORES = ("score", "confidence", "conf")
 _NAMES = ("image", "file_name", "image_id", "path", "name")
 _SIDES = (("x", "y", "w", "h"), ("x", "y", "width", "height"))
@@ -75,7 +79,7 @@ def read_predictions(
 
     Args:
         path: File, folder or zip.
-        format: One of ``FORMATS``.
+        format: One of ``FORMATS``, or ``auto``: as the endings of the files tell.
         names: The frames of the dataset.
         category: The class that is the ball; None where the file has one class only.
         size: Size of the images that pixels refer to; None: the annotated size of each frame.
@@ -85,7 +89,7 @@ def read_predictions(
     Raises:
         InputError: The format is none, or the file as a whole is not what it should be.
     """
-    if format not in FORMATS:
+    if format not in (*FORMATS, AUTO):
         raise InputError(
             f'"{format}" is not a format of predictions; formats are {", ".join(FORMATS)}',
             pointer="/format",
@@ -94,15 +98,22 @@ def read_predictions(
     with opened_tree(path, run.found.report, limits) as tree:
         if tree is None:
             raise run.found.report.problems[0]
-        if format == "coco":
+        run.found.format = kind = _kind_of(tree) if format == AUTO else format
+        if kind == "coco":
             beside = [] if images is None else _document(images, run, limits)
             _read_coco(_json_documents(tree, path), run, beside)
-        elif format == "yolo":
+        elif kind == "yolo":
             _read_yolo(tree, path, run)
         else:
             _read_csv(tree, path, run, limits)
     run.finish(path)
     return run.found
+
+
+def _kind_of(tree: FileTree) -> str:
+    """The format of predictions by the endings of their files; ``coco`` where none tells it."""
+    endings = {Path(name).suffix.lower() for name in tree.names()}
+    return next((kind for ending, kind in ENDINGS if ending in endings), "coco")
 
 
 def read_predicted_cameras(

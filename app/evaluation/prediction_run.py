@@ -31,6 +31,7 @@ class ReadPredictions:
         reasons: Why, by name.
         without_score: Boxes that came without a score and count as sure.
         report: What was wrong.
+        format: As which it was read.
     """
 
     detections: dict[int, list[Detection]] = field(default_factory=dict)
@@ -38,6 +39,7 @@ class ReadPredictions:
     reasons: dict[str, str] = field(default_factory=dict)
     without_score: int = 0
     report: Report = field(default_factory=Report)
+    format: str = ""
 
     @property
     def boxes(self) -> int:

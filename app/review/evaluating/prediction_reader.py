@@ -11,8 +11,6 @@ from app.child_figures import FIGURES
 from app.child_pool import ChildPool
 from app.config import Settings
 from app.datasets.file_tree import Limits
-from app.datasets.report import Report
-from app.datasets.trees import opened_tree
 from app.errors import DatasetFormatError, InputError, TooLargeError
 from app.evaluation.frame_names import FrameNames
 from app.evaluation.prediction_files import (
@@ -32,11 +30,6 @@ LIMITS_HINT = (
     "Bring the predictions in parts, have the operator raise TOUCHLINE_IMPORT_MEMORY, or use the "
     "command line (touchline evaluate), which has no limits. Nothing was kept."
 )
-
-ENDINGS = ((".csv", "csv"), (".json", "coco"), (".txt", "yolo"))
-"""Formats of predictions by the endings of their files; where several are there, the first."""
-AUTO = "auto"
-"""In place of a format: go by the endings."""
 
 
 @dataclass(frozen=True)
@@ -74,21 +67,6 @@ class PredictionFiles:
                 "there is nothing to read: neither boxes nor cameras", pointer="/upload"
             )
         return found
-
-    def with_format(self) -> PredictionFiles:
-        """The same; ``auto`` has become the format that the endings of the files tell."""
-        if self.path is None or self.format != AUTO:
-            return self
-        return replace(self, format=guess_prediction_format(self.path))
-
-
-def guess_prediction_format(path: Path) -> str:
-    """The format of predictions by the endings of their files; ``coco`` where none tells it."""
-    with opened_tree(path, Report()) as tree:
-        if tree is None:
-            return "coco"
-        endings = {Path(item).suffix.lower() for item in tree.names()}
-    return next((format_ for ending, format_ in ENDINGS if ending in endings), "coco")
 
 
 def uploaded_files(

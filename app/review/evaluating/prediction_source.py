@@ -6,9 +6,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from app.errors import NotFoundError
+from app.evaluation.prediction_files import AUTO
 from app.progress import TellProgress
 from app.review.evaluating.evaluation_run import EvaluationRequest, run_evaluation
-from app.review.evaluating.prediction_reader import AUTO, PredictionFiles
+from app.review.evaluating.prediction_reader import PredictionFiles
 from app.review.evaluating.predictions import add_predictions, find_predictions
 from app.review.versions.version import find_version
 from app.soccer.frames import ImageSize

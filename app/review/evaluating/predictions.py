@@ -77,7 +77,7 @@ def add_predictions(
     """
     if name is not None:
         require_name(name, "a set of predictions", digits=True)
-    first, files = files.first, files.with_format()
+    first = files.first
     names = frame_names(store, dataset)
     boxes, cameras = read(files, names, Limits.of(store.settings))
     if not boxes.detections and not cameras.cameras and _is_for_another(boxes, cameras):
@@ -89,7 +89,7 @@ def add_predictions(
         boxes.detections,
         cameras.cameras,
         names=names,
-        format=files.format if files.path is not None else "cameras",
+        format=boxes.format if files.path is not None else "cameras",
         source=first.name,
         report=_report(boxes, cameras),
         unknown=len(boxes.unknown) + len(cameras.unknown),

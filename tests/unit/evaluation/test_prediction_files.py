@@ -40,6 +40,34 @@ def problems(found) -> list[tuple[str | None, str | None, str]]:
     return [(item.record, item.field, item.problem) for item in found.report.problems]
 
 
+CSV = f"image,x,y,w,h,score\n{MATCH}/7.png,10,20,8,9,0.5\n"
+YOLO = "0 0.5 0.5 0.01 0.01 0.5\n"
+
+
+class TestReadAuto:
+    @pytest.mark.parametrize(
+        ("format_", "name", "content"),
+        [
+            ("coco", "a.json", [result()]),
+            ("csv", "a.csv", CSV),
+            ("yolo", "labels/7.txt", YOLO),
+        ],
+    )
+    def test_the_ending_of_the_files_tells_the_format(
+        self, tmp_path, names, format_, name, content
+    ) -> None:
+        path = write(tmp_path / name, content)
+        for place in (path, path.parent):
+            assert read_predictions(place, "auto", names).format == format_
+
+    def test_a_folder_with_several_formats_is_read_by_its_tables(self, tmp_path, names) -> None:
+        write(tmp_path / "a.json", [result()])
+        write(tmp_path / "c.txt", YOLO)
+        write(tmp_path / "b.csv", CSV)
+        found = read_predictions(tmp_path, "auto", names)
+        assert (found.format, found.boxes) == ("csv", 1)
+
+
 class TestReadPredictions:
     @pytest.mark.parametrize(
         ("format_", "name", "problem"),

@@ -16,7 +16,6 @@ from app.review.evaluating import prediction_reader
 from app.review.evaluating.prediction_reader import (
     PredictionFiles,
     PredictionReader,
-    guess_prediction_format,
     read_files,
     uploaded_files,
 )
@@ -102,20 +101,3 @@ class TestPredictionReader:
         monkeypatch.setattr(prediction_reader, "WAITING", -1)
         with pytest.raises(OverloadedError, match="sets of predictions"):
             reader_of().read(written(tmp_path / "a.json", b"[]"), NAMES, Limits.of(Settings()))
-
-
-class TestGuessPredictionFormat:
-    @pytest.mark.parametrize(
-        ("name", "format_"), [("a.json", "coco"), ("a.csv", "csv"), ("labels/7.txt", "yolo")]
-    )
-    def test_the_ending_of_the_files_tells_the_format(self, tmp_path, name, format_) -> None:
-        path = tmp_path / name
-        path.parent.mkdir(exist_ok=True)
-        path.write_text("x")
-        assert guess_prediction_format(path) == format_
-        assert guess_prediction_format(path.parent) == format_
-
-    def test_a_folder_with_several_formats_is_read_by_its_tables(self, tmp_path) -> None:
-        for name in ("a.json", "b.csv", "c.txt"):
-            (tmp_path / name).write_text("x")
-        assert guess_prediction_format(tmp_path) == "csv"
