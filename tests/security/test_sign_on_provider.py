@@ -175,7 +175,7 @@ class TestProvider:
         described = {**door.provider.described(), "issuer": "https://evil.example"}
         path = "/.well-known/openid-configuration"
         door.provider.instead[path] = lambda handler: tell(handler, described)
-        assert_refused(self.ends(door), 409, "another provider than the one")
+        assert_refused(self.ends(door), 409, "does not answer as the provider")
 
     @pytest.mark.parametrize("said", [b"[1]", b"<html>", b'{"a":' * 9000, b"\xff"])
     def test_that_talks_nonsense_is_refused(self, door: Door, said: bytes) -> None:

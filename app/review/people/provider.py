@@ -189,7 +189,7 @@ class Provider:
                 log.warning(
                     "the provider is another one", status=status, it=repr(found.get("issuer"))
                 )
-                raise self._other()
+                raise self._other("does not answer as the provider in this server's settings")
             for name in ("authorization_endpoint", "token_endpoint", "jwks_uri"):
                 self._answers.require_own(found.get(name))
             kept = self._description = _Kept(found, self._clock())
@@ -218,7 +218,7 @@ class Provider:
         usable = [one for one in keys if one is not None]
         if status != 200 or not usable:
             log.warning("the provider has no keys", status=status)
-            raise self._other()
+            raise self._other("shows no keys by which its logins can be checked")
         self._keys = _Kept(jwk.KeySet(usable), self._clock())
         return jwk.KeySet(usable)
 
@@ -227,10 +227,9 @@ class Provider:
             f"{self._rules.label} does not vouch for this login", hint=REFUSED_HINT
         )
 
-    def _other(self) -> ConflictError:
+    def _other(self, what: str) -> ConflictError:
         return ConflictError(
-            f"{self._rules.label} answers as another provider than the one in this server's settings",
-            hint="Whoever runs this server can ask touchline doctor.",
+            f"{self._rules.label} {what}", hint="Whoever runs this server can ask touchline doctor."
         )
 
 
