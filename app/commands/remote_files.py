@@ -202,12 +202,13 @@ def _send(client: Client, path: Path) -> str:
 
 @contextmanager
 def _as_file(path: Path) -> Iterator[Path]:
-    from app.datasets.output import write_zip
+    from app.datasets.output import zip_files
 
     if not path.is_dir():
         yield path
         return
     with tempfile.TemporaryDirectory() as held:
         packed = Path(held) / f"{path.resolve().name}.zip"
-        write_zip(path, packed, stored=PACKED)
+        files = (file for file in sorted(path.rglob("*")) if file.is_file())
+        zip_files(((file.relative_to(path).as_posix(), file) for file in files), packed, PACKED)
         yield packed

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from app.commands.opened import opened_store, opened_to_solve
+from app.commands.opened import executor_of, opened_store
 from app.commands.options import Json, Workers, acting, read_settings
 from app.commands.terminal import print_values, show_progress
 from app.private_file import keep_private
@@ -50,10 +51,11 @@ def sample(
         return
     if out is None:
         keep_private()
-    folder = out or read_settings().home / SAMPLE
-    with opened_to_solve("Making the sample", workers) as (store, executor, progress):
+    settings = read_settings()
+    folder, pool = out or settings.home / SAMPLE, partial(executor_of, settings, workers)
+    with opened_store(settings) as store, show_progress("Making the sample") as progress:
         made = make_sample_dataset(
-            store, dataset, folder, order, executor, progress, workers=workers, actor=acting()
+            store, dataset, folder, order, pool, progress, workers=workers, actor=acting()
         )
     written = vars(made.written) if made.written else {}
     values = {"dataset": made.dataset, "groups": made.groups, "solved": made.solved}

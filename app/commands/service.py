@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import AbstractContextManager
+from functools import partial
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -107,13 +108,9 @@ def _make_sample(settings: Settings) -> None:
     from app.review.practice.sample_dataset import SAMPLE, make_sample_dataset
     from app.sample.order import SampleOrder
 
-    folder, order = settings.home / SAMPLE, SampleOrder()
-    with (
-        opened_store(settings) as store,
-        executor_of(settings) as executor,
-        show_progress("Making the sample") as progress,
-    ):
-        make_sample_dataset(store, SAMPLE, folder, order, executor, progress, actor=acting())
+    folder, pool = settings.home / SAMPLE, partial(executor_of, settings)
+    with opened_store(settings) as store, show_progress("Making the sample") as progress:
+        make_sample_dataset(store, SAMPLE, folder, SampleOrder(), pool, progress, actor=acting())
 
 
 def _serve_part(settings: Settings, socket: socket) -> None:

@@ -39,7 +39,7 @@ def solve(
     json_: Json = False,
 ) -> None:
     """Compute what is missing or out of date; Ctrl+C keeps what is done, and the next run goes on."""
-    from app.review.jobs.full_solve import solve_fully
+    from app.review.jobs.full_solve import count_yield, left_undone, solve_fully
     from app.review.policies.policy import change_policy
 
     chosen = None if policy is None else read_policy_option(policy)
@@ -48,10 +48,11 @@ def solve(
             change_policy(store, dataset, chosen, if_match=None, actor=acting())
         with held_interrupts() as interrupted:
             report = solve_fully(store, dataset, executor, progress, interrupted)
-            if interrupted():
-                left = report.total - report.solved - len(report.failed)
-                complain(f"stopped; {report.solved} groups are kept, {left} are left to do")
+            left = left_undone(store, dataset) if interrupted() else None
+            if left is not None:
+                complain(f"stopped; {report.solved} groups are kept, {left}")
                 raise typer.Exit(INTERRUPTED)
+        count_yield(store, dataset, report, progress)
     print_values(vars(report), json_)
 
 

@@ -8,7 +8,7 @@ import shutil
 import tempfile
 import zipfile
 import zlib
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -134,23 +134,24 @@ def _publish_zip(staging: Path, out: Path, prefix: str, progress: TellProgress |
     sync(out.parent)
 
 
-def write_zip(
-    root: Path,
-    file: object,
-    progress: TellProgress | None = None,
-    stored: Collection[str] = (),
+def write_zip(root: Path, file: object, progress: TellProgress | None = None) -> None:
+    """All files of an export below ``root`` into a zip: sorted names, dated 1980-01-01."""
+    files = GatheredFiles(root)
+    zip_files(told(files, len(files), progress, "Packing the files."), file)
+
+
+def zip_files(
+    files: Iterable[tuple[str, Path | bytes]], file: object, stored: Collection[str] = ()
 ) -> None:
-    """All files below ``root`` into a zip: sorted names, dated 1980-01-01.
+    """Files into a zip, in their order, dated 1980-01-01.
 
     Args:
-        root: The folder.
+        files: Name and content of each.
         file: Where the zip is written: a path, or a file that is open.
-        progress: Hears how many files are in it.
-        stored: Endings of files that are not compressed, such as ``.jpg``.
+        stored: Endings of names whose files are not compressed, such as ``.jpg``.
     """
-    files = GatheredFiles(root)
     with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:  # type: ignore[call-overload]
-        for name, content in told(files, len(files), progress, "Packing the files."):
+        for name, content in files:
             entry = zipfile.ZipInfo(name, _DATE)
             entry.external_attr = 0o644 << 16
             entry.create_system = 3

@@ -91,14 +91,15 @@ def read_predictions(
     """
     if format not in (*FORMATS, AUTO):
         raise InputError(
-            f'"{format}" is not a format of predictions; formats are {", ".join(FORMATS)}',
+            f'"{format}" is not a format of predictions; formats are {", ".join(FORMATS)} and {AUTO}',
             pointer="/format",
         )
+    kind = _told_by_endings(path, limits) if format == AUTO else format
     run = PredictionRun(names, category, size)
     with opened_tree(path, run.found.report, limits) as tree:
         if tree is None:
             raise run.found.report.problems[0]
-        run.found.format = kind = _kind_of(tree) if format == AUTO else format
+        run.found.format = kind
         if kind == "coco":
             beside = [] if images is None else _document(images, run, limits)
             _read_coco(_json_documents(tree, path), run, beside)
@@ -110,9 +111,11 @@ def read_predictions(
     return run.found
 
 
-def _kind_of(tree: FileTree) -> str:
+def _told_by_endings(path: Path, limits: Limits) -> str:
     """The format of predictions by the endings of their files; ``coco`` where none tells it."""
-    endings = {Path(name).suffix.lower() for name in tree.names()}
+    # What is wrong is reported by whoever reads them then.
+    with opened_tree(path, Report(), limits) as tree:
+        endings = set() if tree is None else {Path(name).suffix.lower() for name in tree.names()}
     return next((kind for ending, kind in ENDINGS if ending in endings), "coco")
 
 

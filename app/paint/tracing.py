@@ -29,6 +29,7 @@ class Traced:
         widths: Of the paint across, pixels, shape (N,).
         marking: Index into ``MARKINGS``, shape (N,), increasing.
         jacobian: Derivative along the normal by the camera's parameters, shape (N, 8).
+        visible: Places in all, those too that were left out because their paint is too thin.
     """
 
     places: FloatArray
@@ -38,7 +39,6 @@ class Traced:
     marking: IntArray
     jacobian: FloatArray
     visible: int
-    """Places on the field in all, those too thin to be seen too."""
 
     def only(self, chosen: IntArray, visible: int) -> Traced:
         """Some of the places."""

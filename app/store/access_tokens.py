@@ -69,12 +69,9 @@ def touch_access_token(session: Session, token_id: int, at: str) -> None:
     session.execute(update(AccessTokenModel).where(AccessTokenModel.id == token_id).values(used=at))
 
 
-def delete_access_token(session: Session, token_id: int, person_id: int) -> str | None:
-    """End a token of a person; returns its name, None where there is none."""
-    statement = delete(AccessTokenModel).where(
-        AccessTokenModel.id == token_id, AccessTokenModel.person_id == person_id
-    )
-    return session.execute(statement.returning(AccessTokenModel.name)).scalar_one_or_none()
+def delete_access_token(session: Session, token_id: int) -> None:
+    """End a token."""
+    session.execute(delete(AccessTokenModel).where(AccessTokenModel.id == token_id))
 
 
 def delete_access_tokens(session: Session, person_id: int) -> None:

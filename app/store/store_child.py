@@ -131,7 +131,7 @@ def work_apart(
 
     Raises:
         ReviewError: As the work raised it; ``JobCancelled`` likewise.
-        DamagedError: It met damage; nothing can be changed now from then on, here either.
+        DamagedError: It met damage; from then on nothing can be changed, here either.
         ChildEnded: It went beyond the allowance, or the process was killed or crashed.
     """
     with ExitStack() as turn, closing(Child(allowance)) as child:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -37,13 +38,15 @@ def write_evaluation(store: Store, evaluation: StoredEvaluation, out: Path) -> N
         InputError: The folder cannot be written.
     """
     tables = {f"{table.name}.csv": table for table in tables_of(evaluation)}
+    # Its three files come one after the other.
+    figure = lru_cache(maxsize=1)(partial(get_figure, store, evaluation.id))
 
     def fetch(kind: str, name: str, file: Path) -> None:
         if kind == "tables":
             file.write_text(table_csv(tables[name]), encoding="utf-8")
             return
         title, _, ending = name.rpartition(".")
-        file.write_bytes(_figure_as(get_figure(store, evaluation.id, title), ending))
+        file.write_bytes(_figure_as(figure(title), ending))
 
     frames = (vars(frame) for frame in _frames(store, evaluation.id))
     write_parts(out, evaluation_values(evaluation), frames, fetch)

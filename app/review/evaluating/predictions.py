@@ -68,7 +68,7 @@ def add_predictions(
         files: What to read.
         actor: Who brings them.
         read: Reads the files, here or in another process.
-        keep: Keeps the answer with a new set.
+        keep: Keeps the answer with the set.
 
     Raises:
         InputError: A file cannot be used, no box or camera belongs to a frame of the dataset, or
@@ -116,6 +116,9 @@ def save_predictions(
     keep: Keep[PredictionSet] = keep_nothing,
 ) -> PredictionSet:
     """Keep what was read, or found by a detector, as a new set.
+
+    With ``reuse`` the set that came of the very same reading is the answer where there is one, and
+    a name that is taken gets a number.
 
     Raises:
         ConflictError: There is a set of that name.

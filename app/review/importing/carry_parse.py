@@ -289,7 +289,7 @@ def _kind(value: Json) -> str:
         return f"a text of {len(value)} letters"
     if isinstance(value, list):
         return f"a list of {len(value)}"
-    return "an object" if isinstance(value, dict) else json_text(value)
+    return "an object" if isinstance(value, dict) else json_text(value)[:40]
 
 
 def _mapping(value: Json) -> dict[str, Json]:
@@ -305,6 +305,8 @@ def _list(value: Json, most: int) -> list[Json]:
 
 
 def _text(value: Json, *, empty: bool = False, most: int = MAX_TEXT) -> str:
-    if not isinstance(value, str) or len(value) > most or not (value or empty):
+    if value == "" and not empty:
+        raise InputError("has an empty text where one is expected that says something")
+    if not isinstance(value, str) or len(value) > most:
         raise InputError(f"has {_kind(value)} where a text of at most {most} letters is expected")
     return value

@@ -63,7 +63,7 @@ def import_apart(
         policy: Of a dataset that is made; None: as its first pictures suggest.
 
     Raises:
-        DamagedError: The child met damage; nothing can be changed now from then on, here either.
+        DamagedError: The child met damage; from then on nothing can be changed, here either.
         TooLargeError: It went beyond the limits of the settings, or made the process crash.
     """
     limits = store.settings

@@ -7,8 +7,8 @@ from concurrent.futures import Executor
 
 from app.progress import TellProgress
 from app.review.datasets.dataset import get_dataset_head
-from app.review.editing.pitches import estimate_pitches
-from app.review.editing.recompute import SolveReport, solve_dataset
+from app.review.editing.pitches import estimate_pitches, stale_matches
+from app.review.editing.recompute import SolveReport, solve_dataset, stale_groups
 from app.review.yields.store import AT_ONCE, YieldStore
 from app.store.store import Store
 
@@ -20,7 +20,7 @@ def solve_fully(
     progress: TellProgress,
     stop: Callable[[], bool] = lambda: False,
 ) -> SolveReport:
-    """Solve what is stale, estimate the pitches of matches, and count what many groups yield.
+    """Solve what is stale, and estimate the pitches of matches; ``count_yield`` comes after it.
 
     Args:
         store: The database.
@@ -32,13 +32,25 @@ def solve_fully(
     """
     report = solve_dataset(store, dataset, executor, progress, stop)
     total = report.total
-    if stop():
-        return report
-    # It stays at the groups that are solved, and can be ended all the same.
-    estimate_pitches(store, dataset, executor, lambda *_: progress(total, total), stop)
-    if report.solved > AT_ONCE and not stop():
-        # So that the first look at the yield finds it counted.
-        found = get_dataset_head(store, dataset)
-        progress(total, total, f"Counting what {found.name} yields.")
-        YieldStore(store).keep_up(found.id)
+    if not stop():
+        # It stays at the groups that are solved, and can be ended all the same.
+        estimate_pitches(store, dataset, executor, lambda *_: progress(total, total), stop)
     return report
+
+
+def left_undone(store: Store, dataset: str | int) -> str | None:
+    """What ``solve_fully`` would do now, as a sentence; None: nothing."""
+    groups, matches = len(stale_groups(store, dataset)), len(stale_matches(store, dataset))
+    if groups:
+        return f"{groups} are left to do"
+    return f"the pitches of {matches} matches are left to estimate" if matches else None
+
+
+def count_yield(
+    store: Store, dataset: str | int, report: SolveReport, progress: TellProgress
+) -> None:
+    """Count what a dataset yields where many groups were solved, so that the first look finds it."""
+    if report.solved > AT_ONCE:
+        found = get_dataset_head(store, dataset)
+        progress(report.total, report.total, f"Counting what {found.name} yields.")
+        YieldStore(store).keep_up(found.id)

@@ -11,7 +11,7 @@ from app.review.answers.keep import Keep, Kept, keep_nothing
 from app.review.datasets.dataset import get_dataset_head, list_datasets
 from app.review.editing.pitches import DatasetPitches, apply_pitches, stale_matches
 from app.review.editing.recompute import SolveReport, stale_groups
-from app.review.jobs.full_solve import solve_fully
+from app.review.jobs.full_solve import count_yield, solve_fully
 from app.review.jobs.job_run import JobProgress, Work, counting
 from app.review.jobs.jobs import Jobs, Pool
 from app.review.policies.policy import PolicyState, apply_policy
@@ -169,6 +169,7 @@ def solve_work(store: Store, dataset_id: int, pool: Pool = nullcontext) -> Work:
         )
         with pool() if large else nullcontext() as executor:
             report = solve_fully(store, dataset_id, executor, counting(progress, "groups solved"))
+        count_yield(store, dataset_id, report, progress)
         return {"policy": found.policy.name, **_report(report)}
 
     return work

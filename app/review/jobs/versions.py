@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 from app.child import ChildEnded
-from app.errors import NotFoundError, OverloadedError
+from app.errors import OverloadedError
 from app.progress import TellProgress
 from app.review.answers.keep import Keep, keep_nothing
 from app.review.datasets.dataset import get_dataset_head
@@ -15,13 +14,15 @@ from app.review.jobs.job_run import JobProgress, Work
 from app.review.jobs.jobs import Jobs
 from app.review.versions.freeze import FreezeRequest, freeze, plan_freeze
 from app.review.versions.verify import keep_failure, verify_and_keep
-from app.review.versions.version import Version, find_version, get_version, next_name
+from app.review.versions.version import FREEZE, Version, get_version, list_versions
 from app.soccer.split import Split
-from app.store.jobs import OPEN, Job
+from app.store.jobs import DONE, Job
 from app.store.store import Store
 from app.store.stored_json import Json
 
-FREEZE, VERIFY = "freeze", "verify"
+VERIFY = "verify"
+MOST_LOOKED_AT = 1000
+"""Jobs that are done, of those a server looks through that starts again."""
 
 
 def request_freeze(
@@ -40,14 +41,9 @@ def request_freeze(
     """
     found = get_dataset_head(store, dataset)
     plan_freeze(store, found.id, request, strict=True)
-    if request.name is None:
-        promised = jobs.find(dataset_id=found.id, kinds=(FREEZE,), states=OPEN)
-        with store.read() as session:
-            name = next_name(session, found.id, (job.request["name"] for job in promised))
-        request = replace(request, name=name)
     return jobs.submit(
         FREEZE,
-        f"Freeze {found.name} as {request.name}",
+        f"Freeze {found.name} as {_called(request)}",
         freeze_work(store, found.id, request, actor),
         dataset_id=found.id,
         actor=actor,
@@ -82,7 +78,7 @@ def resume_versions(jobs: Jobs, store: Store) -> None:
 
         def work(progress: JobProgress) -> Json:
             # The server may have stopped between the version and the record of its job.
-            done = _frozen_since(store, dataset_id, values["name"], job.created)
+            done = _frozen_by(jobs, store, job, request)
             if done is not None:
                 return version_result(done)
             return freeze_work(store, dataset_id, request, job.actor)(progress)
@@ -97,7 +93,7 @@ def freeze_work(store: Store, dataset_id: int, request: FreezeRequest, actor: st
     """The work of freezing; its result names the version."""
 
     def work(progress: JobProgress) -> Json:
-        progress(0, None, f"Freezing {request.name}.")
+        progress(0, None, f"Freezing {_called(request)}.")
         return carry_out_apart(
             store,
             "freezing",
@@ -164,9 +160,22 @@ def _request_values(request: FreezeRequest) -> Json:
     return {**vars(request), "split": request.split.values()}
 
 
-def _frozen_since(store: Store, dataset_id: int, name: str, since: str) -> Version | None:
-    try:
-        found = find_version(store, dataset_id, name)
-    except NotFoundError:
-        return None
-    return found if found.name == name and found.created >= since else None
+def _called(request: FreezeRequest) -> str:
+    return request.name or "the next version"
+
+
+def _frozen_by(jobs: Jobs, store: Store, job: Job, request: FreezeRequest) -> Version | None:
+    """The version that a job has made already; None: it has made none."""
+    dataset_id = job.dataset_id or 0
+    done = jobs.find(dataset_id=dataset_id, kinds=(FREEZE,), states=(DONE,), limit=MOST_LOOKED_AT)
+    others = {other.result["version"] for other in done}
+    asked = (job.actor, request.groups, request.split)
+    made = [
+        version
+        for version in list_versions(store, dataset_id)
+        if version.created >= job.created
+        and version.id not in others
+        and request.name in (None, version.name)
+        and (version.actor, version.groups, version.split) == asked
+    ]
+    return made[-1] if made else None

@@ -215,7 +215,7 @@ class AccessTokens:
                     f"there is no token {token_id}",
                     hint="Account in the browser, or touchline users tokens, lists those there are.",
                 )
-            delete_access_token(session, token_id, person.id)
+            delete_access_token(session, token_id)
             _note(session, actor, person, "token ended", {"id": token_id, "name": row.name})
             return self._read(row)
 

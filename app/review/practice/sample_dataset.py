@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from concurrent.futures import Executor
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -10,6 +9,7 @@ from app.progress import TellProgress
 from app.review.datasets.dataset import list_datasets
 from app.review.editing.recompute import solve_dataset
 from app.review.importing.sources import Source, import_source
+from app.review.jobs.jobs import Pool
 from app.sample.order import SampleOrder
 from app.sample.write import SampleReport, write_sample
 from app.store.store import Store
@@ -45,7 +45,7 @@ def make_sample_dataset(
     name: str,
     folder: Path,
     order: SampleOrder,
-    executor: Executor | None,
+    pool: Pool,
     progress: TellProgress,
     *,
     workers: int | None = None,
@@ -58,7 +58,7 @@ def make_sample_dataset(
         name: Of the dataset.
         folder: Where its files are written.
         order: What sample.
-        executor: Where it is solved; None: here.
+        pool: Opens what it is solved by, once it is drawn and read.
         progress: Called with groups drawn, then read, then solved.
         workers: Processes that draw; None: one per processor.
         actor: Who imports it.
@@ -72,7 +72,8 @@ def make_sample_dataset(
     written = write_sample(folder, **vars(order), progress=progress, workers=workers)
     source = Source("soccernet-v3", folder.resolve())
     import_source(store, name, source, store.settings, progress, actor=actor)
-    solve_dataset(store, name, executor, progress)
+    with pool() as executor:
+        solve_dataset(store, name, executor, progress)
     found = _present(store, name)
     return SampleDataset(found.dataset, found.groups, found.solved, written)
 

@@ -13,8 +13,6 @@ from app.finite import MAX_ID, json_text
 from app.review.queue.query import Query
 from app.store.order import Key
 
-"""No key of a row is beyond; NaN is not below it either."""
-
 
 def encode(query: Query, keys: Sequence[Key]) -> str:
     """The cursor that continues after the row with these keys."""
@@ -51,4 +49,5 @@ def _is_key(value: Any) -> bool:
         return True
     if not isinstance(value, (int, float)):
         return False
+    # No key of a row is beyond; NaN is not below it either.
     return abs(value) <= MAX_ID

@@ -194,7 +194,7 @@ class _Run:
         request, dataset = self._request, self._dataset
         return {
             "dataset_id": dataset.id,
-            "note": request.note,
+            "note": checked_note(request.note) or "",
             "licence": request.licence.strip() or licence_text(self._matches(rows)),
             "created": now(),
             "actor": actor,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import count
 from typing import Any
@@ -17,6 +17,7 @@ from app.soccer.solution import Solution
 from app.soccer.split import Split
 from app.store.codecs import policy_from_json
 from app.store.frozen import CALIBRATION, json_of, named_texts, read_frozen, thaw_group
+from app.store.jobs import OPEN, read_jobs
 from app.store.session import Session
 from app.store.solutions import decode_camera, decode_solution
 from app.store.store import Store
@@ -24,6 +25,9 @@ from app.store.stored_json import Json, parse
 from app.store.verifications import Verification as Verification
 from app.store.verifications import read_verifications
 from app.store.versions import VersionGroup, all_versions, dataset_versions, version_row
+
+FREEZE = "freeze"
+"""Kind of the jobs that freeze."""
 
 
 @dataclass(frozen=True)
@@ -148,15 +152,11 @@ def newest_version(store: Store, dataset: str | int) -> Version:
     return found[0]
 
 
-def next_name(session: Session, dataset_id: int, promised: Iterable[str] = ()) -> str:
-    """The next free name of the kind v1, v2, ...
-
-    Args:
-        session: Any session.
-        dataset_id: The dataset.
-        promised: Names that are not free either, because somebody has begun to use them.
-    """
-    names = {row.name for row in dataset_versions(session, dataset_id)} | {*promised}
+def next_name(session: Session, dataset_id: int) -> str:
+    """The next of v1, v2, ... that no version has, and that no waiting freeze was asked to give."""
+    jobs = read_jobs(session, dataset_id=dataset_id, kinds=(FREEZE,), states=OPEN)
+    names = {row.name for row in dataset_versions(session, dataset_id)}
+    names |= {job.request["name"] for job in jobs}
     return next(name for number in count(1) if (name := f"v{number}") not in names)
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from app.datasets.manifest import Manifest, write_manifest
-from app.datasets.output import output_tree, write_zip
+from app.datasets.output import output_tree, write_zip, zip_files
 from app.errors import InputError, JobCancelled, StorageError
 
 MANIFEST = Manifest("d", "cameras", "2030-01-02", {})
@@ -184,7 +184,8 @@ class TestWriteZip:
         root.mkdir()
         for name in ("7.JPG", "a.json"):
             (root / name).write_bytes(b"a" * 1000)
-        write_zip(root, tmp_path / "out.zip", stored=(".jpg",))
+        files = [(path.name, path) for path in sorted(root.iterdir())]
+        zip_files(files, tmp_path / "out.zip", stored=(".jpg",))
         with zipfile.ZipFile(tmp_path / "out.zip") as archive:
             assert [item.compress_type for item in archive.infolist()] == [
                 zipfile.ZIP_STORED,

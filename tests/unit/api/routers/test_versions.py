@@ -50,7 +50,7 @@ class TestFreezeVersion:
         answers = [api.post(address, json=body) for body in bodies]
         jobs = [ended(services, answer) for answer in answers]
         assert [job["result"]["name"] for job in jobs] == ["v2", "v3"]
-        assert jobs[0]["title"] == "Freeze broadcast as v2"
+        assert jobs[0]["title"] == "Freeze broadcast as the next version"
 
     def test_a_dry_run_counts_and_starts_nothing(self, api, services) -> None:
         body = {"name": "v1", "groups": "passing", "dry_run": True}
@@ -83,18 +83,36 @@ class TestFreezeVersion:
         later.close()
         assert (ended_job.state, ended_job.result["name"]) == ("done", "v1")
 
-    def test_what_was_frozen_before_the_server_stopped_is_not_frozen_twice(self, services) -> None:
+    @pytest.mark.parametrize("name", ["v1", None])
+    def test_what_was_frozen_before_the_server_stopped_is_not_frozen_twice(
+        self, services, name
+    ) -> None:
         store, earlier = services.store, Jobs(services.store)
         earlier.close()
-        request = FreezeRequest("v1", groups="passing")
-        job = request_freeze(earlier, store, "broadcast", request, actor="ann")
+        request = FreezeRequest(name, groups="passing")
+        first, second = (
+            request_freeze(earlier, store, "broadcast", request, actor=actor)
+            for actor in ("ann", "bob")
+        )
         version = freeze(store, "broadcast", request, actor="ann")
         later = Jobs(store)
         resume_versions(later, store)
         later.start()
-        ended_job = later.wait(job.id, 60)
+        ended = [later.wait(job.id, 60) for job in (first, second)]
         later.close()
-        assert (ended_job.state, ended_job.result["version"]) == ("done", version.id)
+        assert (ended[0].state, ended[0].result["version"]) == ("done", version.id)
+        if name is None:
+            assert ended[1].result["name"] == "v2"
+        else:
+            assert (ended[1].state, "a version" in ended[1].problem["detail"]) == ("failed", True)
+
+    def test_a_name_that_a_waiting_job_was_asked_for_is_not_given_away(self, services) -> None:
+        store, waiting = services.store, Jobs(services.store)
+        waiting.close()
+        asked = FreezeRequest("v1", groups="passing")
+        request_freeze(waiting, store, "broadcast", asked, actor="ann")
+        there = freeze(store, "broadcast", FreezeRequest(groups="passing"), actor="bob")
+        assert there.name == "v2"
 
 
 class TestVersions:

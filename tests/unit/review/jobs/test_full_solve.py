@@ -9,7 +9,7 @@ import pytest
 from app.review.editing.pitches import stale_matches
 from app.review.editing.recompute import stale_groups
 from app.review.jobs import full_solve
-from app.review.jobs.full_solve import solve_fully
+from app.review.jobs.full_solve import count_yield, left_undone, solve_fully
 from app.review.yields import gathered
 from app.store.store import Store
 
@@ -52,6 +52,14 @@ def test_stopped_between_two_matches_it_keeps_the_first(two: Store) -> None:
     assert (before, stale_matches(two, "demo")) == (["7", "8"], ["8"])
 
 
+def test_what_is_left_is_said_as_long_as_something_is(two: Store) -> None:
+    assert left_undone(two, "demo") == "2 are left to do"
+    solve_fully(two, "demo", None, Told(), lambda: not stale_groups(two, "demo"))
+    assert left_undone(two, "demo") == "the pitches of 2 matches are left to estimate"
+    solve_fully(two, "demo", None, Told())
+    assert left_undone(two, "demo") is None
+
+
 @pytest.mark.parametrize(("at_once", "counted"), [(1, True), (2, False)])
 def test_the_yield_of_many_groups_is_counted_at_once(
     two: Store, monkeypatch: pytest.MonkeyPatch, at_once: int, counted: bool
@@ -65,7 +73,7 @@ def test_the_yield_of_many_groups_is_counted_at_once(
         lambda session, rows: looked.extend(row.group_id for row in rows) or read(session, rows),
     )
     progress = Told()
-    solve_fully(two, "demo", None, progress)
+    count_yield(two, "demo", solve_fully(two, "demo", None, progress), progress)
     sentences = [sentence for *_, sentence in progress.calls if sentence]
     assert sentences == (["Counting what demo yields."] if counted else [])
     assert len(looked) == (2 if counted else 0)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
+
 import pytest
 
 from app.errors import JobCancelled
@@ -19,7 +21,7 @@ ORDER = SampleOrder(groups=2, seed=3, labels_only=True)
 def make(store: Store, progress=lambda *_: None) -> SampleDataset:
     folder = store.settings.home / "sample"
     return make_sample_dataset(
-        store, "drawn", folder, ORDER, None, progress, workers=1, actor="ann"
+        store, "drawn", folder, ORDER, nullcontext, progress, workers=1, actor="ann"
     )
 
 
