@@ -54,6 +54,13 @@ class TestListJobs:
         mine = api.get(API, params={"dataset": "static"}).json()
         assert [item["id"] for item in mine["items"]] == [ids[3], ids[1]]
         assert api.get(API, params={"state": "failed"}).json() == {"items": [], "next": None}
+        other = app.state.services.jobs.submit("verify", "Other", lambda _: 1, actor="ann").id
+        app.state.services.jobs.wait(other, SECONDS)
+        for kind, expected in (("verify", [other]), ("bulk", ids[::-1])):
+            found = api.get(API, params={"kind": kind}).json()["items"]
+            assert [item["id"] for item in found] == expected
+        done = api.get(API, params={"state": "done"}).json()["items"]
+        assert [item["id"] for item in done] == [other, *ids[::-1]]
         assert api.get(API, params={"dataset": "nothing"}).status_code == 404
         assert api.get(API, params={"cursor": "x"}).status_code == 400
 

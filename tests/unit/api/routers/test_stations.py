@@ -135,4 +135,13 @@ class TestStations:
             headers={"If-Match": station["etag"]},
         )
         assert answer.status_code == 404
+        rows = api.get(f"{API}/groups", params={"dataset": "broadcast"}).json()["items"]
+        foreign = next(row["id"] for row in rows if row["id"] != document["id"])
+        answer = api.patch(
+            f"{API}/stations/{station['id']}",
+            params={"group": foreign},
+            json={"calibration": "lines"},
+            headers={"If-Match": station["etag"]},
+        )
+        assert (answer.status_code, "no view in that group" in answer.text) == (404, True)
         assert api.get(f"{API}/stations/{10**6}").status_code == 404

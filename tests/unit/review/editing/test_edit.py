@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import pytest
 
@@ -72,6 +73,14 @@ class TestApply:
         assert after.view("cam1").station.lines["Middle line"] == HERE
         assert after.view("cam2").station == make_static().view("cam2").station
 
+    def test_so_do_two_views_of_one_group_that_share_it(self, make_static) -> None:
+        group = make_static()
+        twin = replace(group.view("cam1"), key="cam1-later")
+        both = replace(group, views=(*group.views, twin))
+        after = SetLines("cam1", {"Middle line": HERE}).apply(both)
+        assert after.view("cam1-later").station == after.view("cam1").station
+        assert after.view("cam1").station.lines["Middle line"] == HERE
+
     def test_a_ball_takes_the_place_of_all_others(self, make_group) -> None:
         two = SetBalls("7.png", (BALL, BALL)).apply(make_group())
         assert SetBall("7.png", BALL).apply(two).view("7.png").balls == (BALL,)
@@ -95,6 +104,9 @@ class TestApply:
             (SetLines("7.png", {"Middle line": HERE * 501}), InputError, "1000 points"),
             (SetBall("7.png", BallAnnotation()), InputError, "box or a point"),
             (SetBall("7.png", BallAnnotation(box=Box(1, 2, 0, 3))), InputError, "above zero"),
+            (SetBall("7.png", BallAnnotation(box=Box(1e9, 2, 3, 3))), InputError, "a picture can"),
+            (SetBall("7.png", BallAnnotation(box=Box(1, math.inf, 3, 3))), InputError, "a picture"),
+            (SetBall("7.png", BallAnnotation(box=Box(1, 2, 1e9, 3))), InputError, "a picture can"),
             (
                 SetBall("7.png", BallAnnotation(point=ImagePoint(1e9, 0))),
                 InputError,

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from app.review.editing.edit import IncludeView
-from app.review.editing.etags import Head, read_etags, read_head
+from app.review.editing.etags import Head, group_etag, read_etags, read_head
 from app.review.editing.state import GroupState
 from app.review.editing.submit import load, submit
+from app.review.editing.undo import undo
 from app.review.importing.ingest import ingest
 from app.review.verdicts.verdict import set_verdict
 from app.store.store import Store
@@ -26,6 +27,17 @@ class TestReadEtags:
         seen.append(judged.etag)
         assert etags_of(store, state.id) == {state.id: judged.etag}
         assert len(set(seen)) == 3
+
+    def test_what_is_undone_is_not_what_it_was(self, store: Store, state: GroupState) -> None:
+        edit = IncludeView("7.png", False)
+        edited = submit(store, state.id, edit, if_match=state.etag, actor="ann")
+        undone = undo(store, state.id, if_match=edited.etag, actor="ann")
+        assert undone.stored.inputs_hash == state.stored.inputs_hash
+        assert etags_of(store, state.id) == {state.id: undone.etag} != {state.id: state.etag}
+
+    def test_other_thresholds_under_the_same_name_are_another(self) -> None:
+        etags = {group_etag("said", policy, "custom", ()) for policy in ("one", "two")}
+        assert len(etags) == 2
 
     def test_without_a_solution_is_another(self, store: Store, fill, make_group) -> None:
         (one,) = fill(make_group(), solved=False)

@@ -10,7 +10,7 @@ from app.datasets.file_tree import DEFAULT_LIMITS
 from app.datasets.report import Report
 from app.errors import InputError
 from app.review.editing.codec import edit_from_json
-from app.review.editing.edit import IncludeView, SetBall
+from app.review.editing.edit import IncludeView, SetBall, SetLines
 from app.review.editing.ledger import read_ledger
 from app.review.editing.replay import rebuild, replay
 from app.review.editing.submit import load, submit
@@ -24,7 +24,7 @@ from app.review.verdicts.verdict import set_verdict
 from app.review.versions.freeze import FreezeRequest, freeze
 from app.review.versions.verify import verify
 from app.soccer.annotation import BallAnnotation, make_lines
-from app.soccer.frames import Box
+from app.soccer.frames import Box, ImagePoint
 from app.soccer.group import Group, Station, View
 from app.soccer.reasons import LeftOut
 from app.store.digest import group_inputs_hash, source_hash
@@ -163,6 +163,15 @@ class TestFixed:
         change(store, LEAVE)
         assert self.fixed(store) == (False, False)
         self.judge(store, "accepted")
+        assert self.fixed(store) == (True, True)
+
+    def test_so_is_one_whose_own_lines_were_drawn(self, store, state) -> None:
+        lines = state.group.view("7.png").station.lines
+        name, points = next(iter(lines.items()))
+        moved = tuple(ImagePoint(point.x + 0.2, point.y) for point in points)
+        change(store, SetLines("7.png", {name: moved}))
+        self.judge(store, "accepted")
+        assert load(store, 1).solution.passes
         assert self.fixed(store) == (True, True)
 
     def test_after_undo_of_all_edits_a_group_is_not_fixed(self, store, state) -> None:

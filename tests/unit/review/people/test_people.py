@@ -290,6 +290,11 @@ class TestChangePerson:
             with pytest.raises(ConflictError, match="last admin"):
                 change_person(home, anna, actor="local", **change)
         join(home, "bob", Role.ADMIN)
+        bob = find_person(home, "bob").id
+        change_person(home, bob, actor="anna", disabled=True)
+        with pytest.raises(ConflictError, match="last admin"):
+            change_person(home, anna, actor="local", disabled=True)
+        change_person(home, bob, actor="anna", disabled=False)
         assert change_person(home, anna, actor="bob", role=Role.LEAD).role is Role.LEAD
 
     def test_the_log_names_who_did_it_and_still_rebuilds(self, home) -> None:

@@ -64,6 +64,13 @@ class TestStatistics:
         )
         assert places.counts[row][column] == list_groups(spread, 1, cell).total == 6
 
+    def test_columns_of_positions_are_along_x_and_rows_along_y(self, spread: Store) -> None:
+        everywhere = {"x_m": X_EDGES[-2], "y_m": Y_EDGES[0]}
+        with spread.write() as session:
+            session.execute(update(QueueModel).values(everywhere))
+        counts = statistics(spread, 1).positions.counts
+        assert (counts[0][-1], sum(map(sum, counts))) == (12, 12)
+
     def test_matches_and_splits_add_up(self, spread: Store) -> None:
         found = statistics(spread, 1)
         assert [(item.split, item.groups) for item in found.splits] == [("test", 6), ("train", 6)]

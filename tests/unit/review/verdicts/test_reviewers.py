@@ -3,7 +3,7 @@ from __future__ import annotations
 import pytest
 
 from app.review.editing.submit import load
-from app.review.verdicts import verdict
+from app.review.verdicts import reviewers, verdict
 from app.review.verdicts.bulk import give_verdicts
 from app.review.verdicts.reviewers import list_reviewers
 from app.review.verdicts.verdict import set_verdict
@@ -34,6 +34,18 @@ class TestListReviewers:
         assert (ann.today, ann.last[:10]) == (5, now()[:10])
         assert (ben.name, ben.rejected, ben.today) == ("ben", 1, 0)
         assert ben.last == "2020-02-02T10:00:00.000000+00:00"
+
+    def test_what_was_judged_earlier_this_month_is_not_of_today(
+        self, store, ids, monkeypatch
+    ) -> None:
+        at = {"now": "2020-02-02T23:59:59.000000+00:00"}
+        monkeypatch.setattr(verdict, "now", lambda: at["now"])
+        monkeypatch.setattr(reviewers, "now", lambda: at["now"])
+        judge(store, ids[0], "accepted", "ann")
+        at["now"] = "2020-02-03T00:00:00.000000+00:00"
+        judge(store, ids[1], "accepted", "ann")
+        (ann,) = list_reviewers(store, 1)
+        assert (ann.accepted, ann.today) == (2, 1)
 
     def test_a_reviewer_whose_verdicts_were_all_replaced_is_still_listed(self, store, ids) -> None:
         judge(store, ids[0], "accepted", "ann")

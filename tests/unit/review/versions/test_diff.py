@@ -92,6 +92,46 @@ class TestDiffVersions:
             diff_versions(store, two[0].id, other.id)
 
 
+@pytest.fixture
+def judged_and_moved(store, fill, make_group):
+    """Two versions of whatever passes: two balls moved, one group accepted, one as it was."""
+    ids = fill(*(make_group(number) for number in (7, 8, 9, 10)))
+    first = frozen(store, "v1", groups="passing")
+    for group, key, pixels in ((ids[0], "7.png", 0.25), (ids[1], "8.png", 0.75)):
+        state = load(store, group)
+        box = state.group.view(key).ball.box
+        ball = BallAnnotation(box=Box(box.x + pixels, box.y, box.width, box.height))
+        submit(store, group, SetBall(key, ball), if_match=state.etag, actor="ben")
+    judge(store, ids[2], "accepted")
+    return first, frozen(store, "v2", groups="passing")
+
+
+class TestOfWhateverPasses:
+    def test_a_group_is_counted_once_however_much_of_it_changed(
+        self, store, judged_and_moved
+    ) -> None:
+        first, second = judged_and_moved
+        diff = diff_versions(store, first.id, second.id)
+        changed = {item.group.rpartition("/")[2]: item.what for item in diff.changed}
+        assert changed == {
+            "7.png": ("annotations",),
+            "8.png": ("annotations",),
+            "9.png": ("verdict",),
+        }
+        assert (len(diff.moved), diff.unchanged) == (2, 1)
+
+    def test_the_ball_that_moved_most_comes_first_and_is_told(
+        self, store, judged_and_moved
+    ) -> None:
+        first, second = judged_and_moved
+        metres = [item.metres for item in diff_versions(store, first.id, second.id).moved]
+        assert metres == sorted(metres, reverse=True)
+        assert metres[0] > 2 * metres[1]
+        lines = changelog(store, second.id)
+        assert "1 group with another verdict." in lines
+        assert any(line.endswith(f"{max(metres):.3g} m at most.") for line in lines)
+
+
 class TestChangelog:
     def test_the_first_version_says_so(self, store, two) -> None:
         assert changelog(store, two[0].id) == ["First version: 3 groups, 6 balls in views."]
@@ -102,6 +142,7 @@ class TestChangelog:
         assert "2 groups added (1 not in the dataset before, 1 unreviewed)." in lines
         assert "1 group dropped (1 rejected: sides_confused)." in lines
         assert any(line.startswith("1 ball moved, by 0.0") for line in lines)
+        assert lines[-1].startswith("split: ")
 
     def test_no_change_is_one_sentence(self, store, two) -> None:
         again = frozen(store, "v3", split=two[1].split)

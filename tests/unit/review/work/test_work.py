@@ -18,6 +18,7 @@ from app.review.people.roles import EVERYTHING, Role
 from app.review.queue.listing import list_groups
 from app.review.takes.gold import mark
 from app.review.verdicts.verdict import set_verdict
+from app.review.work import leases as leases_module
 from app.review.work.batches import (
     NewBatch,
     Part,
@@ -293,11 +294,47 @@ class TestLeases:
         judge(store, groups[0], "bo")
         assert leases.next(batch, BO).group == groups[1]
 
-    def test_nothing_is_given_out_of_a_closed_one(self, store, dataset, leases):
+    def test_nothing_is_given_out_of_a_closed_one(self, store, dataset, groups, leases):
         batch = make_batch(store, dataset, NewBatch("a"), actor="lead").id
         change_batch(store, batch, actor="lead", state="closed")
         with pytest.raises(ConflictError, match="closed"):
             leases.next(batch, BO)
+        with pytest.raises(ConflictError, match="closed"):
+            leases.take(batch, groups[0], BO)
+
+    def test_nothing_is_handed_in_of_one_that_is_closed_meanwhile(
+        self, store, dataset, groups, leases, monkeypatch
+    ):
+        batch = make_batch(store, dataset, NewBatch("a", annotators=["ada"]), actor="lead").id
+        look = leases_module.own_of
+
+        def closing(*arguments):
+            found = look(*arguments)
+            monkeypatch.undo()
+            change_batch(store, batch, actor="lead", state="closed")
+            return found
+
+        monkeypatch.setattr(leases_module, "own_of", closing)
+        with pytest.raises(ConflictError, match="closed"):
+            leases.hand_in(batch, groups[0], ADA, actor="ada")
+
+    @pytest.mark.parametrize("done", [True, False])
+    def test_what_somebody_else_handed_in_stays_theirs(self, store, dataset, groups, leases, done):
+        new = NewBatch("a", annotators=["ada", "bo"])
+        batch = make_batch(store, dataset, new, actor="lead").id
+        leases.hand_in(batch, groups[0], ADA, actor="ada")
+        with pytest.raises(ConflictError, match="ada has handed this group in"):
+            leases.hand_in(batch, groups[0], BO, actor="bo", done=done)
+        (row,) = [one for one in list_batch_groups(store, batch) if one.group == groups[0]]
+        assert row.handed_in_by == "ada"
+
+    def test_a_group_that_was_judged_is_not_handed_back(self, store, dataset, groups, leases):
+        new = NewBatch("a", annotators=["ada"], reviewers=["bo"])
+        batch = make_batch(store, dataset, new, actor="lead").id
+        leases.hand_in(batch, groups[0], ADA, actor="ada")
+        judge(store, groups[0], "bo")
+        with pytest.raises(ConflictError, match="judged"):
+            leases.hand_back(batch, groups[0], BO, "once more", actor="bo")
 
 
 class TestProgress:
