@@ -28,6 +28,7 @@ from app.child import ChildEnded
 from app.child_figures import KINDS
 from app.child_pool import ChildPool
 from app.errors import DamagedError, StorageError
+from app.review.importing.ingest import ingest
 from app.store.store import Store
 from tests.waiting import SECONDS
 
@@ -61,6 +62,12 @@ def test_says_how_many_groups_there_are_and_how_many_wait_to_be_solved(read) -> 
     assert read("touchline_groups") >= 1
     assert read("touchline_unsolved_groups") == 0
     assert read("touchline_oldest_unsolved_seconds") == 0
+
+
+def test_a_group_that_waits_to_be_solved_is_counted(app: FastAPI, read, group) -> None:
+    ingest(app.state.services.store, "waiting", [group], source="test", actor="ann")
+    assert read("touchline_unsolved_groups") == 1
+    assert read("touchline_oldest_unsolved_seconds") >= 0
 
 
 def test_says_how_long_the_log_is_and_how_much_room_is_left(read) -> None:

@@ -174,11 +174,15 @@ class TestWorkApart:
         assert mark.read_text() == "put away"
 
     def test_told_to_end_after_its_last_step_it_is_done(self, store: Store) -> None:
+        told: list[int] = []
+
         def progress(done: int, *_: object) -> None:
+            told.append(done)
             if done == 2:
                 raise JobCancelled
 
         run(store, count, 2, progress=progress)
+        assert told[-1] == 2
 
     def test_one_that_comes_to_no_step_is_ended_and_lets_others_write(
         self, store: Store, tmp_path: Path

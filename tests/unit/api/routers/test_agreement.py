@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+import csv
+import io
+
+import pytest
+
 from app.review.takes.take import begin_take
 
 DATASET = "/api/v1/datasets/broadcast"
@@ -44,8 +49,14 @@ class TestAdjudication:
         assert found["groups"][0]["taken"] == "ben"
         (two,) = found["pairs"]
         assert two["spreads"]["ball_px"]["tail"] > 3
-        header, row = api.get(f"{DATASET}/agreement/groups.csv").text.splitlines()
-        assert len(header.split(",")) == len(row.split(","))
+        table = api.get(f"{DATASET}/agreement/groups.csv").text
+        (row,) = csv.DictReader(io.StringIO(table))
+        spreads = found["groups"][0]["spreads"]
+        for name, spread in spreads.items():
+            for end in ("median", "tail"):
+                told = row[f"{name}_{end}"]
+                assert (float(told) if told else None) == pytest.approx(spread[end]), name
+        assert any(spread["median"] != spread["tail"] for spread in spreads.values())
         assert api.get(f"{DATASET}/agreement", params={"of_batch": 7}).json()["groups"] == []
 
     def test_limits_are_changed_and_wrong_ones_refused(self, api) -> None:

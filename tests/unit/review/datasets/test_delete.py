@@ -35,6 +35,7 @@ from app.store.store import Store
 from app.store.tables import Base
 from app.store.tables.log import LogModel
 from app.store.tables.solutions import CalibrationModel
+from app.store.webhooks import insert_webhook, webhooks_of
 
 
 @pytest.fixture
@@ -172,9 +173,13 @@ class TestDeleteDataset:
         seen = Logins(two)._clock()
         zoe = Login(1, person.id, "zoe", DatasetRoles(Role.VIEWER), seen)
         AccessTokens(two).make(zoe, "demo alone", [Scope.READ], dataset_id=1)
+        with two.write() as session:
+            insert_webhook(session, 1, "https://a.example", ["ping"], salt="0" * 32, by="eve")
         delete_dataset(two, "demo", confirm="demo", actor="eve", afresh=PAPER)
         made = get_dataset(two, "demo")
         assert (made.id, made.groups) == (3, 0)
+        with two.read() as session:
+            assert [row.url for row in webhooks_of(session, made.id)] == ["https://a.example"]
         with two.read() as session:
             assert read_roles(session, person.id, Role.VIEWER).single == {3: Role.NONE}
             assert replay(session) == read_ledger(session)

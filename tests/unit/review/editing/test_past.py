@@ -60,6 +60,17 @@ class TestReadStep:
             assert brought.views[0].after.station == camera.station
             assert changed.views[0].after.station.lines["Middle line"] == HERE
 
+    def test_what_was_changed_of_it_before_a_group_came_is_not_in_its_past(
+        self, store: Store, fill, make_static
+    ) -> None:
+        (first,) = fill(make_static(10))
+        camera = load_station(store, load(store, first).station_ids["cam1"])
+        edit = SetStationLines({"Middle line": HERE})
+        submit_station(store, camera.id, edit, if_match=camera.etag, actor="ann")
+        second = fill(make_static(10), make_static(11))[1]
+        kinds = [[entry.kind for entry in history(store, group)] for group in (first, second)]
+        assert kinds == [["import", "station_edit"], ["import"]]
+
     def test_an_entry_of_another_group_is_unknown(self, store: Store, fill, make_group) -> None:
         one, other = fill(make_group(7), make_group(8))
         (entry,) = history(store, other)

@@ -19,6 +19,7 @@ from app.review.queue.changes import (
     read_solved,
     read_solved_since,
 )
+from app.review.talk.comments import begin_thread
 from app.review.verdicts.verdict import set_verdict
 from app.soccer.policy import STRICT
 from app.store.log import newest_entry
@@ -49,6 +50,15 @@ class TestReadChanges:
             Change(before + 2, found, "demo", "verdict", "bob", one, judged.etag)
         ]
         assert since(store, before + 2) == []
+
+    def test_a_comment_hides_no_change_of_its_group(self, store: Store, fill, make_group) -> None:
+        (one,) = fill(make_group(7))
+        before, etag = newest(store), load(store, one).etag
+        submit(store, one, IncludeView("7.png", False), if_match=etag, actor="ann")
+        begin_thread(store, one, "Is it?", actor="bob")
+        edited, commented = since(store, before)
+        assert (edited.group_id, edited.actor) == (commented.group_id, "ann") == (one, "ann")
+        assert (commented.kind, commented.actor) == ("comment", "bob")
 
     def test_an_edit_of_a_static_camera_changes_each_of_its_groups(
         self, store: Store, fill, make_static

@@ -5,7 +5,7 @@ import time
 from typing import Any
 
 import pytest
-from sqlalchemy import insert
+from sqlalchemy import insert, update
 
 from app.errors import InputError, NotFoundError
 from app.review.editing.submit import load
@@ -197,10 +197,16 @@ class TestListGroups:
         ],
     )
     def test_filters(self, store, dataset, query: str, holds) -> None:
+        odd = {"gate:unsolved": {"solved": False}, "override:any": {"override": "jac"}}
+        if query in odd:
+            with store.write() as session:
+                some = update(QueueModel).where(QueueModel.number.in_([3, 40]))
+                session.execute(some.values(odd[query]))
         rows = list_groups(store, dataset, "", 500).items
         page = list_groups(store, dataset, query, 500)
         assert [row.id for row in page.items] == [row.id for row in rows if holds(row)]
         assert page.total == len(page.items)
+        assert query not in odd or page.total == 2
 
     def test_a_cursor_belongs_to_its_query(self, store, dataset) -> None:
         cursor = list_groups(store, dataset, "sort:jac", 5).next
@@ -223,8 +229,9 @@ class TestListGroups:
             start = time.process_time()
             list_groups(store, season, f"status:unreviewed jac<0.95 sort:{sort}", 50)
             spent.append(time.process_time() - start)
-        # 50 ms are promised; of processor time, as other work shares the machine.
-        assert min(spent) < 0.05
+        # 50 ms are promised, and `make bench` measures them. Of processor time, as other work shares
+        # the machine: what takes five times as long reads every row.
+        assert max(spent) < 0.25
 
 
 class TestPositions:
@@ -265,8 +272,9 @@ class TestPositions:
             page = list_groups(store, season, "sort:value", 100, start=start)
             spent.append(time.process_time() - began)
             assert len(page.items) == 100
-        # 50 ms are promised; of processor time, as other work shares the machine.
-        assert min(spent) < 0.05
+        # 50 ms are promised, and `make bench` measures them. Of processor time, as other work shares
+        # the machine: what takes five times as long reads every row.
+        assert max(spent) < 0.25
 
 
 class TestNeighbours:

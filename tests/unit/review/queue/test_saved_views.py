@@ -1,10 +1,12 @@
 from __future__ import annotations
 
 import pytest
+from sqlalchemy import update
 
 from app.errors import ConflictError, InputError, NotFoundError
 from app.review.queue import saved_views
 from app.review.queue.saved_views import delete_view, get_view, list_saved_views, save_view
+from app.store.tables.saved_views import SavedViewModel
 
 
 @pytest.fixture
@@ -44,6 +46,17 @@ class TestSaveView:
         save_view(store, 1, "All", "", actor="ann")
         with pytest.raises(ConflictError, match="at most 1"):
             save_view(store, 1, "More", "", actor="ann")
+
+
+class TestListSavedViews:
+    def test_a_query_of_another_version_finds_nothing_and_spoils_no_list(self, store, ids) -> None:
+        old = save_view(store, 1, "Old", "", actor="ann")
+        save_view(store, 1, "Present", "", actor="ann")
+        with store.write() as session:
+            changed = update(SavedViewModel).where(SavedViewModel.id == old.id)
+            session.execute(changed.values(query="colour:red"))
+        found = [(item.name, item.query, item.groups) for item in list_saved_views(store, 1)]
+        assert found == [("Old", "colour:red", 0), ("Present", "", 2)]
 
 
 class TestDeleteView:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from app.errors import ForbiddenError, InputError, NotFoundError
+from app.errors import ConflictError, ForbiddenError, InputError, NotFoundError
 from app.review.editing.etags import read_etags
 from app.review.editing.past import history
 from app.review.editing.replay import rebuild
@@ -178,6 +178,38 @@ class TestMentions:
         comments.reply(store, group, thread.id, "@bob three", actor="anna")
         assert told(store, "anna") == ["reply"]
         assert told(store, "bob") == ["mention"]
+
+    def test_who_spoke_through_a_token_hears_of_a_reply(self, store: Store, group: int) -> None:
+        thread = comments.begin_thread(store, group, "One", actor="anna (token lens)")
+        comments.reply(store, group, thread.id, "Two", actor="bob")
+        assert told(store, "anna") == ["reply"]
+
+    def test_who_is_disabled_is_not_mentioned(self, store: Store, group: int) -> None:
+        with store.read() as session:
+            bob = person_by_name(session, "bob").id
+        change_person(store, bob, actor="local", disabled=True)
+        thread = comments.begin_thread(store, group, "@bob look", actor="anna")
+        assert thread.comments[0].mentions == ()
+
+    def test_a_correction_is_told_to_those_alone_whom_it_names_anew(
+        self, store: Store, group: int
+    ) -> None:
+        thread = comments.begin_thread(store, group, "@bob look", actor="anna")
+        mine = thread.comments[0].id
+        comments.change(store, group, thread.id, mine, "@bob @local look here", actor="anna")
+        assert told(store, "bob") == ["mention"]
+        other = comments.begin_thread(store, group, "look", actor="anna")
+        comments.change(store, group, other.id, other.comments[0].id, "@bob look", actor="anna")
+        assert told(store, "bob") == ["mention", "mention"]
+
+    def test_a_thread_is_full_some_day(
+        self, store: Store, group: int, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(comments, "MOST", 2)
+        thread = comments.begin_thread(store, group, "One", actor="anna")
+        comments.reply(store, group, thread.id, "Two", actor="bob")
+        with pytest.raises(ConflictError, match="at most 2 comments"):
+            comments.reply(store, group, thread.id, "Three", actor="bob")
 
 
 class TestBell:

@@ -9,6 +9,7 @@ import pytest
 from sqlalchemy import func, insert, select, text
 
 from app.errors import ConflictError, InputError, NotFoundError
+from app.review.answers.saved_progress import SavedProgress
 from app.review.editing.edit import SetBall
 from app.review.editing.ledger import read_ledger
 from app.review.editing.replay import replay
@@ -16,10 +17,11 @@ from app.review.editing.state import VerdictState
 from app.review.editing.submit import load, submit
 from app.review.importing.ingest import ensure_dataset
 from app.review.queue.listing import list_groups
+from app.review.queue.progress import summary
 from app.review.verdicts import bulk, bulk_undo
-from app.review.verdicts.bulk import give_verdicts, list_batches, plan_verdicts
+from app.review.verdicts.bulk import BatchRun, give_verdicts, list_batches, plan_verdicts
 from app.review.verdicts.bulk_undo import undo_batch
-from app.review.verdicts.verdict import set_verdict
+from app.review.verdicts.verdict import check_verdict, set_verdict
 from app.store.log import verify_chain
 from app.store.queue import refresh_queue
 from app.store.session import Session
@@ -158,11 +160,32 @@ class TestGiveVerdicts:
         assert (first.changed, again.changed, again.batch) == (4, 0, None)
         assert len(list_batches(store, 1)) == 1
 
+    def test_the_same_verdict_with_a_note_of_its_own_is_a_new_one(self, store, ids) -> None:
+        give_verdicts(store, 1, "", "deferred", actor="ben")
+        again = give_verdicts(store, 1, "", "deferred", note="until Monday", actor="ann")
+        assert again.changed == 4
+        assert verdict_of(store, ids[0]).note == "until Monday"
+
     def test_a_verdict_that_is_out_of_date_is_given_again(self, store, ids) -> None:
         give_verdicts(store, 1, "", "deferred", actor="ben")
         etag = load(store, ids[0]).etag
         submit(store, ids[0], SetBall("7.png", None), if_match=etag, actor="ann")
+        assert (summary(store, 1).stale, summary(store, 1, "stale:no").stale) == (1, 0)
         assert give_verdicts(store, 1, "", "deferred", actor="ben").changed == 1
+        assert summary(store, 1).stale == 0
+
+    def test_a_request_that_is_being_carried_out_is_not_carried_out_twice(self, store, ids) -> None:
+        verdict = check_verdict("deferred", None, None)
+        progress = SavedProgress("key", "ann", "digest")
+        first, second = (BatchRun(1, "", verdict, "ann", progress=progress) for _ in range(2))
+        with store.write() as session:
+            assert (first.resume(session), second.resume(session)) == (None, None)
+        with store.write() as session:
+            first.interrupt(session, {"left": [[1, 2]]})
+        with pytest.raises(ConflictError, match="is being carried out"), store.write() as session:
+            second.interrupt(session, {"left": [[1, 2]]})
+        with store.write() as session:
+            first.interrupt(session, {"left": [[2, 2]]})
 
     def test_another_number_than_expected_changes_nothing(self, store, ids) -> None:
         with pytest.raises(ConflictError, match="4 groups would change, not 3"):

@@ -3,7 +3,7 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
-from sqlalchemy import text
+from sqlalchemy import text, update
 
 from app.errors import ConflictError, NotFoundError
 from app.review.editing.edit import SetBall
@@ -16,6 +16,7 @@ from app.review.verdicts.bulk import give_verdicts, list_batches
 from app.review.verdicts.bulk_redo import redo_batch
 from app.review.verdicts.bulk_undo import undo_batch
 from app.review.verdicts.verdict import set_verdict
+from app.store.tables.queue import QueueModel
 
 
 @pytest.fixture
@@ -74,6 +75,18 @@ class TestRedoBatch:
         assert redo_batch(store, done.batch, actor="eve").changed == 4
         with store.read() as session:
             assert replay(session) == read_ledger(session)
+
+    def test_a_group_that_it_is_refused_for_is_told_with_the_reason(
+        self, store, ids, monkeypatch
+    ) -> None:
+        batch = give_verdicts(store, 1, "", "accepted", actor="ben").batch
+        undo_batch(store, batch, actor="ben")
+        with store.write() as session:
+            changed = update(QueueModel).where(QueueModel.group_id == ids[0])
+            session.execute(changed.values(pictures=0))
+        done = redo_batch(store, batch, actor="ben")
+        assert (done.changed, done.kept) == (2, 0)
+        assert [(item.reason, item.groups) for item in done.refused] == [("no_picture", 1)]
 
     def test_taking_a_redone_batch_back_restores_the_verdicts_before_it(self, store, ids) -> None:
         judge(store, ids[0], "accepted")
