@@ -29,6 +29,7 @@ from app.soccer.group import Group, Station, View
 from app.soccer.reasons import LeftOut
 from app.store.digest import group_inputs_hash, source_hash
 from app.store.frozen import freeze_said
+from app.store.queue import refresh_queue
 from tests.balls import seen
 from tests.cameras import SIZE
 from tests.unit.review.conftest import OPPOSITE, drawn
@@ -172,6 +173,12 @@ class TestFixed:
         change(store, SetLines("7.png", {name: moved}))
         self.judge(store, "accepted")
         assert load(store, 1).solution.passes
+        assert self.fixed(store) == (True, True)
+        with store.write() as session:
+            refresh_queue(session, [1])
+        assert self.fixed(store) == (True, True)
+        self.judge(store, "unreviewed")
+        give_verdicts(store, 1, "", "accepted", actor="ben")
         assert self.fixed(store) == (True, True)
 
     def test_after_undo_of_all_edits_a_group_is_not_fixed(self, store, state) -> None:
