@@ -89,7 +89,7 @@ def change_gold(client: Client, number: int, gold_every: int | None) -> dict[str
 def _batch(item: Mapping[str, Any]) -> dict[str, Any]:
     last = None if item["last"] is None else time_text(item["last"])
     own = {"query": item["q"], "created": time_text(item["created"]), "last": last}
-    return {name: {**item, **own}[name] for name in BATCH}
+    return some({**item, **own}, *BATCH)
 
 
 def told(progress: TellProgress) -> Callable[[dict[str, Any]], None]:

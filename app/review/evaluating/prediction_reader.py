@@ -143,10 +143,10 @@ class PredictionReader:
             TooLargeError: It went beyond the limits, or made the process crash.
             OverloadedError: Too many wait.
         """
-        first = files.path or files.cameras
+        name = files.first.name
 
         def explain(error: ChildEnded) -> TooLargeError:
-            return TooLargeError(f"{first.name if first else ''} {error}", hint=LIMITS_HINT)
+            return TooLargeError(f"{name} {error}", hint=LIMITS_HINT)
 
         task = self._pool.submit(read_files, files, names, limits, explain=explain)
         try:

@@ -43,7 +43,8 @@ def left_undone(store: Store, dataset: str | int) -> str | None:
     groups, matches = len(stale_groups(store, dataset)), len(stale_matches(store, dataset))
     if groups:
         return f"{groups} are left to do"
-    return f"the pitches of {matches} matches are left to estimate" if matches else None
+    many = "1 match" if matches == 1 else f"{matches} matches"
+    return f"the pitch of {many} is left to estimate" if matches else None
 
 
 def count_yield(

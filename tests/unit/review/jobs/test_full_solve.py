@@ -55,7 +55,7 @@ def test_stopped_between_two_matches_it_keeps_the_first(two: Store) -> None:
 def test_what_is_left_is_said_as_long_as_something_is(two: Store) -> None:
     assert left_undone(two, "demo") == "2 are left to do"
     solve_fully(two, "demo", None, Told(), lambda: not stale_groups(two, "demo"))
-    assert left_undone(two, "demo") == "the pitches of 2 matches are left to estimate"
+    assert left_undone(two, "demo") == "the pitch of 2 matches is left to estimate"
     solve_fully(two, "demo", None, Told())
     assert left_undone(two, "demo") is None
 
