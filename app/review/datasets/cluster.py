@@ -36,6 +36,7 @@ PATIENCE_S = 120.0
 _CONNECT_S = 10.0
 _WORKERS_S = 60.0
 """Workers that were started together with who asks take so long on a busy machine."""
+_LEAVE_S = 5.0
 _LOOK_S = 0.5
 _COUNT_S = 5.0
 """Seconds between two looks whether there is a worker at all."""
@@ -372,8 +373,12 @@ def hush() -> None:
 
 
 def _leave(client: Any) -> None:
-    with suppress(Exception):
-        client.close(timeout=_LOOK_S)
+    try:
+        client.close(timeout=_LEAVE_S)
+    except Exception:
+        # Or it would be closed again when it is collected, at the end of the process by a loop
+        # that runs no more, and say in a traceback that it waited for nothing.
+        client.status = "closed"
 
 
 def _explained(error: BaseException) -> BaseException:

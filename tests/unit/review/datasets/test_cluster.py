@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future
@@ -158,6 +159,26 @@ class TestCluster:
         with Cluster(place) as workers:
             assert workers.submit(double, 4).result(SECONDS) == 8
         assert lost
+
+    def test_a_scheduler_that_takes_no_leave_is_left_once_and_without_a_word(
+        self, place: SchedulerPlace, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        from distributed import Client
+
+        left: list[Client] = []
+
+        async def hang(client: Client, fast: bool = False) -> None:
+            left.append(client)
+            await asyncio.sleep(SECONDS)
+
+        monkeypatch.setattr(cluster, "_LEAVE_S", 0.1)
+        executor = Cluster(place)
+        with monkeypatch.context() as stuck:
+            stuck.setattr(Client, "_close", hang)
+            executor.shutdown()
+            # Dask does this to every client that is collected.
+            left[0].__del__()
+        assert len(left) == 1
 
     def test_a_worker_of_another_version_does_nothing(
         self, place: SchedulerPlace, monkeypatch: pytest.MonkeyPatch
