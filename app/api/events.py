@@ -187,7 +187,7 @@ class Events:
         return feed
 
     def unsubscribe(self, feed: Feed) -> None:
-        """Listen no more."""
+        """Stop listening."""
         with self._lock:
             self._feeds.discard(feed)
             self._counts.lost += feed.lost

@@ -69,7 +69,7 @@ def list_(json_: Json = False) -> None:
 
 @commands.command()
 def disable(name: Name, json_: Json = False) -> None:
-    """Let somebody in no more, and log them out everywhere; what they did stays."""
+    """Stop letting somebody in, and log them out everywhere; what they did stays."""
     _change(name, json_, disabled=True)
 
 

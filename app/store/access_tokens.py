@@ -80,7 +80,7 @@ def delete_access_tokens(session: Session, person_id: int) -> None:
 
 
 def delete_expired_token(session: Session, person_id: int, name: str, at: str) -> None:
-    """Make room for a token of that name, where the one that has it is good no more."""
+    """Make room for a token of that name, where the one that has it is no longer valid."""
     session.execute(
         delete(AccessTokenModel).where(
             AccessTokenModel.person_id == person_id,

@@ -74,7 +74,7 @@ def update_person(session: Session, person_id: int, **values: Any) -> None:
 def insert_link(
     session: Session, token_hash: str, person_id: int | None, *, by: str, expires: str
 ) -> None:
-    """Insert a link; those that the same person (or nobody) had before are good no more."""
+    """Insert a link; those that the same person (or nobody) had before are no longer valid."""
     forget_links(session, person_id)
     values = {"token_hash": token_hash, "person_id": person_id, "created": now()}
     session.execute(insert(OneTimeLinkModel), {**values, "created_by": by, "expires": expires})

@@ -132,7 +132,7 @@ def keep_upload(settings: Settings, upload_id: str) -> None:
 def delete_upload(
     settings: Settings, upload_id: str, mine: Callable[[str], bool] = lambda _actor: True
 ) -> None:
-    """Delete an upload, or be among those who sent it no more while others have sent it, too.
+    """Delete an upload, or no longer be among those who sent it while others have sent it, too.
 
     Args:
         settings: Where it lies.

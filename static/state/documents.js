@@ -20,7 +20,7 @@ export function known(id) {
 /** Groups of which something was told while they are read: the answer may be older than that. @type {Set<number>} */
 const outdated = new Set();
 
-/** Something was told of a group: an answer that is on its way counts no more. @param {number} id */
+/** Something was told of a group: an answer that is on its way no longer counts. @param {number} id */
 export function outdate(id) {
 	if (loading.has(id)) outdated.add(id);
 }

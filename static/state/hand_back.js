@@ -36,7 +36,7 @@ const isReady = computed(() => {
 export const frozen = computed(() => {
 	const one = take.value;
 	if (one === null || one.group !== groupDocument.value?.id) return '';
-	if (one.settled !== null) return 'This annotation was decided about already; it changes no more.';
+	if (one.settled !== null) return 'This annotation was decided about already; it can no longer be changed.';
 	const mine = !isTeam || one.person === myName.value;
 	if (one.handed_in !== null) return mine ? '' : `${one.person} has handed this in; hand it back, or take it over.`;
 	return mine ? '' : `${one.person} judges this annotation.`;
@@ -85,7 +85,7 @@ export function askTakeOver() {
 	if (!canTakeOver.value || !one) return;
 	question.value = {
 		kind: 'over', person: one.person,
-		says: `What ${one.person} changed here, and their verdict${one.verdict ? ` (${one.verdict})` : ''}, go into the group under their name. This annotation then changes no more; where others annotated the group, too, theirs are set aside. Undo in the group takes the change back.`,
+		says: `What ${one.person} changed here, and their verdict${one.verdict ? ` (${one.verdict})` : ''}, go into the group under their name. This annotation can then no longer be changed; where others annotated the group, too, theirs are set aside. Undo in the group takes the change back.`,
 		send: async () => {
 			const { id } = await postAdoption(one.group);
 			navigate(reviewAddress(id));

@@ -82,7 +82,7 @@ export function PasskeysCard({ changed = () => {} }) {
 					<${OneField} key=${leaving.id} id="passkey-remove" ...${proof()} button=${`Take away ${leaving.name}`} name="password" type="password" complete="current-password" error=${error} send=${(/** @type {string} */ password) => remove(leaving, password)}
 						beside=${html`<button class="button" type="button" onClick=${() => setLeaving(null)}>Keep it</button>`}
 					>
-						<p>${leaving.name} will log you in no more. Delete it in the device, too.</p>
+						<p>${leaving.name} will no longer log you in. Delete it in the device, too.</p>
 					<//>` : null}
 			</div>
 			${unavailable ? html`<p class="note passkeys__note">${unavailable.replace(/^./, (first) => first.toUpperCase())}</p>` : null}

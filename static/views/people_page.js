@@ -117,7 +117,7 @@ function PersonRow({ one, change, link, tokens, factor, unlink }) {
 			<td><span class="table__actions">
 				${one.tokens ? html`<button class="button button--small" type="button" aria-label=${`Tokens of ${one.name}`} onClick=${tokens}>${plural(one.tokens, 'token')}</button>` : null}
 				${one.second_factor && !mine ? html`<button class="button button--small" type="button" aria-label=${`Second factor off for ${one.name}`} title="For somebody who has lost it" onClick=${factor}>Second factor off</button>` : null}
-				${one.sign_on && !mine ? html`<button class="button button--small" type="button" aria-label=${`Unlink ${one.name}`} title="Their account of the provider logs them in no more" onClick=${unlink}>Unlink</button>` : null}
+				${one.sign_on && !mine ? html`<button class="button button--small" type="button" aria-label=${`Unlink ${one.name}`} title="Their account of the provider then no longer logs them in" onClick=${unlink}>Unlink</button>` : null}
 				${one.disabled || mine ? null : html`<button class="button button--small" type="button" aria-label=${`New link for ${one.name}`} onClick=${link}>New link</button>`}
 				<button class="button button--small ${one.disabled ? '' : 'button--danger'}" type="button" disabled=${mine} title=${why} aria-label=${`${one.disabled ? 'Enable' : 'Disable'} ${one.name}`} onClick=${() => change({ disabled: !one.disabled })}>${one.disabled ? 'Enable' : 'Disable'}</button>
 			</span></td>

@@ -72,7 +72,7 @@ def mark(group: Id, edit: GoldEdit, store: AppStore, actor: Actor, asked: AskedU
     responses=responses(404),
 )
 def unmark(group: Id, store: AppStore, actor: Actor, asked: AskedUnder) -> Response:
-    """Let a gold group be an ordinary one again; what people made of it is shown no more."""
+    """Let a gold group be an ordinary one again; what people made of it is no longer shown."""
     reply = Reply(asked, _gold_answer)
     return reply.of(gold.unmark(store, group, actor=actor, keep=reply.keep))
 

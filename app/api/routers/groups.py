@@ -120,7 +120,7 @@ def list_groups(
 
     To read all of them follow `next`: while others edit, a cursor neither skips a group nor gives
     it twice. To look at any place of the list say `from`: page 90 costs what page 2 costs, but
-    positions are those of this moment and move when groups come to match or match no more. Such a
+    positions are those of this moment and move when groups come to match or cease to. Such a
     page has a `next` too.
     """
     found = dataset_id(store, dataset)

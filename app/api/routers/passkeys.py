@@ -68,7 +68,7 @@ def make(new: NewPasskey, request: Request, team: AppTeam, me: Me) -> PasskeyMad
     responses=responses(401, 404, 409, 413, 415, 429),
 )
 def remove(passkey: Id, said: PasswordOnly, request: Request, team: AppTeam, me: Me) -> None:
-    """Accept a passkey no more; 409 for the last second factor, where everybody needs one."""
+    """Stop accepting a passkey; 409 for the last second factor, where everybody needs one."""
     team.tries.count(team.address(request), me.name)
     team.passkeys.remove(me, passkey, said.password)
 

@@ -52,7 +52,7 @@ def confirm(said: CodeOnly, team: AppTeam, me: Me) -> RecoveryCodes:
     responses=responses(401, 409, 413, 415, 429),
 )
 def remove(said: PasswordOnly, request: Request, team: AppTeam, me: Me) -> None:
-    """Ask for a code no more; 409 where everybody needs a second factor."""
+    """Stop asking for a code; 409 where everybody needs a second factor."""
     team.tries.count(team.address(request), me.name)
     team.factors.remove(me, said.password)
 

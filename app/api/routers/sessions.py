@@ -218,7 +218,7 @@ def look_at_link(asked: LinkLook, request: Request, store: AppStore, team: AppTe
 def use_link(
     chosen: LinkUse, request: Request, response: Response, store: AppStore, team: AppTeam
 ) -> SessionDocument:
-    """Set the password that a link is for, and log in with it; the link is good no more.
+    """Set the password that a link is for, and log in with it; the link is then no longer valid.
 
     For whoever has a second factor the password is set, and the answer is the 401 whose pointer is
     `/code`: log in with the new password and a code.

@@ -65,7 +65,7 @@ def change_user(user: Id, change: UserEdit, store: AppStore, _team: AppTeam, me:
     responses=responses(401, 404, 409),
 )
 def renew_link(user: Id, request: Request, store: AppStore, team: AppTeam, me: Me) -> UserWithLink:
-    """A new link with which somebody sets their password; those before it are good no more.
+    """A new link with which somebody sets their password; earlier links are no longer valid.
 
     Nobody makes one for themselves, and no token makes any.
     """

@@ -31,7 +31,7 @@ class NewAccessToken(BaseModel):
     )
     days: Annotated[
         StrictInt,
-        Field(ge=1, le=MOST_DAYS, description="After so many it is good no more."),
+        Field(ge=1, le=MOST_DAYS, description="After so many it is no longer valid."),
     ] = DAYS
     dataset: Annotated[
         str | None,
@@ -54,7 +54,7 @@ class AccessTokenDocument(Document):
     created: datetime
     expires: datetime
     used: datetime | None = Field(description="When it was used last, to some minutes.")
-    expired: bool = Field(description="It is good no more.")
+    expired: bool = Field(description="It is no longer valid.")
 
 
 class AccessTokenList(ListDocument[AccessTokenDocument]):

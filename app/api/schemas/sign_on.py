@@ -25,7 +25,8 @@ class SignOnBegin(BaseModel):
         default="/groups", description="A page of this server, to be shown then."
     )
     link: Token | None = Field(
-        default=None, description="The part of a link that follows its #; it is good no more then."
+        default=None,
+        description="The part of a link that follows its #; it is no longer valid then.",
     )
     name: Name | None = Field(default=None, description="Of the first admin, who chooses one.")
 

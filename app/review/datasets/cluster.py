@@ -377,7 +377,7 @@ def _leave(client: Any) -> None:
         client.close(timeout=_LEAVE_S)
     except Exception:
         # Or it would be closed again when it is collected, at the end of the process by a loop
-        # that runs no more, and say in a traceback that it waited for nothing.
+        # that no longer runs, and say in a traceback that it waited for nothing.
         client.status = "closed"
 
 

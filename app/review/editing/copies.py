@@ -13,7 +13,7 @@ def require_open(session: Session, dataset_id: int, group_id: int) -> None:
     take = take_of_copy(session, group_id) if dataset_id > COPIES else None
     if take is not None and take.handed_in is not None:
         raise ConflictError(
-            "this annotation was handed in, and changes no more",
+            "this annotation was handed in, and can no longer be changed",
             hint="Take your verdict back to go on, or ask a lead.",
         )
 

@@ -51,7 +51,7 @@ class ExportFolder:
         """A path beside the zip of an export, for this run to call its half written files after.
 
         What a server or a process that was killed at an export has left of it goes before, also
-        under a server that is still at it: it is theirs no more. After it goes what is this run's
+        under a server that is still at it: it is no longer theirs. After it goes what is this run's
         alone, for another server may have begun with it anew.
         """
         self.folder.mkdir(mode=0o700, parents=True, exist_ok=True)

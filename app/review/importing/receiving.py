@@ -72,7 +72,7 @@ def delete_sent(
     keep: Kept,
     progress: SavedProgress | None,
 ) -> None:
-    """Delete an upload, or be among those who sent it no more while others have sent it, too.
+    """Delete an upload, or no longer be among those who sent it while others have sent it, too.
 
     What goes is a file, which no transaction holds. That it is to go is written down before, and
     the answer afterwards: sent again, a request that was stopped in between does the rest.

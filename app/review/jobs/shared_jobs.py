@@ -244,7 +244,7 @@ class SharedJobs(Jobs):
 
     def _lose(self) -> None:
         """Let another process go on: the connection that held the claim is gone."""
-        log.warning("this process carries out jobs no more")
+        log.warning("this process no longer carries out jobs")
         lost, self._lost = self._lost, None
         with self._changed:
             for run in self._queue.waiting:

@@ -59,7 +59,7 @@ class AccessToken:
         start: Its first characters.
         dataset: The one dataset that it is for; None: all that its person may see.
         used: When it was used last, to some minutes; None: never.
-        expired: It is good no more.
+        expired: It is no longer valid.
     """
 
     id: int
@@ -119,7 +119,7 @@ class AccessTokens:
             login: Whose it is.
             name: What the log calls it, beside their name.
             scopes: What it is for; at least one.
-            days: After so many it is good no more.
+            days: After so many it is no longer valid.
             dataset_id: The one dataset that it is for; None: all.
 
         Returns:

@@ -31,7 +31,7 @@ class Waiting(Protocol):
         """Let something wait for somebody, in the place of what did."""
 
     def take(self, asker: str) -> bytes | None:
-        """What waits for somebody, and then does no more; None where nothing does that is good."""
+        """What waits for somebody, and from then on does not; None where nothing does that is good."""
 
 
 class Remembered:

@@ -104,7 +104,7 @@ def use(store: Store, token: str, password: str, name: str | None = None) -> str
 
 
 def take(session: Session, token: str, name: str | None, *, password: str | None) -> int:
-    """Whose a link is, which is good no more; their sessions end, and they have that password.
+    """Whose a link is, which is then no longer valid; their sessions end, and they have that password.
 
     Raises:
         NotFoundError: It is not good.

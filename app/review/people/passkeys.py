@@ -173,7 +173,7 @@ class Passkeys:
         return Passkey(number, name, at, None), codes
 
     def remove(self, login: Login, passkey_id: int, password: str | None) -> None:
-        """Accept a passkey no more.
+        """Stop accepting a passkey.
 
         Raises:
             InputError: That is not the password.

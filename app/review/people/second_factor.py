@@ -136,7 +136,7 @@ class SecondFactors:
         return codes
 
     def remove(self, login: Login, password: str | None) -> None:
-        """Ask for the codes of an authenticator no more.
+        """Stop asking for the codes of an authenticator.
 
         Raises:
             InputError: That is not the password.

@@ -148,7 +148,7 @@ def mark(
 def unmark(
     store: Store, group_id: int, *, actor: str, keep: Keep[GoldGroup] = keep_nothing
 ) -> GoldGroup:
-    """Let a gold group be an ordinary one again; what was measured by it is shown no more.
+    """Let a gold group be an ordinary one again; what was measured by it is no longer shown.
 
     ``keep`` keeps the answer in its transaction.
 

@@ -242,7 +242,9 @@ class WebhookSender:
     def _turn_off(self, session: Session, row: Any, answer: Attempt) -> None:
         """Tell nobody any more who wants nothing, or has taken nothing for as long as one tries."""
         if answer.status == GONE:
-            update_webhook(session, row.webhook_id, {"off": "it answered 410: it wants no more"})
+            update_webhook(
+                session, row.webhook_id, {"off": "it answered 410: it wants no further messages"}
+            )
         elif not arrived_since(session, row.webhook_id, row.created):
             reason = f"nothing arrived since {row.created[:16].replace('T', ' ')} UTC"
             update_webhook(session, row.webhook_id, {"off": reason})

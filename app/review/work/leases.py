@@ -276,7 +276,7 @@ def open_for(
         session: A write session.
         batch: The batch, open.
         worker: Who asks.
-        at: Now; leases that end before count no more.
+        at: Now; leases that end before no longer count.
         after: Id of the group that they come from: never that one, those behind it first, and what
             else they have open last. None: where they have a group open, that one.
 

@@ -248,7 +248,7 @@ class YieldStore:
         return known
 
     def _judged(self, gathered: Gathered, policy: Policy, old: Snapshot | None) -> Snapshot:
-        """The snapshot of groups under a policy; what was judged before is so no more."""
+        """The snapshot of groups under a policy; what was judged before no longer is."""
         before = {id(part.table): part for part in old.blocks} if old is not None else {}
 
         def judged_block(block: KeptBlock) -> Block:

@@ -49,7 +49,7 @@ class Sharing(Protocol):
         """Begin to listen, on a thread of its own."""
 
     def close(self) -> None:
-        """End all claims, and listen no more."""
+        """End all claims, and stop listening."""
 
 
 class Alone:
