@@ -358,7 +358,8 @@ def _connect(place: SchedulerPlace) -> Any:
         return Client(
             place.address, security=place.security(), timeout=_CONNECT_S, set_as_default=False
         )
-    except (OSError, TimeoutError) as error:
+    except Exception as error:
+        # A scheduler that goes while it is greeted may leave any error, and who watches must go on.
         raise ClusterError(
             f"no scheduler answers at {place.address}",
             hint=f"Start one: touchline scheduler {place.address}",

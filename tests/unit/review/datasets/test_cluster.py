@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import threading
+import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future
 from pathlib import Path
@@ -192,6 +193,28 @@ class TestCluster:
         monkeypatch.setattr(cluster, "build", of_another_version)
         with pytest.raises(ClusterError, match="has solver 4 instead of 5"):
             Cluster(place)
+
+    def test_a_scheduler_that_goes_while_it_is_greeted_is_waited_for(
+        self, place: SchedulerPlace, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        import distributed
+
+        greet, greeted = distributed.Client, []
+
+        def greet_the_second_time(*words: object, **named: object) -> object:
+            greeted.append(words)
+            if len(greeted) == 1:
+                raise RuntimeError("it said half of its name")
+            return greet(*words, **named)
+
+        with Cluster(place) as workers:
+            monkeypatch.setattr(distributed, "Client", greet_the_second_time)
+            workers._lost.set()
+            waiting = time.monotonic() + SECONDS
+            while len(greeted) < 2 and time.monotonic() < waiting:
+                time.sleep(0.05)
+            assert workers.submit(double, 4).result(SECONDS) == 8
+        assert len(greeted) == 2
 
     def test_who_waits_for_nobody_is_told(self, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(cluster, "_CONNECT_S", 0.5)
