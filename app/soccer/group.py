@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from string import ascii_uppercase
 
 from app.errors import InputError
 from app.geometry.camera import Camera
@@ -17,6 +18,11 @@ from app.soccer.reasons import LeftOut
 
 CALIBRATIONS = ("given", "lines")
 """Which calibration of a camera can count: the one that came with the data, or that of its lines."""
+
+
+def view_letter(index: int) -> str:
+    """What people call the view at that place of its group: A, B, ..., Z, V27, V28, ..."""
+    return ascii_uppercase[index] if index < len(ascii_uppercase) else f"V{index + 1}"
 
 
 @dataclass(frozen=True)

@@ -15,13 +15,13 @@ import numpy as np
 
 from app.geometry.arrays import BoolArray
 from app.soccer.finding import Finding
+from app.soccer.group import view_letter
 from app.soccer.policy import Policy
 from app.soccer.solution import Pair, Solution
 from app.solving.facts import Facts
 from app.solving.findings import closest, view_disagrees
 from app.solving.gates import reprojection
 from app.solving.judgement import failures, view_jac
-from app.solving.solve import view_letter
 
 
 def has_smaller_tau(policy: Policy, before: Policy) -> bool:

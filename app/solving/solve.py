@@ -13,7 +13,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from app.soccer.group import Group, View
+from app.soccer.group import Group, View, view_letter
 from app.soccer.policy import Policy
 from app.soccer.solution import (
     GATES,
@@ -94,11 +94,6 @@ def solve_with_facts(
         solver_version=SOLVER_VERSION,
     )
     return solution, facts
-
-
-def view_letter(index: int) -> str:
-    """What people call the view at that place of its group: A, B, C, ..."""
-    return chr(ord("A") + index) if index < 26 else f"V{index + 1}"
 
 
 def _calibrated(view: View, group: Group, policy: Policy, known: dict[str, Calibration]) -> str:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from datetime import datetime
-from string import ascii_uppercase
 from typing import Any, Literal
 
 from pydantic import Field
@@ -14,7 +13,7 @@ from app.api.schemas.policy import PolicyDocument
 from app.api.schemas.solution import SolutionDocument
 from app.review.editing.state import GroupState
 from app.soccer.frame_number import counts_time
-from app.soccer.group import Group, View
+from app.soccer.group import Group, View, view_letter
 from app.soccer.pitch import Pitch
 from app.soccer.reasons import LeftOut
 
@@ -169,11 +168,6 @@ def view_labels(group: Group) -> list[str]:
     return labels
 
 
-def letter(index: int) -> str:
-    """A, B, ... for the views in their order."""
-    return ascii_uppercase[index] if index < len(ascii_uppercase) else str(index + 1)
-
-
 def image_address(view_id: int) -> str:
     """Where the frame of a view is served."""
     return f"/api/v1/views/{view_id}/image"
@@ -184,7 +178,7 @@ def _view(state: GroupState, view: View, index: int, label: str) -> ViewDocument
     return ViewDocument.model_construct(
         id=view_id,
         key=view.key,
-        letter=letter(index),
+        letter=view_letter(index),
         label=label,
         width=view.size.width,
         height=view.size.height,

@@ -8,10 +8,10 @@ from pydantic import Field
 
 from app.api.schemas.annotation import Ball, LineDocuments, lines_document
 from app.api.schemas.document import Document
-from app.api.schemas.group import PitchSize, image_address, letter
+from app.api.schemas.group import PitchSize, image_address
 from app.api.schemas.queue import LogEntryDocument
 from app.review.editing.past import ChangedView, Step
-from app.soccer.group import View
+from app.soccer.group import View, view_letter
 
 
 class PastView(Document):
@@ -52,7 +52,7 @@ class ChangedViewDocument(Document):
         shown = changed.id is not None and there.media is not None
         return cls(
             key=changed.key,
-            letter=letter(changed.index),
+            letter=view_letter(changed.index),
             width=there.size.width,
             height=there.size.height,
             image=image_address(changed.id) if shown and changed.id is not None else None,

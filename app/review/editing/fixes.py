@@ -9,7 +9,7 @@ from app.review.editing.edit import Edit, IncludeView, SetBall, SetLines, SetPic
 from app.soccer.annotation import BallAnnotation
 from app.soccer.finding import Finding, Fix
 from app.soccer.frames import Box, ImagePoint
-from app.soccer.group import Group, View
+from app.soccer.group import Group, View, view_letter
 from app.soccer.picture import OPEN
 from app.soccer.pitch import twin_marking
 from app.solving.paint_findings import READ_PAINT
@@ -104,7 +104,7 @@ def rank(fix: Fix) -> int:
 
 def sentence(group: Group, fix: Fix, moved_px: float = 0.0) -> str:
     """The condition under which the group passes, to be read after "would pass if"."""
-    letter = chr(ord("A") + [view.key for view in group.views].index(fix.view or ""))
+    letter = view_letter([view.key for view in group.views].index(fix.view or ""))
     return _words(_ACTIONS[fix.action].sentence, fix, letter=letter, px=moved_px)
 
 

@@ -22,7 +22,7 @@ from app.review.editing.fixes import (
 )
 from app.soccer.finding import Fix
 from app.soccer.frames import ImagePoint
-from app.soccer.group import Group, View
+from app.soccer.group import Group, View, view_letter
 from app.soccer.policy import Policy
 from app.soccer.solution import Calibration, Gate, MarkingFit, Solution, ViewSolution
 from app.solving.jaccard import project_markings
@@ -203,7 +203,7 @@ def _of_undrawn(group: Group, view: View, solved: ViewSolution) -> Iterator[_Ide
     camera = solved.calibration.camera
     if not undrawn or camera is None:
         return
-    letter = chr(ord("A") + group.views.index(view))
+    letter = view_letter(group.views.index(view))
     names = [f"{fit.marking} (visible over {max(fit.length_px, 1):.0f} px)" for fit in undrawn]
     verb = "were" if len(names) > 1 else "was"
     said = f"{' and '.join(names)} {verb} drawn in {letter}"

@@ -15,8 +15,7 @@ from app.review.editing.state import VerdictState
 from app.review.practice.words import WORDS
 from app.sample.practice import CLEAN
 from app.sample.scene import PlantedFault, SceneTruth, ViewTruth
-from app.soccer.group import Group, View
-from app.solving.solve import view_letter
+from app.soccer.group import Group, View, view_letter
 
 OPEN, MENDED, RIGHT, ALMOST, WRONG = "open", "mended", "right", "almost", "wrong"
 OFF_PX = 12.0

@@ -13,7 +13,7 @@ from app.soccer.policy import PAPER, STRICT
 from app.soccer.solution import Calibration, MarkingFit, Suspect
 from app.solving.calibrate import calibrate_station
 from app.solving.calibration_findings import calibration_findings
-from app.solving.solve import solve, view_letter
+from app.solving.solve import solve
 from tests.balls import BALL_M
 from tests.cameras import SIZE, looking, wide
 from tests.unit.solving.conftest import (
@@ -445,11 +445,6 @@ class TestCalibrationFindings:
         wrong = replace(clean.views[0], station=replace(station, lines=make_lines(lines)))
         found = solve(group(wrong, *clean.views[1:]), PAPER).findings
         assert [(item.kind, item.suggested) for item in found] == [("wrong_label", "Circle right")]
-
-
-class TestViewLetter:
-    def test_views_after_the_26th_are_numbered(self):
-        assert [view_letter(index) for index in (0, 2, 25, 26)] == ["A", "C", "Z", "V27"]
 
 
 class TestBallInGroup:

@@ -15,6 +15,8 @@ from app.review.editing.fixes import (
 from app.soccer.annotation import BallAnnotation
 from app.soccer.finding import Finding, Fix
 from app.soccer.frames import Box, ImagePoint
+from app.soccer.group import Group, Station, View
+from tests.cameras import SIZE
 from tests.unit.solving.conftest import BEHIND_GOAL, MAIN, group, view
 
 BALL = (36.0, 3.0, -0.5)
@@ -169,6 +171,10 @@ class TestSentence:
         assert sentence(GROUP, dropped) == "point 2 of Middle line in B was dropped"
         moved = sentence(GROUP, replace(dropped, action="move_point"), 3.14159)
         assert moved == "point 2 of Middle line in B moved 3.1 px"
+
+    def test_names_the_27th_view_as_the_gates_do(self):
+        many = Group("g", tuple(View(f"{n}", Station(f"{n}", SIZE)) for n in range(27)))
+        assert sentence(many, Fix("exclude_view", "26")).startswith("V27 ")
 
 
 class TestRank:
