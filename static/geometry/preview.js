@@ -100,7 +100,8 @@ export function seenBalls(group, solution) {
 		const json = solved?.calibration.camera;
 		// A ball that was put where the others see it confirms nothing.
 		if (!view.included || !solved || !json || !center || ball.inferred) return [];
-		const dropped = solved.failed === 'calibratable' || solved.failed === 'jac' ? solved.failed : null;
+		// Used again since, it stands until the server says what it fails.
+		const dropped = solved.failed === 'excluded' ? null : solved.failed;
 		const tau = (group.policy.tau_percent / 100) * diagonal(view);
 		return [{ view, camera: cameraFromJson(json), center, tau, dropped }];
 	});

@@ -6,6 +6,9 @@ import { apply, cross, dot, norm, smallestSingularVector, subtract, times } from
 
 /** @import {Camera, ImagePoint, PitchPoint} from './camera.js' */
 
+/** Fourth coordinate of a unit vector below which it is no place but a direction. */
+const PARALLEL = 1e-12;
+
 /**
  * The point whose images are the two pixels: homogeneous linear DLT on pixel coordinates.
  *
@@ -24,7 +27,7 @@ export function triangulate(a, pixelA, b, pixelB) {
 		...rows(projectionMatrix(a), idealA),
 		...rows(projectionMatrix(b), idealB),
 	]);
-	if (Math.abs(X[3]) < 1e-15) return null;
+	if (Math.abs(X[3]) < PARALLEL) return null;
 	return [X[0] / X[3], X[1] / X[3], X[2] / X[3]];
 }
 

@@ -11,7 +11,7 @@ const SIZE = { name: 'size', label: 'Size of the images', hint: 'width x height,
 /** @type {FormatOption[]} */
 const STATIC = [
 	CALIBRATION, SIZE,
-	{ name: 'frame_offset', label: 'Frame offset', hint: 'number in the ground truth minus number in the video: 8, or by camera 1:8,2:9', kind: 'offset' },
+	{ name: 'frame_offset', label: 'Frame offset', hint: 'number in the ground truth minus number in the video: 8, or by camera 1=8,2=9', kind: 'offset' },
 	{ name: 'flipped', label: 'Mirrored cameras', hint: 'numbers, for example 2,6', kind: 'cameras' },
 ];
 
@@ -45,7 +45,7 @@ export function optionValue({ kind }, text) {
 	if (kind === 'cameras') return said.split(/[\s,]+/).map((one) => (/^\d+$/.test(one) ? Number(one) : one));
 	if (kind === 'offset') {
 		if (/^-?\d+$/.test(said)) return Number(said);
-		const pairs = said.split(/[\s,]+/).map((pair) => pair.split(':'));
+		const pairs = said.split(/[\s,]+/).map((pair) => pair.split(/[=:]/));
 		return Object.fromEntries(pairs.map(([camera, offset]) => [camera, /^-?\d+$/.test(offset ?? '') ? Number(offset) : offset ?? null]));
 	}
 	return said;

@@ -42,10 +42,18 @@ describe('previewBall', () => {
 		assert.equal(next.pairs[0].failed, 'reprojection');
 	});
 
-	it('does not let a view count that an earlier gate dropped', () => {
+	for (const gate of ['calibratable', 'jac', 'agreement']) {
+		it(`does not let a view count that the gate ${gate} dropped`, () => {
+			const group = { policy, views: [viewOf('a', mainCamera), viewOf('b', goalCamera)] };
+			const dropped = { ...solution, views: [solved('a', mainCamera, gate), solution.views[1]] };
+			assert.equal(previewBall(group, dropped).pairs[0].failed, gate);
+		});
+	}
+
+	it('lets a view count that is used again', () => {
 		const group = { policy, views: [viewOf('a', mainCamera), viewOf('b', goalCamera)] };
-		const dropped = { ...solution, views: [solved('a', mainCamera, 'jac'), solution.views[1]] };
-		assert.equal(previewBall(group, dropped).pairs[0].failed, 'jac');
+		const again = { ...solution, views: [solved('a', mainCamera, 'excluded'), solution.views[1]] };
+		assert.equal(previewBall(group, again).pairs[0].failed, null);
 	});
 
 	it('leaves out a view that a person left out', () => {

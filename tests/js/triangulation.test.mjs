@@ -41,6 +41,20 @@ describe('triangulate', () => {
 	});
 });
 
+describe('triangulate with parallel rays', () => {
+	const aside = (metres) => cameraFromJson({ ...mainCamera, position_meters: [metres, 0, 0] });
+	const straight = { x: mainCamera.principal_point[0], y: mainCamera.principal_point[1] };
+
+	it('has no point', () => {
+		assert.equal(triangulate(aside(0), straight, aside(1), straight), null);
+	});
+
+	it('has none either beyond what the server calls a place', () => {
+		const nearly = { x: straight.x + 1e-10, y: straight.y };
+		assert.equal(triangulate(aside(0), straight, aside(1), nearly), null);
+	});
+});
+
 describe('parallaxDegrees', () => {
 	const at = (x, y) => cameraFromJson({ ...mainCamera, position_meters: [x, y, 0] });
 
