@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+PITCH_SIZE = "pitch_size"
+"""The one finding that is of a match; it stands at the first group of it."""
 FINDING_KINDS = (
     "wrong_label",
     "sides_swapped",
@@ -23,6 +25,7 @@ FINDING_KINDS = (
     "implausible_camera",
     "several_balls",
     "upstream_changed",
+    PITCH_SIZE,
 )
 """Every kind of finding."""
 

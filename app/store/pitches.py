@@ -9,6 +9,7 @@ from typing import Any
 from sqlalchemy import delete, func, insert, select
 
 from app.soccer.annotation import Lines
+from app.soccer.finding import PITCH_SIZE
 from app.soccer.frames import ImageSize
 from app.soccer.pitch import Pitch
 from app.store.codecs import lines_from_json, picture_from_json
@@ -23,7 +24,6 @@ from app.store.tables.pitches import PitchEstimateModel
 
 PITCH = "pitch"
 """Kind of the log's entries that say how long and wide a pitch is, one for each group."""
-FINDING = "pitch_size"
 
 
 @dataclass(frozen=True)
@@ -200,7 +200,7 @@ def replace_pitch_findings(
     """Put findings (group and sentence) in the place of a dataset's; returns groups concerned."""
     model = ImportFindingModel
     mine = select(GroupModel.id).where(GroupModel.dataset_id == dataset_id)
-    where = (model.kind == FINDING, model.group_id.in_(mine))
+    where = (model.kind == PITCH_SIZE, model.group_id.in_(mine))
     present = {
         (row.group_id, row.sentence)
         for row in session.execute(select(model.group_id, model.sentence).where(*where))
@@ -211,7 +211,7 @@ def replace_pitch_findings(
     session.execute(delete(model).where(*where))
     if wanted:
         rows = [
-            {"group_id": group, "view": None, "kind": FINDING, "sentence": sentence}
+            {"group_id": group, "view": None, "kind": PITCH_SIZE, "sentence": sentence}
             for group, sentence in sorted(wanted)
         ]
         session.execute(insert(model), rows)

@@ -8,9 +8,9 @@ from typing import Any
 
 from sqlalchemy import delete, insert, select, text
 
+from app.soccer.finding import PITCH_SIZE
 from app.store.dialect.statements import DeferReferences
 from app.store.groups import StoredGroup, read_groups
-from app.store.pitches import FINDING
 from app.store.session import Session
 from app.store.stations import StoredStation, stored_station
 from app.store.tables import Base
@@ -56,7 +56,7 @@ def all_spare(session: Session) -> Iterator[Any]:
 def all_noticed(session: Session) -> Iterator[Any]:
     """The row of everything that imports noticed; what was computed is not among it."""
     statement = select(*ImportFindingModel.__table__.columns)
-    return iter(session.execute(statement.where(ImportFindingModel.kind != FINDING)))
+    return iter(session.execute(statement.where(ImportFindingModel.kind != PITCH_SIZE)))
 
 
 def rewrite(

@@ -54,7 +54,7 @@ class TestPage:
 
     def test_has_every_action_and_every_finding(self) -> None:
         assert set(ACTIONS) == set(_ACTIONS)
-        assert set(FINDINGS) == {*FINDING_KINDS, "pitch_size"}
+        assert set(FINDINGS) == {*FINDING_KINDS}
 
     def test_says_of_each_finding_what_the_solver_proposes(self) -> None:
         for kind, actions in proposed().items():

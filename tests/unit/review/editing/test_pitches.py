@@ -7,6 +7,7 @@ import pytest
 from sqlalchemy import Engine, event
 
 from app.errors import InputError, NotFoundError, StaleRevisionError
+from app.review.datasets.dataset import dataset_id
 from app.review.editing.edit import SetLines
 from app.review.editing.ledger import read_ledger
 from app.review.editing.past import history
@@ -25,6 +26,7 @@ from app.review.editing.submit import load, submit
 from app.review.editing.undo import undo
 from app.review.importing.ingest import ingest
 from app.review.queue.findings import finding_values
+from app.review.queue.listing import list_groups
 from app.soccer.annotation import make_lines
 from app.soccer.group import Group, Station, View
 from app.soccer.picture import OPEN, PictureGeometry
@@ -98,6 +100,8 @@ class TestEstimatePitches:
     def test_the_match_has_one_finding(self, solved):
         (found,) = [item for item in finding_values(solved, "demo") if item["kind"] == "pitch_size"]
         assert found["group"] == f"{SMALL}/0.png"
+        listed = list_groups(solved, dataset_id(solved, "demo"), "finding:pitch_size").items
+        assert [row.key for row in listed] == [found["group"]]
         assert "solved as 105 x 68 m" in found["sentence"]
 
     def test_what_is_known_is_not_computed_again(self, solved, monkeypatch):
