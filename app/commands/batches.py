@@ -123,6 +123,10 @@ def gold(
     json_: Json = False,
 ) -> None:
     """Make gold groups of those whose truth is known; batches mix them in."""
+    from app.review.takes.gold import TruthSource
+
+    if source not in (TruthSource.SAMPLE, TruthSource.VERSION):
+        raise typer.BadParameter("say sample or version", param_hint="--from")
     server = given_server()
     if server is not None:
         from app.commands.remote import choose_gold
@@ -131,11 +135,8 @@ def gold(
         with connected(server) as client:
             print_values(choose_gold(client, dataset, asked), json_)
         return
-    from app.review.takes.gold import TruthSource
     from app.review.takes.known_truth import GoldChoice, mark_known
 
-    if source not in (TruthSource.SAMPLE, TruthSource.VERSION):
-        raise typer.BadParameter("say sample or version", param_hint="--from")
     choice = GoldChoice(TruthSource(source), version, query, size, start)
     with opened_store() as store:
         found = mark_known(store, dataset, choice, actor=acting())
@@ -146,7 +147,7 @@ def gold(
 def change(
     batch: Number,
     gold_every: Annotated[
-        int | None, typer.Option(min=1, max=1000, help="One of so many groups is a gold one.")
+        int | None, typer.Option(min=1, help="One of so many groups is a gold one.")
     ] = None,
     no_gold: Annotated[bool, typer.Option("--no-gold", help="No gold groups any more.")] = False,
     json_: Json = False,

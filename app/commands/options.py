@@ -43,10 +43,10 @@ def parse_cameras(text: str) -> frozenset[int]:
 
 
 def parse_frame_offset(text: str) -> int | dict[int, int]:
-    """A frame offset as it is typed: ``8``, or ``1=8,2=9`` by camera."""
+    """A frame offset as it is typed: ``8``, or ``1=8,2=9`` (also ``1:8,2:9``) by camera."""
     if re.fullmatch(r"-?\d{1,6}", text):
         return int(text)
-    pairs = [re.fullmatch(r"(\d{1,3})=(-?\d{1,6})", part.strip()) for part in text.split(",")]
+    pairs = [re.fullmatch(r"(\d{1,3})[=:](-?\d{1,6})", part.strip()) for part in text.split(",")]
     found = [(int(pair[1]), int(pair[2])) for pair in pairs if pair]
     if len(found) < len(pairs):
         raise typer.BadParameter(f'"{text}" is not an offset; write 8, or 1=8,2=9 by camera')

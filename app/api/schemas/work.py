@@ -13,7 +13,7 @@ from app.api.schemas.take import HandedBackDocument
 from app.finite import MAX_ID
 from app.review.datasets.naming import MAX_TITLE
 from app.review.queue.query import MAX_LISTED_LENGTH
-from app.review.work.batches import MOST_GROUPS, MOST_VERDICTS, Part
+from app.review.work.batches import MOST_GROUPS, MOST_VERDICTS, RAREST_GOLD, Part
 from app.review.work.progress import Pace
 
 Name = Annotated[str, Field(min_length=1, max_length=MAX_TITLE)]
@@ -53,7 +53,7 @@ class NewBatchDocument(BaseModel):
     blind: bool = Field(
         default=True, description="Where several judge, nobody sees what the others say."
     )
-    gold_every: Annotated[int, Field(ge=1, le=1000)] | None = Field(
+    gold_every: Annotated[int, Field(ge=1, le=RAREST_GOLD)] | None = Field(
         default=None, description="One of so many groups is a gold one; null: none is."
     )
 
@@ -72,7 +72,7 @@ class BatchEdit(BaseModel):
     state: Literal["open", "closed"] | None = Field(
         default=None, description="Nothing is given out of a closed one."
     )
-    gold_every: Annotated[int, Field(ge=1, le=1000)] | None = Field(
+    gold_every: Annotated[int, Field(ge=1, le=RAREST_GOLD)] | None = Field(
         default=None,
         description="From the next group on that somebody begins; null: no more gold groups.",
     )

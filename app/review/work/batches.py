@@ -47,6 +47,8 @@ MOST_BATCHES = 500
 """Of one dataset: a list that people read."""
 MOST_VERDICTS = 5
 """So many independent verdicts can a batch ask for."""
+RAREST_GOLD = 1000
+"""One of so many groups of a batch is a gold one at least, where any are."""
 WORK = "work"
 """Kind of the log's entries about batches; they change no group."""
 
@@ -268,8 +270,9 @@ def change_batch(
 
     Raises:
         NotFoundError: There is none.
-        InputError: Somebody named may not do that part.
+        InputError: Somebody named may not do that part, or gold groups would be too rare.
     """
+    _check_gold(gold_every)
     before = get_batch(store, batch_id)
     values: dict[str, Any] = {}
     if name is not None:
@@ -384,6 +387,12 @@ def _check(new: NewBatch) -> None:
         raise InputError(
             f"a batch asks for 1 to {MOST_VERDICTS} verdicts on each group", pointer="/verdicts"
         )
+    _check_gold(new.gold_every)
+
+
+def _check_gold(every: int | None) -> None:
+    if every is not None and not 1 <= every <= RAREST_GOLD:
+        raise InputError(f"one of 1 to {RAREST_GOLD} groups is a gold one", pointer="/gold_every")
 
 
 def _nothing(found: Sequence[int]) -> InputError:

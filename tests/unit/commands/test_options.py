@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import pytest
+from typer import BadParameter
+
+from app.commands.options import parse_frame_offset
 
 Run = Callable[..., tuple[int, str, str]]
 
@@ -17,6 +20,20 @@ class TestParsePlace:
         assert code == 2
         assert "Path '/\\u001b[31mx' does not exist." in err
         assert "\x1b" not in err
+
+
+class TestParseFrameOffset:
+    @pytest.mark.parametrize("text", ["1=8,2=-9", "1:8, 2:-9"])
+    def test_cameras_are_told_apart_with_an_equals_sign_or_a_colon(self, text: str) -> None:
+        assert parse_frame_offset(text) == {1: 8, 2: -9}
+
+    def test_one_number_is_that_of_all(self) -> None:
+        assert parse_frame_offset("-8") == -8
+
+    @pytest.mark.parametrize("text", ["", "1=", "1-8", "1=8;2=9"])
+    def test_anything_else_is_refused(self, text: str) -> None:
+        with pytest.raises(BadParameter, match="is not an offset"):
+            parse_frame_offset(text)
 
 
 class TestReadSettings:

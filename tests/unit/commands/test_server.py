@@ -156,6 +156,7 @@ def test_what_is_imported_frozen_exported_and_measured_there_is_as_here(
         run("batch", "change", rest, "--gold-every", every)
         assert get_batch(place.store, int(rest)).gold_every == int(every)
         assert "the truth of none" in str(run("batch", "gold", "small").exception)
+        assert "say sample or version" in run("batch", "gold", "small", "--from", "hearsay").output
     remote("batch", "change", rest, "--no-gold")
     assert get_batch(place.store, int(rest)).gold_every is None
     assert remote("batch", "change", rest).exit_code == 2

@@ -269,6 +269,16 @@ class TestLeases:
         with store.read() as session:
             assert groups[3] in replay(session).groups
 
+    @pytest.mark.parametrize("every", [0, 1001])
+    def test_gold_groups_come_at_least_once_in_a_thousand(self, store, dataset, groups, every):
+        kept = make_batch(store, dataset, NewBatch("a", size=1, gold_every=1000), actor="lead").id
+        with pytest.raises(InputError, match="one of 1 to 1000 groups is a gold one") as refused:
+            make_batch(store, dataset, NewBatch("b", size=1, gold_every=every), actor="lead")
+        assert refused.value.pointer == "/gold_every"
+        with pytest.raises(InputError, match="one of 1 to 1000"):
+            change_batch(store, kept, gold_every=every, actor="lead")
+        assert [(one.id, one.gold_every) for one in list_batches(store, dataset)] == [(kept, 1000)]
+
     def test_what_is_annotated_among_gold_waits_for_its_reviewer_who_may_hand_it_back(
         self, store, dataset, groups, leases
     ):
