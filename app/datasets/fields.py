@@ -7,9 +7,7 @@ import re
 from typing import Any
 
 from app.finite import quoted
-
-MAX_PIXEL = 1e6
-"""No annotated coordinate is further than this from the image's origin, pixels."""
+from app.soccer.frames import MAX_PIXEL
 
 _NUMBER = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d{1,3})?", re.ASCII)
 

@@ -14,12 +14,11 @@ from app.datasets.json_text import read_json
 from app.datasets.report import Report
 from app.datasets.safe_path import check_name
 from app.datasets.sn_calibration_reader import lines_from_json
-from app.datasets.soccernet_record import MAX_SIDE
 from app.datasets.soccernet_v3 import SPLITS
 from app.datasets.trees import opened_tree
 from app.errors import DatasetFormatError, UnsafePathError
 from app.soccer.annotation import BallAnnotation, Extras, Lines
-from app.soccer.frames import Box, ImageSize
+from app.soccer.frames import MAX_SIDE, Box, ImageSize
 from app.soccer.group import Group, Station, View
 from app.soccer.media import Media
 

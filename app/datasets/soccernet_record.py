@@ -12,13 +12,11 @@ from app.datasets.report import Report
 from app.datasets.sn_calibration import spelling
 from app.errors import DatasetFormatError, UnknownMarkingError
 from app.soccer.annotation import CORNERS, BallAnnotation, Extras, Lines, make_lines
-from app.soccer.frames import Box, ImagePoint, ImageSize
+from app.soccer.frames import MAX_SIDE, Box, ImagePoint, ImageSize
 from app.soccer.group import View
 from app.soccer.pitch import WITHOUT_GEOMETRY, canonical_marking
 
 BALL = "Ball"
-MAX_SIDE = 16_384
-"""Longest side of an annotated image, pixels."""
 
 IMAGE = "imageMetadata"
 RECORD = "record"

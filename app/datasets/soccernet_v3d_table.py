@@ -13,13 +13,12 @@ from app.datasets.file_tree import FileTree, Limits
 from app.datasets.json_text import parse_literal
 from app.datasets.report import Report
 from app.datasets.safe_path import check_name
-from app.datasets.soccernet_record import MAX_SIDE
 from app.datasets.soccernet_v3d import SPLIT_FILES, TABLE
 from app.errors import DatasetFormatError, UnsafePathError
 from app.finite import quoted
 from app.geometry.camera import Camera
 from app.soccer.annotation import BallAnnotation
-from app.soccer.frames import Box, ImageSize
+from app.soccer.frames import MAX_SIDE, Box, ImageSize
 
 REQUIRED = ("league", "season", "match", "main_action", "action", "replay", "img_w", "img_h")
 _TRUE, _FALSE = ("true", "1", "1.0"), ("false", "0", "0.0")

@@ -15,12 +15,12 @@ from typing import Any
 import numpy as np
 
 from app.datasets import fields
-from app.datasets.soccernet_record import MAX_SIDE
 from app.errors import DatasetFormatError, GeometryError
 from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
 from app.geometry.fisheye import ARCTAN_POLYNOMIAL as TERMS
 from app.geometry.lens import ARCTAN_POLYNOMIAL
+from app.soccer.frames import MAX_SIDE
 
 MATRIX, POLYNOMIAL = "camera_matrix", "dist_poly"
 MAX_SKEWNESS = 1e-3

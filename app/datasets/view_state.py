@@ -13,11 +13,10 @@ from typing import Any
 from app.datasets import fields
 from app.datasets.camera_json import camera_from_json, camera_to_json
 from app.datasets.safe_path import check_name
-from app.datasets.soccernet_record import MAX_SIDE
 from app.errors import DatasetFormatError, InputError, UnknownMarkingError, UnsafePathError
 from app.geometry.camera import camera_covariance
 from app.soccer.annotation import BallAnnotation, Extras, Lines, make_lines
-from app.soccer.frames import Box, ImagePoint, ImageSize
+from app.soccer.frames import MAX_SIDE, Box, ImagePoint, ImageSize
 from app.soccer.group import CALIBRATIONS, Group, Station, View
 from app.soccer.picture import PictureGeometry
 from app.soccer.pitch import Pitch, canonical_marking

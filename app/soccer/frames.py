@@ -6,6 +6,11 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
+MAX_PIXEL = 1e6
+"""No annotated coordinate is further than this from the image's origin, pixels."""
+MAX_SIDE = 16_384
+"""No annotated image is wider or higher, pixels."""
+
 
 class ImagePoint(NamedTuple):
     """A point in an image, pixels, origin at the centre of the top-left pixel."""

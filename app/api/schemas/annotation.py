@@ -18,11 +18,8 @@ from pydantic import (
 from app.api.schemas.identity_cache import IdentityCache
 from app.errors import UnknownMarkingError
 from app.soccer.annotation import BallAnnotation, Lines
-from app.soccer.frames import Box, ImagePoint
+from app.soccer.frames import MAX_PIXEL, Box, ImagePoint
 from app.soccer.pitch import MARKINGS, canonical_marking
-
-MAX_PIXEL = 100_000.0
-"""Annotated points may lie outside the image, but not that far."""
 
 
 def _known(name: str) -> str:

@@ -10,10 +10,11 @@ from app.api.schemas.document import Document
 from app.datasets.format_names import ImportFormat
 from app.review.importing.folders import FolderItem
 from app.review.jobs.imports import ImportRequest
+from app.soccer.frames import MAX_SIDE
 
 Camera = Annotated[int, Field(ge=0, le=999)]
 Offset = Annotated[int, Field(ge=-999_999, le=999_999)]
-Side = Annotated[int, Field(ge=2, le=16_384)]
+Side = Annotated[int, Field(ge=2, le=MAX_SIDE)]
 
 
 class ImportPlace(BaseModel):

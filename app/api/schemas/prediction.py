@@ -22,10 +22,10 @@ from app.finite import MAX_ID
 from app.review.evaluating.accept import SHOWN, AcceptPlan, AcceptReport, AcceptRequest
 from app.review.evaluating.group_predictions import GroupPredictions
 from app.review.evaluating.predictions import PredictedBox, PredictionSet
-from app.soccer.frames import ImageSize
+from app.soccer.frames import MAX_SIDE, ImageSize
 
 Upload = Annotated[str, Field(min_length=1, max_length=64, description="Id of an upload.")]
-Side = Annotated[int, Field(strict=True, ge=2, le=16_384)]
+Side = Annotated[int, Field(strict=True, ge=2, le=MAX_SIDE)]
 Size = tuple[Side, Side]
 ViewId = Annotated[int, Field(strict=True, ge=1, le=MAX_ID)]
 MAX_VIEWS = 200

@@ -10,9 +10,9 @@ from pydantic import BaseModel, ConfigDict, Field
 from app.api.schemas.document import Document, ListDocument
 from app.review.talk.comments import LONGEST, StoredComment, StoredThread
 from app.soccer.actors import is_of, person_of
+from app.soccer.frames import MAX_PIXEL
 
 Text = Annotated[str, Field(min_length=1, max_length=LONGEST, description="Plain text.")]
-_PIXEL = 100_000.0
 
 
 class Spot(BaseModel):
@@ -20,8 +20,8 @@ class Spot(BaseModel):
 
     model_config = ConfigDict(extra="forbid", from_attributes=True)
 
-    x: float = Field(ge=-_PIXEL, le=_PIXEL, allow_inf_nan=False)
-    y: float = Field(ge=-_PIXEL, le=_PIXEL, allow_inf_nan=False)
+    x: float = Field(ge=-MAX_PIXEL, le=MAX_PIXEL, allow_inf_nan=False)
+    y: float = Field(ge=-MAX_PIXEL, le=MAX_PIXEL, allow_inf_nan=False)
 
 
 class NewComment(BaseModel):

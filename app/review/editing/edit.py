@@ -13,7 +13,7 @@ from typing import Protocol
 from app.errors import InputError, NotFoundError
 from app.geometry.camera import Camera
 from app.soccer.annotation import BallAnnotation, Lines, make_lines
-from app.soccer.frames import ImagePoint
+from app.soccer.frames import MAX_PIXEL, ImagePoint
 from app.soccer.group import CALIBRATIONS, Group, SharedPosition, Station, View
 from app.soccer.paint_evidence import PaintReading
 from app.soccer.picture import PictureGeometry
@@ -22,8 +22,6 @@ from app.soccer.reasons import left_out
 
 MAX_POINTS = 1000
 """Most points of one marking."""
-MAX_COORDINATE = 1e6
-"""Pixels; farther out nothing can be meant."""
 
 LineChanges = Mapping[str, tuple[ImagePoint, ...] | None]
 """New points by marking; None or no points deletes the marking, absent ones stay."""
@@ -383,7 +381,7 @@ def _checked_points(marking: str, points: tuple[ImagePoint, ...]) -> tuple[Image
     if len(points) > MAX_POINTS:
         raise InputError(f"{marking} has more than {MAX_POINTS} points")
     for index, point in enumerate(points):
-        if not all(math.isfinite(value) and abs(value) <= MAX_COORDINATE for value in point):
+        if not all(math.isfinite(value) and abs(value) <= MAX_PIXEL for value in point):
             pointer = f"/lines/{marking.replace('~', '~0').replace('/', '~1')}/{index}"
             raise InputError(
                 f"point {index + 1} of {marking} is not a number of pixels that a picture can have",
@@ -402,7 +400,7 @@ def _check_ball(ball: BallAnnotation) -> None:
         numbers += [ball.box.x, ball.box.y, ball.box.width, ball.box.height]
         if not (ball.box.width > 0 and ball.box.height > 0):
             raise InputError("a ball's box needs a width and a height above zero", pointer="/box")
-    if not all(math.isfinite(value) and abs(value) <= MAX_COORDINATE for value in numbers):
+    if not all(math.isfinite(value) and abs(value) <= MAX_PIXEL for value in numbers):
         raise InputError(
             "the place of the ball is not a number of pixels that a picture can have",
             pointer="/box" if ball.box else "/point",

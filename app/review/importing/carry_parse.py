@@ -17,6 +17,7 @@ from app.review.importing.group_limits import MAX_POINTS, MAX_VIEWS, points_of
 from app.review.policies.text import CUSTOM, policy_values, policy_with
 from app.review.verdicts.verdict import STATES
 from app.soccer.annotation import Extras
+from app.soccer.frames import MAX_SIDE
 from app.soccer.group import CALIBRATIONS, Group, Station, View
 from app.soccer.pitch import canonical_marking
 from app.soccer.policy import PAPER, Policy
@@ -26,7 +27,7 @@ from app.store.imports import VERDICT
 from app.store.stored_json import Json
 
 MAX_LINE = 32 * 1024 * 1024
-MAX_BALLS, MAX_SIDE, MAX_TEXT = 100, 20_000, 1000
+MAX_BALLS, MAX_TEXT = 100, 1000
 MAX_STATES = 100_000
 _MISSHAPEN = (ArithmeticError, AttributeError, LookupError, ReviewError, TypeError, ValueError)
 """What reading a value raises that is not of the shape that it should have."""
@@ -216,7 +217,7 @@ def _station(value: Json) -> Station:
 def _checked(station: Station) -> Station:
     _text(station.key)
     for side in (station.size.width, station.size.height):
-        if not isinstance(side, int) or isinstance(side, bool) or not 1 <= side <= MAX_SIDE:
+        if not isinstance(side, int) or isinstance(side, bool) or not 2 <= side <= MAX_SIDE:
             raise InputError(f"has an image side of {side}")
     if station.calibration not in CALIBRATIONS:
         raise InputError("has a calibration that Touchline does not know")
