@@ -10,7 +10,7 @@ from sqlalchemy import Table, bindparam, delete, or_, select, text
 from zlib_ng import zlib_ng
 
 from app.finite import json_text
-from app.store.clock import now
+from app.store.clock import now, text_of
 from app.store.dialect.statements import insert
 from app.store.session import Session
 from app.store.stored_json import inflate, parse
@@ -85,7 +85,7 @@ def shorten_answers(session: Session, most: int) -> int:
 
 def _oldest() -> str:
     oldest = datetime.now(UTC) - timedelta(hours=KEPT_HOURS)
-    return oldest.isoformat(timespec="microseconds")
+    return text_of(oldest)
 
 
 _SHORTEN = text(

@@ -12,7 +12,7 @@ from sqlalchemy import case, delete, func, insert, select, update
 from app.canonical import canonical
 from app.finite import finite
 from app.store.aliases import columns_shown
-from app.store.clock import now
+from app.store.clock import now, text_of
 from app.store.dialect.statements import member
 from app.store.group_rows import next_id
 from app.store.session import Session
@@ -198,7 +198,7 @@ def forget_jobs(session: Session, days: int) -> int:
     Returns:
         How many.
     """
-    oldest = (datetime.now(UTC) - timedelta(days=days)).isoformat(timespec="microseconds")
+    oldest = text_of(datetime.now(UTC) - timedelta(days=days))
     gone = (
         delete(JobModel)
         .where(JobModel.state.not_in(OPEN), JobModel.ended < oldest)

@@ -16,6 +16,7 @@ from app.review.exporting.folder import ExportFolder
 from app.review.jobs.jobs import Jobs
 from app.store.anchor import sync_anchor
 from app.store.answers import forget_answers, shorten_answers
+from app.store.clock import text_of
 from app.store.jobs import forget_jobs
 from app.store.leftovers import delete_leftovers
 from app.store.orphans import expire_cache
@@ -102,7 +103,7 @@ def forget_old_deliveries(store: Store, at: datetime | None = None) -> int:
     Nothing is written where there is none.
     """
     before = (at or datetime.now(UTC)) - DELIVERIES_KEPT
-    text = before.isoformat(timespec="microseconds")
+    text = text_of(before)
     with store.read() as session:
         if not has_old_deliveries(session, text):
             return 0

@@ -29,6 +29,7 @@ from app.store.access_tokens import (
     insert_access_token,
     touch_access_token,
 )
+from app.store.clock import text_of
 from app.store.people import person_by_id
 from app.store.rights import rights_in
 from app.store.session import Session
@@ -142,15 +143,15 @@ class AccessTokens:
             "name": name,
             "start": text[: len(PREFIX) + SHOWN],
             "scopes": " ".join(chosen),
-            "created": _text(at),
-            "expires": _text(at + timedelta(days=days)),
+            "created": text_of(at),
+            "expires": text_of(at + timedelta(days=days)),
             "used": None,
         }
         with self._store.write() as session:
             person = person_by_id(session, login.person_id)
             if person is None or person.disabled:
                 raise NotLoggedInError("the account was disabled meanwhile")
-            delete_expired_token(session, person.id, name, _text(at))
+            delete_expired_token(session, person.id, name, text_of(at))
             mine = access_tokens(session, person.id)
             _require_room([row.name for row in mine], name)
             token_id = insert_access_token(session, values)
@@ -167,7 +168,7 @@ class AccessTokens:
         if not is_whole(text):
             raise NotLoggedInError(CUT, hint="Copy it again, all of it.")
         with self._store.glance() as session:
-            row = find_access_token(session, hash_of(text), _text(self._clock()), LEADING)
+            row = find_access_token(session, hash_of(text), text_of(self._clock()), LEADING)
         if row is None:
             raise NotLoggedInError(INVALID, hint=ANOTHER)
         roles = roles_with(Role(row.role), rights_in(row))
@@ -185,7 +186,7 @@ class AccessTokens:
     def touch(self, login: Login) -> None:
         """Write down that a token is used."""
         with self._store.write(lasting=False) as session:
-            touch_access_token(session, login.id, _text(self._clock()))
+            touch_access_token(session, login.id, text_of(self._clock()))
 
     def of_person(self, person_id: int | None) -> list[AccessToken]:
         """The tokens of a person, or of everybody (None), the newest of each first."""
@@ -222,7 +223,7 @@ class AccessTokens:
     def _read(self, row: Any) -> AccessToken:
         names = ("id", "person", "name", "start", "dataset", "created", "expires", "used")
         values = {name: getattr(row, name) for name in names}
-        expired = row.expires <= _text(self._clock())
+        expired = row.expires <= text_of(self._clock())
         return AccessToken(**values, scopes=_scopes(row), expired=expired)
 
 
@@ -250,7 +251,3 @@ def _note(session: Session, actor: str, person: Any, did: str, values: dict[str,
     said = {name: values[name] for name in ("scopes", "expires", "dataset_id") if name in values}
     token = {"token": values["name"], "token_id": values["id"]}
     note(session, actor, person.name, did, person.role, **token, **said)
-
-
-def _text(at: datetime) -> str:
-    return at.isoformat(timespec="microseconds")

@@ -19,7 +19,7 @@ from app.store.bells import (
     mark_read,
     read_rings,
 )
-from app.store.clock import now
+from app.store.clock import now, text_of
 from app.store.people import person_by_name
 from app.store.session import Session
 from app.store.store import Store
@@ -120,4 +120,4 @@ def _read(session: Session, login: Login, limit: int = 50, before: int | None = 
 
 
 def _oldest() -> str:
-    return (datetime.now(UTC) - timedelta(days=KEPT_DAYS)).isoformat(timespec="microseconds")
+    return text_of(datetime.now(UTC) - timedelta(days=KEPT_DAYS))

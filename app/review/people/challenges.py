@@ -5,13 +5,14 @@ from __future__ import annotations
 import secrets
 from base64 import urlsafe_b64encode
 from collections.abc import Callable
-from datetime import UTC, datetime, timedelta
+from datetime import datetime, timedelta
 from threading import Lock
 from typing import Protocol
 
 from cryptography.fernet import Fernet
 
 from app.review.people.tokens import hash_of
+from app.store.clock import text_of
 from app.store.keys import BEGUN, installation_key
 from app.store.short_lived import put_begun, take_begun
 from app.store.store import Store
@@ -82,14 +83,14 @@ class Written:
     def put(self, asker: str, value: bytes) -> None:
         """See ``Waiting``."""
         at = self._clock()
-        closed, ends = self._key().encrypt(value), _text(at + self._lasts)
+        closed, ends = self._key().encrypt(value), text_of(at + self._lasts)
         with self._store.write(lasting=False) as session:
-            put_begun(session, self._name(asker), closed, ends, _text(at), MOST)
+            put_begun(session, self._name(asker), closed, ends, text_of(at), MOST)
 
     def take(self, asker: str) -> bytes | None:
         """See ``Waiting``."""
         with self._store.write() as session:
-            closed = take_begun(session, self._name(asker), _text(self._clock()))
+            closed = take_begun(session, self._name(asker), text_of(self._clock()))
         return None if closed is None else self._key().decrypt(closed)
 
     def _name(self, asker: str) -> str:
@@ -121,7 +122,3 @@ class Challenges:
     def take(self, asker: str) -> bytes | None:
         """The challenge of somebody, who has none then; None where none is good."""
         return self._waiting.take(asker)
-
-
-def _text(at: datetime) -> str:
-    return at.astimezone(UTC).isoformat(timespec="microseconds")

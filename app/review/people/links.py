@@ -11,7 +11,7 @@ from app.review.people.names import checked_name, note
 from app.review.people.passwords import hash_password
 from app.review.people.roles import Role
 from app.review.people.tokens import hash_of, new_token
-from app.store.clock import now
+from app.store.clock import now, text_of
 from app.store.identities import identity_of
 from app.store.logins import delete_logins
 from app.store.people import (
@@ -65,7 +65,7 @@ def insert_new(
     session: Session, person_id: int | None, *, by: str, at: datetime, lasts: timedelta = LASTS
 ) -> Link:
     """Make a link for a person (None: for the first admin), in the caller's transaction."""
-    token, expires = new_token(), (at + lasts).isoformat(timespec="microseconds")
+    token, expires = new_token(), text_of(at + lasts)
     insert_link(session, hash_of(token), person_id, by=by, expires=expires)
     return Link(token, expires)
 

@@ -14,6 +14,7 @@ from app.review.people.passwords import LONGEST, hash_password, is_password
 from app.review.people.roles import Action, DatasetRoles, Role, Scope, Sight, may
 from app.review.people.tokens import hash_of, new_token
 from app.soccer.actors import with_token
+from app.store.clock import text_of
 from app.store.logins import (
     delete_ended,
     delete_login,
@@ -210,9 +211,9 @@ class Logins:
         values = {
             "token_hash": hash_of(token),
             "person_id": person_id,
-            "created": _text(at),
-            "seen": _text(at),
-            "expires": _text(at + LASTS),
+            "created": text_of(at),
+            "seen": text_of(at),
+            "expires": text_of(at + LASTS),
             "browser": browser[:200],
             "address": address[:60],
             "way": way,
@@ -224,7 +225,7 @@ class Logins:
             if person is None or person.disabled or person.password != password:
                 raise NotLoggedInError(WRONG)
             require(session)
-            delete_ended(session, at=_text(at), idle_since=_text(at - IDLE))
+            delete_ended(session, at=text_of(at), idle_since=text_of(at - IDLE))
             if before and (
                 old := find_login(session, hash_of(before), leading=LEADING, **self._alive(at))
             ):
@@ -262,7 +263,7 @@ class Logins:
     def touch(self, login: Login) -> None:
         """Write down that a session is used."""
         with self._store.write(lasting=False) as session:
-            touch_login(session, login.id, _text(self._clock()))
+            touch_login(session, login.id, text_of(self._clock()))
 
     def sessions(self, login: Login) -> list[OpenSession]:
         """Every session of a person, the one that was used last first."""
@@ -320,7 +321,7 @@ class Logins:
         )
 
     def _alive(self, at: datetime) -> dict[str, str]:
-        return {"at": _text(at), "idle_since": _text(at - IDLE)}
+        return {"at": text_of(at), "idle_since": text_of(at - IDLE)}
 
 
 def read_roles(session: Session, person_id: int, everywhere: Role) -> DatasetRoles:
@@ -339,7 +340,3 @@ def roles_with(everywhere: Role, rights: Rights) -> DatasetRoles:
     roles = DatasetRoles(everywhere, single)
     copies = {key: roles.role_in(of_id) for key, of_id in rights.copies.items()}
     return DatasetRoles(everywhere, {**single, **copies})
-
-
-def _text(at: datetime) -> str:
-    return at.isoformat(timespec="microseconds")

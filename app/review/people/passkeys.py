@@ -37,6 +37,7 @@ from app.review.people.second_factor import (
     require_password,
 )
 from app.review.people.tokens import hash_of
+from app.store.clock import text_of
 from app.store.logins import delete_logins
 from app.store.passkeys import (
     delete_passkey,
@@ -146,7 +147,7 @@ class Passkeys:
             ConflictError: There are too many, or one of that name, or it is known already.
         """
         made = self._read_new(login, credential, site)
-        name, at = name.strip(), _text(self._clock())
+        name, at = name.strip(), text_of(self._clock())
         if not name:
             raise InputError("a passkey needs a name", pointer="/name")
         values = {
@@ -233,7 +234,7 @@ class Passkeys:
             if found is None or found.person_id != row.person_id:
                 raise NotLoggedInError(REFUSED, hint=AGAIN)
             count = _verified(found, credential, challenge, site)
-            use_passkey(session, found.id, count, _text(self._clock()))
+            use_passkey(session, found.id, count, text_of(self._clock()))
 
         return self._logins.begin(
             row.person_id, person.password, browser, address, before, require, Way.PASSKEY
@@ -293,7 +294,3 @@ def _of_session(login: Login) -> str:
 
 def _of_browser(asker: str) -> str:
     return f"browser {hash_of(asker)}"
-
-
-def _text(at: datetime) -> str:
-    return at.isoformat(timespec="microseconds")

@@ -27,6 +27,7 @@ from app.review.people.provider import Asked, Provider
 from app.review.people.second_factor import require_password
 from app.review.people.sign_on_rules import SignOnRules, shown_of
 from app.review.people.tokens import hash_of, new_token
+from app.store.clock import text_of
 from app.store.identities import find_identity, put_identity, use_identity
 from app.store.logins import delete_logins
 from app.store.people import insert_person, person_by_id, person_by_name
@@ -203,7 +204,7 @@ class SignOn:
                 raise NotLoggedInError(self._unknown(), hint=self._ask())
             if not vouched and has_second_factor(session, person_id):
                 self._require_factor(session, person_id, factor)
-            use_identity(session, person_id, shown_of(claims), _text(self._clock()))
+            use_identity(session, person_id, shown_of(claims), text_of(self._clock()))
 
         try:
             token = self._logins.begin(
@@ -306,7 +307,7 @@ class SignOn:
         shown, person = shown_of(claims), person_by_id(session, person_id)
         assert person is not None
         values = {"issuer": self.rules.issuer, "subject": claims["sub"], "shown": shown}
-        put_identity(session, {**values, "person_id": person_id, "created": _text(self._clock())})
+        put_identity(session, {**values, "person_id": person_id, "created": text_of(self._clock())})
         note(session, person.name, person.name, "single sign-on linked", person.role, account=shown)
 
     def _name(self, person_id: int) -> str:
@@ -339,7 +340,3 @@ def _is_theirs(
 ) -> bool:
     found = find_identity(session, rules.issuer, claims["sub"])
     return found is not None and found.person_id == person_id
-
-
-def _text(at: datetime) -> str:
-    return at.isoformat(timespec="microseconds")

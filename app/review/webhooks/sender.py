@@ -24,6 +24,7 @@ from app.review.webhooks.addresses import require_allowed
 from app.review.webhooks.messages import Message, read_messages
 from app.review.webhooks.signing import secret_of, sign
 from app.review.work.stalls import tell_stalls
+from app.store.clock import text_of
 from app.store.datasets import dataset_names
 from app.store.session import Session
 from app.store.store import Store
@@ -146,7 +147,7 @@ class WebhookSender:
         """
         now = self._clock()
         with self._store.read() as session:
-            due = due_deliveries(session, _text(now), TOGETHER, OF_ONE)
+            due = due_deliveries(session, text_of(now), TOGETHER, OF_ONE)
         answers = asyncio.run(self._try_all(due)) if due else []
         if answers:
             with self._store.write() as session:
@@ -227,12 +228,12 @@ class WebhookSender:
 
     def _note(self, session: Session, row: Any, answer: Attempt) -> None:
         now = self._clock()
-        tried = {"attempts": row.attempts + 1, "tried": _text(now), "status": answer.status}
+        tried = {"attempts": row.attempts + 1, "tried": text_of(now), "status": answer.status}
         values: dict[str, Any] = {**tried, "problem": answer.problem, "next_at": None}
         if answer.problem is None:
             values["state"] = DELIVERED
         elif row.attempts < len(AGAIN) and answer.status != GONE:
-            values["next_at"] = _text(now + AGAIN[row.attempts])
+            values["next_at"] = text_of(now + AGAIN[row.attempts])
         else:
             values["state"] = FAILED
         update_delivery(session, row.id, values)
@@ -268,7 +269,3 @@ def _tell(session: Session, row: Any, messages: Sequence[Message]) -> int:
     told = {"log_id": max(row.log_id, logged), "jobs_until": until, "job_id": job}
     update_webhook(session, row.id, told)
     return made
-
-
-def _text(at: datetime) -> str:
-    return at.isoformat(timespec="microseconds")

@@ -16,6 +16,7 @@ from app.review.takes.hand_back import checked_reason, note_hand_back
 from app.review.takes.handed_back import HandedBack, read_handed_back
 from app.review.work.batches import WORK, Batch, Here, Part, read_batch
 from app.review.work.own import hand_in_own, next_own, own_of, returned_to, takes_part
+from app.store.clock import text_of
 from app.store.log import Entry, append
 from app.store.session import Session
 from app.store.store import Store
@@ -248,9 +249,9 @@ class Leases:
 
     def _kept(self, session: Session, batch: Batch, row: Any, part: Part, worker: Worker) -> Lease:
         at, group = self._clock(), row.group_id
-        until = _text(at + LASTS)
-        keep_lease(session, batch.id, group, worker.name, at=_text(at), until=until)
-        here = _here(session, batch, group, _text(at))
+        until = text_of(at + LASTS)
+        keep_lease(session, batch.id, group, worker.name, at=text_of(at), until=until)
+        here = _here(session, batch, group, text_of(at))
         if row.handed_in_by is None:
             return Lease(batch, group, part, until, here)
         if row.handed_in is not None:
@@ -260,7 +261,7 @@ class Leases:
         return Lease(batch, group, part, until, here, handed_back=back)
 
     def _now(self) -> str:
-        return _text(self._clock())
+        return text_of(self._clock())
 
 
 def open_for(
@@ -343,7 +344,3 @@ def _group(session: Session, batch: Batch, group: int) -> Any:
     if row is None:
         raise NotFoundError(f'the batch "{batch.name}" has no group {group}')
     return row
-
-
-def _text(at: datetime) -> str:
-    return at.isoformat(timespec="microseconds")

@@ -7,6 +7,7 @@ from datetime import datetime, timedelta
 from enum import StrEnum
 
 from app.review.work.batches import Batch, read_batch
+from app.store.clock import text_of
 from app.store.session import Session
 from app.store.store import Store
 from app.store.webhook_outbox import STALLED, announce, listeners, stamp
@@ -88,7 +89,7 @@ def _tell(session: Session, batch: Batch, stall: Stall, at: datetime) -> int:
         STALLED,
         event,
         actor=BY_ITSELF,
-        at=at.isoformat(timespec="microseconds"),
+        at=text_of(at),
         batch_id=batch.id,
         also=told,
     )
