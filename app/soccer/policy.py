@@ -7,9 +7,12 @@ import json
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, field, fields
 from functools import cached_property
-from typing import Any, Literal, get_args, get_type_hints
+from typing import Any, Literal, TypeVar, get_args, get_type_hints
 
+from app.geometry.arrays import FloatArray
 from app.soccer.solution import GAMMAS_PERCENT, GATES
+
+Pixels = TypeVar("Pixels", float, FloatArray)
 
 CALIBRATION = "calibration"
 """Name of the policy's part that calibrations depend on; its thresholds are dotted."""
@@ -179,6 +182,10 @@ class Policy:
     pitch_width_m: float = _threshold(
         68.0, PITCH, "Width of the pitch, where none is known", "m", 45.0, 90.0
     )
+
+    def tau_px(self, diagonal: Pixels) -> Pixels:
+        """Largest reprojection error of a valid pair in views of these diagonals, pixels both."""
+        return self.tau_percent / 100 * diagonal
 
     @cached_property
     def hash(self) -> str:

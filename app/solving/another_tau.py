@@ -58,10 +58,7 @@ def retold(solution: Solution, diagonals: Sequence[float], policy: Policy) -> So
     if any(item.kind == "sides_swapped" for item in solution.findings):
         return None
     keys = [view.view for view in solution.views]
-    tau_px = {
-        key: policy.tau_percent / 100 * diagonal
-        for key, diagonal in zip(keys, diagonals, strict=True)
-    }
+    tau_px = {key: policy.tau_px(diagonal) for key, diagonal in zip(keys, diagonals, strict=True)}
     letters = {key: view_letter(place) for place, key in enumerate(keys)}
     gate = reprojection(solution.pairs, letters, tau_px)
     return replace(

@@ -138,7 +138,7 @@ def _view_disagrees(
     ]
     if solved.included or not judged or not any(pair.valid for pair in pairs):
         return
-    tau_px = policy.tau_percent / 100 * view.size.diagonal
+    tau_px = policy.tau_px(view.size.diagonal)
     yield view_disagrees(view.key, min(max(pair.errors_px) for pair in judged), tau_px)
 
 
@@ -190,7 +190,7 @@ def _not_synchronous(pairs: Sequence[Pair], policy: Policy, group: Group) -> Ite
         f"{sentence}. Look first whether each ball is drawn on the ball. If they are, compare "
         "players and clock: the pictures show different instants where these differ.",
         number=max(best.errors_px),
-        threshold=policy.tau_percent / 100 * max(sizes),
+        threshold=policy.tau_px(max(sizes)),
     )
 
 

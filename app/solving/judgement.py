@@ -199,7 +199,7 @@ def _view_failed(facts: Facts, jac: FloatArray, policy: Policy) -> IntArray:
 
 
 def _pair_failed(facts: Facts, view_failed: IntArray, policy: Policy) -> IntArray:
-    tau_px = policy.tau_percent / 100 * facts.view_diagonal
+    tau_px = policy.tau_px(facts.view_diagonal)
     a, b = (facts.pair_errors <= tau_px[facts.pair_view]).T
     failed = np.where(a & b & facts.pair_front, np.int8(PASSES), np.int8(_REPROJECTION))
     failed[facts.pair_baseline < policy.min_baseline_m] = _BASELINE

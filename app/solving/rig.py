@@ -173,7 +173,7 @@ def make_rig(
     points = best_points(rig.start, rig.rays, np.inf)
     at = linearize(rig.start, points, rig.rays)
     apart = np.hypot(*at.residuals.T) * rig.rays.sigma
-    limits = policy.tau_percent / 100 * 2 * rig.rays.half_diagonals
+    limits = policy.tau_px(2 * rig.rays.half_diagonals)
     # Where the cameras are far off themselves, most rays pass each other that far.
     limits = np.maximum(limits, GROSS * np.median(apart))
     gross = np.zeros(rig.rays.points, bool)

@@ -144,7 +144,7 @@ def _judged(
             letter=view_letter(index),
             calibration=solved.calibration,
             jac=None if np.isnan(jac) else jac,
-            tau_px=policy.tau_percent / 100 * view.size.diagonal,
+            tau_px=policy.tau_px(view.size.diagonal),
             has_ball=view.ball is not None and not view.ball.inferred,
             failed=solved.failed,
         )

@@ -77,7 +77,7 @@ class Sighting:
 
     def tau_px(self, policy: Policy) -> float:
         """Largest reprojection error of a valid pair, pixels."""
-        return policy.tau_percent / 100 * self.size.diagonal
+        return policy.tau_px(self.size.diagonal)
 
 
 @dataclass(frozen=True)
