@@ -20,9 +20,9 @@ def read_private(path: Path, variable: str) -> str:
         InputError: Others may use it, or it cannot be read as text. What it holds is in no sentence.
     """
     try:
-        if stat.S_IMODE(path.stat().st_mode) & 0o077:
+        if is_open_to_others(path.stat()):
             raise InputError(
-                f"others than its owner may use {path}, which {variable} names",
+                f"other users can read {path}, which {variable} names",
                 hint=f"chmod 600 {path}",
             )
         return path.read_text("utf-8").strip()
@@ -31,6 +31,11 @@ def read_private(path: Path, variable: str) -> str:
             f"{path}, which {variable} names, cannot be read",
             hint="Is it there, and a plain text file of whoever runs Touchline?",
         ) from error
+
+
+def is_open_to_others(found: os.stat_result) -> bool:
+    """Whether others than its owner may do anything with a file."""
+    return bool(stat.S_IMODE(found.st_mode) & 0o077)
 
 
 def keep_private() -> None:

@@ -7,7 +7,6 @@ The command line is then a user of the public interface, and uses the library fo
 from __future__ import annotations
 
 import os
-import stat
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
@@ -18,6 +17,7 @@ from urllib.parse import urlsplit
 
 from app.datasets.plain_file import open_plain
 from app.errors import InputError, ReviewError
+from app.private_file import is_open_to_others
 
 if TYPE_CHECKING:
     from touchline.client import Client
@@ -90,12 +90,12 @@ def read_token(path: Path) -> str:
 
     try:
         with open_plain(path) as file:
-            mode = os.fstat(file.fileno()).st_mode
+            found = os.fstat(file.fileno())
             text = file.read(MAX_TOKEN).decode("ascii", "replace").strip()
     except OSError as error:
         raise InputError(f"{path} cannot be read ({error.strerror})") from error
-    if stat.S_IMODE(mode) & 0o077:
-        raise InputError(f"others can read {path}", hint=f"chmod 600 {path}")
+    if is_open_to_others(found):
+        raise InputError(f"other users can read {path}", hint=f"chmod 600 {path}")
     if not is_whole(text):
         raise InputError(
             f"{path} holds no whole token",

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import configparser
-import stat
 from typing import TYPE_CHECKING
 
 from app.errors import StorageError
 from app.object_store.refusal import OPERATOR
+from app.private_file import is_open_to_others
 
 if TYPE_CHECKING:
     from app.config import StoreSettings
@@ -33,9 +33,9 @@ def _keys_of_file(settings: StoreSettings) -> tuple[str, ...]:
     path, parser = settings.key_file, configparser.ConfigParser(interpolation=None)
     assert path is not None
     try:
-        if stat.S_IMODE(path.stat().st_mode) & 0o077:
+        if is_open_to_others(path.stat()):
             raise StorageError(
-                "others than its owner may read the file of a store's keys",
+                "other users can read the file of a store's keys",
                 hint=f"Run chmod 600 {path.name}.",
             )
         parser.read_string(path.read_text("utf-8"))

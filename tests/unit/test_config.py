@@ -72,7 +72,7 @@ class TestDatabaseUrlFile:
     @pytest.mark.parametrize("mode", [0o640, 0o604, 0o620])
     def test_a_file_that_others_may_use_is_refused(self, file: Path, mode: int) -> None:
         file.chmod(mode)
-        with pytest.raises(InputError, match="others than its owner may use") as caught:
+        with pytest.raises(InputError, match="other users can read") as caught:
             Settings(database_url_file=file)
         assert "pass" not in f"{caught.value.message} {caught.value.hint}"
 

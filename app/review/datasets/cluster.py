@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import logging
 import platform
-import stat
 import threading
 import time
 from collections.abc import Callable
@@ -27,6 +26,7 @@ from urllib.parse import urlsplit
 from app.datasets.manifest import software_version
 from app.errors import ClusterError, InputError
 from app.hosts import is_local
+from app.private_file import is_open_to_others
 from app.soccer.solution import SOLVER_VERSION
 
 R = TypeVar("R")
@@ -397,8 +397,10 @@ def _explained(error: BaseException) -> BaseException:
 def _require_keys(folder: Path) -> None:
     for name in _KEYS:
         try:
-            mode = (folder / name).stat().st_mode
+            found = (folder / name).stat()
         except OSError as error:
             raise InputError(f"{folder / name} cannot be read ({error.strerror})") from error
-        if name == "key.pem" and stat.S_IMODE(mode) & 0o077:
-            raise InputError(f"others can read {folder / name}", hint=f"chmod 600 {folder / name}")
+        if name == "key.pem" and is_open_to_others(found):
+            raise InputError(
+                f"other users can read {folder / name}", hint=f"chmod 600 {folder / name}"
+            )

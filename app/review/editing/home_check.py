@@ -97,7 +97,7 @@ def _linked_admins(store: Store) -> Check | None:
 def _permissions(settings: Settings) -> Check:
     found = open_to_others(settings)
     if found:
-        sentence = f"others than its owner may read {len(found):,} files and folders: {found[0]}"
+        sentence = f"other users can read {len(found):,} files and folders: {found[0]}"
         more = "" if len(found) == 1 else " and others"
         mend = f"Start touchline serve, or run chmod -R go= {settings.home}"
         return Check("permissions", False, sentence + more, mend)

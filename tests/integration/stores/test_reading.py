@@ -264,7 +264,7 @@ class TestBadDays:
         file = tmp_path / "keys"
         file.write_text("[default]\naws_access_key_id = one\naws_secret_access_key = s\n")
         settings = stored_settings(tmp_path / "home", door, key=None, secret=None, key_file=file)
-        with pytest.raises(StorageError, match="others than its owner"):
+        with pytest.raises(StorageError, match="other users can read"):
             open_store(settings, "frames")
         file.chmod(0o600)
         first = open_store(settings, "frames")

@@ -53,7 +53,7 @@ def test_a_password_that_everybody_could_read_is_refused(settings: Settings, add
 
 def test_a_file_that_others_may_read_is_refused(settings: Settings, file: Path) -> None:
     file.chmod(0o640)
-    with pytest.raises(InputError, match="others than its owner may use"):
+    with pytest.raises(InputError, match="other users can read"):
         ends_of(str(file), "home", settings)
 
 

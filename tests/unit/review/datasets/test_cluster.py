@@ -100,7 +100,7 @@ class TestReadPlace:
         keys = write_keys(tmp_path)
         assert read_place("tls://solve.example.org:8786", keys).port == 8786
         (keys / "key.pem").chmod(0o640)
-        with pytest.raises(InputError, match=r"others can read .*key\.pem"):
+        with pytest.raises(InputError, match=r"other users can read .*key\.pem"):
             read_place("tls://solve.example.org:8786", keys)
         (keys / "ca.pem").unlink()
         with pytest.raises(InputError, match=r"ca\.pem cannot be read"):

@@ -91,7 +91,7 @@ class TestExamineHome:
         assert faults(settings) == {}
         settings.home.chmod(0o755)
         found = faults(settings)["permissions"]
-        assert (found.sentence.startswith("others than its owner may read 2"), found.mend) == (
+        assert (found.sentence.startswith("other users can read 2"), found.mend) == (
             True,
             f"Start touchline serve, or run chmod -R go= {settings.home}",
         )

@@ -77,7 +77,7 @@ class TestReadRules:
             read(tmp_path, **WHOLE, sso_client_secret_file=file)
         for mode in (0o640, 0o604, 0o620):
             file.chmod(mode)
-            with pytest.raises(InputError, match="others than its owner"):
+            with pytest.raises(InputError, match="other users can read"):
                 read(tmp_path, **said, sso_client_secret_file=file)
         with pytest.raises(InputError, match="cannot be read"):
             read(tmp_path, **said, sso_client_secret_file=tmp_path / "none")
