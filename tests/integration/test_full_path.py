@@ -138,11 +138,21 @@ class TestFullPath:
         tag = {"If-Match": first.json()["etag"]}
         client.post(f"{API}/groups/{group['id']}/undo", headers=tag)
 
+    def test_where_nothing_is_accepted_nothing_is_exported(self, client: httpx.Client) -> None:
+        group = first_group(client)
+        taken_back = client.put(
+            f"{API}/groups/{group['id']}/verdict",
+            json={"state": "unreviewed"},
+            headers={"If-Match": group["etag"]},
+        )
+        assert taken_back.is_success, taken_back.text
+        assert client.get(f"{API}/datasets/small").json()["accepted"] == 0
+        order = {"dataset": "small", "format": "soccernet-v3d"}
+        nothing = client.post(f"{API}/exports", json=order)
+        assert (nothing.status_code, "nothing" in nothing.text) == (400, True)
+
     def test_accepted_groups_leave_as_a_zip_with_a_manifest(self, client: httpx.Client) -> None:
         order = {"dataset": "small", "format": "soccernet-v3d"}
-        if not client.get(f"{API}/datasets/small").json()["accepted"]:
-            nothing = client.post(f"{API}/exports", json=order)
-            assert (nothing.status_code, "nothing" in nothing.text) == (400, True)
         group = first_group(client)
         accepted = client.put(
             f"{API}/groups/{group['id']}/verdict",
