@@ -30,8 +30,8 @@ def has_smaller_tau(policy: Policy, before: Policy) -> bool:
     return alike == policy and policy.tau_percent < before.tau_percent
 
 
-def undecided(facts: Facts, before: Policy, policy: Policy) -> BoolArray:
-    """Groups whose views and pairs fail what they failed under the policy before, shape (G,).
+def alike_under(facts: Facts, before: Policy, policy: Policy) -> BoolArray:
+    """Groups in which no pair fails another gate than under the policy before, shape (G,).
 
     Args:
         facts: The groups.
@@ -51,7 +51,7 @@ def retold(solution: Solution, diagonals: Sequence[float], policy: Policy) -> So
 
     Args:
         solution: Under a policy that this one ``has_smaller_tau`` than, of a group that is
-            ``undecided``; its calibrations are not read.
+            ``alike_under``; its calibrations are not read.
         diagonals: Of the pictures of its views, pixels.
         policy: The policy with that tau.
     """

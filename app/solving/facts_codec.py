@@ -100,7 +100,7 @@ def _scatter(
         arrays[name][target] = numbers[:, at:end].reshape(len(target), *shape)
         at = end
     if at != length:
-        raise ValueError("some numbers are of no column")
+        raise ValueError("there are more numbers than the columns hold")
 
 
 def _of(name: str) -> str:

@@ -153,12 +153,12 @@ class Store:
             BusyError: There would be something to wait for; ``glance`` waits for it.
         """
         if self._peeker is None:
-            raise BusyError("the database answers nothing at once")
+            raise BusyError("the database cannot answer without waiting")
         try:
             with self._watched(), Session(self._peeker) as session:
                 yield session
         except NoConnectionError as error:
-            raise BusyError("another thread is peeking") from error
+            raise BusyError("another thread is using the connection that never waits") from error
 
     @contextmanager
     def write(self, *, lasting: bool = True) -> Iterator[Session]:
@@ -181,7 +181,7 @@ class Store:
             session.begin()
             yield session
             if not lasting and session.log_end is not None:
-                raise RuntimeError("what the log says must last")
+                raise RuntimeError("entries of the log must be on the disk")
             self._require_anchored(session)
             if self._file is not None:
                 self._file.require_there()

@@ -65,10 +65,10 @@ def decode_row(session: Session, row: Any) -> Solution:
     with as_written():
         solution = decode_solution(unpack(row.body), calibrations)
         if named != [view.calibration_key for view in solution.views]:
-            raise ValueError("it rests on other calibrations than its row says")
+            raise ValueError("its calibrations differ from those in its row")
         said = (solution.policy_hash, solution.solver_version)
         if said != (row.policy_hash, row.solver_version):
-            raise ValueError("it is that of another policy or solver than its row says")
+            raise ValueError("its policy or solver differs from the one in its row")
     return solution
 
 

@@ -36,7 +36,7 @@ const isReady = computed(() => {
 export const frozen = computed(() => {
 	const one = take.value;
 	if (one === null || one.group !== groupDocument.value?.id) return '';
-	if (one.settled !== null) return 'This annotation was decided about already; it can no longer be changed.';
+	if (one.settled !== null) return 'This annotation was adjudicated already; it can no longer be changed.';
 	const mine = !isTeam || one.person === myName.value;
 	if (one.handed_in !== null) return mine ? '' : `${one.person} has handed this in; hand it back, or take it over.`;
 	return mine ? '' : `${one.person} judges this annotation.`;

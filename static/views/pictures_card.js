@@ -46,7 +46,7 @@ function MatchPicture({ one, shown, busy, onSet }) {
 						title=${`Solve the ${plural(one.frames, 'picture')} of this main camera with ${pictureWords(proposed)}`}
 					>Use it<//>` : null}
 				${one.picture || one.mixed ? html`
-					<${MatchButton} name=${name} busy=${busy} act=${() => onSet(null)} title="Take the pictures to be as they were taken">As taken<//>` : null}
+					<${MatchButton} name=${name} busy=${busy} act=${() => onSet(null)} title="Treat the pictures as neither stretched nor cropped">As taken<//>` : null}
 			</span></td>
 		</tr>`;
 }

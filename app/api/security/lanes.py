@@ -284,7 +284,7 @@ class _Place:
         self._loop = asyncio.get_running_loop()
 
     def leave_from_anywhere(self) -> None:
-        """Give it back before the work is done, from another thread; too many may not do so."""
+        """Give the place back before the work is done, from another thread; only so many may do so."""
         # A loop that has stopped lets nobody in any more.
         with suppress(RuntimeError):
             self._loop.call_soon_threadsafe(self._leave)

@@ -195,7 +195,7 @@ class Cluster(Executor):
     def submit(self, work: Callable[..., R], /, *arguments: Any, **named: Any) -> Future[R]:
         """Have a function of a module called by a worker."""
         if named:
-            raise TypeError("named arguments do not travel")
+            raise TypeError("named arguments cannot be sent to a worker")
         future: Future[R] = Future()
         with self._lock:
             self._under_way[future] = task = _Task(work, arguments)

@@ -22,4 +22,4 @@ def require_unsettled(session: Session, dataset_id: int, group_id: int) -> None:
     """Raise ConflictError where a group is an own annotation that somebody has decided about."""
     take = take_of_copy(session, group_id) if dataset_id > COPIES else None
     if take is not None and take.settled is not None:
-        raise ConflictError("this annotation was decided about already; its verdict stays as it is")
+        raise ConflictError("this annotation was adjudicated already; its verdict stays as it is")

@@ -11,7 +11,7 @@ from app.errors import DamagedError
 from app.review.datasets.dataset import DatasetHead
 from app.review.editing.solve_encoded import Result
 from app.soccer.policy import Policy
-from app.solving.another_tau import has_smaller_tau, retold, undecided
+from app.solving.another_tau import alike_under, has_smaller_tau, retold
 from app.solving.facts_codec import facts_from_bytes
 from app.store.kept_solutions import KeptSolution, kept_solutions
 from app.store.policies import policy_history
@@ -67,7 +67,7 @@ def _by_policy(task: RetellTask) -> Iterator[list[KeptSolution]]:
 def _retell(task: RetellTask, kept: Sequence[KeptSolution]) -> Iterator[Result]:
     policy = task.policy
     facts = facts_from_bytes([item.facts for item in kept])
-    same = undecided(facts, task.before[kept[0].policy_hash], policy)
+    same = alike_under(facts, task.before[kept[0].policy_hash], policy)
     ends = np.cumsum(np.bincount(facts.view_group, minlength=facts.groups))
     diagonals = np.split(facts.view_diagonal, ends[:-1])
     for place in np.flatnonzero(same).tolist():

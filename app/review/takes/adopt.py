@@ -149,7 +149,7 @@ def _require_ready(take: Take) -> None:
     if take.handed_in is None:
         raise ConflictError(f"{take.person} has not handed this in yet")
     if take.settled is not None:
-        raise ConflictError("this annotation was decided about already")
+        raise ConflictError("this annotation was adjudicated already")
 
 
 def _adopt_stations(

@@ -135,7 +135,7 @@ def mark(
         )
     with store.write() as session:
         if is_copy(session, state.dataset_id):
-            raise ConflictError("an own annotation is no gold group")
+            raise ConflictError("a person's own annotation cannot be a gold group")
         mark_gold(session, group_id, state.dataset_id, start, _truth(state), actor)
         # Not an entry of the group: everybody who sees it reads its history.
         body = {"group": group_id, "did": "marked", "start": start}

@@ -97,7 +97,7 @@ def mark_known(
     version = _version(store, dataset, choice)
     with store.read() as session:
         if is_copy(session, number):
-            raise ConflictError("an own annotation is no gold group")
+            raise ConflictError("a person's own annotation cannot be a gold group")
         asked = Listing(session, number, query.conditions).ids(query.order)
         found = _of_sample(session, asked)
         if version is not None:
@@ -171,7 +171,9 @@ def _version(store: Store, dataset: str | int, choice: GoldChoice) -> Version | 
     if choice.source is not TruthSource.VERSION:
         return None
     if choice.version is None:
-        raise InputError("say which version knows the truth", pointer="/version")
+        raise InputError(
+            "name the frozen version whose verdicts and balls are the truth", pointer="/version"
+        )
     return find_version(store, dataset, choice.version)
 
 

@@ -207,7 +207,7 @@ def reopen(store: Store, take_id: int, *, keep: Keep[TakeView] = keep_nothing) -
 def reopen_take(session: Session, take: Take) -> None:
     """``reopen`` within a write session; what was compared with it waits for no decision any more."""
     if take.settled is not None:
-        raise ConflictError("this annotation was decided about already")
+        raise ConflictError("this annotation was adjudicated already")
     update_take(session, take.id, handed_in=None)
     forget_open(session, take.group_id, take.batch_id or 0)
 

@@ -96,7 +96,7 @@ def ping(webhook_id: int, dataset: str, at: str, actor: str) -> Message:
 
 
 def _of_log(webhook_id: int, dataset: str, entries: Sequence[Any]) -> Iterator[Message]:
-    """What one person did of one kind, without anything else between it, is one message."""
+    """Entries of one kind by one person that follow each other become one message."""
 
     def what(row: Any) -> tuple[Kind, str]:
         kind = _OF_LOG.get(row.kind.removeprefix("station_"), Kind.DATASET)

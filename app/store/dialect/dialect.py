@@ -75,8 +75,8 @@ class Dialect(Protocol):
         """The same engine without transactions: each statement is one, and sees one snapshot."""
 
     def peeking(self, settings: Settings) -> Engine | None:
-        """An engine without transactions whose one connection waits for nothing; None where every
-        statement is waited for, because it goes over a line."""
+        """An engine without transactions whose one connection never waits; None where each statement
+        has to, because the database is reached over a network."""
 
     def sharing(
         self, engine: Engine, reported: Callable[[], AbstractContextManager[None]]

@@ -114,7 +114,7 @@ class PostgreSQL:
                 )
             if show("SHOW server_encoding").scalar_one() != "UTF8":
                 raise StorageError(
-                    "the database does not hold every text",
+                    "the encoding of the database is not UTF-8",
                     hint="Create it with ENCODING 'UTF8' TEMPLATE template0.",
                 )
 

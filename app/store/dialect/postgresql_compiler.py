@@ -32,7 +32,7 @@ class Types(PGTypeCompiler):
 
 
 class Columns(PGDDLCompiler):
-    """Text that sorts by its code points, ids of 64 bits, references that can wait."""
+    """Columns as they are created: collation "C" for text, bigint ids, deferrable references."""
 
     def get_column_specification(self, column: Column[Any], **kw: Any) -> str:
         """A column as it is created."""

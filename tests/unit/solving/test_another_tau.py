@@ -8,7 +8,7 @@ from app.soccer.annotation import BallAnnotation
 from app.soccer.group import Group
 from app.soccer.policy import PAPER, STRICT, Policy
 from app.soccer.solution import Solution
-from app.solving.another_tau import has_smaller_tau, retold, undecided
+from app.solving.another_tau import alike_under, has_smaller_tau, retold
 from app.solving.facts import Facts
 from app.solving.solve import solve, solve_with_facts
 from tests.cameras import SIZE
@@ -44,7 +44,7 @@ def again(found: Group, before: Policy, policy: Policy) -> tuple[Solution | None
     """Retold under a policy, and solved."""
     then, facts = solve_with_facts(found, before, {})
     now = solve(found, policy)
-    if not undecided(facts, before, policy)[0]:
+    if not alike_under(facts, before, policy)[0]:
         return None, now
     return retold(then, facts.view_diagonal.tolist(), policy), now
 
@@ -61,8 +61,8 @@ class TestUndecided:
     def test_a_pair_between_the_two_taus_is_decided_anew(self):
         facts: Facts = solve_with_facts(apart(0.0, 0.8 * TAU_PX), PAPER, {})[1]
         error = facts.pair_errors.max() / SIZE.diagonal * 100
-        assert not undecided(facts, PAPER, with_tau(0.99 * error))[0]
-        assert undecided(facts, PAPER, with_tau(1.01 * error))[0]
+        assert not alike_under(facts, PAPER, with_tau(0.99 * error))[0]
+        assert alike_under(facts, PAPER, with_tau(1.01 * error))[0]
 
 
 class TestRetold:

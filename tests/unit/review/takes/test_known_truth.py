@@ -143,7 +143,7 @@ class TestVersion:
         judge(store, take.copy_id, "dee")
         ((result,),) = [person.results for person in read_report(store, "demo").people]
         assert (result.right, result.error.ball_px, result.error.line_px) == (True, 0, 0)
-        with pytest.raises(InputError, match="which version"):
+        with pytest.raises(InputError, match="name the frozen version"):
             mark_known(store, "demo", GoldChoice(TruthSource.VERSION), actor="lea")
 
 
