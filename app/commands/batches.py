@@ -12,6 +12,7 @@ from app.commands.options import Json, acting
 from app.commands.server import connected, given_server
 from app.commands.shown_fields import BATCH
 from app.commands.terminal import print_rows, print_values
+from app.soccer.choices import GoldStart
 
 commands = typer.Typer(help="Groups that are given out to people.", no_args_is_help=True)
 
@@ -117,9 +118,7 @@ def gold(
     version: Annotated[str | None, typer.Option(help="Name or id of the version.")] = None,
     query: Annotated[str, typer.Option("--query", help="Which groups; default: all.")] = "",
     size: Annotated[int, typer.Option(min=1, max=1000, help="The first so many of them.")] = 1000,
-    start: Annotated[
-        str, typer.Option(help="What people begin with: imported, without_balls or bare.")
-    ] = "imported",
+    start: Annotated[GoldStart, typer.Option(help="What people begin with.")] = "imported",
     json_: Json = False,
 ) -> None:
     """Make gold groups of those whose truth is known; batches mix them in."""

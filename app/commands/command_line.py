@@ -63,7 +63,8 @@ class _Commands(typer.core.TyperGroup):
         try:
             return super().invoke(ctx)
         except typer.BadParameter as error:
-            error.message = harmless(error.message)
+            # What its parser of choices raised, without the words that tell it from other errors.
+            error.message = harmless(error.message.removeprefix("Value error, "))
             raise
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from enum import StrEnum
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -10,11 +9,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from app.commands.opened import opened_store
-from app.commands.options import BallBox, Dataset, Json, acting, parse_size
+from app.commands.options import Dataset, Json, acting, parse_size
 from app.commands.predictions import print_set
 from app.commands.server import Server, connected, given_server
 from app.commands.terminal import print_json, say, show_progress
 from app.progress import TellProgress
+from app.soccer.choices import AnyPredictionFormat, BoxKind, LiveRule
 from app.soccer.frames import ImageSize
 
 if TYPE_CHECKING:
@@ -22,23 +22,6 @@ if TYPE_CHECKING:
     from app.review.evaluating.prediction_source import SourcesRequest
 
 commands = typer.Typer()
-
-
-class PredictionFormat(StrEnum):
-    """How predictions are written."""
-
-    AUTO = "auto"
-    COCO = "coco"
-    YOLO = "yolo"
-    CSV = "csv"
-
-
-class LiveGroups(StrEnum):
-    """Which groups take part where there is no version."""
-
-    PASSING = "passing"
-    ACCEPTED = "accepted"
-    ALL = "all"
 
 
 BALLS, CAMERAS = "Predicted balls", "Predicted cameras"
@@ -54,7 +37,7 @@ Predictions = Annotated[
     str | None, typer.Argument(help="File, folder or zip of ball boxes, or the name of a set.")
 ]
 Format = Annotated[
-    PredictionFormat,
+    AnyPredictionFormat,
     typer.Option("--format", rich_help_panel=BALLS, help="auto goes by the files' endings."),
 ]
 Images = Annotated[
@@ -103,7 +86,7 @@ Careful = Annotated[
     ),
 ]
 CarefulFormat = Annotated[
-    PredictionFormat,
+    AnyPredictionFormat,
     typer.Option(rich_help_panel=CAREFUL, help="As --format, of the careful boxes."),
 ]
 CarefulSize = Annotated[
@@ -122,14 +105,14 @@ Version = Annotated[
     ),
 ]
 Groups = Annotated[
-    LiveGroups,
+    LiveRule,
     typer.Option(rich_help_panel=TRUTH, help="Without a version: which groups take part."),
 ]
 SplitName = Annotated[
     str | None, typer.Option("--split", rich_help_panel=TRUTH, help="Frames of this split alone.")
 ]
 Boxes = Annotated[
-    BallBox, typer.Option(rich_help_panel=TRUTH, help="Which box of the dataset is the truth.")
+    BoxKind, typer.Option(rich_help_panel=TRUTH, help="Which box of the dataset is the truth.")
 ]
 Name = Annotated[str, typer.Option(rich_help_panel=RESULT, help="Name of the evaluation.")]
 Out = Annotated[
@@ -142,7 +125,7 @@ Out = Annotated[
 def evaluate(
     dataset: Dataset,
     predictions: Predictions = None,
-    format_: Format = PredictionFormat.AUTO,
+    format_: Format = "auto",
     images: Images = None,
     category: Category = None,
     size: PixelSize = None,
@@ -150,13 +133,13 @@ def evaluate(
     cameras: Cameras = None,
     cameras_size: CamerasSize = None,
     careful: Careful = None,
-    careful_format: CarefulFormat = PredictionFormat.AUTO,
+    careful_format: CarefulFormat = "auto",
     careful_size: CarefulSize = None,
     careful_category: CarefulCategory = None,
     version: Version = None,
-    groups: Groups = LiveGroups.PASSING,
+    groups: Groups = "passing",
     split: SplitName = None,
-    boxes: Boxes = BallBox.OPTIMIZED,
+    boxes: Boxes = "optimized",
     name: Name = "",
     out: Out = None,
     json_: Json = False,
@@ -171,11 +154,9 @@ def evaluate(
     from app.review.evaluating.prediction_source import PredictionSource, SourcesRequest
 
     request = SourcesRequest(
-        EvaluationRequest(
-            name=name, groups=groups.value, split=split, boxes=boxes.value, min_score=min_score
-        ),
-        PredictionSource(predictions, format_.value, images, category, size, cameras, cameras_size),
-        PredictionSource(careful, careful_format.value, None, careful_category, careful_size),
+        EvaluationRequest(name=name, groups=groups, split=split, boxes=boxes, min_score=min_score),
+        PredictionSource(predictions, format_, images, category, size, cameras, cameras_size),
+        PredictionSource(careful, careful_format, None, careful_category, careful_size),
         version,
     )
     server = given_server()

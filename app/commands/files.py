@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -10,7 +9,7 @@ import typer
 
 from app.commands.opened import opened_store
 from app.commands.options import (
-    BallBox,
+    POLICY_OR_FILE,
     Dataset,
     Json,
     acting,
@@ -26,34 +25,13 @@ from app.commands.terminal import complain, print_export, print_import, show_pro
 from app.datasets.format_names import ExportFormat, ImportFormat
 from app.object_store.address import is_address
 from app.object_store.path import StoredPath, find_path, target_path
+from app.soccer.choices import BoxKind, CalibrationChoice, PicturesWritten, TrainingViews
 from app.soccer.frames import ImageSize
 
 if TYPE_CHECKING:
     from app.config import Settings
 
 commands = typer.Typer()
-
-
-class Calibration(StrEnum):
-    """Which calibration counts where there are both."""
-
-    GIVEN = "given"
-    LINES = "lines"
-
-
-class Views(StrEnum):
-    """From which views training data are made."""
-
-    VALID = "valid"
-    ALL = "all"
-
-
-class Images(StrEnum):
-    """What an export does with frames."""
-
-    NONE = "none"
-    COPY = "copy"
-    LINK = "link"
 
 
 @commands.command("import")
@@ -69,7 +47,7 @@ def import_(
     lines: Annotated[
         Path | None, typer.Option(exists=True, help="ISSIA: line files of the static cameras.")
     ] = None,
-    calibration: Annotated[Calibration, typer.Option(help="Which one counts.")] = Calibration.GIVEN,
+    calibration: Annotated[CalibrationChoice, typer.Option(help="Which one counts.")] = "given",
     frame_offset: Annotated[
         str, typer.Option(help="ISSIA: XGTF frame minus video frame; 8, or 1=8,2=9 by camera.")
     ] = "8",
@@ -85,7 +63,7 @@ def import_(
     policy: Annotated[
         str,
         typer.Option(
-            metavar="paper|strict|touchline|FILE.yaml",
+            metavar=POLICY_OR_FILE,
             help="Judges the dataset where this import makes it.",
         ),
     ] = "paper",
@@ -110,7 +88,7 @@ def import_(
         from app.commands import remote_files
 
         options: dict[str, Any] = {
-            "calibration": calibration.value,
+            "calibration": calibration,
             "frame_offset": parse_frame_offset(frame_offset),
             "flipped": sorted(parse_cameras(flip)),
             "size": None if size is None else [size.width, size.height],
@@ -134,7 +112,7 @@ def import_(
         root,
         size=size,
         lines=None if lines is None else lines.resolve(),
-        calibration=calibration.value,
+        calibration=calibration,
         frame_offset=parse_frame_offset(frame_offset),
         flipped=parse_cameras(flip),
         frames=None if frames is None else _root(settings, frames),
@@ -165,11 +143,11 @@ def export(
     everything: Annotated[
         bool, typer.Option("--all", help="Every group, failed and rejected too.")
     ] = False,
-    boxes: Annotated[BallBox, typer.Option(help="Which ball box is written.")] = BallBox.OPTIMIZED,
-    images: Annotated[Images, typer.Option(help="What happens to frames.")] = Images.NONE,
+    boxes: Annotated[BoxKind, typer.Option(help="Which ball box is written.")] = "optimized",
+    images: Annotated[PicturesWritten, typer.Option(help="What happens to frames.")] = "none",
     views: Annotated[
-        Views, typer.Option(help="coco and yolo: balls that no other view confirms, too?")
-    ] = Views.VALID,
+        TrainingViews, typer.Option(help="coco and yolo: balls that no other view confirms, too?")
+    ] = "valid",
     version: Annotated[
         str | None, typer.Option(help="A frozen version (name, id or hash): always the same bytes.")
     ] = None,
@@ -177,16 +155,16 @@ def export(
 ) -> None:
     """Write accepted groups, all of them, or a frozen version, with a manifest."""
     asked: dict[str, Any] = {
-        "boxes": boxes.value,
-        "images": images.value,
-        "views": views.value,
+        "boxes": boxes,
+        "images": images,
+        "views": views,
         "version": version,
     }
     server = given_server()
     if server is not None:
         from app.commands import remote_files
 
-        if images is Images.LINK:
+        if images == "link":
             raise typer.BadParameter("a server cannot link to frames here; choose copy or none")
         request = {"dataset": dataset, "format": format_, "all": everything, **asked}
         with connected(server) as client, show_progress("Exporting") as progress:

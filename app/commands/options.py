@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import re
 from contextvars import ContextVar
-from enum import StrEnum
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, get_args
 
 import typer
 
 from app.soccer.actors import LOCAL_USER, script_name
+from app.soccer.choices import PolicyName
 from app.soccer.frames import ImageSize
 
 if TYPE_CHECKING:
@@ -17,13 +17,7 @@ if TYPE_CHECKING:
 
     from app.config import Settings
 
-
-class BallBox(StrEnum):
-    """Which of a ball's boxes counts."""
-
-    OPTIMIZED = "optimized"
-    ANNOTATED = "annotated"
-    EXACT = "exact"
+POLICY_OR_FILE = "|".join((*get_args(PolicyName), "FILE.yaml"))
 
 
 def parse_size(text: str) -> ImageSize:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from app.commands.opened import opened_store
-from app.commands.options import Dataset, Json, acting, read_text
+from app.commands.options import POLICY_OR_FILE, Dataset, Json, acting, read_text
 from app.commands.terminal import print_json, print_values, say
 
 if TYPE_CHECKING:
@@ -49,7 +49,7 @@ def show(
 @commands.command("set")
 def set_(
     policy: Annotated[
-        str, typer.Argument(metavar="POLICY", help="paper, strict, touchline, or a YAML file.")
+        str, typer.Argument(metavar=POLICY_OR_FILE, help="Its name, or a file with it.")
     ],
     dataset: Dataset,
     json_: Json = False,

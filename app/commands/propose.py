@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, get_args
 
 import typer
 
 from app.commands.opened import opened_store
 from app.commands.options import Json, Workers, parse_size, read_settings
 from app.commands.terminal import print_json, print_values, say, show_progress
+from app.soccer.choices import ProposalOutcome
 
 commands = typer.Typer()
 
@@ -90,9 +91,7 @@ def _propose_for_views(
                 print_json(items)
                 return
             for item in items:
-                counts = ", ".join(
-                    f"{item[name]} {name}" for name in ("proposed", "unsure", "nothing")
-                )
+                counts = ", ".join(f"{item[name]} {name}" for name in get_args(ProposalOutcome))
                 said = f"{item['looked']} of {item['views']} views looked at: {counts}"
                 name = f"{item['match']}: " if item["match"] else ""
                 say(f"{name}{said}, {item['accepted']} accepted")

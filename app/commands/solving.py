@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from app.commands.opened import opened_store, opened_to_solve
-from app.commands.options import Cluster, Dataset, Json, Workers, acting
+from app.commands.options import POLICY_OR_FILE, Cluster, Dataset, Json, Workers, acting
 from app.commands.policy import read_policy_option
 from app.commands.server import connected, given_server
 from app.commands.terminal import (
@@ -30,7 +30,7 @@ def solve(
     policy: Annotated[
         str | None,
         typer.Option(
-            metavar="paper|strict|touchline|FILE.yaml",
+            metavar=POLICY_OR_FILE,
             help="Judge the dataset by this policy from now on.",
         ),
     ] = None,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from enum import StrEnum
 from typing import Annotated, Any
 
 import typer
@@ -10,22 +9,14 @@ import typer
 from app.commands.opened import opened_store
 from app.commands.options import Dataset, Json, acting
 from app.commands.terminal import complain, print_json, print_values, say
+from app.soccer.choices import VerdictState
 
 commands = typer.Typer()
 
 
-class State(StrEnum):
-    """What is said of a group."""
-
-    ACCEPTED = "accepted"
-    REJECTED = "rejected"
-    DEFERRED = "deferred"
-    UNREVIEWED = "unreviewed"
-
-
 @commands.command()
 def verdict(
-    state: Annotated[State, typer.Argument(help="unreviewed takes a verdict back.")],
+    state: Annotated[VerdictState, typer.Argument(help="unreviewed takes a verdict back.")],
     dataset: Dataset,
     query: Annotated[
         str,
@@ -57,7 +48,7 @@ def verdict(
 
     with opened_store() as store:
         found = dataset_id(store, dataset)
-        plan = plan_verdicts(store, found, query, state.value, reason, note)
+        plan = plan_verdicts(store, found, query, state, reason, note)
         values: dict[str, Any] = {"matches": plan.matches, "would_change": plan.would_change}
         refused = plan.refused
         if not dry_run:
@@ -65,7 +56,7 @@ def verdict(
                 store,
                 found,
                 query,
-                state.value,
+                state,
                 reason,
                 note,
                 actor=acting(),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -28,6 +27,7 @@ from app.commands.terminal import (
     say,
     show_progress,
 )
+from app.soccer.choices import SplitKind, VersionRule
 
 if TYPE_CHECKING:
     from app.review.versions.version import Version
@@ -37,21 +37,6 @@ commands = typer.Typer()
 VersionName = Annotated[str, typer.Argument(help="Name, id or hash of a version.")]
 SHOWN = 20
 """Lines of each kind that a table shows."""
-
-
-class SplitKind(StrEnum):
-    """How a version is split into train and test."""
-
-    GIVEN = "given"
-    MATCH = "match"
-    CAMERA = "camera"
-
-
-class Groups(StrEnum):
-    """Which groups enter a version."""
-
-    ACCEPTED = "accepted"
-    PASSING = "passing"
 
 
 @commands.command()
@@ -67,11 +52,12 @@ def freeze(
         Path | None, typer.Option(exists=True, dir_okay=False, help="A file with that text.")
     ] = None,
     groups: Annotated[
-        Groups, typer.Option(help="accepted by people, or whatever is passing and not rejected.")
-    ] = Groups.ACCEPTED,
+        VersionRule,
+        typer.Option(help="accepted by people, or whatever is passing and not rejected."),
+    ] = "accepted",
     split: Annotated[
         SplitKind, typer.Option(help="How it is split into train and test.")
-    ] = SplitKind.GIVEN,
+    ] = "given",
     seed: Annotated[int, typer.Option(min=0, help="Seed of a split by match.")] = 0,
     test_share: Annotated[
         float, typer.Option(help="Share of the matches that go to test, in a split by match.")
@@ -88,7 +74,7 @@ def freeze(
     from app.soccer.split import Split
 
     cameras = tuple(f"cam{number}" for number in sorted(parse_cameras(test_cameras)))
-    chosen = Split(split.value, seed, test_share, cameras)
+    chosen = Split(split, seed, test_share, cameras)
     text = licence if licence_file is None else read_text(licence_file, MAX_LICENCE)
     server = given_server()
     if server is not None:
@@ -98,7 +84,7 @@ def freeze(
             "name": name or named,
             "note": note,
             "licence": text,
-            "groups": groups.value,
+            "groups": groups,
             "split": vars(chosen),
         }
         with connected(server) as client, show_progress("Freezing") as progress:
@@ -106,7 +92,7 @@ def freeze(
         print_values(found, json_)
         return
     with opened_store() as store, show_progress("Freezing") as progress:
-        request = FreezeRequest(name or named, note, text, chosen, groups.value)
+        request = FreezeRequest(name or named, note, text, chosen, groups)
         if dry_run:
             print_values(vars(plan_freeze(store, dataset, request)), json_)
             return

@@ -21,7 +21,7 @@ from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
-from typing import Any
+from typing import Any, get_args
 
 from app.datasets import fields
 from app.datasets.cameras_reader import read_cameras
@@ -41,9 +41,10 @@ from app.evaluation.prediction_run import (
     read_field,
 )
 from app.geometry.camera import Camera
+from app.soccer.choices import PredictionFormat
 from app.soccer.frames import Box, ImageSize
 
-FORMATS = ("coco", "yolo", "csv")
+FORMATS: tuple[str, ...] = get_args(PredictionFormat)
 AUTO = "auto"
 """In the place of a format: as the endings of the files tell."""
 ENDINGS = ((".csv", "csv"), (".json", "coco"), (".txt", "yolo"))

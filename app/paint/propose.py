@@ -13,7 +13,6 @@ from collections.abc import Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from functools import cache
-from typing import Literal
 
 import cv2
 import numpy as np
@@ -31,13 +30,13 @@ from app.paint.scoring import ScoredPicture
 from app.paint.search import KAPPA_MEAN, SCOUTED, SEARCHED, Shown, search, shown_by, shows_the_same
 from app.paint.snap import Snapped, snap_reading
 from app.paint.straight import straight_pieces
+from app.soccer.choices import ProposalOutcome
 from app.soccer.frames import ImageSize
 from app.soccer.pitch import MARKINGS, Pitch
 from app.soccer.policy import CalibrationPolicy
 from app.solving.observations import principal_point
 
 Image = npt.NDArray[np.uint8]
-Outcome = Literal["proposed", "unsure", "nothing"]
 
 SEARCH_VERSION = 2
 """Of the search and what decides: where nothing was proposed, a later one looks again."""
@@ -85,7 +84,7 @@ class FrameProposal:
             something else; None where there is no other.
     """
 
-    outcome: Outcome
+    outcome: ProposalOutcome
     reason: str | None
     camera: Camera | None = None
     agreement: PaintAgreement | None = None

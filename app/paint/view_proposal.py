@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
@@ -15,6 +14,7 @@ from app.paint.evidence import Image
 from app.paint.picture_scale import PictureScale, why_unreadable
 from app.paint.propose import propose
 from app.soccer.annotation import Lines
+from app.soccer.choices import ProposalOutcome
 from app.soccer.frames import ImageSize
 from app.soccer.media import Media
 from app.soccer.pitch import Pitch
@@ -36,7 +36,7 @@ class ViewProposal:
         points: How many places of paint the camera lies on.
     """
 
-    outcome: Literal["proposed", "unsure", "nothing"]
+    outcome: ProposalOutcome
     sentence: str
     lines: Lines
     supported: float | None = None

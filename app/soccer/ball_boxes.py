@@ -9,12 +9,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import get_args
 
+from app.soccer.choices import BoxKind
 from app.soccer.frames import Box
 from app.soccer.group import View
 from app.soccer.solution import BallFit, Solution
 
-BOX_KINDS = ("optimized", "annotated", "exact")
+BOX_KINDS: tuple[str, ...] = get_args(BoxKind)
 
 
 def has_ball_3d(solution: Solution | None, view: View) -> bool:

@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from string import ascii_uppercase
+from typing import get_args
 
 from app.errors import InputError
 from app.geometry.camera import Camera
 from app.soccer.annotation import BallAnnotation, Extras, Lines
+from app.soccer.choices import CalibrationChoice
 from app.soccer.frames import ImageSize
 from app.soccer.media import Media
 from app.soccer.paint_evidence import PaintReading
@@ -16,8 +18,7 @@ from app.soccer.picture import PictureGeometry
 from app.soccer.pitch import Pitch
 from app.soccer.reasons import LeftOut
 
-CALIBRATIONS = ("given", "lines")
-"""Which calibration of a camera can count: the one that came with the data, or that of its lines."""
+CALIBRATIONS: tuple[str, ...] = get_args(CalibrationChoice)
 
 
 def view_letter(index: int) -> str:

@@ -7,13 +7,14 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, get_args
 
 import numpy as np
 
 from app.canonical import digest_of
 from app.errors import InputError
 from app.soccer.annotation import Lines, make_lines
+from app.soccer.choices import ProposalOutcome
 from app.soccer.frames import ImagePoint
 from app.soccer.pitch import canonical_marking
 
@@ -62,8 +63,7 @@ class PaintEvidence:
         return make_lines(lines)
 
 
-PROPOSAL_OUTCOMES = ("proposed", "unsure", "nothing")
-"""What can become of a view for which lines are sought in the paint of its picture."""
+PROPOSAL_OUTCOMES: tuple[ProposalOutcome, ...] = get_args(ProposalOutcome)
 
 
 @dataclass(frozen=True)

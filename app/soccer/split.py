@@ -8,11 +8,12 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import asdict, dataclass
-from typing import Any
+from typing import Any, get_args
 
 from app.errors import InputError
+from app.soccer.choices import SplitKind
 
-KINDS = ("given", "match", "camera")
+KINDS: tuple[str, ...] = get_args(SplitKind)
 TRAIN, TEST = "train", "test"
 TEST_CAMERAS = ("cam1", "cam2")
 """ISSIA's: cameras 3 to 6 train, 1 and 2 test."""

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, get_args
 
 from sqlalchemy import delete, select
 
+from app.soccer.choices import GoldStart
 from app.store.clock import now
 from app.store.dialect.statements import insert
 from app.store.session import Session
@@ -17,7 +18,7 @@ from app.store.tables.takes import GoldModel, TakeModel
 IMPORTED = "imported"
 WITHOUT_BALLS = "without_balls"
 BARE = "bare"
-STARTS = (IMPORTED, WITHOUT_BALLS, BARE)
+STARTS: tuple[str, ...] = get_args(GoldStart)
 _HEADS = select(
     GoldModel.group_id,
     GoldModel.dataset_id,

@@ -11,6 +11,7 @@ from sqlalchemy import case, delete, func, insert, select, update
 
 from app.canonical import canonical
 from app.finite import finite
+from app.soccer.choices import JobState
 from app.store.aliases import columns_shown
 from app.store.clock import now, text_of
 from app.store.dialect.statements import member
@@ -21,8 +22,11 @@ from app.store.stored_json import Json, parse
 from app.store.tables.groups import DatasetModel
 from app.store.tables.jobs import JobModel
 
-WAITING, RUNNING = "waiting", "running"
-DONE, FAILED, CANCELLED = "done", "failed", "cancelled"
+WAITING: JobState = "waiting"
+RUNNING: JobState = "running"
+DONE: JobState = "done"
+FAILED: JobState = "failed"
+CANCELLED: JobState = "cancelled"
 EXPORT = "export"
 """The kind of job whose row is the only way to its file."""
 OPEN = (WAITING, RUNNING)

@@ -15,6 +15,7 @@ from sqlalchemy.orm import aliased
 
 from app.canonical import canonical
 from app.soccer.annotation import Lines
+from app.soccer.paint_evidence import PROPOSAL_OUTCOMES
 from app.store.codecs import lines_from_json, lines_to_json
 from app.store.dialect.statements import insert, items_of, numbers_in
 from app.store.session import Session
@@ -196,7 +197,7 @@ def match_proposals(
             GroupModel.match,
             number(asked),
             number(looked),
-            *(number(looked, outcome == name) for name in ("proposed", "unsure", "nothing")),
+            *(number(looked, outcome == name) for name in PROPOSAL_OUTCOMES),
             number(outcome == "proposed", StationModel.proposed.is_not(None)),
         )
         .join(ViewModel, ViewModel.group_id == GroupModel.id)

@@ -21,6 +21,7 @@ from sqlalchemy import (
     update,
 )
 
+from app.soccer.choices import BatchState
 from app.store.dialect.statements import insert as upsert
 from app.store.session import Session
 from app.store.tables.groups import DatasetModel
@@ -30,8 +31,8 @@ from app.store.tables.queue import QueueModel
 from app.store.tables.takes import TakeModel
 from app.store.tables.work import BatchGroupModel, BatchModel, BatchPersonModel, LeaseModel
 
-OPEN, CLOSED = "open", "closed"
-"""States of a batch."""
+OPEN: BatchState = "open"
+CLOSED: BatchState = "closed"
 _BATCHES = select(*BatchModel.__table__.columns, DatasetModel.name.label("dataset")).join(
     DatasetModel, DatasetModel.id == BatchModel.dataset_id
 )

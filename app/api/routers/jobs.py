@@ -10,11 +10,12 @@ from app.api.cursor import parse_cursor
 from app.api.deps import Actor, AppServices, Id, Sees
 from app.api.problem import responses
 from app.api.reply import AskedUnder, Reply, document
-from app.api.schemas.job import JobDocument, JobKind, JobPage, JobState
+from app.api.schemas.job import JobDocument, JobKind, JobPage
 from app.review.answers.keep import Kept
 from app.review.datasets.dataset import dataset_id
 from app.review.jobs.job_records import Job
 from app.review.people.deeds import with_deed
+from app.soccer.choices import JobState
 
 router = APIRouter(prefix="/jobs", tags=["jobs"])
 

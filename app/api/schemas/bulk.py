@@ -8,9 +8,9 @@ from typing import Annotated
 from pydantic import BaseModel, ConfigDict, Field
 
 from app.api.schemas.document import Document, ListDocument
-from app.api.schemas.group import State
 from app.review.queue.query import MAX_LISTED_LENGTH
 from app.review.verdicts.bulk import BatchReport, BulkPlan, Refusal, SampleGroup
+from app.soccer.choices import VerdictState
 from app.soccer.reasons import Reason
 
 
@@ -36,7 +36,7 @@ class BulkVerdict(BaseModel):
             "of groups, `id:12,15,19` or, for all but these, `-id:12,15,19`.",
         ),
     ] = ""
-    state: State
+    state: VerdictState
     reason: Reason | None = None
     note: Annotated[str, Field(max_length=2000)] | None = None
     expected: Annotated[int, Field(ge=0, le=2**53)] | None = Field(
@@ -86,7 +86,7 @@ class BatchDocument(Document):
     at: datetime
     actor: str
     q: str = Field(validation_alias="query")
-    state: State
+    state: VerdictState
     reason: Reason | None
     note: str | None
     changed: int

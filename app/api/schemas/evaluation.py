@@ -16,6 +16,7 @@ from app.evaluation.table import Cell, Column, FrameRange, Row
 from app.finite import MAX_ID
 from app.review.evaluating.evaluation import Comparison, read_tables
 from app.review.evaluating.evaluation_run import EvaluationRequest
+from app.soccer.choices import BoxKind, LiveRule
 
 SetId = Annotated[int, Field(strict=True, ge=1, le=MAX_ID)]
 
@@ -37,13 +38,13 @@ class EvaluationBody(BaseModel):
         default=None,
         description="Id, name or hash of a frozen version; null: the dataset as it is now.",
     )
-    groups: Literal["passing", "accepted", "all"] = Field(
+    groups: LiveRule = Field(
         default="passing", description="Without a version: which groups take part."
     )
     split: Annotated[str, Field(max_length=50)] | None = Field(
         default=None, description="Frames of this split alone."
     )
-    boxes: Literal["optimized", "annotated", "exact"] = Field(
+    boxes: BoxKind = Field(
         default="optimized", description="Which box of the dataset is the truth."
     )
     min_score: Annotated[float, Field(ge=0, le=1)] = Field(

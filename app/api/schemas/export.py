@@ -13,10 +13,7 @@ from app.api.schemas.version import VersionId
 from app.datasets.format_names import ExportFormat
 from app.review.exporting.folder import ExportEntry
 from app.review.jobs.job_records import DONE, Job
-
-Boxes = Literal["optimized", "annotated", "exact"]
-Images = Literal["none", "copy"]
-Views = Literal["valid", "all"]
+from app.soccer.choices import BoxKind, JobState, PicturesSent, TrainingViews
 
 
 class ExportRequest(BaseModel):
@@ -35,9 +32,11 @@ class ExportRequest(BaseModel):
         description="Id, name or hash of a frozen version: its groups as they were, always the "
         "same bytes.",
     )
-    boxes: Boxes = Field(default="optimized", description="Which ball box is written.")
-    images: Images = Field(default="none", description="Whether frames are copied into the zip.")
-    views: Views = Field(
+    boxes: BoxKind = Field(default="optimized", description="Which ball box is written.")
+    images: PicturesSent = Field(
+        default="none", description="Whether frames are copied into the zip."
+    )
+    views: TrainingViews = Field(
         default="valid",
         description="coco and yolo: whether views that annotate a ball and are in no valid pair "
         "take part.",
@@ -65,7 +64,7 @@ class ExportDocument(BaseModel):
     """An export: what was asked for, how far it is, and, once it is ready, what came of it."""
 
     id: str
-    state: Literal["waiting", "running", "done", "failed", "cancelled", "gone"] = Field(
+    state: Literal[JobState, "gone"] = Field(
         description="As of its job; `gone`: it was written, and its file is deleted."
     )
     status: Literal["waiting", "running", "ready", "failed", "cancelled", "gone"] = Field(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from datetime import datetime
-from typing import Any, Literal
+from typing import Any
 
 from pydantic import Field
 
@@ -12,12 +12,11 @@ from app.api.schemas.document import Document
 from app.api.schemas.policy import PolicyDocument
 from app.api.schemas.solution import SolutionDocument
 from app.review.editing.state import GroupState
+from app.soccer.choices import CalibrationChoice, VerdictState
 from app.soccer.frame_number import counts_time
 from app.soccer.group import Group, View, view_letter
 from app.soccer.pitch import Pitch
 from app.soccer.reasons import LeftOut
-
-State = Literal["unreviewed", "accepted", "rejected", "deferred"]
 
 
 class DatasetName(Document):
@@ -34,7 +33,7 @@ class PitchSize(Document, shows=Pitch):
 class VerdictDocument(Document):
     """What people decided; `stale` when the group changed afterwards."""
 
-    state: State
+    state: VerdictState
     reason: str | None
     note: str | None
     by: str | None = Field(validation_alias="actor")
@@ -62,9 +61,7 @@ class StationDocument(Document):
     id: int
     key: str
     shared: bool
-    calibration: Literal["given", "lines"] = Field(
-        description="Which calibration counts when both exist."
-    )
+    calibration: CalibrationChoice = Field(description="Which calibration counts when both exist.")
     has_given: bool
     picture: PictureDocument | None = Field(
         description="What was done to the picture, where somebody said that something was."

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field, StrictBool, model_validator
 
@@ -10,6 +10,7 @@ from app.api.schemas.document import Document
 from app.datasets.format_names import ImportFormat
 from app.review.importing.folders import FolderItem
 from app.review.jobs.imports import ImportRequest
+from app.soccer.choices import CalibrationChoice, PolicyName
 from app.soccer.frames import MAX_SIDE
 
 Camera = Annotated[int, Field(ge=0, le=999)]
@@ -41,7 +42,7 @@ class ImportOptions(BaseModel):
 
     model_config = ConfigDict(extra="forbid")
 
-    calibration: Literal["given", "lines"] = Field(
+    calibration: CalibrationChoice = Field(
         default="given",
         description="Which calibration counts where a view has a given camera and lines.",
     )
@@ -84,7 +85,7 @@ class ImportBody(BaseModel):
     format: ImportFormat
     source: ImportPlace
     options: ImportOptions = ImportOptions()
-    policy: Literal["paper", "strict", "touchline"] | None = Field(
+    policy: PolicyName | None = Field(
         default=None,
         description="Of a dataset that is made; null: `touchline` where most of its views have a "
         "picture whose paint can place their camera, else `paper`.",

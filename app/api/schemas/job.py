@@ -8,6 +8,7 @@ from typing import Any, Literal
 from pydantic import Field
 
 from app.api.schemas.document import Document, ListDocument
+from app.soccer.choices import JobState
 
 JobKind = Literal[
     "solve",
@@ -25,7 +26,6 @@ JobKind = Literal[
     "proposals",
     "pictures",
 ]
-JobState = Literal["waiting", "running", "done", "failed", "cancelled"]
 
 
 class JobProblem(Document):

@@ -22,6 +22,7 @@ from app.finite import MAX_ID
 from app.review.evaluating.accept import SHOWN, AcceptPlan, AcceptReport, AcceptRequest
 from app.review.evaluating.group_predictions import GroupPredictions
 from app.review.evaluating.predictions import PredictedBox, PredictionSet
+from app.soccer.choices import AnyPredictionFormat
 from app.soccer.frames import MAX_SIDE, ImageSize
 
 Upload = Annotated[str, Field(min_length=1, max_length=64, description="Id of an upload.")]
@@ -51,7 +52,7 @@ class PredictionRequest(BaseModel):
         description="Name of the set; unique in its dataset. null: the set that came of the very "
         "same reading, where there is one; else a new one, named after its file.",
     )
-    format: Literal["auto", "coco", "yolo", "csv"] = Field(
+    format: AnyPredictionFormat = Field(
         default="coco", description="`auto`: as the endings of the files tell."
     )
     upload: Upload | None = None

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Literal
-
 from pydantic import BaseModel, ConfigDict, Field, StrictBool
 
 from app.api.schemas.annotation import LineDocuments, lines_document
 from app.api.schemas.document import Document, ListDocument
 from app.review.editing.proposals import Proposal
+from app.soccer.choices import ProposalOutcome
 
 
 class MatchProposalsDocument(Document):
@@ -65,7 +64,7 @@ class GroupProposal(BaseModel):
         description="Whether the view still has no given camera, and no lines or those beside "
         "which this was proposed because they determined no camera."
     )
-    outcome: Literal["proposed", "unsure", "nothing"]
+    outcome: ProposalOutcome
     sentence: str = Field(
         description="Why nothing is proposed, or which drawn lines lie elsewhere; else empty."
     )

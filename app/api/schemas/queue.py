@@ -8,7 +8,7 @@ from typing import Any, Literal
 from pydantic import Field
 
 from app.api.schemas.document import Document, ListDocument
-from app.api.schemas.group import State, image_address
+from app.api.schemas.group import image_address
 from app.api.schemas.solution import (
     FailingGate,
     FindingDocument,
@@ -20,6 +20,7 @@ from app.review.editing.past import STATION_EDITS, LogEntry
 from app.review.queue.findings import GroupFindings
 from app.review.queue.listing import GroupRow as QueueRow
 from app.review.queue.listing import Neighbours as QueueNeighbours
+from app.soccer.choices import VerdictState
 from app.soccer.finding import Finding
 
 THUMBNAIL_WIDTH = 208
@@ -45,7 +46,7 @@ class GroupRow(Document):
     label: str
     match: str
     split: str
-    status: State
+    status: VerdictState
     stale: bool
     passes: bool | None = Field(description="null while it is not solved.")
     first_failing: FailingGate | None

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Literal
-
 from pydantic import BaseModel, Field
 
 from app.api.schemas.annotation import LineDocuments, lines_document
 from app.api.schemas.group import DatasetName
 from app.review.editing.stations import StationState
+from app.soccer.choices import CalibrationChoice
 
 
 class StationDetail(BaseModel):
@@ -20,7 +19,7 @@ class StationDetail(BaseModel):
     shared: bool
     width: int
     height: int
-    calibration: Literal["given", "lines"]
+    calibration: CalibrationChoice
     has_given: bool
     has_given_covariance: bool = Field(
         description="Whether its given camera says how far it may be off; an accepted rig does."

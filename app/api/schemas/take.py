@@ -15,6 +15,7 @@ from app.review.takes.guidelines import MAX_LETTERS, GuidelineVersion
 from app.review.takes.hand_back import MAX_REASON
 from app.review.takes.known_truth import MOST
 from app.review.takes.take import TakeView
+from app.soccer.choices import GoldStart
 
 
 class HandedBackDocument(Document):
@@ -83,7 +84,7 @@ class GoldEdit(BaseModel):
         extra="forbid", json_schema_extra={"examples": [{"start": "without_balls"}]}
     )
 
-    start: Literal["imported", "without_balls", "bare"] = "imported"
+    start: GoldStart = "imported"
 
 
 class GoldChoiceDocument(BaseModel):
@@ -113,7 +114,7 @@ class GoldChoiceDocument(BaseModel):
     size: Annotated[int, Field(ge=1, le=MOST)] = Field(
         default=MOST, description="So many of them at most, the first ones."
     )
-    start: Literal["imported", "without_balls", "bare"] = "imported"
+    start: GoldStart = "imported"
 
 
 class GoldChosenDocument(Document):

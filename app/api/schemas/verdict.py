@@ -6,7 +6,7 @@ from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from app.api.schemas.group import State
+from app.soccer.choices import VerdictState
 from app.soccer.reasons import Reason
 
 
@@ -28,6 +28,6 @@ class VerdictEdit(BaseModel):
         },
     )
 
-    state: State
+    state: VerdictState
     reason: Reason | None = None
     note: Annotated[str, Field(max_length=2000)] | None = None

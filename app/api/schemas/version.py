@@ -22,6 +22,7 @@ from app.review.versions.diff import Move, Passage, Setting
 from app.review.versions.freeze import MAX_LICENCE, FreezeRequest
 from app.review.versions.verify import Difference
 from app.review.versions.version import Verification
+from app.soccer.choices import SplitKind, VersionRule
 from app.soccer.reasons import MAX_NOTE
 from app.soccer.split import TEST_CAMERAS, Split
 
@@ -41,7 +42,7 @@ class SplitChoice(BaseModel):
 
     model_config = ConfigDict(extra="forbid")
 
-    kind: Literal["given", "match", "camera"] = Field(
+    kind: SplitKind = Field(
         default="given", description="As the dataset says; drawn by match; by camera (ISSIA)."
     )
     seed: StrictInt = Field(default=0, ge=0, le=2**53, description="Seed of the draw by match.")
@@ -76,7 +77,7 @@ class VersionRequest(BaseModel):
         str, Field(max_length=MAX_LICENCE, description="Empty: the terms of the sources.")
     ] = ""
     split: SplitChoice = SplitChoice()
-    groups: Literal["accepted", "passing"] = Field(
+    groups: VersionRule = Field(
         default="accepted",
         description="What people accepted; or whatever the policy passes and nobody refused.",
     )
@@ -148,7 +149,7 @@ class VersionDocument(Document):
     actor: str
     note: str
     licence: str
-    groups: Literal["accepted", "passing"]
+    groups: VersionRule
     counts: dict[str, Any] = Field(
         description="Groups, views, balls, overrides; by split; why groups are not in it."
     )

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Annotated, Literal
+from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field, StrictBool, model_validator
 
 from app.api.schemas.document import ListDocument
 from app.api.schemas.group import image_address
+from app.soccer.choices import CalibrationChoice
 from app.soccer.picture import ASPECTS, MAX_SHIFT, OPEN, PictureGeometry
 from app.soccer.reasons import MAX_NOTE, Reason
 
@@ -69,7 +70,7 @@ class ViewEdit(BaseModel):
     note: Annotated[str, Field(max_length=MAX_NOTE)] | None = Field(
         default=None, description="The same in one's own words; `other` needs it."
     )
-    calibration: Literal["given", "lines"] = "given"
+    calibration: CalibrationChoice = "given"
     picture: PictureEdit | None = Field(
         default=None, description="What was done to the picture; null: it is as it was taken."
     )
@@ -90,7 +91,7 @@ class StationEdit(BaseModel):
         extra="forbid", json_schema_extra={"examples": [{"calibration": "lines"}]}
     )
 
-    calibration: Literal["given", "lines"]
+    calibration: CalibrationChoice
 
 
 class Neighbour(BaseModel):

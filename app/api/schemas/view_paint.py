@@ -10,6 +10,7 @@ from app.api.schemas.annotation import LineEdits, Point
 from app.api.schemas.document import Document
 from app.paint.view_paint import ViewPaint
 from app.paint.view_proposal import ViewProposal
+from app.soccer.choices import ProposalOutcome
 
 Spot = Annotated[list[float], Field(min_length=2, max_length=2)]
 """x and y."""
@@ -73,7 +74,7 @@ class PaintDocument(Document):
 class ProposalDocument(Document):
     """Lines for a view without a camera, as its frame shows them; a prediction until saved."""
 
-    outcome: Literal["proposed", "unsure", "nothing"]
+    outcome: ProposalOutcome
     sentence: str = Field(
         description="Why nothing is proposed, or which drawn lines lie elsewhere; else empty."
     )

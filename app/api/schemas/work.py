@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from datetime import date, datetime
-from typing import Annotated, Literal
+from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -15,6 +15,7 @@ from app.review.datasets.naming import MAX_TITLE
 from app.review.queue.query import MAX_LISTED_LENGTH
 from app.review.work.batches import MOST_GROUPS, MOST_VERDICTS, RAREST_GOLD, Part
 from app.review.work.progress import Pace
+from app.soccer.choices import BatchState
 
 Name = Annotated[str, Field(min_length=1, max_length=MAX_TITLE)]
 People = Annotated[list[Annotated[str, Field(max_length=60)]], Field(max_length=200)]
@@ -69,7 +70,7 @@ class BatchEdit(BaseModel):
     due: date | None = Field(default=None, description="null: on no day.")
     annotators: People | None = None
     reviewers: People | None = None
-    state: Literal["open", "closed"] | None = Field(
+    state: BatchState | None = Field(
         default=None, description="Nothing is given out of a closed one."
     )
     gold_every: Annotated[int, Field(ge=1, le=RAREST_GOLD)] | None = Field(
@@ -89,7 +90,7 @@ class WorkBatchDocument(Document):
     verdicts: int
     blind: bool
     due: date | None
-    state: Literal["open", "closed"]
+    state: BatchState
     created: datetime
     created_by: str
     annotators: list[str]

@@ -35,12 +35,13 @@ from app.paint.snap import Snapped, snap
 from app.progress import TellProgress
 from app.review.datasets.picture_files import PictureFile, UniqueNames, picture_stems, read_pictures
 from app.soccer.frames import ImageSize
+from app.soccer.paint_evidence import PROPOSAL_OUTCOMES
 from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy
 from app.soccer.solution import Calibration
 from app.solving.calibrate import calibrate
 
-PROPOSED, UNSURE, NOTHING = "proposed", "unsure", "nothing"
+PROPOSED, UNSURE, NOTHING = PROPOSAL_OUTCOMES
 """Outcomes: the camera is the paint's; the clicks' camera stays; there is none."""
 SENTENCES = {
     "no_paint": "too little paint is seen: the camera of the clicks stays",

@@ -23,6 +23,7 @@ from app.paint.propose import FrameProposal, propose
 from app.progress import TellProgress
 from app.review.datasets.picture_files import PictureFile, UniqueNames, read_pictures
 from app.soccer.frames import ImageSize
+from app.soccer.paint_evidence import PROPOSAL_OUTCOMES
 
 RESULT = "propose.json"
 
@@ -72,7 +73,7 @@ def propose_files(
 def counts_of(rows: Sequence[dict[str, Any]]) -> dict[str, int]:
     """How many frames had which outcome."""
     counts = Counter(row["outcome"] for row in rows)
-    return {name: counts[name] for name in ("proposed", "unsure", "nothing")}
+    return {name: counts[name] for name in PROPOSAL_OUTCOMES}
 
 
 def _propose_one(

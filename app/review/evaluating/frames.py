@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from typing import get_args
 
 from app.datasets.manifest import software_version
 from app.errors import ConflictError, InputError
@@ -11,9 +12,10 @@ from app.evaluation.frame import Frame
 from app.finite import quoted
 from app.review.datasets.dataset import DatasetHead
 from app.review.editing.state import read_states
-from app.review.versions.membership import RULES, read_candidates, require_solved
+from app.review.versions.membership import read_candidates, require_solved
 from app.review.versions.version import FrozenGroup, Version, thaw
 from app.soccer.ball_boxes import ball_boxes, has_ball_3d
+from app.soccer.choices import LiveRule
 from app.soccer.group import Group
 from app.soccer.policy import Policy
 from app.soccer.solution import SOLVER_VERSION, Solution
@@ -24,7 +26,7 @@ from app.store.stored_json import Json
 from app.store.versions import BATCH, read_rows
 from app.store.views import present_ids
 
-LIVE_RULES = (*RULES, "all")
+LIVE_RULES: tuple[str, ...] = get_args(LiveRule)
 """Which groups of a dataset that is not frozen take part."""
 
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 from itertools import islice
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import get_args
 
 from app.datasets.export_record import ExportRecord
 from app.datasets.file_tree import Root
@@ -39,13 +40,14 @@ from app.review.importing.carry import carry_out
 from app.review.importing.spare import spare_persons
 from app.review.versions.version import find_version
 from app.soccer.ball_boxes import BOX_KINDS
+from app.soccer.choices import PicturesWritten, TrainingViews
 from app.store.frames import make_picture
 from app.store.session import Session
 from app.store.store import Store
 from app.store.views import frame_files
 
-IMAGES = ("none", "copy", "link")
-VIEWS = ("valid", "all")
+IMAGES: tuple[str, ...] = get_args(PicturesWritten)
+VIEWS: tuple[str, ...] = get_args(TrainingViews)
 TRIED = 100
 """Groups that are tried before an export is promised."""
 

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, get_args
 
+from app.soccer.choices import VerdictState
 from app.soccer.finding import FINDING_KINDS
 from app.soccer.paint_evidence import PROPOSAL_OUTCOMES
 from app.soccer.reasons import REASONS
@@ -56,7 +57,7 @@ class QueryOrder:
     meaning: str
 
 
-STATUSES = ("unreviewed", "accepted", "rejected", "deferred")
+STATUSES: tuple[str, ...] = get_args(VerdictState)
 YES_NO = ("yes", "no")
 WHETHER = ("any", "none")
 

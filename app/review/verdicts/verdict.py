@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import get_args
 
 from app.errors import InputError
 from app.review.answers.keep import Keep, keep_nothing
@@ -10,6 +11,7 @@ from app.review.editing.copies import require_unsettled
 from app.review.editing.etags import require_said, require_unchanged
 from app.review.editing.state import GroupState
 from app.review.editing.submit import read_solved
+from app.soccer.choices import VerdictState
 from app.soccer.group import Group
 from app.soccer.reasons import REASONS, checked_note, require_words
 from app.soccer.solution import Solution
@@ -20,7 +22,7 @@ from app.store.session import Session
 from app.store.store import Store
 from app.store.verdicts import StoredVerdict, insert_verdicts, next_verdict_id
 
-STATES = ("unreviewed", "accepted", "rejected", "deferred")
+STATES: tuple[str, ...] = get_args(VerdictState)
 
 
 @dataclass(frozen=True)

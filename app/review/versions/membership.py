@@ -5,14 +5,15 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, get_args
 
 from app.errors import ConflictError
+from app.soccer.choices import VersionRule
 from app.store.session import Session
 from app.store.stored_json import Json
 from app.store.versions import candidate_rows
 
-RULES = ("accepted", "passing")
+RULES: tuple[str, ...] = get_args(VersionRule)
 UNSOLVED = "not solved"
 _DIGITS = re.compile(r"(\d+)")
 

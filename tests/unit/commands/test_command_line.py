@@ -383,6 +383,17 @@ class TestExport:
         assert re.search(r"\n  .*, (\w+\.png): frame \1 is no JPEG, PNG or WebP image\n", told)
         assert str(tree) not in told
 
+    def test_a_word_that_is_no_choice_is_told_with_those_that_are(
+        self, run: Run, tmp_path: Path
+    ) -> None:
+        asked = ("--dataset", "x", "--format", "coco", "--boxes", "none", tmp_path)
+        code, _, err = run("export", *asked)
+        told = " ".join(err.replace("│", "").split())
+        assert code == 2
+        assert "for '--boxes': 'none' is not one of 'optimized', 'annotated', 'exact'." in told, (
+            told
+        )
+
     def test_an_unknown_format_is_wrong_usage(self, run: Run, tmp_path: Path) -> None:
         assert run("export", "--dataset", "sn", "--format", "doc", tmp_path / "out")[0] == 2
 

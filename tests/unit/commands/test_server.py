@@ -217,7 +217,10 @@ class TestRefusals:
         path = tmp_path / "token"
         path.write_text(new_text())
         path.chmod(mode)
-        with pytest.raises(InputError, match="other users can read"), connected(Server(place.url, path)):
+        with (
+            pytest.raises(InputError, match="other users can read"),
+            connected(Server(place.url, path)),
+        ):
             pass
 
     def test_a_pipe_in_the_place_of_a_token_is_refused_at_once(

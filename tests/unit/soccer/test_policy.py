@@ -1,7 +1,9 @@
 from dataclasses import fields, replace
+from typing import get_args
 
 import pytest
 
+from app.soccer.choices import PolicyName
 from app.soccer.policy import (
     CALIBRATION,
     PAPER,
@@ -24,6 +26,12 @@ def another(threshold: Threshold) -> object:
     if threshold.minimum is None and not words:
         candidates = [True, False]
     return next(value for value in candidates if value != threshold.default)
+
+
+class TestPolicies:
+    def test_each_can_be_named_in_a_request_and_no_other(self):
+        assert get_args(PolicyName) == tuple(POLICIES)
+        assert all(policy.name == name for name, policy in POLICIES.items())
 
 
 class TestHash:

@@ -1,0 +1,41 @@
+"""The closed sets of words that files, requests and commands share; each is written here alone.
+
+Tuples of them stand where they are used (``get_args``). Nothing is imported, so that the command line starts fast.
+"""
+
+from __future__ import annotations
+
+from typing import Literal
+
+CalibrationChoice = Literal["given", "lines"]
+"""Which calibration of a camera counts: the one that came with the data, or that of its lines."""
+BoxKind = Literal["optimized", "annotated", "exact"]
+"""Which box of a ball counts."""
+PolicyName = Literal["paper", "strict", "touchline"]
+"""The policies that Touchline brings along."""
+VerdictState = Literal["unreviewed", "accepted", "rejected", "deferred"]
+"""What people said of a group."""
+VersionRule = Literal["accepted", "passing"]
+"""Which groups enter a version: those that people accepted, or whatever passes and is not rejected."""
+LiveRule = Literal["passing", "accepted", "all"]
+"""Which groups take part in an evaluation against a dataset that is not frozen."""
+SplitKind = Literal["given", "match", "camera"]
+"""How a version is split into train and test."""
+ProposalOutcome = Literal["proposed", "unsure", "nothing"]
+"""What can become of a view for which lines are sought in the paint of its picture."""
+PredictionFormat = Literal["coco", "yolo", "csv"]
+"""How files of predictions are written."""
+AnyPredictionFormat = Literal["auto", "coco", "yolo", "csv"]
+"""The same, or as the endings of the files tell."""
+PicturesSent = Literal["none", "copy"]
+"""What an export of a server does with frames."""
+PicturesWritten = Literal["none", "copy", "link"]
+"""What an export into a folder of this machine does with frames."""
+TrainingViews = Literal["valid", "all"]
+"""Which views training data are made from: those in which the 3D ball holds, or all."""
+GoldStart = Literal["imported", "without_balls", "bare"]
+"""What annotators of a gold group begin with."""
+BatchState = Literal["open", "closed"]
+"""Whether groups are still given out of a batch."""
+JobState = Literal["waiting", "running", "done", "failed", "cancelled"]
+"""How far long work is."""
