@@ -118,6 +118,21 @@ class ImageError(InputError):
 class NotFoundError(ReviewError):
     """Nothing of that name or number exists."""
 
+    @classmethod
+    def group(cls, group_id: int) -> Self:
+        """That there is no such group."""
+        return cls(f"there is no group {group_id}")
+
+    @classmethod
+    def person(cls, person_id: int) -> Self:
+        """That there is nobody of that id."""
+        return cls(f"there is nobody with id {person_id}")
+
+    @classmethod
+    def dataset(cls, name: str | int) -> Self:
+        """That there is no such dataset."""
+        return cls(f'there is no dataset "{name}"')
+
 
 class ConflictError(ReviewError):
     """The request does not fit the present state."""

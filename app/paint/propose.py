@@ -165,11 +165,19 @@ def propose(
     return _answer(image, frame, ranked, pitch)
 
 
+def why_too_small(image: Image) -> str | None:
+    """Why no line can be followed in a picture of that size; None where lines can."""
+    height, width = image.shape[:2]
+    if min(height, width) >= LEAST_SIDE:
+        return None
+    return f"the picture is too small ({width} x {height} pixels): no line can be followed"
+
+
 def read_frame(image: Image) -> SearchedFrame | str:
     """A frame ready to be searched, or why there is nothing to search for."""
+    if (small := why_too_small(image)) is not None:
+        return small
     height, width = image.shape[:2]
-    if min(height, width) < LEAST_SIDE:
-        return f"the picture is too small ({width} x {height} pixels): no line can be followed"
     if width > WORK_WIDTH:
         size = (WORK_WIDTH, max(round(height * WORK_WIDTH / width), 1))
         image = np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA))

@@ -138,7 +138,7 @@ def save_policy(session: Session, dataset_id: int, policy: Policy, actor: str) -
 def _need(session: Session, dataset: str | int) -> Any:
     row = find_dataset(session, dataset)
     if row is None:
-        raise NotFoundError(f'there is no dataset "{dataset}"')
+        raise NotFoundError.dataset(dataset)
     return row
 
 

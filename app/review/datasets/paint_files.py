@@ -29,7 +29,7 @@ from app.geometry.lens import BROWN_CONRADY
 from app.paint.agreement import agreement
 from app.paint.evidence import to_paint_evidence
 from app.paint.grass import field_of_play, why_no_field
-from app.paint.propose import LEAST_SIDE
+from app.paint.propose import why_too_small
 from app.paint.ridges import line_like
 from app.paint.snap import Snapped, snap
 from app.progress import TellProgress
@@ -175,10 +175,9 @@ def _snap_picture(
         return _row(frame, NOTHING, reason=picture.problem), None, None
     if isinstance(value, ReviewError):
         return _row(frame, NOTHING, reason=value.message), None, None
-    height, width = picture.image.shape[:2]
-    if min(height, width) < LEAST_SIDE:
-        small = f"the picture is too small ({width} x {height} pixels): no line can be followed"
+    if (small := why_too_small(picture.image)) is not None:
         return _row(frame, NOTHING, reason=small), None, None
+    height, width = picture.image.shape[:2]
     size = ImageSize(width, height)
     try:
         lines, _ = lines_from_json(value, size, picture.stem, report)

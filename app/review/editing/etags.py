@@ -81,7 +81,7 @@ def require_unchanged(session: Session, group_id: int, if_match: str, what: str)
     """
     head = read_head(session, group_id)
     if head is None:
-        raise NotFoundError(f"there is no group {group_id}")
+        raise NotFoundError.group(group_id)
     require_said(session, group_id, head.said, if_match, what)
     return head.policy_hash
 
@@ -89,10 +89,18 @@ def require_unchanged(session: Session, group_id: int, if_match: str, what: str)
 def require_said(session: Session, group_id: int, said: str, if_match: str, what: str) -> None:
     """``require_unchanged`` where what was said about the group is known."""
     if said != said_of(if_match):
+        require_etag(read_etags(session, [group_id])[group_id], if_match, what)
+
+
+def require_etag(current: str, if_match: str, what: str) -> None:
+    """Refuse a change that builds on another state than the present one.
+
+    Raises:
+        StaleRevisionError: With both ETags.
+    """
+    if said_of(current) != said_of(if_match):
         raise StaleRevisionError(
-            f"{what} has changed in the meantime",
-            base_etag=if_match,
-            current_etag=read_etags(session, [group_id])[group_id],
+            f"{what} has changed in the meantime", base_etag=if_match, current_etag=current
         )
 
 

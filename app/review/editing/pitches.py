@@ -19,8 +19,8 @@ from app.review.datasets.fan_out import fan_out
 from app.review.datasets.match_choice import need_match
 from app.review.editing.codec import edit_from_json
 from app.review.editing.edit import SetPitch
+from app.review.editing.etags import require_etag
 from app.review.editing.group_edits import give_edits
-from app.review.editing.state import require_etag
 from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy, digested_calibration
 from app.soccer.solution import SOLVER_VERSION

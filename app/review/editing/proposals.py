@@ -114,7 +114,7 @@ def get_group_proposals(store: Store, group_id: int) -> list[tuple[str, bool, Pr
     """
     with store.read() as session:
         if read_head(session, group_id) is None:
-            raise NotFoundError(f"there is no group {group_id}")
+            raise NotFoundError.group(group_id)
         return group_proposals(session, group_id)
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from app.errors import NotFoundError, StaleRevisionError
-from app.review.editing.etags import group_etag, said_of, said_part
+from app.errors import NotFoundError
+from app.review.editing.etags import group_etag, said_part
 from app.review.editing.undo_stacks import Stacks, read_stacks
 from app.soccer.finding import Finding
 from app.soccer.group import Group
@@ -153,7 +153,7 @@ def need_group(session: Session, group_id: int) -> StoredGroup:
     """A group whole; raises NotFoundError where there is none."""
     stored = read_groups(session, [group_id]).get(group_id)
     if stored is None:
-        raise NotFoundError(f"there is no group {group_id}")
+        raise NotFoundError.group(group_id)
     return stored
 
 
@@ -165,7 +165,7 @@ def read_record(session: Session, group_id: int) -> Record:
     """
     records = read_records(session, [group_id])
     if not records:
-        raise NotFoundError(f"there is no group {group_id}")
+        raise NotFoundError.group(group_id)
     return records[0]
 
 
@@ -216,18 +216,6 @@ def read_states(
 def station_etag(stored: StoredStation) -> str:
     """The station's own ETag, quoted."""
     return f'"{digest([stored.digest, stored.revision])[:16]}"'
-
-
-def require_etag(current: str, if_match: str, what: str) -> None:
-    """Refuse a change that builds on another state than the present one.
-
-    Raises:
-        StaleRevisionError: With both ETags.
-    """
-    if said_of(current) != said_of(if_match):
-        raise StaleRevisionError(
-            f"{what} has changed in the meantime", base_etag=if_match, current_etag=current
-        )
 
 
 def _verdict_state(

@@ -10,6 +10,7 @@ from app.errors import ConflictError, NotFoundError
 from app.review.answers.keep import Keep, keep_nothing
 from app.review.editing.codec import station_edit_from_json, step_to_json
 from app.review.editing.edit import SetStationLines, StationEdit, with_station
+from app.review.editing.etags import require_etag
 from app.review.editing.known import known_calibrations
 from app.review.editing.point_limits import require_few_points
 from app.review.editing.solve_encoded import solve_encoded
@@ -17,7 +18,6 @@ from app.review.editing.state import (
     GroupState,
     read_record,
     read_state,
-    require_etag,
     station_etag,
 )
 from app.review.editing.undo_stacks import next_step, read_station_stacks

@@ -102,7 +102,7 @@ def current_etag(store: Store, group_id: int) -> str:
     with store.read() as session:
         found = read_etags(session, [group_id])
     if group_id not in found:
-        raise NotFoundError(f"there is no group {group_id}")
+        raise NotFoundError.group(group_id)
     return found[group_id]
 
 

@@ -63,7 +63,7 @@ def group_predictions(store: Store, group_id: int) -> GroupPredictions:
     with store.read() as session:
         dataset = group_dataset(session, group_id)
         if dataset is None:
-            raise NotFoundError(f"there is no group {group_id}")
+            raise NotFoundError.group(group_id)
         boxes = _with_sets(session, read_group_boxes(session, group_id))
         taken = list(_taken(session, group_id))
         said = group_entries(session, group_id) if taken else []

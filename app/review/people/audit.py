@@ -129,7 +129,7 @@ def require_group(store: Store, group_id: int) -> None:
     """Raise NotFoundError where there is no such group."""
     with store.read() as session:
         if find_group(session, group_id) is None:
-            raise NotFoundError(f"there is no group {group_id}")
+            raise NotFoundError.group(group_id)
 
 
 def every_entry(

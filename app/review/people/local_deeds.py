@@ -33,7 +33,7 @@ def adopt(store: Store, person_id: int, *, actor: str) -> str:
     with store.write() as session:
         person = person_by_id(session, person_id)
         if person is None:
-            raise NotFoundError(f"there is nobody with id {person_id}")
+            raise NotFoundError.person(person_id)
         before = find_alias(session, LOCAL_USER)
         if before is not None:
             raise ConflictError(

@@ -98,7 +98,7 @@ def give_role(
         dataset_id = _need_dataset(session, dataset)
         person = person_by_id(session, person_id)
         if person is None:
-            raise NotFoundError(f"there is nobody with id {person_id}")
+            raise NotFoundError.person(person_id)
         if person.name == person_of(actor):
             raise ForbiddenError(
                 "nobody changes their own rights", hint="An admin, or another lead, can."
@@ -116,7 +116,7 @@ def give_role(
 def _need_dataset(session: Session, dataset: str | int) -> int:
     row = find_dataset(session, dataset)
     if row is None:
-        raise NotFoundError(f'there is no dataset "{dataset}"')
+        raise NotFoundError.dataset(dataset)
     return int(row.id)
 
 

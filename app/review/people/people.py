@@ -204,7 +204,7 @@ def find_person(store: Store, name: str) -> Person:
 def _read(session: Session, person_id: int) -> Person:
     row = person_by_id(session, person_id)
     if row is None:
-        raise NotFoundError(f"there is nobody with id {person_id}")
+        raise NotFoundError.person(person_id)
     waiting, tokens = people_with_links(session, now()), count_access_tokens(session)
     factors, ways = people_with_second_factor(session), people_with_identity(session)
     return _person(row, waiting, tokens, factors, ways)

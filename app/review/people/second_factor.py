@@ -159,7 +159,7 @@ class SecondFactors:
         with self._store.write() as session:
             person = person_by_id(session, person_id)
             if person is None:
-                raise NotFoundError(f"there is nobody with id {person_id}")
+                raise NotFoundError.person(person_id)
             if person.name == actor:
                 raise ForbiddenError(
                     "nobody takes away their own second factor so", hint="Do it under Account."

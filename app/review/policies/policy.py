@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from app.review.datasets.dataset import read_dataset_head, save_policy
-from app.review.editing.state import require_etag
+from app.review.editing.etags import require_etag
 from app.soccer.policy import Policy
 from app.store.digest import digest
 from app.store.policies import PolicyVersion, policy_history

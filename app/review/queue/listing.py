@@ -192,7 +192,7 @@ def neighbours(store: Store, group_id: int, query: str = "") -> Neighbours:
     with store.read() as session:
         place = find_place(session, group_id, order)
         if place is None:
-            raise NotFoundError(f"there is no group {group_id}")
+            raise NotFoundError.group(group_id)
         dataset_id, keys = place
         listing = Listing(session, dataset_id, parsed.conditions)
         index, total = listing.place(order, keys, group_id)

@@ -230,7 +230,7 @@ def get_take_of(store: Store, copy_id: int) -> Take:
     with store.read() as session:
         there = bool(read_groups(session, [copy_id]))
     if not there:
-        raise NotFoundError(f"there is no group {copy_id}")
+        raise NotFoundError.group(copy_id)
     raise NotFoundError(f"group {copy_id} is nobody's own annotation")
 
 

@@ -297,7 +297,7 @@ def _checked(text: str) -> str:
 def _need_group(session: Session, group_id: int) -> ThreadGroup:
     group = find_group(session, group_id)
     if group is None:
-        raise NotFoundError(f"there is no group {group_id}")
+        raise NotFoundError.group(group_id)
     return group
 
 

@@ -288,7 +288,7 @@ def read_policy(session: Session, dataset_id: int) -> Policy:
     """The present policy of a dataset; raises NotFoundError when there is none."""
     row = find_dataset(session, dataset_id)
     if row is None:
-        raise NotFoundError(f'there is no dataset "{dataset_id}"')
+        raise NotFoundError.dataset(dataset_id)
     return policy_of(row.policy)
 
 
