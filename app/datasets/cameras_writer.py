@@ -9,6 +9,7 @@ from app.datasets.camera_json import camera_to_json
 from app.datasets.export_record import ExportRecord
 from app.datasets.frame_names import view_place
 from app.datasets.view_files import PutText, put_on_disk, write_below
+from app.errors import InputError
 from app.finite import json_text
 from app.geometry.camera import Camera
 
@@ -65,10 +66,16 @@ def write_camera_files(
 
 
 def put_view_cameras(put: PutText, record: ExportRecord, written: set[str]) -> int:
-    """Write the cameras of a group that are not written yet; how many that were."""
+    """Write the cameras of a group that are not written yet; how many that were.
+
+    Raises:
+        InputError: Those of two frames would have one name.
+    """
     before = len(written)
     for view in record.group.views:
         place, camera = view_place(record.group, view), record.camera(view)
+        if camera is not None and place in written and not view.station.shared:
+            raise InputError(f"the cameras of two frames would both be called {place}")
         if camera is not None and place not in written:
             put(camera_name(place), camera_text(camera))
             written.add(place)

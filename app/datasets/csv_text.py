@@ -26,14 +26,15 @@ def cell(value: Value) -> str:
     """The text of one cell.
 
     Missing values (None, NaN) are empty. Text that a spreadsheet would run as a formula gets an
-    apostrophe before it; numbers stay as they are.
+    apostrophe before it, and so does what would be taken for that; numbers stay as they are.
     """
     if value is None:
         return ""
     if isinstance(value, str):
         # A carriage return alone would end the row for some readers, quoted or not.
         text = value.replace("\r\n", "\n").replace("\r", "\n")
-        return f"'{text}" if text.startswith(_FORMULA) and not _NUMBER.fullmatch(text) else text
+        formula = text.lstrip("'").startswith(_FORMULA)
+        return f"'{text}" if formula and not _NUMBER.fullmatch(text) else text
     if isinstance(value, (bool, int)):
         return str(value)
     return repr(float(value)) if math.isfinite(value) else ""
@@ -111,7 +112,7 @@ def read_rows(
 
 def _plain_cell(text: str) -> str:
     """A cell without the apostrophe that ``cell`` put before a formula."""
-    if text.startswith("'") and text[1:].startswith(_FORMULA):
+    if text.startswith("'") and text.lstrip("'").startswith(_FORMULA):
         return text[1:]
     return text
 

@@ -37,12 +37,24 @@ def match_frame(group: Group, view: View, split: str, suffix: str) -> str:
 
 
 def flat_frame(group: Group, view: View, split: str, suffix: str) -> str:
-    """``images/<split>/<digest of the group>_<view>.jpg``: no name of ours meets another."""
-    digest = hashlib.sha256(group.key.encode()).hexdigest()[:12]
-    name = PurePosixPath(view.key)
-    known = name.suffix.lower() in IMAGE_SUFFIXES
-    stem = _UNSAFE.sub("-", str(name.with_suffix("")) if known else view.key)
-    return f"images/{split_folder(split)}/{digest}_{stem}{name.suffix.lower() if known else suffix}"
+    """``images/<split>/<digest of the group>_<view>.jpg``: no name of ours meets another.
+
+    Labels have the name without its ending: views that would share it have a digest of theirs, too.
+    """
+    ending = PurePosixPath(view.key).suffix.lower()
+    stem = _flat_stem(view.key)
+    if sum(_flat_stem(other.key).lower() == stem.lower() for other in group.views) > 1:
+        stem = f"{stem}_{_digest(view.key)}"
+    ending = ending if ending in IMAGE_SUFFIXES else suffix
+    return f"images/{split_folder(split)}/{_digest(group.key)}_{stem}{ending}"
+
+
+def _flat_stem(key: str) -> str:
+    return _UNSAFE.sub("-", view_stem(key))
+
+
+def _digest(key: str) -> str:
+    return hashlib.sha256(key.encode()).hexdigest()[:12]
 
 
 def split_folder(split: str) -> str:

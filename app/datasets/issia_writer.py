@@ -9,12 +9,14 @@ from pathlib import Path
 from typing import IO, Any
 from xml.sax.saxutils import quoteattr
 
+from app.datasets import fields
 from app.datasets.camera_json import camera_to_json
 from app.datasets.issia import CALIBRATION, DEFAULT_OFFSET, FramePersons, frame_number, view_camera
 from app.datasets.safe_path import resolve_inside
 from app.datasets.sn_calibration_writer import line_file_text
 from app.datasets.spill import Key, Spill, open_spill
 from app.finite import json_text
+from app.soccer.annotation import CORNERS
 from app.soccer.group import Group, Station, View
 
 _BALL, _NOTE, _PERSON = 0, 1, 2
@@ -104,10 +106,14 @@ def _add_persons(
 ) -> None:
     for box in boxes:
         points = box.get("points")
-        if not isinstance(points, dict) or not {"x1", "y1", "x2", "y2"} <= points.keys():
+        if not isinstance(points, dict) or not set(CORNERS) <= points.keys():
             continue
-        x, y = points["x1"], points["y1"]
-        numbers = map(_number, (x, y, points["x2"] - x, points["y2"] - y))
+        try:
+            x, y, right, bottom = (fields.number(points[corner]) for corner in CORNERS)
+        except ValueError:
+            # Kept as it came from a file that said something else.
+            continue
+        numbers = map(_number, (x, y, right - x, bottom - y))
         place = " ".join(
             f"{name}={number}"
             for name, number in zip(("x", "y", "width", "height"), numbers, strict=True)

@@ -132,6 +132,8 @@ def write_sn_calibration(
                 place, camera = view_place(record.group, view), record.camera(view)
                 # A static camera that many groups share is written once.
                 known = place in names.of_place
+                if known and not view.station.shared:
+                    raise InputError(f"two frames would both be called {place}")
                 name = names.of(place, record.split(view), view.size)
                 if not known:
                     lines, others = view.station.lines, view.extras.lines

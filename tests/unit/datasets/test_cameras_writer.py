@@ -10,7 +10,7 @@ from app.datasets.cameras_reader import read_cameras
 from app.datasets.cameras_writer import write_camera_files, write_cameras
 from app.datasets.export_record import ExportRecord
 from app.datasets.report import Report
-from app.errors import UnsafePathError
+from app.errors import InputError, UnsafePathError
 from app.geometry.camera import Camera
 from app.soccer.group import Group
 
@@ -37,6 +37,14 @@ class TestWriteCameraFiles:
         assert write_camera_files(tmp_path, records) == {"groups": 3, "cameras": 2}
         names = sorted(path.name for path in (tmp_path / "issia").iterdir())
         assert names == ["camera_cam3.json", "camera_cam4.json"]
+
+    def test_two_frames_that_differ_in_their_ending_are_refused_and_none_is_dropped(
+        self, tmp_path: Path, solved: Solved, soccer_group: Make
+    ) -> None:
+        view = soccer_group(replays=0).views[0]
+        groups = [Group(key, (replace(view, key=key),)) for key in ("a/7.png", "a/7.jpg")]
+        with pytest.raises(InputError, match="cameras of two frames would both be called a/7"):
+            write_camera_files(tmp_path, map(solved, groups))
 
     def test_a_match_that_leaves_the_folder_is_refused(
         self, tmp_path: Path, solved: Solved, soccer_group: Make

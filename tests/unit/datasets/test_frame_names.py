@@ -29,6 +29,16 @@ class TestFlatFrame:
         assert len(set(names)) == len(names) == 8
         assert all(name.startswith("images/val/") for name in names)
 
+    def test_views_that_differ_in_their_ending_or_in_a_sign_have_labels_of_their_own(
+        self, soccer_group: Make
+    ) -> None:
+        view = soccer_group().views[0]
+        for keys in (("7.png", "7.jpg"), ("cam 1", "cam-1"), ("A.png", "a.png")):
+            group = Group("g", tuple(replace(view, key=key) for key in keys))
+            names = [flat_frame(group, one, "", ".jpg") for one in group.views]
+            labels = {name.rsplit(".", 1)[0].lower() for name in names}
+            assert len(labels) == 2, names
+
 
 class TestSplitFolder:
     def test_uses_the_names_of_yolo_and_trains_without_a_split(self) -> None:

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,17 @@ from app.datasets import parquet_writer
 from app.datasets.export_record import ExportRecord
 from app.datasets.parquet_writer import COLUMNS, write_parquet
 from app.geometry.camera import Camera
+from app.soccer.frames import Box, ImagePoint
 from app.soccer.group import Group
+from app.soccer.solution import (
+    BallFit,
+    BestBall,
+    Calibration,
+    ChiSquare,
+    Gate,
+    PaintFit,
+    ViewSolution,
+)
 
 Solved = Callable[..., ExportRecord]
 Make = Callable[..., Group]
@@ -20,6 +31,35 @@ Make = Callable[..., Group]
 def rows(root: Path) -> list[dict[str, Any]]:
     table: list[dict[str, Any]] = pq.read_table(root / "views.parquet").to_pylist()
     return table
+
+
+NUMBERED = {
+    "split": "train",
+    "group_split": "train",
+    "frame_present": True,
+    "jac_0.5": 0.1,
+    "jac_1": 0.2,
+    "jac_2": 0.3,
+    "line_error_px": 11.0,
+    "agreement": 0.125,
+    "sigma_m": 0.4,
+    "parallax_degrees": 21.0,
+    "point": "best",
+    "mean_sigma_m": 0.7,
+    "best_sigma_m": 0.6,
+    "p_value": 0.8,
+    "reprojected": [3.0, 4.0],
+    "error_px": 5.0,
+    "error_percent": 6.0,
+    "optimized_diameter_px": 7.0,
+    "optimized_error_m": 8.0,
+    "size_ratio": 9.0,
+    "depth_m": 10.0,
+    "in_valid_pair": True,
+    "view_failed": "jac",
+    "group_failed": "reprojection",
+}
+"""Columns of a row whose numbers are all different."""
 
 
 class TestWriteParquet:
@@ -39,6 +79,42 @@ class TestWriteParquet:
             "accepted", "demo", "abc",
         )  # fmt: skip
         assert first["version"] is None
+
+    def test_every_number_stands_in_its_own_column(
+        self, tmp_path: Path, solved: Solved, soccer_group: Make, camera: Camera
+    ) -> None:
+        record = solved(soccer_group())
+        solution, view = record.solution, record.group.views[0]
+        assert solution is not None and solution.ball is not None
+        fit = BallFit(
+            ImagePoint(3.0, 4.0), 5.0, 6.0, 7.0, Box(1.0, 2.0, 7.5, 7.5), 8.0, None, 9.0, 10.0
+        )
+        paint = PaintFit(supported=0.5, explained=0.25, points=9)
+        calibration = Calibration("lines", camera, jac=(0.1, 0.2, 0.3), error_px=11.0, paint=paint)
+        first = ViewSolution(view.key, calibration, "k", True, "jac", fit)
+        ball = replace(solution.ball, sigma_m=0.4, parallax_degrees=21.0)
+        best = BestBall((1.0, 2.0, -3.0), (0.5,) * 9, 0.6, ("a", "b"))
+        gate = Gate("reprojection", False, 1.0, 2.0, -1.0, "no")
+        numbered = replace(
+            solution,
+            views=(first, *solution.views[1:]),
+            ball=ball,
+            mean_ball=replace(ball, sigma_m=0.7),
+            best_ball=best,
+            chi_square=ChiSquare(1.0, 2, 0.8, ("a", "b")),
+            gates=(gate,),
+        )
+        frames = {view.key: "frames/7.png"}
+        group = replace(record.group, split="train")
+        record = replace(record, group=group, solution=numbered, frames=frames)
+        counts = write_parquet(tmp_path, [record], everything=True)
+        found, other = rows(tmp_path)
+        pan, tilt, roll = camera.pan_tilt_roll_degrees
+        expected = NUMBERED | {"pan_degrees": pan, "tilt_degrees": tilt, "roll_degrees": roll}
+        assert {name: found[name] for name in expected} == expected
+        assert len({pan, tilt, roll}) == 3
+        assert (other["frame_present"], other["in_valid_pair"]) == (False, True)
+        assert counts["boxes"] == sum(row["box_width"] is not None for row in (found, other))
 
     def test_row_groups_are_written_as_they_fill(
         self, tmp_path: Path, solved: Solved, soccer_group: Make, monkeypatch: pytest.MonkeyPatch

@@ -97,6 +97,14 @@ class TestWriteSnCalibration:
         with pytest.raises(InputError, match="would both be called valid-1280x720/00002"):
             write_sn_calibration(tmp_path, map(solved, groups))
 
+    def test_two_frames_that_differ_in_their_ending_are_refused_and_none_is_dropped(
+        self, tmp_path: Path, solved: Solved, soccer_group: Make
+    ) -> None:
+        view = soccer_group(replays=0).views[0]
+        groups = [Group(key, (replace(view, key=key),)) for key in ("a/7.png", "a/7.jpg")]
+        with pytest.raises(InputError, match="two frames would both be called a/7"):
+            write_sn_calibration(tmp_path, map(solved, groups))
+
     def test_the_layout_of_before_is_read_all_the_same(
         self, tmp_path: Path, soccer_group: Make, camera: Camera, report: Report
     ) -> None:
