@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import json
 import os
 import zipfile
 from pathlib import Path
@@ -132,6 +133,30 @@ class TestOutputTree:
         (tmp_path / "manifest.json").write_text(text)
         with pytest.raises(InputError, match="is no earlier export"), output_tree(tmp_path):
             raise AssertionError("not reached")
+
+    @pytest.mark.parametrize("name", ["out", "out.zip"])
+    def test_an_export_of_another_program_with_such_a_manifest_is_never_replaced(
+        self, tmp_path: Path, name: str
+    ) -> None:
+        foreign = {"software": {"name": "another"}, "files": [{"path": "a.txt"}]}
+        content = {"manifest.json": json.dumps(foreign), "a.txt": "theirs"}
+        out = tmp_path / name
+        if name == "out":
+            out.mkdir()
+            for file, text in content.items():
+                (out / file).write_text(text)
+        else:
+            with zipfile.ZipFile(out, "w") as archive:
+                for file, text in content.items():
+                    archive.writestr(file, text)
+        with pytest.raises(InputError, match="is no earlier export"), output_tree(out):
+            raise AssertionError("not reached")
+
+    def test_others_may_read_what_was_published(self, tmp_path: Path) -> None:
+        _export(tmp_path / "out")
+        _export(tmp_path / "out.zip")
+        assert (tmp_path / "out").stat().st_mode & 0o777 == 0o755
+        assert (tmp_path / "out.zip").stat().st_mode & 0o777 == 0o644
 
     @pytest.mark.parametrize("kind", ["text", "zip", "mixed", "link"])
     def test_a_foreign_file_that_ends_in_zip_is_never_replaced(

@@ -34,11 +34,16 @@ class TestReadParquet:
         known = replace(groups[0].views[0].station, given=camera, given_covariance=COVARIANCE)
         known = replace(known, picture=PictureGeometry(1.25, (0.5, -0.25), (0.125, 0.0, 0.5)))
         known = replace(known, proposed=(min(known.lines),))
-        groups[0] = groups[0].with_view(replace(groups[0].views[0], station=known))
+        known = replace(known, flipped=True)
+        seen = replace(groups[0].views[0].balls[0], inferred=True, occluded=True)
+        first = replace(groups[0].views[0], station=known, balls=(seen,))
+        groups[0] = replace(groups[0].with_view(first), split="valid")
         groups[1] = groups[1].with_view(replace(groups[1].views[1], included=False, left_out=why))
         folder = tmp_path / "out"
         folder.mkdir()
-        write_parquet(folder, [solved(group) for group in groups])
+        splits = {view.key: "train" for view in groups[0].views}
+        records = [replace(solved(groups[0]), splits=splits), solved(groups[1])]
+        write_parquet(folder, records)
         packed = make_zip({"views.parquet": (folder / "views.parquet").read_bytes()})
         for place in (folder, folder / "views.parquet", packed):
             assert list(read_parquet(place, report)) == groups

@@ -13,6 +13,7 @@ HOSTILE = [
     "", "..", "../a", "a/../../b", "a/..", "/etc/passwd", "//host/share", "C:/a", "c:a",
     "a\\b", "..\\a", "a\x00b", "a\nb", "a\x7f", "%2e%2e/a", "%2e%2e%2fa", "%252e%252e%252fa",
     "..%2fa", "%2fetc/passwd", "..%5ca", "a%00b", "\uff0e\uff0e/a", "\u2025/a", "a/\ud800",
+    "%EF%BC%8E%EF%BC%8E/a", "%E2%80%A5/a",
     "a/" + "b" * 256, "é" * 128 + "/a",
 ]  # fmt: skip
 

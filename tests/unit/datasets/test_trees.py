@@ -12,10 +12,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from app.config import Settings
-from app.datasets.file_tree import Limits
+from app.datasets.file_tree import Limits, files_inside
 from app.datasets.folder_tree import FolderTree
 from app.datasets.guess_format import guess_format
 from app.datasets.match_frames import MatchFrames
+from app.datasets.plain_file import read_plain
 from app.datasets.report import Report
 from app.datasets.safe_path import is_hidden
 from app.datasets.soccernet_v3_reader import read_soccernet_v3
@@ -114,6 +115,22 @@ class TestFolderTree:
         assert tree is not None
         with pytest.raises(DatasetFormatError, match="longer than 10 bytes"):
             tree.read_bytes("a")
+
+
+class TestFilesInside:
+    def test_every_name_below_a_folder_is_among_them(self) -> None:
+        names = sorted(["a/x", "a/Ünsal.png", "a/日本.png", "a~", "b/x"])
+        assert files_inside(names, "a/") == {"x", "Ünsal.png", "日本.png"}
+
+
+class TestReadPlain:
+    def test_a_file_beyond_the_limit_is_refused_and_never_cut(self, tmp_path: Path) -> None:
+        path = tmp_path / "a"
+        path.write_bytes(b"12345")
+        assert read_plain(path, 5) == b"12345"
+        for limit in (4, 3):
+            with pytest.raises(DatasetFormatError, match=f"longer than {limit} bytes"):
+                read_plain(path, limit)
 
 
 class TestZipTree:
@@ -254,6 +271,25 @@ class TestNamesThatAreNoText:
         outer = ZipTree(path, report, Limits())
         with closing(outer), closing(outer.nested("inner.zip", report)) as inner:
             assert inner.read_bytes("d.json") == b"three"
+
+    @pytest.mark.parametrize(
+        ("limits", "said"),
+        [
+            (Limits(members=5), "has 2 members; at most 1 are read"),
+            (Limits(total_bytes=3_000), "unpacks to 2,000 bytes; at most 1,000 are read"),
+        ],
+    )
+    def test_what_nested_zips_hold_counts_toward_the_limits_of_the_one_around_them(
+        self, tmp_path: Path, make_zip: MakeZip, report: Report, limits: Limits, said: str
+    ) -> None:
+        inner = make_zip({"a": "x" * 1_000, "b": "y" * 1_000}, tmp_path / "inner.zip").read_bytes()
+        path = make_zip({"one.zip": inner, "two.zip": inner}, tmp_path / "outer.zip")
+        outer = ZipTree(path, report, limits)
+        with closing(outer), pytest.raises(DatasetFormatError, match=said):
+            for name in ("one.zip", "two.zip"):
+                with closing(outer.nested(name, report)) as tree:
+                    for member in ("a", "b"):
+                        tree.read_bytes(member)
 
     def test_a_picture_of_such_a_zip_is_read(self, marked: Path) -> None:
         with closing(Archives()) as archives:
