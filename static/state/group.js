@@ -12,6 +12,7 @@ import * as client from '../api/client.js';
 import { ApiError } from '../api/problem.js';
 import { previewBall } from '../geometry/preview.js';
 import { latest } from '../lib/latest.js';
+import { stored } from '../lib/storage.js';
 import { known, load, rememberAnswer } from './documents.js';
 import { applyEdit, describe, previewBody, requestOf, sameTarget, stationOf, viewOf } from './edits.js';
 import { did } from './last_action.js';
@@ -175,7 +176,7 @@ export function submitVerdict(verdict) {
 export function submitTurn(verb) {
 	const at = groupDocument.value;
 	if (!at || refuses('annotate', at.dataset.name)) return;
-	const last = lastStation.value?.group === at.id ? lastStation.value.station : null;
+	const last = lastStationOf(at.id);
 	const station = at.views.find((view) => view.station.id === last)?.station;
 	enqueue({
 		path: station ? `/stations/${station.id}/${verb}?group=${at.id}` : `/groups/${at.id}/${verb}`,
@@ -191,11 +192,26 @@ function baseOf(at, key) {
 	return { lines, balls, included, left_out, picture: station.picture ?? null, verdict: at.verdict };
 }
 
+/** Groups whose last edit of this window changed a static camera, the newest last; it outlives a reload. */
+const lastStations = stored('last stations', /** @type {{group: number, station: number}[]} */ ([]), 'sessionStorage');
+const MOST_STATIONS = 100;
+
 /**
- * The static camera that the last edit on this group changed: its edits have a line of their own,
- * and undo has to ask there.
+ * The static camera that the last edit of this window on a group changed; null: it changed none.
+ * Its edits have a line of their own, and undo has to ask there.
+ *
+ * @param {number | undefined} group
  */
-export const lastStation = signal(/** @type {{group: number, station: number} | null} */ (null));
+export function lastStationOf(group) {
+	return lastStations.value.find((one) => one.group === group)?.station ?? null;
+}
+
+/** @param {number} group @param {number | null} station */
+function keepStation(group, station) {
+	const others = lastStations.value.filter((one) => one.group !== group);
+	const kept = station === null ? others : [...others.slice(1 - MOST_STATIONS), { group, station }];
+	if (kept.length || lastStations.value.length) lastStations.value = kept;
+}
 
 /** @param {Item} item @param {GroupDocument} answer */
 function delivered(item, answer) {
@@ -206,7 +222,7 @@ function delivered(item, answer) {
 			? { ...other, etag: etagFor(other, answer) } : other));
 		takeOver(answer);
 		if (pending.value.length === 0 && !draft.value) expected.value = null;
-		if (item.edit) lastStation.value = item.station === null ? null : { group: item.group, station: item.station };
+		if (item.edit) keepStation(item.group, item.station);
 	});
 	if (item.edit) announce(`${describe(answer, item.edit)}, saved.`);
 	else if (item.method === 'POST') announce(item.path.includes('/undo') ? 'Undone.' : 'Done again.');

@@ -44,9 +44,9 @@ export function didAgain(as) {
 	actions.value = withAction(actions.value, as ?? action);
 }
 
-/** It cannot be done again, or was done again elsewhere. @param {BatchDone} action */
+/** It cannot be done again, or was done again elsewhere. @param {Action} action */
 export function forgetUndone(action) {
-	const rest = undone.value.filter((other) => !isSameBatch(other, action));
+	const rest = undone.value.filter((other) => other !== action && !isSameBatch(other, action));
 	if (rest.length < undone.value.length) undone.value = rest;
 }
 

@@ -4,7 +4,7 @@
 import { computed } from '@preact/signals';
 
 import { navigate, page } from '../lib/router.js';
-import { groupDocument, lastStation, open, pending, submitTurn } from './group.js';
+import { groupDocument, lastStationOf, open, pending, submitTurn } from './group.js';
 import { actions, didAgain, forget, forgetEdit, nextBack, tookBack, undone } from './last_action.js';
 import { returnTo, reviewAddress } from './navigation.js';
 import { announce, complain } from './notice.js';
@@ -14,9 +14,7 @@ import { giveVerdictAgain, takeVerdictBack } from './verdicts.js';
 
 /** @import {EditDone} from './last_action.js' */
 
-const ownStation = computed(() => (
-	lastStation.value?.group === groupDocument.value?.id ? (lastStation.value?.station ?? null) : null
-));
+const ownStation = computed(() => lastStationOf(groupDocument.value?.id));
 /** The group that the page is about, in the review as in the calibration editor. */
 const onScreen = computed(() => ('group' in page.value ? page.value.group : null));
 const next = computed(() => {
@@ -67,9 +65,10 @@ async function undoOne() {
 function undoHere() {
 	const at = groupDocument.value;
 	if (!at) return;
-	forgetEdit(at.id);
-	if (isAway.value) undoUnsent();
-	else {
+	if (isAway.value) {
+		if (undoUnsent()) forgetEdit(at.id);
+	} else {
+		forgetEdit(at.id);
 		tookBack({ kind: 'edit', group: at.id, number: at.number, times: 1 });
 		submitTurn('undo');
 	}
@@ -78,7 +77,7 @@ function undoHere() {
 /** Return to a group and undo its last edit. @param {EditDone} action */
 async function undoThere(action) {
 	if (!(await returnTo(action.group))) return;
-	if (groupDocument.value?.can_undo) undoHere();
+	if (groupDocument.value?.can_undo || ownStation.value !== null) undoHere();
 	else forget(action);
 }
 
@@ -109,20 +108,21 @@ async function redoThere(action) {
 	submitTurn('redo');
 }
 
-/** While the server is away only what it never saw can be taken back. */
+/** While the server is away only what it never saw can be taken back. @returns {boolean} whether something was */
 function undoUnsent() {
 	const own = outbox.value.filter(({ group, edit }) => group === groupDocument.value?.id && edit);
 	const last = own.at(-1);
 	if (!last) {
 		complain('Undo needs the server, which cannot be reached.');
-		return;
+		return false;
 	}
 	// The first of all may have reached the server, only its answer did not reach us.
 	if (last === outbox.value[0]) {
 		submitTurn('undo');
-		return;
+		return true;
 	}
 	discard(({ id }) => id === last.id);
 	announce('Undone.');
 	wake();
+	return true;
 }

@@ -8,7 +8,7 @@ import { doubt } from './advice.js';
 import { conflict } from './conflict.js';
 import { group, groupDocument, onRefused, settle, submit, submitVerdict } from './group.js';
 import { frozen } from './hand_back.js';
-import { actions, did, didAgain, forget, tookBack } from './last_action.js';
+import { actions, did, didAgain, forget, forgetUndone, tookBack } from './last_action.js';
 import { batchId, currentId, goNext, query, queueAddress, returnTo, reviewAddress } from './navigation.js';
 import { isMoving, nextOfBatch } from './leases.js';
 import { announce, complain, inform } from './notice.js';
@@ -173,7 +173,13 @@ export async function takeVerdictBack(action) {
 
 /** Give a verdict again that was taken back, on its group. @param {VerdictDone} action */
 export async function giveVerdictAgain(action) {
-	if (!(await returnTo(action.group))) return;
+	if (!(await returnTo(action.group)) || !group.value) return;
+	const { state, reason } = group.value.verdict;
+	if (state !== action.before.state || reason !== action.before.reason) {
+		forgetUndone(action);
+		complain(`Group ${action.number} was judged since; that verdict stays.`);
+		return;
+	}
 	didAgain();
 	submitVerdict(action.given);
 	announce(`Group ${action.number} ${action.given.state} again.`);

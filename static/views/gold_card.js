@@ -80,7 +80,7 @@ export function GoldCard({ dataset }) {
 	if (!may || (!value && !error)) return null;
 	return html`
 		<section class="card card--flush" aria-labelledby="gold-title">
-			<h2 id="gold-title"><${Term} id="gold-group">Gold groups<//></h2>
+			<h2 id="gold-title"><${Term} word="gold-group">Gold groups<//></h2>
 			${error || refused ? html`<${FormError} error=${error ?? refused} />` : null}
 			<p class="gold__about">${value?.groups.length ? `${plural(value.groups.length, 'group')} whose truth is known.` : 'There is none yet.'} Judge a group, then <em>Gold group: its truth is known</em> in its palette (<kbd>Ctrl K</kbd>); or let <em>Give out…</em> take those of a sample or a version. Batches mix them in; nobody is told which they are.</p>
 			${value?.people.length ? html`

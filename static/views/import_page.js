@@ -106,16 +106,16 @@ function Outcome({ job, dry, dataset }) {
 
 /** One import at a time: the last one, and what went wrong before it could begin. */
 function useImport() {
-	const [state, setState] = useState(/** @type {{job: JobJson | null, dry: boolean, error: string}} */ ({ job: null, dry: true, error: '' }));
+	const [state, setState] = useState(/** @type {{job: JobJson | null, dry: boolean, dataset: string, error: string}} */ ({ job: null, dry: true, dataset: '', error: '' }));
 	/** @param {import('../api/imports.js').ImportRequest} body */
 	async function run(body) {
-		const dry = body.dry_run;
-		setState({ job: null, dry, error: '' });
+		const { dry_run: dry, dataset } = body;
+		setState({ job: null, dry, dataset, error: '' });
 		try {
-			await follow(await postImport(body), (job) => setState({ job, dry, error: '' }));
+			await follow(await postImport(body), (job) => setState({ job, dry, dataset, error: '' }));
 			if (!dry) loadDatasets();
 		} catch (error) {
-			setState({ job: null, dry, error: sentenceOf(error) });
+			setState({ job: null, dry, dataset, error: sentenceOf(error) });
 		}
 	}
 	return { ...state, run };
@@ -127,7 +127,7 @@ export function ImportPage() {
 	const [source, setSource] = useState(/** @type {ImportSource | null} */ (null));
 	const [options, setOptions] = useState(/** @type {Options} */ ({}));
 	const [policy, setPolicy] = useState('');
-	const { job, dry, error, run } = useImport();
+	const { job, dry, dataset: imported, error, run } = useImport();
 	useEffect(() => { loadDatasets(); }, []);
 	const chosen = IMPORT_FORMATS.find(({ name }) => name === format) ?? IMPORT_FORMATS[0];
 	const name = dataset.trim();
@@ -170,7 +170,7 @@ export function ImportPage() {
 						${error ? html`<p class="form__error" role="alert">${error}</p>` : null}
 					</form>
 				</section>
-				${job ? html`<${Outcome} job=${job} dry=${dry} dataset=${name} />` : html`
+				${job ? html`<${Outcome} job=${job} dry=${dry} dataset=${imported} />` : html`
 					<section class="card empty"><h2>Nothing is changed before you say so</h2><p>Trying it out reads the files and reports what an import would do: what is new, what changed, and every record that cannot be read, with its file and place.</p></section>`}
 			</div>
 		<//>

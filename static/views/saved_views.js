@@ -15,15 +15,14 @@ import { Popover } from './popover.js';
 
 /** @import {DatasetJson} from '../api/types.js' */
 
-/** @param {{q: string, save: (name: string) => Promise<void>}} props */
+/** @param {{q: string, save: (name: string) => Promise<boolean>}} props   `save`: whether it was */
 function SaveForm({ q, save }) {
 	const [name, setName] = useState('');
 	/** @param {SubmitEvent} event */
 	async function send(event) {
 		event.preventDefault();
 		if (!name.trim()) return;
-		await save(name.trim());
-		setName('');
+		if (await save(name.trim())) setName('');
 	}
 	if (!q) return html`<p class="empty-note">Type a query to save it under a name.</p>`;
 	return html`

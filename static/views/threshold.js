@@ -43,6 +43,13 @@ function Slider({ field, value, id, change }) {
 	const shown = typeof value === 'number' ? value : low;
 	const off = value === null;
 	const share = Math.max(0, Math.min(1, (shown - low) / (high - low)));
+	/** A number within the limits; where none is left, the one that was there. @param {Event} event */
+	function type({ target }) {
+		const box = /** @type {HTMLInputElement} */ (target);
+		const typed = box.value.trim() && Number.isFinite(Number(box.value)) ? Math.max(low, Math.min(high, Number(box.value))) : shown;
+		box.value = String(typed);
+		if (typed !== shown) change(typed);
+	}
 	return html`
 		<input
 			class="threshold__slider" type="range" min=${low} max=${high} step=${stepOf(low, high)} value=${shown} disabled=${off} title=${off ? OFF : ''}
@@ -51,7 +58,7 @@ function Slider({ field, value, id, change }) {
 		/>
 		<input
 			class="field threshold__number" id=${id} type="number" min=${low} max=${high} step="any" value=${off ? '' : shown} disabled=${off} title=${off ? OFF : ''}
-			onChange=${withValue((text) => { if (Number.isFinite(Number(text))) change(Math.max(low, Math.min(high, Number(text)))); })}
+			onChange=${type}
 		/>
 		<${Unit} unit=${field.unit} />
 	`;

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -9,7 +10,15 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from app.soccer.pitch import MARKINGS
-from tests.e2e.screen import at_rest, jobs_end, on_present, passing, settled, submitted, until
+from tests.e2e.screen import (
+    at_rest,
+    jobs_end,
+    on_present,
+    passing,
+    settled,
+    submitted,
+    until,
+)
 from tests.e2e.test_access import CUT_OFF, NESTED_SCROLLERS, SIZES, serious, serious_in_both, soon
 
 OpenPage = Callable[..., Page]
@@ -333,6 +342,26 @@ class TestStation:
         expect(page.get_by_role("button", name="Given camera")).to_have_attribute(
             "aria-pressed", "true"
         )
+        jobs_end(page, film)
+
+    def test_undo_returns_to_the_group_of_an_edit_also_after_the_page_was_loaded_anew(
+        self, open_page: OpenPage, film: str
+    ) -> None:
+        page = open_page(None)
+        groups = page.request.get(f"{film}/api/v1/datasets/film/timeline").json()["id"]
+        editor = Editor(page, film, groups[0], 3)
+        before = editor.lines
+        editor.choose(longest(before))
+        editor.press(".", "Shift+ArrowDown")
+        editor.staged(1)
+        editor.press("Control+s")
+        editor.saved()
+        assert editor.lines != before
+        page.goto(f"{film}/review/{groups[5]}")
+        page.wait_for_selector(".strip__tabs")
+        page.keyboard.press("Control+z")
+        expect(page).to_have_url(re.compile(rf"/review/{groups[0]}\b"))
+        until(page, lambda: editor.lines == before)
         jobs_end(page, film)
 
     def test_all_static_cameras_are_adjusted_and_that_is_taken_back(

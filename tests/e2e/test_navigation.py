@@ -203,3 +203,22 @@ class TestTakingVerdictsBack:
         expect(page.locator(".bar")).to_contain_text("was judged again since")
         assert state_of(page, queue[2]) == "rejected"
         withdraw_verdict(page, queue[2])
+
+    def test_gives_no_verdict_again_over_one_that_somebody_has_given_since(
+        self, page: Page
+    ) -> None:
+        queue = ids(page, QUERY)
+        screen = at(page, queue[2], QUERY)
+        screen.press("s")
+        stands(page, queue, 3)
+        screen.press("Control+z")
+        stands(page, queue, 2)
+        become(page, queue[2:3], "unreviewed")
+        screen.saved()
+        judge(page, queue[2], "rejected", "duplicate_view")
+        page.reload()
+        screen.ready()
+        screen.press("Control+Shift+z")
+        expect(page.locator(".bar")).to_contain_text("was judged since")
+        assert state_of(page, queue[2]) == "rejected"
+        withdraw_verdict(page, queue[2])

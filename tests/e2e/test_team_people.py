@@ -137,6 +137,10 @@ class TestPeople:
         page.goto("/audit?family=edit")
         row = page.get_by_role("row").filter(has_text="leaving out")
         expect(row).to_contain_text("lena")
+        console.expect("a status of 422")
+        page.goto("/audit?family=edit&until=soon")
+        expect(page.get_by_text("The audit cannot be shown")).to_be_visible()
+        page.goto("/audit?family=edit")
         assert serious_in_both(page) == []
         row.get_by_role("link").click()
         expect(page.get_by_role("img", name="View B after")).to_be_visible()

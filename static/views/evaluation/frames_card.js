@@ -2,7 +2,7 @@
 /** The frames behind a number; each opens its group. */
 
 import { html } from 'htm/preact';
-import { useEffect, useState } from 'preact/hooks';
+import { useEffect, useRef, useState } from 'preact/hooks';
 
 import { getFrames } from '../../api/evaluations.js';
 import { ApiError, sentenceOf } from '../../api/problem.js';
@@ -53,17 +53,26 @@ function Row({ frame, columns }) {
 /** Pages of frames. @param {number} evaluation @param {FrameQuery} query */
 function useFrames(evaluation, query) {
 	const [state, setState] = useState(/** @type {{items: FrameJson[], next: string | null, total: number, error: ApiError | null}} */ ({ items: [], next: null, total: 0, error: null }));
+	const asking = useRef(new AbortController());
 	/** @param {FrameJson[]} before @param {string | null} cursor */
 	async function read(before, cursor) {
+		// Another number, or the same page once more: only what was asked last counts.
+		asking.current.abort();
+		const { signal } = asking.current = new AbortController();
 		try {
-			const found = await getFrames(evaluation, { ...query, cursor });
+			const found = await getFrames(evaluation, { ...query, cursor }, signal);
+			if (signal.aborted) return;
 			setState({ items: [...before, ...found.items], next: found.next, total: found.total, error: null });
 		} catch (error) {
+			if (signal.aborted) return;
 			if (!(error instanceof ApiError)) throw error;
 			setState((old) => ({ ...old, error }));
 		}
 	}
-	useEffect(() => { read([], null); }, [evaluation, JSON.stringify(query)]);
+	useEffect(() => {
+		read([], null);
+		return () => asking.current.abort();
+	}, [evaluation, JSON.stringify(query)]);
 	return { ...state, more: () => read(state.items, state.next) };
 }
 

@@ -2,7 +2,7 @@
 /** The audit: who said and did what, in the datasets that one leads. */
 
 import { html } from 'htm/preact';
-import { useEffect, useState } from 'preact/hooks';
+import { useEffect, useRef, useState } from 'preact/hooks';
 
 import { auditFile, getAudit } from '../../api/past.js';
 import { ApiError } from '../../api/problem.js';
@@ -26,9 +26,15 @@ const FIELDS = /** @type {const} */ (['q', 'person', 'family', 'dataset', 'since
 function asked() {
 	const found = Object.fromEntries([...FIELDS, 'group'].map((name) => [name, param(name)]).filter(([, value]) => value));
 	// A day ends when the next one begins.
-	if (found.until) found.until = new Date(Date.parse(found.until) + 86_400_000).toISOString();
-	if (found.since) found.since = new Date(Date.parse(found.since)).toISOString();
+	if (found.until) found.until = timeOf(found.until, 86_400_000);
+	if (found.since) found.since = timeOf(found.since, 0);
 	return found;
+}
+
+/** A day as the server asks for it; what is none stays as it is, and is refused there. @param {string} day @param {number} later ms */
+function timeOf(day, later) {
+	const at = Date.parse(day);
+	return Number.isNaN(at) ? day : new Date(at + later).toISOString();
 }
 
 /** Entries, a page at a time. @param {AuditFilter} filter @param {string} key */
@@ -36,24 +42,27 @@ function useAudit(filter, key) {
 	const [found, setFound] = useState(/** @type {{items: AuditEntryJson[], next: number | null} | null} */ (null));
 	const [error, setError] = useState(/** @type {ApiError | null} */ (null));
 	const [waiting, setWaiting] = useState(true);
-	/** @param {number | null} before @param {AbortSignal} [signal] */
-	async function read(before, signal) {
+	const asking = useRef(new AbortController());
+	/** @param {number | null} before */
+	async function read(before) {
+		const { signal } = asking.current;
 		setWaiting(true);
 		try {
 			const more = await getAudit(filter, before, signal);
 			setFound((known) => ({ items: before === null ? more.items : [...(known?.items ?? []), ...more.items], next: more.next }));
 			setError(null);
 		} catch (problem) {
-			if (signal?.aborted) return;
+			if (signal.aborted) return;
 			if (!(problem instanceof ApiError)) throw problem;
 			setError(problem);
 		}
 		setWaiting(false);
 	}
 	useEffect(() => {
-		const controller = new AbortController();
-		read(null, controller.signal);
-		return () => controller.abort();
+		asking.current = new AbortController();
+		read(null);
+		// Also what was asked for more of the former filter: its rows are none of this one.
+		return () => asking.current.abort();
 	}, [key]);
 	return { found, error, waiting, retry: () => read(null), more: () => read(found?.next ?? null) };
 }

@@ -31,7 +31,8 @@ function Rings({ items, unread, close }) {
 		if (!step || !links.length) return;
 		event.preventDefault();
 		const at = links.findIndex((link) => link === document.activeElement);
-		links[(at + step + links.length) % links.length].focus();
+		// From outside the list, up is the last one and down the first.
+		links[at < 0 ? (step > 0 ? 0 : links.length - 1) : (at + step + links.length) % links.length].focus();
 	}
 	return html`
 		<div class="bell__panel" onKeyDown=${key}>
