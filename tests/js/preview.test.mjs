@@ -33,6 +33,23 @@ describe('previewBall', () => {
 		close(next.ball.point, point, 1e-8);
 		assert.deepEqual(next.ball.views, ['a', 'b']);
 		assert.ok(next.views.every(({ ball }) => ball.error_px < 1e-6));
+		close([next.ball.height_m], [1.5], 1e-8);
+	});
+
+	it('lets a ball confirm nothing that was put where the others see it', () => {
+		const put = viewOf('a', mainCamera);
+		const group = { policy, views: [{ ...put, balls: [{ ...put.balls[0], inferred: true }] }, viewOf('b', goalCamera)] };
+		assert.deepEqual(previewBall(group, solution).pairs, []);
+	});
+
+	it('draws no box in a view that no valid pair has', () => {
+		const third = { ...goalCamera, position_meters: [70, 12, -6] };
+		const views = [viewOf('a', mainCamera), viewOf('b', goalCamera), viewOf('c', third)];
+		const fell = { ...solution, views: [...solution.views, solved('c', third, 'jac')] };
+		const next = previewBall({ policy, views }, fell);
+		assert.deepEqual(next.ball.views, ['a', 'b']);
+		assert.deepEqual(next.views.map(({ ball }) => ball.optimized_box !== null), [true, true, false]);
+		assert.ok(Number.isFinite(next.views[2].ball.error_px));
 	});
 
 	it('has no ball when the views do not meet', () => {
