@@ -45,3 +45,11 @@ def test_one_of_two_is_taken_by_keyboard(home: Path, open_page: Callable[..., Pa
     groups = page.get_by_role("region", name="Groups, the worst first", exact=True)
     expect(groups).to_contain_text("ada’s, by local")
     withdraw_verdict(page, group)
+
+    agreement = "/api/v1/datasets/sample/agreement"
+    before = page.request.get(agreement).json()["limits"]
+    page.get_by_label("ball centre, px").fill("4.5")
+    page.get_by_role("button", name="Save limits").click()
+    expect(page.get_by_text("They count for what is handed in from now on")).to_be_visible()
+    assert page.request.get(agreement).json()["limits"] == {**before, "ball_px": 4.5}
+    assert page.request.put(f"{agreement}/limits", data=before).ok

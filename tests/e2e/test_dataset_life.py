@@ -108,6 +108,16 @@ def freeze_and_verify(page: Page) -> None:
     page.get_by_role("button", name="Verify").click()
     expect(page.locator(".verify")).to_contain_text("came out as they were")
     usable(page)
+    page.get_by_role("button", name="Export…").click()
+    dialog = page.get_by_role("dialog", name="Export passing through, version v1")
+    with page.expect_request(lambda sent: sent.method == "POST" and "exports" in sent.url) as sent:
+        dialog.get_by_role("button", name="Export", exact=True).click()
+    (version,) = page.request.get("/api/v1/datasets/passing%20through/versions").json()["items"]
+    asked = sent.value.post_data_json
+    # There is no picture to be copied.
+    assert (asked["version"], asked["images"], asked["views"]) == (version["id"], "none", "valid")
+    expect(dialog.locator(".export__result")).to_contain_text("Ready")
+    page.keyboard.press("Escape")
 
 
 def evaluate(page: Page, predictions: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 
@@ -42,11 +43,17 @@ class TestSessions:
         page.get_by_label("What it is for").fill("nightly")
         page.get_by_label("export: make exports").check()
         expect(page.get_by_label("admin: look")).to_be_disabled()
+        page.locator("#token-dataset").select_option("sample")
+        page.locator("#token-days").select_option("30")
         page.get_by_role("button", name="Make a token").click()
         text = page.get_by_label("Token", exact=True)
         until(page, lambda: text.count() and text.input_value().startswith("tl_"))
         given = {"Authorization": f"Bearer {text.input_value()}"}
         assert httpx.get(f"{team}/api/v1/datasets", headers=given).is_success
+        (kept,) = page.request.get("/api/v1/tokens").json()["items"]
+        created, expires = (datetime.fromisoformat(kept[name]) for name in ("created", "expires"))
+        assert (kept["dataset"], (expires - created).days) == ("sample", 30)
+        assert kept["scopes"] == ["read", "export"]
         assert serious_in_both(page) == []
         page.get_by_role("button", name="End nightly").click()
         expect(page.get_by_role("button", name="End nightly")).to_be_hidden()
