@@ -35,7 +35,7 @@ START_SECONDS = 120.0
 _ONE_THREAD = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "OPENCV_FOR_THREADS_NUM")
 """Each thread of these libraries reserves memory before it does anything."""
 
-Reason = Literal["memory", "processor", "silence", "killed", "told", "crash"]
+EndReason = Literal["memory", "processor", "silence", "killed", "told", "crash"]
 """``memory`` and ``processor`` are limits of ours; who is killed or told to end, is so from outside."""
 
 
@@ -57,12 +57,12 @@ class Allowance:
 class ChildEnded(Exception):  # noqa: N818
     """A child did not finish its task; it is gone, and the next task gets another."""
 
-    def __init__(self, reason: Reason, allowance: Allowance):
+    def __init__(self, reason: EndReason, allowance: Allowance):
         super().__init__(_sentence(reason, allowance))
         self.reason = reason
 
 
-def _sentence(reason: Reason, allowance: Allowance) -> str:
+def _sentence(reason: EndReason, allowance: Allowance) -> str:
     """What happened, to be read after the name of what was worked on."""
     return {
         "memory": f"needs more than {allowance.memory / 2**20:,.0f} MiB of memory",
@@ -177,14 +177,14 @@ class Child:
             raise ChildEnded("memory", self.allowance)
         raise RuntimeError(value)
 
-    def _cause_of_death(self) -> Reason:
+    def _cause_of_death(self) -> EndReason:
         process = self._process
         code = None
         if process is not None:
             process.join(1.0)
             code = process.exitcode
         self.close()
-        causes: dict[int | None, Reason] = {
+        causes: dict[int | None, EndReason] = {
             -signal.SIGXCPU: "processor",
             # Without a word of ours, this is the kernel's when the machine runs out of memory.
             -signal.SIGKILL: "killed",

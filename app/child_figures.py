@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import get_args
 
-from app.child import ChildEnded, Reason
+from app.child import ChildEnded, EndReason
 
 KINDS = (
     "pictures",
@@ -39,7 +39,7 @@ class ChildFigures:
 
     def __init__(self) -> None:
         self.busy = self.waiting = 0
-        self.ended: dict[Reason, int] = dict.fromkeys(get_args(Reason), 0)
+        self.ended: dict[EndReason, int] = dict.fromkeys(get_args(EndReason), 0)
         self._lock = threading.Lock()
 
     def wait(self) -> None:

@@ -21,7 +21,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from app.api.deps import ACTOR_HEADER
 from app.api.errors import RETRY_SECONDS, status_of
 from app.api.problem import make_problem, problem_response
-from app.api.reply import ASKED, KEPT_HEADERS, Asked
+from app.api.reply import ASKED, KEPT_HEADERS, KeyedRequest
 from app.api.security.access import actor_of
 from app.api.security.bodies import BYTES, VALUE
 from app.api.security.concealment import HIDDEN, SENT
@@ -155,7 +155,7 @@ class Idempotency:
             asked = None
         else:
             await request.read()
-            asked = Asked(key, actor, request.digest())
+            asked = KeyedRequest(key, actor, request.digest())
             request.scope[ASKED] = asked
         recorded = _Recorded(send)
         await self.app(request.scope, request.receive, recorded.send)

@@ -22,7 +22,7 @@ KEPT_HEADERS = ("content-type", "etag", "location", "cache-control")
 
 
 @dataclass
-class Asked:
+class KeyedRequest:
     """A request under an Idempotency-Key; ``kept`` once its answer is in the database."""
 
     key: str
@@ -54,7 +54,7 @@ class Reply(Generic[T]):
         made: The answer that was kept, or None.
     """
 
-    def __init__(self, asked: Asked | None, make: Callable[[T], Response]):
+    def __init__(self, asked: KeyedRequest | None, make: Callable[[T], Response]):
         self._asked, self._make = asked, make
         self.made: Response | None = None
         self._of: T | None = None
@@ -97,10 +97,10 @@ def nothing(_outcome: object) -> Response:
     return Response(status_code=204)
 
 
-async def get_asked(request: Request) -> Asked | None:
+async def get_asked(request: Request) -> KeyedRequest | None:
     """The key under which a request was sent, or None."""
-    asked: Asked | None = request.scope.get(ASKED)
+    asked: KeyedRequest | None = request.scope.get(ASKED)
     return asked
 
 
-AskedUnder = Annotated[Asked | None, Depends(get_asked)]
+AskedUnder = Annotated[KeyedRequest | None, Depends(get_asked)]

@@ -16,7 +16,7 @@ from app.errors import ConflictError, NotLoggedInError
 from app.review.people.access_tokens import AccessTokens
 from app.review.people.challenges import LASTS as CHALLENGE_LASTS
 from app.review.people.logins import LASTS, Login, Logins, Way
-from app.review.people.passkeys import Passkeys, Site
+from app.review.people.passkeys import Passkeys, PasskeySite
 from app.review.people.second_factor import SecondFactors
 from app.review.people.sign_on import LASTS as BEGUN_LASTS
 from app.review.people.sign_on import SignOn
@@ -129,7 +129,7 @@ class Team:
                 f"people log in by {label} alone here", hint=f"Log in with {label}."
             )
 
-    def site(self, request: Request) -> Site:
+    def site(self, request: Request) -> PasskeySite:
         """For whom passkeys are: the address that people open, as the operator said, or this machine.
 
         Raises:
@@ -139,7 +139,7 @@ class Team:
         name = said.hostname or ""
         if name == "localhost" or (said.scheme == "https" and not _is_number(name)):
             port = f":{said.port}" if said.port not in (None, 80, 443) else ""
-            return Site(name, f"{said.scheme}://{name}{port}")
+            return PasskeySite(name, f"{said.scheme}://{name}{port}")
         raise ConflictError(
             "browsers make no passkeys for this address",
             hint="They need https and a name (touchline serve --team --url), or localhost.",

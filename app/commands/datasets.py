@@ -8,7 +8,7 @@ import typer
 
 from app.commands.opened import opened_store
 from app.commands.options import Json, acting
-from app.commands.server import Server, connected, given_server
+from app.commands.server import ServerPlace, connected, given_server
 from app.commands.shown_fields import DATASET
 from app.commands.terminal import print_json, print_values, say
 
@@ -41,7 +41,7 @@ def _values() -> list[dict[str, Any]]:
     ]
 
 
-def _values_at(server: Server) -> list[dict[str, Any]]:
+def _values_at(server: ServerPlace) -> list[dict[str, Any]]:
     from app.commands.remote import dataset_values
 
     with connected(server) as client:

@@ -11,7 +11,7 @@ import typer
 from app.commands.opened import opened_store
 from app.commands.options import Dataset, Json, acting, parse_size
 from app.commands.predictions import print_set
-from app.commands.server import Server, connected, given_server
+from app.commands.server import ServerPlace, connected, given_server
 from app.commands.terminal import print_json, say, show_progress
 from app.progress import TellProgress
 from app.soccer.choices import AnyPredictionFormat, BoxKind, LiveRule
@@ -189,7 +189,11 @@ def _evaluate(
 
 
 def _evaluate_at(
-    server: Server, dataset: str, request: SourcesRequest, out: Path | None, progress: TellProgress
+    server: ServerPlace,
+    dataset: str,
+    request: SourcesRequest,
+    out: Path | None,
+    progress: TellProgress,
 ) -> tuple[_Values, list[_Values]]:
     """As ``_evaluate``, by a server."""
     from app.commands import remote_files

@@ -15,7 +15,7 @@ from app.commands.terminal import print_json, print_values, say
 commands = typer.Typer()
 
 
-class Accepted(StrEnum):
+class AcceptedPart(StrEnum):
     """What of a proposal is saved."""
 
     CAMERAS = "cameras"
@@ -26,7 +26,7 @@ class Accepted(StrEnum):
 def rig(
     dataset: Dataset,
     accept: Annotated[
-        Accepted | None,
+        AcceptedPart | None,
         typer.Option(
             help="Save the adjusted cameras, or only how far the cameras in use may be off."
         ),

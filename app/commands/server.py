@@ -29,14 +29,14 @@ MAX_TOKEN = 1000
 
 
 @dataclass(frozen=True)
-class Server:
+class ServerPlace:
     """Where it is, and the file that holds a token for it; None: it asks nobody."""
 
     url: str
     token_file: Path | None
 
 
-_SERVER: ContextVar[Server | None] = ContextVar("server", default=None)
+_SERVER: ContextVar[ServerPlace | None] = ContextVar("server", default=None)
 
 
 def work_at(url: str | None, token_file: Path | None, command: str | None) -> None:
@@ -63,10 +63,10 @@ def work_at(url: str | None, token_file: Path | None, command: str | None) -> No
             f"{url} is not encrypted: a token must not travel in the clear",
             hint="Write https://; http:// is for this machine alone.",
         )
-    _SERVER.set(Server(url.rstrip("/"), token_file))
+    _SERVER.set(ServerPlace(url.rstrip("/"), token_file))
 
 
-def given_server() -> Server | None:
+def given_server() -> ServerPlace | None:
     """The server that this command works against; None: it works in a home."""
     return _SERVER.get()
 
@@ -105,7 +105,7 @@ def read_token(path: Path) -> str:
 
 
 @contextmanager
-def connected(server: Server) -> Iterator[Client]:
+def connected(server: ServerPlace) -> Iterator[Client]:
     """A connection to a server that was looked at: it is there, of this version, and knows us.
 
     Raises:
@@ -127,7 +127,7 @@ def connected(server: Server) -> Iterator[Client]:
         raise _explained(server, error) from error
 
 
-def _require_version(server: Server, client: Client) -> None:
+def _require_version(server: ServerPlace, client: Client) -> None:
     from app.datasets.manifest import software_version
 
     mine, found = software_version(), None
@@ -146,7 +146,7 @@ def _require_version(server: Server, client: Client) -> None:
         )
 
 
-def _require_team(server: Server, client: Client) -> None:
+def _require_team(server: ServerPlace, client: Client) -> None:
     session = client.get("session")
     if session["team"] and session["name"] is None:
         raise InputError(
@@ -160,7 +160,7 @@ def _require_team(server: Server, client: Client) -> None:
         )
 
 
-def _explained(server: Server, error: Exception) -> ReviewError:
+def _explained(server: ServerPlace, error: Exception) -> ReviewError:
     """The same as an error of a command: what the server said, or why it said nothing."""
     message, hint = getattr(error, "message", str(error)), getattr(error, "hint", None)
     said_nothing = getattr(error, "status", None) == 0

@@ -23,9 +23,7 @@ from app.soccer.annotation import BallAnnotation, Extras
 from app.soccer.frames import ImagePoint, ImageSize
 from app.soccer.group import Group, Station, View
 from app.soccer.media import Media
-
-TEST_CAMERAS = frozenset({1, 2})
-"""Cameras 3 to 6 train."""
+from app.soccer.split import TEST_CAMERAS
 
 _VIDEO_SUFFIXES = (".mp4", ".avi", ".mpg", ".mpeg", ".mkv", ".mov")
 # "Film Role-0 ID-3 T-0 ...", "cam3", "camera_3", "ground_truth_3": what follows says nothing.
@@ -125,7 +123,7 @@ def _person_boxes(track: ViperTrack, frame: int) -> tuple[Mapping[str, Any], ...
 
 def _split(cameras: list[int]) -> str:
     """The split of a frame; empty where cameras of both see it."""
-    sides = {"test" if camera in TEST_CAMERAS else "train" for camera in cameras}
+    sides = {"test" if f"cam{camera}" in TEST_CAMERAS else "train" for camera in cameras}
     return sides.pop() if len(sides) == 1 else ""
 
 

@@ -57,7 +57,7 @@ MIN_CLICK_SIGMA_PX = 0.5
 
 
 @dataclass(frozen=True)
-class Stage:
+class ResectionStage:
     """One round of refinement: how many starts go in, how far, how forgiving."""
 
     starts: int
@@ -66,7 +66,7 @@ class Stage:
     tolerance: float
 
 
-FINAL = Stage(starts=1, steps=25, scale_px=0.0, tolerance=1e-6)
+FINAL = ResectionStage(starts=1, steps=25, scale_px=0.0, tolerance=1e-6)
 """Its scale is the policy's."""
 
 
@@ -81,16 +81,16 @@ class Plan:
         final: Likewise, under the policy's scale.
     """
 
-    scout: Stage
-    search: Stage
-    narrow: Stage
-    final: Stage
+    scout: ResectionStage
+    search: ResectionStage
+    narrow: ResectionStage
+    final: ResectionStage
 
 
 QUICK = Plan(
-    scout=Stage(starts=len(STANDS), steps=1, scale_px=30.0, tolerance=1e-3),
-    search=Stage(starts=12, steps=8, scale_px=30.0, tolerance=1e-3),
-    narrow=Stage(starts=4, steps=10, scale_px=8.0, tolerance=1e-4),
+    scout=ResectionStage(starts=len(STANDS), steps=1, scale_px=30.0, tolerance=1e-3),
+    search=ResectionStage(starts=12, steps=8, scale_px=30.0, tolerance=1e-3),
+    narrow=ResectionStage(starts=4, steps=10, scale_px=8.0, tolerance=1e-4),
     final=FINAL,
 )
 """For what its lines determine well: wherever it begins, it ends in one camera."""
@@ -333,7 +333,7 @@ class ResectionProblem:
         self,
         observations: Observations,
         starts: FloatArray,
-        stage: Stage,
+        stage: ResectionStage,
         damping: float = 1e-3,
         prior: Prior | None = None,
     ) -> Fit:

@@ -22,7 +22,7 @@ _SPANS = ("spans", "undo_spans")
 
 
 @dataclass(frozen=True)
-class BulkVerdict:
+class StoredBulkVerdict:
     """A bulk verdict as it is remembered.
 
     Attributes:
@@ -58,21 +58,21 @@ class BulkVerdict:
         return self.undone is not None or self.undo_spans is not None
 
 
-def read_batches(session: Session, dataset_id: int, limit: int) -> list[BulkVerdict]:
+def read_batches(session: Session, dataset_id: int, limit: int) -> list[StoredBulkVerdict]:
     """The batches of a dataset, the newest first."""
     model = VerdictBatchModel
     statement = _BATCHES.where(model.dataset_id == dataset_id).order_by(model.id.desc())
     return [_batch(row) for row in session.execute(statement.limit(limit))]
 
 
-def find_batch(session: Session, batch_id: int) -> BulkVerdict | None:
+def find_batch(session: Session, batch_id: int) -> StoredBulkVerdict | None:
     """A batch by its id."""
     row = session.execute(_BATCHES.where(VerdictBatchModel.id == batch_id)).one_or_none()
     return None if row is None else _batch(row)
 
 
 def insert_batch(session: Session, **values: Any) -> int:
-    """Insert a batch, from fields of ``BulkVerdict`` but its id; returns its id."""
+    """Insert a batch, from fields of ``StoredBulkVerdict`` but its id; returns its id."""
     identity = next_id(session, VerdictBatchModel)
     session.execute(insert(VerdictBatchModel), [{**_row(values), "id": identity}])
     return identity
@@ -84,9 +84,9 @@ def update_batch(session: Session, batch_id: int, **values: Any) -> None:
     session.execute(update(VerdictBatchModel).where(mine).values(_row(values)))
 
 
-def _batch(row: Any) -> BulkVerdict:
+def _batch(row: Any) -> StoredBulkVerdict:
     spans = {name: parse(getattr(row, name) or "null") for name in _SPANS}
-    return BulkVerdict(**{**row._mapping, **spans})
+    return StoredBulkVerdict(**{**row._mapping, **spans})
 
 
 def _row(values: dict[str, Any]) -> dict[str, Any]:

@@ -33,8 +33,8 @@ PATIENCE = 5.0
 """Seconds in which work that is told to end may put away what it has begun."""
 
 Result = TypeVar("Result")
-Kind = Literal["write", "written", "step", "question"]
-Word = tuple[Kind, Any]
+WordKind = Literal["write", "written", "step", "question"]
+Word = tuple[WordKind, Any]
 """What the process says: that it wants to write, that it has written, how far it is, or a question."""
 Answer = tuple[bool, Any]
 """Whether it is refused; what is answered, or the error."""
@@ -87,7 +87,7 @@ class Caller:
         """Say that what was to be written is written, or will not be."""
         self._say("written", None)
 
-    def _say(self, kind: Kind, what: Any) -> Any:
+    def _say(self, kind: WordKind, what: Any) -> Any:
         refused, answer = self._tell((kind, what))
         if refused:
             raise answer

@@ -6,7 +6,7 @@ import os
 from dataclasses import dataclass
 from pathlib import Path
 
-from app.datasets.issia_reader import TEST_CAMERAS, IssiaOptions, open_issia
+from app.datasets.issia_reader import IssiaOptions, open_issia
 from app.datasets.report import Report
 from app.evaluation.evaluate import Evaluation, Inputs, Options, evaluate
 from app.evaluation.frame import Frame
@@ -14,6 +14,7 @@ from app.review.datasets.dataset import get_dataset
 from app.review.editing.recompute import solve_dataset
 from app.review.evaluating.frames import live_truth
 from app.review.importing.ingest import ingest
+from app.soccer.split import TEST_CAMERAS
 from app.store.store import Store
 from tests.paper.simulated import SimulatedDetector
 
@@ -69,7 +70,7 @@ def run_issia(store: Store, seed: int, folder: Path = FOLDER) -> Issia | None:
     )
 
 
-_TEST = frozenset(f"cam{number}" for number in TEST_CAMERAS)
+_TEST = frozenset(TEST_CAMERAS)
 
 
 def _key(frame: Frame) -> str:

@@ -24,7 +24,7 @@ from app.review.importing.ingest import ingest
 from app.review.people import links, passwords
 from app.review.people.logins import Logins
 from app.review.people.members import give_role
-from app.review.people.ownership import Kind
+from app.review.people.ownership import OwnedKind
 from app.review.people.people import invite
 from app.review.people.roles import Role
 from app.store.store import Store
@@ -39,12 +39,12 @@ with warnings.catch_warnings():
 API = "/api/v1"
 BASE = "http://127.0.0.1:8000"
 MINE, THEIRS = "mine", "theirs"
-NOTHING: Mapping[Kind, Any] = {
-    Kind.DATASET: "nothing of that name",
-    Kind.NEW_DATASET: "nothing of that name",
-    Kind.VERSION: "nothing of that name",
-    Kind.EXPORT: "88888888",
-    Kind.UPLOAD: "8" * 32,
+NOTHING: Mapping[OwnedKind, Any] = {
+    OwnedKind.DATASET: "nothing of that name",
+    OwnedKind.NEW_DATASET: "nothing of that name",
+    OwnedKind.VERSION: "nothing of that name",
+    OwnedKind.EXPORT: "88888888",
+    OwnedKind.UPLOAD: "8" * 32,
 }
 NO_ID = 88888888
 SECRET = "three plain words"
@@ -66,7 +66,7 @@ class Mentioned:
 
     place: str
     field: str
-    kind: Kind
+    kind: OwnedKind
 
 
 def mentioned(row: Row) -> list[Mentioned]:
@@ -91,7 +91,7 @@ class Apart:
     app: FastAPI
     client: TestClient
     cookies: dict[str, str] = field(default_factory=dict)
-    ids: dict[str, dict[Kind, Any]] = field(default_factory=lambda: {MINE: {}, THEIRS: {}})
+    ids: dict[str, dict[OwnedKind, Any]] = field(default_factory=lambda: {MINE: {}, THEIRS: {}})
 
     @property
     def store(self) -> Store:
@@ -144,10 +144,10 @@ class Apart:
         sent = body if row.kind == "body" else None
         return self.ask(name, row.method, target, sent)
 
-    def value(self, kind: Kind, where: str) -> Any:
+    def value(self, kind: OwnedKind, where: str) -> Any:
         """The id of something of a kind; of nothing without a dataset."""
         if where:
-            return self.ids[where][Kind.DATASET if kind is Kind.NEW_DATASET else kind]
+            return self.ids[where][OwnedKind.DATASET if kind is OwnedKind.NEW_DATASET else kind]
         return NOTHING.get(kind, NO_ID)
 
     def done(self, answer: Any) -> Any:
@@ -171,41 +171,45 @@ class Apart:
         rows = f"image,x,y,w,h,score\n{group.match}/{group.views[0].key},600,300,9,9,0.5\n"
         for number, name in enumerate((MINE, THEIRS), start=1):
             found = self.ids[name]
-            found |= {Kind.DATASET: name, Kind.GROUP: number}
+            found |= {OwnedKind.DATASET: name, OwnedKind.GROUP: number}
             document = self.ask("admin", "GET", f"/groups/{number}").json()
-            found[Kind.VIEW] = document["views"][0]["id"]
-            found[Kind.STATION] = document["views"][0]["station"]["id"]
+            found[OwnedKind.VIEW] = document["views"][0]["id"]
+            found[OwnedKind.STATION] = document["views"][0]["station"]["id"]
             self._fill(name, rows)
 
     def _fill(self, name: str, rows: str) -> None:
         found, at = self.ids[name], f"/datasets/{name}"
         owner = "mine-lead" if name == MINE else "other-lead"
         upload = self.ask(owner, "POST", f"/uploads?name={name}.csv", rows.encode())
-        found[Kind.UPLOAD] = upload.json()["id"]
-        body = {"name": "p1", "upload": found[Kind.UPLOAD], "format": "csv"}
-        found[Kind.PREDICTIONS] = self.ask(owner, "POST", f"{at}/predictions", body).json()["id"]
-        body = {"predictions": found[Kind.PREDICTIONS], "groups": "all"}
+        found[OwnedKind.UPLOAD] = upload.json()["id"]
+        body = {"name": "p1", "upload": found[OwnedKind.UPLOAD], "format": "csv"}
+        found[OwnedKind.PREDICTIONS] = self.ask(owner, "POST", f"{at}/predictions", body).json()[
+            "id"
+        ]
+        body = {"predictions": found[OwnedKind.PREDICTIONS], "groups": "all"}
         run = self.done(self.ask(owner, "POST", f"{at}/evaluations", body))
-        found[Kind.EVALUATION] = run["result"]["evaluation"]
+        found[OwnedKind.EVALUATION] = run["result"]["evaluation"]
         body = {"dataset": name, "format": "soccernet-v3d", "all": True}
         export = self.done(self.ask(owner, "POST", "/exports", body))
-        found[Kind.JOB] = run["id"]
-        found[Kind.EXPORT] = str(export["id"])
+        found[OwnedKind.JOB] = run["id"]
+        found[OwnedKind.EXPORT] = str(export["id"])
         body = {"name": "same", "groups": "passing", "split": {"kind": "given"}}
         frozen = self.done(self.ask(owner, "POST", f"{at}/versions", body))
-        found[Kind.VERSION] = str(frozen["result"]["version"])
+        found[OwnedKind.VERSION] = str(frozen["result"]["version"])
         body = {"name": f"view of {name}", "q": "status:unreviewed"}
         if name == MINE:
             # Ids of different kinds shall not be the same by accident.
             for spare in ("one", "two"):
                 self.ask(owner, "POST", f"{at}/saved-views", {**body, "name": spare})
-        found[Kind.SAVED_VIEW] = self.ask(owner, "POST", f"{at}/saved-views", body).json()["id"]
+        found[OwnedKind.SAVED_VIEW] = self.ask(owner, "POST", f"{at}/saved-views", body).json()[
+            "id"
+        ]
         given = self.ask(owner, "POST", f"{at}/verdicts", {"q": "", "state": "deferred"})
-        found[Kind.BATCH] = given.json()["batch"]
+        found[OwnedKind.BATCH] = given.json()["batch"]
         for spare in (f"work of {name}", "spare one", "spare two"):
             body = {"name": spare, "skip_given": False}
             made = self.ask(owner, "POST", f"{at}/batches", body)
-        found[Kind.WORK] = made.json()["id"]
+        found[OwnedKind.WORK] = made.json()["id"]
         assert all(found.values()), found
 
 

@@ -18,7 +18,7 @@ from app.api.security.asked_datasets import (
     kind_of_path,
 )
 from app.api.security.rules import RULES
-from app.review.people.ownership import Kind
+from app.review.people.ownership import OwnedKind
 from app.review.people.roles import Action, Role
 from app.store.jobs import NewJob, insert_job, update_job
 from tests.security.apart import (
@@ -58,7 +58,7 @@ def apart(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Apart]:
 def plain(answer: Any, apart: Apart, where: str) -> tuple[int, str]:
     """An answer without what is of this one request."""
     text = re.sub(r"urn:uuid:[0-9a-f-]+", "", answer.text)
-    for kind in Kind:
+    for kind in OwnedKind:
         value = str(apart.value(kind, where))
         text = re.sub(rf"(?<![\w-]){re.escape(value)}(?![\w-])", "*", text)
     return answer.status_code, text
@@ -123,7 +123,7 @@ class TestMatrix:
     ) -> None:
         """Field by field, the others naming something of one's own."""
         for item in mentioned(row):
-            if item.kind is Kind.NEW_DATASET:
+            if item.kind is OwnedKind.NEW_DATASET:
                 continue
             for name in ("viewer", "lead", "all-but"):
                 told = []
@@ -140,7 +140,7 @@ class TestMatrix:
     def test_ones_own_is_there_for_whom_the_role_suffices(self, apart: Apart, row: Row) -> None:
         where = {item.field: MINE for item in mentioned(row)}
         least = RANKS.index(row.role)
-        mine = {Kind.UPLOAD, Kind.NEW_DATASET} & {item.kind for item in mentioned(row)}
+        mine = {OwnedKind.UPLOAD, OwnedKind.NEW_DATASET} & {item.kind for item in mentioned(row)}
         if least > RANKS.index("viewer") and not mine:
             below = apart.answer(RANKS[least - 1], row, where)
             assert below.status_code == 403, (row, below.text)
@@ -243,7 +243,7 @@ class TestTables:
 
     def test_whatever_names_a_thing_is_looked_at(self, apart: Apart) -> None:
         """Parameters and fields of the OpenAPI document with the name of a kind of thing."""
-        told = {kind.value for kind in Kind} | {"with", "careful", "views", "against"}
+        told = {kind.value for kind in OwnedKind} | {"with", "careful", "views", "against"}
         # Looked for in the dataset that the same request names.
         within = {"version", "views", "against"}
         # The key of a view of the group that the address names.
@@ -278,6 +278,6 @@ class TestTables:
         assert missed == []
 
     def test_the_first_word_of_an_address_says_what_it_is_about(self) -> None:
-        assert kind_of_path(f"GET {API}/saved-views/{{view}}") == ("view", Kind.SAVED_VIEW)
+        assert kind_of_path(f"GET {API}/saved-views/{{view}}") == ("view", OwnedKind.SAVED_VIEW)
         assert kind_of_path(f"GET {API}/groups/ids") is None
         assert str(NO_ID)

@@ -17,7 +17,7 @@ from app.api.security import tries
 from app.api.team import Team as WayIn
 from app.config import Settings
 from app.errors import ConflictError
-from app.review.people.passkeys import Site
+from app.review.people.passkeys import PasskeySite
 from app.review.people.people import find_person
 from app.review.people.roles import Role
 from app.review.people.second_factor import SecondFactors
@@ -149,15 +149,15 @@ class TestPasskeys:
         for url, site in (
             (
                 "https://touchline.example.org",
-                Site("touchline.example.org", "https://touchline.example.org"),
+                PasskeySite("touchline.example.org", "https://touchline.example.org"),
             ),
             (
                 "https://touchline.example.org:443",
-                Site("touchline.example.org", "https://touchline.example.org"),
+                PasskeySite("touchline.example.org", "https://touchline.example.org"),
             ),
             (
                 "https://ball.example.org:8443",
-                Site("ball.example.org", "https://ball.example.org:8443"),
+                PasskeySite("ball.example.org", "https://ball.example.org:8443"),
             ),
             ("http://ball.example.org", None),
             ("https://192.0.2.7", None),

@@ -6,7 +6,7 @@ from typing import get_args
 
 import pytest
 
-from app.child import Allowance, ChildEnded, Reason
+from app.child import Allowance, ChildEnded, EndReason
 from app.child_figures import ChildFigures
 
 ALLOWANCE = Allowance(memory=2**20, processor=1.0, silence=1.0)
@@ -24,14 +24,14 @@ class TestWorking:
         assert figures.busy == 0
         assert set(figures.ended.values()) == {0}
 
-    @pytest.mark.parametrize("reason", get_args(Reason))
+    @pytest.mark.parametrize("reason", get_args(EndReason))
     def test_a_child_that_ends_is_counted_under_its_reason_alone(
-        self, figures: ChildFigures, reason: Reason
+        self, figures: ChildFigures, reason: EndReason
     ) -> None:
         for _ in range(2):
             with pytest.raises(ChildEnded), figures.working():
                 raise ChildEnded(reason, ALLOWANCE)
-        assert figures.ended == {**dict.fromkeys(get_args(Reason), 0), reason: 2}
+        assert figures.ended == {**dict.fromkeys(get_args(EndReason), 0), reason: 2}
         assert figures.busy == 0
 
     def test_a_task_that_refuses_ended_no_child(self, figures: ChildFigures) -> None:

@@ -16,7 +16,7 @@ from app.soccer.finding import FINDING_KINDS
 
 router = APIRouter(prefix="/findings", tags=["findings"])
 
-Kind = Literal[FINDING_KINDS]  # type: ignore[valid-type]
+FindingKind = Literal[FINDING_KINDS]  # type: ignore[valid-type]
 MAX_GROUPS = 200
 
 
@@ -24,7 +24,7 @@ MAX_GROUPS = 200
 def list_findings(
     store: AppStore,
     dataset: DatasetQuery,
-    kind: Annotated[Kind | None, Query(description="Only these.")] = None,
+    kind: Annotated[FindingKind | None, Query(description="Only these.")] = None,
     limit: Annotated[int, Query(ge=1, le=MAX_GROUPS, description="Groups a page.")] = 50,
     cursor: Annotated[
         str | None, Query(max_length=20, description="`next` of the page before.")

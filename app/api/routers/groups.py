@@ -21,7 +21,7 @@ from app.api.deps import (
     etag_matches,
 )
 from app.api.problem import Responses, responses
-from app.api.reply import Asked, AskedUnder, Reply, document
+from app.api.reply import AskedUnder, KeyedRequest, Reply, document
 from app.api.schemas.group import GroupDocument
 from app.api.schemas.past import StepDocument
 from app.api.schemas.preview import PreviewDocument, PreviewRequest
@@ -75,7 +75,7 @@ def load_document_of_view(store: Store, view_id: int) -> GroupDocument:
 
 
 def change_group(
-    asked: Asked | None,
+    asked: KeyedRequest | None,
     present: Callable[[], GroupDocument],
     change: Callable[..., GroupState],
     then: Callable[[GroupState], object] | None = None,
@@ -246,7 +246,7 @@ def _step(
     group: int,
     actor: str,
     if_match: str,
-    asked: Asked | None,
+    asked: KeyedRequest | None,
 ) -> Response:
     store = services.store
     change = partial(step, store, group, if_match=if_match, actor=actor, paint=services.paint)

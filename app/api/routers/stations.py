@@ -11,7 +11,7 @@ from fastapi import APIRouter, Query, Response
 from app.api.conflicts import current_state
 from app.api.deps import Actor, AppServices, AppStore, Id, IfMatch
 from app.api.problem import Responses, responses
-from app.api.reply import Asked, AskedUnder, Reply
+from app.api.reply import AskedUnder, KeyedRequest, Reply
 from app.api.routers.groups import CHANGED, CONFLICTS, group_answer, load_document
 from app.api.schemas.annotation import LinesEdit
 from app.api.schemas.group import GroupDocument
@@ -146,7 +146,7 @@ def _change(
     change: Callable[..., StationState],
     if_match: str,
     actor: str,
-    asked: Asked | None,
+    asked: KeyedRequest | None,
 ) -> Response:
     """Change a station with the group in view, and queue the others."""
     store = services.store

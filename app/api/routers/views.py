@@ -14,7 +14,7 @@ from fastapi import APIRouter, Body, Query, Request, Response
 from app.api.deps import Actor, AppServices, Id, IfMatch, etag_matches
 from app.api.pool_answer import while_wanted
 from app.api.problem import Responses, responses
-from app.api.reply import Asked, AskedUnder
+from app.api.reply import AskedUnder, KeyedRequest
 from app.api.routers.groups import CHANGED, CONFLICTS, change_group, load_document_of_view
 from app.api.schemas.annotation import BallEdit, LinesEdit
 from app.api.schemas.group import GroupDocument
@@ -139,7 +139,7 @@ def _submit(
     edit_of: Callable[[str], Edit],
     if_match: str,
     actor: str,
-    asked: Asked | None,
+    asked: KeyedRequest | None,
     solve: Solve = solve_encoded,
 ) -> Response:
     store = services.store

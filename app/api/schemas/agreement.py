@@ -12,7 +12,7 @@ from app.api.schemas.group import GroupDocument
 from app.evaluation.agreement_limits import Disagreement, Spread
 from app.evaluation.annotation_distance import Ball3DDistance, LineDistance, ViewDistance
 from app.finite import MAX_ID
-from app.review.agreement.adjudicate import Case, Waiting
+from app.review.agreement.adjudicate import Case, OpenCase
 from app.review.agreement.compare import AnnotationPair, Comparison
 from app.review.agreement.summary import GroupAgreement, PeopleAgreement
 
@@ -195,7 +195,7 @@ class AgreementDocument(Document):
     groups: list[GroupAgreementDocument] = Field(description="The worst first.")
 
 
-class WaitingDocument(Document, shows=Waiting):
+class WaitingDocument(Document, shows=OpenCase):
     """A group that waits for a decision."""
 
     since: datetime

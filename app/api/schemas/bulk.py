@@ -11,7 +11,7 @@ from app.api.schemas.document import Document, ListDocument
 from app.review.queue.query import MAX_LISTED_LENGTH
 from app.review.verdicts.bulk import BatchReport, BulkPlan, Refusal, SampleGroup
 from app.soccer.choices import VerdictState
-from app.soccer.reasons import Reason
+from app.soccer.reasons import MAX_NOTE, Reason
 
 
 class BulkVerdict(BaseModel):
@@ -38,7 +38,7 @@ class BulkVerdict(BaseModel):
     ] = ""
     state: VerdictState
     reason: Reason | None = None
-    note: Annotated[str, Field(max_length=2000)] | None = None
+    note: Annotated[str, Field(max_length=MAX_NOTE)] | None = None
     expected: Annotated[int, Field(ge=0, le=2**53)] | None = Field(
         default=None, description="`would_change` of the dry run; 409 when it is another by now."
     )

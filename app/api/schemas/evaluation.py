@@ -14,8 +14,8 @@ from app.evaluation.figure import Axis, Mark
 from app.evaluation.result import FrameResult
 from app.evaluation.table import Cell, Column, FrameRange, Row
 from app.finite import MAX_ID
-from app.review.evaluating.evaluation import Comparison, read_tables
-from app.review.evaluating.evaluation_run import EvaluationRequest
+from app.review.evaluating.evaluation import RunComparison, read_tables
+from app.review.evaluating.evaluation_run import MAX_NAME, EvaluationRequest
 from app.soccer.choices import BoxKind, LiveRule
 
 SetId = Annotated[int, Field(strict=True, ge=1, le=MAX_ID)]
@@ -29,7 +29,7 @@ class EvaluationBody(BaseModel):
         json_schema_extra={"examples": [{"predictions": 3, "version": 1, "split": "test"}]},
     )
 
-    name: Annotated[str, Field(max_length=100)] = ""
+    name: Annotated[str, Field(max_length=MAX_NAME)] = ""
     predictions: SetId | None = Field(default=None, description="Boxes, cameras or both.")
     careful: SetId | None = Field(
         default=None, description="Careful boxes, for the table of boxes (the paper's table 1)."
@@ -244,7 +244,7 @@ class ComparisonDocument(Document):
     total: int
 
     @staticmethod
-    def of(found: Comparison, limit: int, offset: int) -> ComparisonDocument:
+    def of(found: RunComparison, limit: int, offset: int) -> ComparisonDocument:
         """The document of a comparison, with one page of its frames."""
         frames = found.frames.frames
         shown = frames[offset : offset + limit]

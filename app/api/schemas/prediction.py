@@ -22,6 +22,7 @@ from app.finite import MAX_ID
 from app.review.evaluating.accept import SHOWN, AcceptPlan, AcceptReport, AcceptRequest
 from app.review.evaluating.group_predictions import GroupPredictions
 from app.review.evaluating.predictions import PredictedBox, PredictionSet
+from app.review.queue.query import MAX_LENGTH
 from app.soccer.choices import AnyPredictionFormat
 from app.soccer.frames import MAX_SIDE, ImageSize
 
@@ -212,7 +213,7 @@ class AcceptBody(BaseModel):
 
     dataset: Annotated[str, Field(max_length=200, description="Name or id.")]
     predictions: Annotated[int, Field(strict=True, ge=1, le=MAX_ID)]
-    q: Annotated[str, Field(max_length=1000)] | None = Field(
+    q: Annotated[str, Field(max_length=MAX_LENGTH)] | None = Field(
         default=None, description="Query of the queue that chooses groups; a job accepts them."
     )
     views: Annotated[list[ViewId], Field(min_length=1, max_length=MAX_VIEWS)] | None = Field(

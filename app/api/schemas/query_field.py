@@ -5,14 +5,14 @@ from __future__ import annotations
 from pydantic import Field
 
 from app.api.schemas.document import Document, ListDocument
-from app.review.queue.fields import Kind
+from app.review.queue.fields import FieldKind
 
 
 class QueryFieldDocument(Document):
     """One field of a query."""
 
     name: str
-    kind: Kind = Field(
+    kind: FieldKind = Field(
         description="`number` compares, `flag` is yes or no, `choice` is one of `values`, `text` is "
         "any text, `ids` are numbers of groups, `order` says how groups are listed."
     )

@@ -9,6 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from app.api.schemas.document import Document, ListDocument
 from app.review.datasets.naming import MAX_TITLE
+from app.review.queue.query import MAX_LENGTH
 from app.review.verdicts.reviewers import Reviewer
 
 
@@ -21,7 +22,7 @@ class NewSavedView(BaseModel):
     )
 
     name: Annotated[str, Field(min_length=1, max_length=MAX_TITLE)]
-    q: Annotated[str, Field(max_length=1000)]
+    q: Annotated[str, Field(max_length=MAX_LENGTH)]
 
 
 class SavedViewDocument(Document):

@@ -7,10 +7,10 @@ from typing import Any
 from pydantic import Field, model_validator
 
 from app.api.schemas.document import Document
-from app.review.queue.statistics import Histogram, Measure, Series, Share
+from app.review.queue.statistics import Measure, MeasureHistogram, MeasureSeries, Share
 
 
-class SplitSeries(Document, shows=Series):
+class SplitSeries(Document, shows=MeasureSeries):
     """The bars of one split."""
 
     unknown: int = Field(description="Groups that have no such number.")
@@ -33,7 +33,9 @@ class StatisticsHistogram(Document, shows=Measure):
     @model_validator(mode="before")
     @classmethod
     def _with_measure(cls, value: Any) -> Any:
-        return {**vars(value), **vars(value.measure)} if isinstance(value, Histogram) else value
+        return (
+            {**vars(value), **vars(value.measure)} if isinstance(value, MeasureHistogram) else value
+        )
 
 
 class PositionsDocument(Document):

@@ -7,7 +7,7 @@ from typing import Annotated
 from pydantic import BaseModel, ConfigDict, Field
 
 from app.soccer.choices import VerdictState
-from app.soccer.reasons import Reason
+from app.soccer.reasons import MAX_NOTE, Reason
 
 
 class VerdictEdit(BaseModel):
@@ -30,4 +30,4 @@ class VerdictEdit(BaseModel):
 
     state: VerdictState
     reason: Reason | None = None
-    note: Annotated[str, Field(max_length=2000)] | None = None
+    note: Annotated[str, Field(max_length=MAX_NOTE)] | None = None

@@ -20,7 +20,7 @@ from app.api.schemas.policy import PolicyDocument
 from app.finite import MAX_ID
 from app.review.versions.diff import Move, Passage, Setting
 from app.review.versions.freeze import MAX_LICENCE, FreezeRequest
-from app.review.versions.verify import Difference
+from app.review.versions.verify import VersionDifference
 from app.review.versions.version import Verification
 from app.soccer.choices import SplitKind, VersionRule
 from app.soccer.reasons import MAX_NOTE
@@ -96,7 +96,7 @@ class FreezePlanDocument(Document):
     unsolved: int = Field(description="How many of the groups that enter have to be solved first.")
 
 
-class FrozenDifferenceDocument(Document, shows=Difference):
+class FrozenDifferenceDocument(Document, shows=VersionDifference):
     """Something that did not come out as it was frozen; `group` null: the version itself."""
 
 

@@ -24,7 +24,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from app.api.problem import SCHEME, make_problem, problem_response
 from app.api.security.asked_datasets import (
-    Asked,
+    AskedAbout,
     OwnedMention,
     datasets_of,
     is_hidden,
@@ -107,7 +107,7 @@ async def require_decided(request: Request) -> None:
 
 
 @dataclass(frozen=True)
-class Row:
+class RuleRow:
     """A row of the table that a request fits, with the parameters of its address."""
 
     name: str
@@ -132,18 +132,18 @@ class _Rules:
             found = compile_path(template)[0], name, RULES[name]
             self._rows.setdefault(key, []).append(found)
 
-    def find(self, method: str, path: str) -> Row | None:
+    def find(self, method: str, path: str) -> RuleRow | None:
         """Row of a request; None where there is none. Fixed addresses come first."""
         name = f"{method} {path}"
         if name in self._fixed:
-            return Row(name, self._fixed[name], {})
+            return RuleRow(name, self._fixed[name], {})
         parts = path.split("/")
         size: _Key = (method, len(parts), *parts[3:4])
         keys: tuple[_Key, ...] = ((*size, parts[-1]), (*size, ""), (method,))
         for key in keys:
             for pattern, name, action in self._rows.get(key, ()):
                 if fits := pattern.match(path):
-                    return Row(name, action, fits.groupdict())
+                    return RuleRow(name, action, fits.groupdict())
         return None
 
 
@@ -188,7 +188,7 @@ class Access:
             scope[RULE] = row.name
             await self.app(scope, receive, send)
             return
-        asked = None if row is None else Asked.of(row.name, scope, row.path)
+        asked = None if row is None else AskedAbout.of(row.name, scope, row.path)
         action = None if row is None else row.action
         try:
             let = await self._ask(scope, asked, action)
@@ -211,7 +211,7 @@ class Access:
         else:
             await self.app(scope, receive, send)
 
-    async def _ask(self, scope: Scope, asked: Asked | None, action: Action | None) -> _Let:
+    async def _ask(self, scope: Scope, asked: AskedAbout | None, action: Action | None) -> _Let:
         """Who that is, and what they may know of what they ask.
 
         Raises:
@@ -226,7 +226,7 @@ class Access:
             return await run_sync(self._look, scope, asked, action, limiter=self._threads)
         return self._let(login, asked, action)
 
-    def _look(self, scope: Scope, asked: Asked | None, action: Action | None) -> _Let:
+    def _look(self, scope: Scope, asked: AskedAbout | None, action: Action | None) -> _Let:
         return self._let(self._login(scope), asked, action)
 
     def _login_at_once(self, scope: Scope) -> Login | None:
@@ -240,7 +240,7 @@ class Access:
             return self._team.logins.find(cookie_of(scope, self._team.cookie) or "", at_once=True)
         return None
 
-    def _let(self, login: Login, asked: Asked | None, action: Action | None) -> _Let:
+    def _let(self, login: Login, asked: AskedAbout | None, action: Action | None) -> _Let:
         if asked is None or action is None:
             return _Let(login, [])
         if login.token is not None:
@@ -287,7 +287,7 @@ class Access:
 
     async def _stream(
         self,
-        asked: Asked,
+        asked: AskedAbout,
         action: Action,
         scope: Scope,
         receive: Receive,
@@ -340,7 +340,7 @@ class Access:
             await send({"type": "http.response.body", "body": b"", "more_body": False})
 
     async def _still_may(
-        self, scope: Scope, asked: Asked, action: Action, roles: DatasetRoles
+        self, scope: Scope, asked: AskedAbout, action: Action, roles: DatasetRoles
     ) -> bool:
         """Whether somebody may go on reading, with the rights that they had when they began."""
         try:

@@ -18,32 +18,32 @@ from app.api.security.bodies import VALUE
 from app.errors import ForbiddenError
 from app.finite import MAX_ID
 from app.review.people.logins import Login
-from app.review.people.ownership import Kind, Named, Ownership, find_ownership, role_at
+from app.review.people.ownership import Named, OwnedKind, Ownership, find_ownership, role_at
 from app.review.people.roles import EVERYTHING, Action, DatasetRoles, Role, Sight, require
 from app.review.queue.fields import BLIND
 from app.store.store import Store
 
-PATH: Mapping[str, Kind] = {
-    "datasets": Kind.DATASET,
-    "groups": Kind.GROUP,
-    "views": Kind.VIEW,
-    "stations": Kind.STATION,
-    "versions": Kind.VERSION,
-    "exports": Kind.EXPORT,
-    "jobs": Kind.JOB,
-    "predictions": Kind.PREDICTIONS,
-    "evaluations": Kind.EVALUATION,
-    "saved-views": Kind.SAVED_VIEW,
-    "verdict-batches": Kind.BATCH,
-    "batches": Kind.WORK,
-    "uploads": Kind.UPLOAD,
+PATH: Mapping[str, OwnedKind] = {
+    "datasets": OwnedKind.DATASET,
+    "groups": OwnedKind.GROUP,
+    "views": OwnedKind.VIEW,
+    "stations": OwnedKind.STATION,
+    "versions": OwnedKind.VERSION,
+    "exports": OwnedKind.EXPORT,
+    "jobs": OwnedKind.JOB,
+    "predictions": OwnedKind.PREDICTIONS,
+    "evaluations": OwnedKind.EVALUATION,
+    "saved-views": OwnedKind.SAVED_VIEW,
+    "verdict-batches": OwnedKind.BATCH,
+    "batches": OwnedKind.WORK,
+    "uploads": OwnedKind.UPLOAD,
 }
 """What the parameter is that follows such a word at the beginning of an address."""
-_DATASET = {"dataset": Kind.DATASET}
-QUERY: Mapping[str, Mapping[str, Kind]] = {
+_DATASET = {"dataset": OwnedKind.DATASET}
+QUERY: Mapping[str, Mapping[str, OwnedKind]] = {
     "GET /api/v1/groups": _DATASET,
-    "GET /api/v1/audit": {**_DATASET, "group": Kind.GROUP},
-    "GET /api/v1/audit/export.{ending}": {**_DATASET, "group": Kind.GROUP},
+    "GET /api/v1/audit": {**_DATASET, "group": OwnedKind.GROUP},
+    "GET /api/v1/audit/export.{ending}": {**_DATASET, "group": OwnedKind.GROUP},
     "GET /api/v1/groups/ids": _DATASET,
     "GET /api/v1/findings": _DATASET,
     "GET /api/v1/exports": _DATASET,
@@ -54,32 +54,32 @@ QUERY: Mapping[str, Mapping[str, Kind]] = {
     "GET /api/v1/versions/{version}/changelog": _DATASET,
     "GET /api/v1/versions/{version}/diff": _DATASET,
     "POST /api/v1/versions/{version}/verify": _DATASET,
-    "GET /api/v1/evaluations/{evaluation}/compare": {"with": Kind.EVALUATION},
-    "GET /api/v1/groups/{group}/comparison": {"with": Kind.GROUP},
-    "PATCH /api/v1/stations/{station}": {"group": Kind.GROUP},
-    "PATCH /api/v1/stations/{station}/lines": {"group": Kind.GROUP},
-    "POST /api/v1/stations/{station}/undo": {"group": Kind.GROUP},
-    "POST /api/v1/stations/{station}/redo": {"group": Kind.GROUP},
+    "GET /api/v1/evaluations/{evaluation}/compare": {"with": OwnedKind.EVALUATION},
+    "GET /api/v1/groups/{group}/comparison": {"with": OwnedKind.GROUP},
+    "PATCH /api/v1/stations/{station}": {"group": OwnedKind.GROUP},
+    "PATCH /api/v1/stations/{station}/lines": {"group": OwnedKind.GROUP},
+    "POST /api/v1/stations/{station}/undo": {"group": OwnedKind.GROUP},
+    "POST /api/v1/stations/{station}/redo": {"group": OwnedKind.GROUP},
 }
 """What query parameters name, by route."""
-BODY: Mapping[str, Mapping[str, Kind]] = {
+BODY: Mapping[str, Mapping[str, OwnedKind]] = {
     "POST /api/v1/exports": _DATASET,
     "POST /api/v1/tokens": _DATASET,
     "POST /api/v1/imports": {
-        "dataset": Kind.NEW_DATASET,
-        "source/upload": Kind.UPLOAD,
-        "options/lines/upload": Kind.UPLOAD,
+        "dataset": OwnedKind.NEW_DATASET,
+        "source/upload": OwnedKind.UPLOAD,
+        "options/lines/upload": OwnedKind.UPLOAD,
     },
-    "POST /api/v1/predictions/accept": {**_DATASET, "predictions": Kind.PREDICTIONS},
+    "POST /api/v1/predictions/accept": {**_DATASET, "predictions": OwnedKind.PREDICTIONS},
     "POST /api/v1/datasets/{dataset}/predictions": {
-        "upload": Kind.UPLOAD,
-        "images_upload": Kind.UPLOAD,
-        "cameras_upload": Kind.UPLOAD,
+        "upload": OwnedKind.UPLOAD,
+        "images_upload": OwnedKind.UPLOAD,
+        "cameras_upload": OwnedKind.UPLOAD,
     },
-    "POST /api/v1/datasets/{dataset}/guidelines/pictures": {"upload": Kind.UPLOAD},
+    "POST /api/v1/datasets/{dataset}/guidelines/pictures": {"upload": OwnedKind.UPLOAD},
     "POST /api/v1/datasets/{dataset}/evaluations": {
-        "predictions": Kind.PREDICTIONS,
-        "careful": Kind.PREDICTIONS,
+        "predictions": OwnedKind.PREDICTIONS,
+        "careful": OwnedKind.PREDICTIONS,
     },
 }
 """What fields of a JSON body name, by route; a slash leads into an object."""
@@ -108,14 +108,22 @@ EVERYWHERE_FIELDS: Mapping[str, tuple[str, ...]] = {
     "POST /api/v1/imports": ("source/folder", "options/lines/folder"),
 }
 """Fields of a JSON body that name what belongs to no dataset, by route."""
-FIXED: Mapping[str, Named] = {"POST /api/v1/practice": Named(Kind.NEW_DATASET, "practice")}
+FIXED: Mapping[str, Named] = {"POST /api/v1/practice": Named(OwnedKind.NEW_DATASET, "practice")}
 """Routes about one dataset that no request names."""
 
 HERE, ALL = " in this dataset", " in all datasets"
 """Where a role would have to be, in a refusal."""
-OWNED = frozenset({Kind.JOB, Kind.EXPORT, Kind.UPLOAD})
+OWNED = frozenset({OwnedKind.JOB, OwnedKind.EXPORT, OwnedKind.UPLOAD})
 """Kinds that belong to somebody while they have no dataset."""
-TEXTS = frozenset({Kind.DATASET, Kind.NEW_DATASET, Kind.VERSION, Kind.EXPORT, Kind.UPLOAD})
+TEXTS = frozenset(
+    {
+        OwnedKind.DATASET,
+        OwnedKind.NEW_DATASET,
+        OwnedKind.VERSION,
+        OwnedKind.EXPORT,
+        OwnedKind.UPLOAD,
+    }
+)
 _BLIND = re.compile(rf"\b({'|'.join(BLIND)})[:=<>]")
 """Also within quotes: rather once too often."""
 _ID: TypeAdapter[int] = TypeAdapter(Annotated[int, Field(ge=1, le=MAX_ID)])
@@ -132,7 +140,7 @@ class Mention:
 
 
 @dataclass(frozen=True)
-class Asked:
+class AskedAbout:
     """A request as far as it says what it is about."""
 
     route: str
@@ -142,7 +150,7 @@ class Asked:
     mentions: tuple[Mention, ...]
 
     @staticmethod
-    def of(route: str, scope: Scope, path: Mapping[str, str]) -> Asked:
+    def of(route: str, scope: Scope, path: Mapping[str, str]) -> AskedAbout:
         """What a request names.
 
         Args:
@@ -153,7 +161,7 @@ class Asked:
         text = scope.get("query_string", b"").decode("latin-1")
         query = tuple(parse_qsl(text, keep_blank_values=True))
         body = scope.get(VALUE)
-        return Asked(route, path, query, body, tuple(_mentions(route, path, query, body)))
+        return AskedAbout(route, path, query, body, tuple(_mentions(route, path, query, body)))
 
 
 @dataclass(frozen=True)
@@ -164,7 +172,7 @@ class OwnedMention:
     ownership: Ownership | None
 
 
-def kind_of_path(route: str) -> tuple[str, Kind] | None:
+def kind_of_path(route: str) -> tuple[str, OwnedKind] | None:
     """Name and kind of the parameter that says what an address is about; None where none does."""
     parts = route.partition(" ")[2].split("/")
     if parts[:3] != ["", "api", "v1"] or len(parts) < 5 or parts[3] not in PATH:
@@ -178,7 +186,7 @@ def is_known(route: str) -> bool:
     return kind_of_path(route) is not None or route in decided
 
 
-def datasets_of(store: Store, asked: Asked, login: Login) -> list[OwnedMention]:
+def datasets_of(store: Store, asked: AskedAbout, login: Login) -> list[OwnedMention]:
     """Where everything is that a request mentions, as far as a reader may know.
 
     Each is found by one indexed statement, and none is asked for where it decides nothing: an
@@ -201,19 +209,21 @@ def is_hidden(store: Store, owned: list[OwnedMention]) -> bool:
     """Whether anything that a request mentions is there, and its reader does not see it."""
     return any(
         item.ownership is None
-        and item.mention.named.kind is not Kind.NEW_DATASET
+        and item.mention.named.kind is not OwnedKind.NEW_DATASET
         and find_ownership(store, item.mention.named, EVERYTHING) is not None
         for item in owned
     )
 
 
-def takes_looking(asked: Asked, login: Login) -> bool:
+def takes_looking(asked: AskedAbout, login: Login) -> bool:
     """Whether ``datasets_of`` has to ask the database."""
     named = (mention.named for mention in asked.mentions)
     return not login.roles.is_admin and any(_is_looked_for(one, login.roles) for one in named)
 
 
-def require_allowed(asked: Asked, owned: list[OwnedMention], login: Login, action: Action) -> None:
+def require_allowed(
+    asked: AskedAbout, owned: list[OwnedMention], login: Login, action: Action
+) -> None:
     """Raise ForbiddenError unless somebody may do that wherever they see what a request names."""
     roles = login.roles
     if roles.is_admin:
@@ -225,7 +235,7 @@ def require_allowed(asked: Asked, owned: list[OwnedMention], login: Login, actio
     elif not asked.mentions and not (asked.route in LISTS and action is Action.READ):
         require(roles.highest, action)
     for item in owned:
-        if item.mention.named.kind is Kind.NEW_DATASET:
+        if item.mention.named.kind is OwnedKind.NEW_DATASET:
             _require_new(item.ownership, roles, action)
         elif item.ownership is not None:
             here = HERE if roles.single and item.ownership.dataset is not None else ""
@@ -235,12 +245,12 @@ def require_allowed(asked: Asked, owned: list[OwnedMention], login: Login, actio
                 require(role, Action.REVIEW, here)
 
 
-def asks_what_is_blind(asked: Asked) -> bool:
+def asks_what_is_blind(asked: AskedAbout) -> bool:
     """Whether a query of groups asks what others made of them: annotators are not to know."""
     return any(name == "q" and _BLIND.search(value) is not None for name, value in asked.query)
 
 
-def _names_what_is_nobodys(asked: Asked) -> bool:
+def _names_what_is_nobodys(asked: AskedAbout) -> bool:
     """Whether a body names a folder of the operator, which lies beside all datasets."""
     fields = EVERYWHERE_FIELDS.get(asked.route, ())
     return any(_field(asked.body, field) is not None for field in fields)
@@ -263,14 +273,14 @@ def _ownership(store: Store, named: Named, login: Login, sight: Sight) -> Owners
     if not _is_looked_for(named, roles):
         return None if roles.everywhere is Role.NONE else Ownership(None, frozenset({login.owner}))
     found = find_ownership(store, named, sight)
-    if found is None or named.kind is Kind.NEW_DATASET:
+    if found is None or named.kind is OwnedKind.NEW_DATASET:
         return found
     return None if role_at(found, roles, login.owner) is Role.NONE else found
 
 
 def _is_looked_for(named: Named, roles: DatasetRoles) -> bool:
     """Whether it matters where something is: who is the same everywhere is so there."""
-    return bool(roles.single) or named.kind in OWNED | {Kind.NEW_DATASET}
+    return bool(roles.single) or named.kind in OWNED | {OwnedKind.NEW_DATASET}
 
 
 def _mentions(
@@ -292,7 +302,7 @@ def _mentions(
 
 
 def _mention(
-    place: str, field: str, kind: Kind, value: str | int, index: int = 0
+    place: str, field: str, kind: OwnedKind, value: str | int, index: int = 0
 ) -> Iterator[Mention]:
     """Nothing for what is no id: the route refuses it by the same rule."""
     if kind in TEXTS:

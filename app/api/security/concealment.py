@@ -14,10 +14,10 @@ from starlette.datastructures import Headers, MutableHeaders
 from starlette.types import Message, Receive, Scope, Send
 
 from app.api.schemas.problem import MEDIA_TYPE
-from app.api.security.asked_datasets import TEXTS, Asked, Mention, OwnedMention
+from app.api.security.asked_datasets import TEXTS, AskedAbout, Mention, OwnedMention
 from app.api.security.bodies import VALUE
 from app.finite import MAX_ID, json_text
-from app.review.people.ownership import Kind
+from app.review.people.ownership import OwnedKind
 
 SENT = "touchline.sent"
 """Where a request's scope under other names has the one that was sent."""
@@ -36,13 +36,13 @@ class Concealment:
         owned: Where the things are that it mentions.
     """
 
-    def __init__(self, asked: Asked, owned: list[OwnedMention]):
+    def __init__(self, asked: AskedAbout, owned: list[OwnedMention]):
         self._asked = asked
         self._other: list[tuple[Mention, str | int]] = []
         self._said: dict[bytes, bytes] = {}
         for one in owned:
             mention, ownership = one.mention, one.ownership
-            if mention.named.kind is Kind.NEW_DATASET:
+            if mention.named.kind is OwnedKind.NEW_DATASET:
                 continue
             if ownership is None:
                 other = _without(mention.named.kind)
@@ -135,8 +135,8 @@ def _json(body: Any) -> bytes:
     return json_text(body).encode()
 
 
-def _without(kind: Kind) -> str | int:
+def _without(kind: OwnedKind) -> str | int:
     """The name of that kind that nothing has."""
-    if kind is Kind.UPLOAD:
+    if kind is OwnedKind.UPLOAD:
         return _NO_UPLOAD
-    return _NO_NAME if kind in (Kind.DATASET, Kind.VERSION) else _NO_ID
+    return _NO_NAME if kind in (OwnedKind.DATASET, OwnedKind.VERSION) else _NO_ID

@@ -25,7 +25,7 @@ from app.store.store import Store
 
 
 @dataclass(frozen=True)
-class Waiting:
+class OpenCase:
     """A group that waits for a decision.
 
     Attributes:
@@ -59,7 +59,7 @@ class Case:
     own: bool
 
 
-def list_waiting(store: Store, dataset: str | int) -> list[Waiting]:
+def list_waiting(store: Store, dataset: str | int) -> list[OpenCase]:
     """The groups of a dataset that wait for a decision, those that disagree most first."""
     number = dataset_id(store, dataset)
     with store.read() as session:
@@ -69,7 +69,7 @@ def list_waiting(store: Store, dataset: str | int) -> list[Waiting]:
         batch = row.batch_id or None
         people = tuple(take.person for take in ready_takes(store, row.group_id, batch))
         found.append(
-            Waiting(
+            OpenCase(
                 row.group_id, row.number, batch, people, row.worst, row.disagreements, row.found
             )
         )

@@ -65,7 +65,7 @@ class FramePage:
 
 
 @dataclass(frozen=True)
-class Comparison:
+class RunComparison:
     """Two runs of one dataset.
 
     Attributes:
@@ -172,7 +172,7 @@ def list_frames(
     return FramePage(items, offset + len(items) if more else None, total)
 
 
-def compare(store: Store, first_id: int, second_id: int, field: str = "error_m") -> Comparison:
+def compare(store: Store, first_id: int, second_id: int, field: str = "error_m") -> RunComparison:
     """What changed from one run to another of the same dataset.
 
     Raises:
@@ -190,7 +190,7 @@ def compare(store: Store, first_id: int, second_id: int, field: str = "error_m")
             for item in (first, second)
         ]
     differs = differing_pins(first.pins, second.pins)
-    return Comparison(
+    return RunComparison(
         first,
         second,
         set(differs) <= {"software_version"},

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any, TypeVar
 
-from app.child import ChildEnded, Reason
+from app.child import ChildEnded, EndReason
 from app.errors import OverloadedError, TooLargeError
 from app.progress import TellProgress
 from app.review.jobs.job_run import JobProgress
@@ -22,7 +22,7 @@ STOP_SECONDS = 2.0
 """So long after its process a server may be told to stop."""
 _AGAIN = "Start it again."
 _MEMORY = f"{_AGAIN} Where it happens often, give more memory."
-_ENDS: dict[Reason, tuple[str, str]] = {
+_ENDS: dict[EndReason, tuple[str, str]] = {
     "memory": ("needs more memory than there is", _MEMORY),
     "killed": ("was killed, most likely for want of memory", _MEMORY),
     "told": ("was told to end", _AGAIN),

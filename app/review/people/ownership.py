@@ -24,7 +24,7 @@ MIN_HASH = 8
 """So many digits of a hash name a version."""
 
 
-class Kind(StrEnum):
+class OwnedKind(StrEnum):
     """What an address can name."""
 
     DATASET = "dataset"
@@ -81,7 +81,7 @@ def role_at(found: Ownership, roles: DatasetRoles, name: str) -> Role:
 class Named:
     """What a request names, by its id or by whatever else names a thing of that kind."""
 
-    kind: Kind
+    kind: OwnedKind
     by: str | int
 
 
@@ -93,7 +93,7 @@ def find_ownership(store: Store, named: Named, sight: Sight) -> Ownership | None
         named: What, and how it is named.
         sight: Which datasets take part where a name alone does not say which of them is meant.
     """
-    if named.kind is Kind.UPLOAD:
+    if named.kind is OwnedKind.UPLOAD:
         return _upload(store, named.by)
     with store.read() as session:
         find = _FIND.get(named.kind)
@@ -150,10 +150,10 @@ def _number(named: str | int) -> int | None:
     return int(named) if named.isascii() and named.isdigit() and len(named) < 19 else None
 
 
-_FIND: Mapping[Kind, Callable[[Session, Any, Sight], Ownership | None]] = {
-    Kind.DATASET: _dataset,
-    Kind.NEW_DATASET: _dataset,
-    Kind.JOB: _job,
-    Kind.EXPORT: _job,
-    Kind.VERSION: _version,
+_FIND: Mapping[OwnedKind, Callable[[Session, Any, Sight], Ownership | None]] = {
+    OwnedKind.DATASET: _dataset,
+    OwnedKind.NEW_DATASET: _dataset,
+    OwnedKind.JOB: _job,
+    OwnedKind.EXPORT: _job,
+    OwnedKind.VERSION: _version,
 }

@@ -62,11 +62,11 @@ LATE = "that took too long, or was answered before"
 
 
 @dataclass(frozen=True)
-class Site:
+class PasskeySite:
     """For whom passkeys are: the name that people open, and the origin of its pages.
 
     Example:
-        >>> Site("touchline.example.org", "https://touchline.example.org").name
+        >>> PasskeySite("touchline.example.org", "https://touchline.example.org").name
         'touchline.example.org'
     """
 
@@ -108,7 +108,7 @@ class Passkeys:
             rows = passkeys_of(session, person_id)
         return [Passkey(row.id, row.name, row.created, row.used) for row in rows]
 
-    def begin(self, login: Login, password: str | None, site: Site) -> dict[str, Any]:
+    def begin(self, login: Login, password: str | None, site: PasskeySite) -> dict[str, Any]:
         """What a browser needs to make a passkey (PublicKeyCredentialCreationOptionsJSON).
 
         Raises:
@@ -135,7 +135,7 @@ class Passkeys:
         return options_to_json_dict(options)
 
     def make(
-        self, login: Login, name: str, credential: dict[str, Any], site: Site
+        self, login: Login, name: str, credential: dict[str, Any], site: PasskeySite
     ) -> tuple[Passkey, list[str]]:
         """Keep the passkey that a browser has made; every other session ends.
 
@@ -189,7 +189,7 @@ class Passkeys:
             end_factor(session, login)
             note(session, login.name, login.name, "no passkey", login.role, passkey=name)
 
-    def ask(self, asker: str, site: Site) -> dict[str, Any]:
+    def ask(self, asker: str, site: PasskeySite) -> dict[str, Any]:
         """What a browser needs to log in with a passkey (PublicKeyCredentialRequestOptionsJSON).
 
         Args:
@@ -207,7 +207,7 @@ class Passkeys:
         self,
         asker: str,
         credential: dict[str, Any],
-        site: Site,
+        site: PasskeySite,
         *,
         browser: str = "",
         address: str = "",
@@ -240,7 +240,7 @@ class Passkeys:
             row.person_id, person.password, browser, address, before, require, Way.PASSKEY
         )
 
-    def _read_new(self, login: Login, credential: dict[str, Any], site: Site) -> Any:
+    def _read_new(self, login: Login, credential: dict[str, Any], site: PasskeySite) -> Any:
         challenge = self._challenges.take(_of_session(login))
         if challenge is None:
             raise InputError(LATE, hint="Begin again.", pointer="/credential")
@@ -259,7 +259,7 @@ class Passkeys:
             raise InputError(REFUSED, hint="Begin again.", pointer="/credential") from error
 
 
-def _verified(row: Any, credential: dict[str, Any], challenge: bytes, site: Site) -> int:
+def _verified(row: Any, credential: dict[str, Any], challenge: bytes, site: PasskeySite) -> int:
     """How often the device says that it has signed; raises NotLoggedInError unless it has, this."""
     try:
         if base64url_to_bytes(credential["response"]["userHandle"]) != _handle(row.person_id):

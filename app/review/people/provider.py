@@ -44,7 +44,7 @@ _FORM = {"Content-Type": "application/x-www-form-urlencoded"}
 
 
 @dataclass(frozen=True)
-class Asked:
+class LoginAsked:
     """What was asked of the provider for one login.
 
     Attributes:
@@ -84,7 +84,7 @@ class Provider:
         self._description: _Kept | None = None
         self._keys: _Kept | None = None
 
-    def address(self, asked: Asked) -> str:
+    def address(self, asked: LoginAsked) -> str:
         """Where a browser goes to log in.
 
         Raises:
@@ -99,7 +99,7 @@ class Provider:
         )
         return str(address)
 
-    def claims(self, asked: Asked, code: str) -> Mapping[str, Any]:
+    def claims(self, asked: LoginAsked, code: str) -> Mapping[str, Any]:
         """What the provider says of who has logged in; ``code`` is what their browser brought back.
 
         Raises:
@@ -118,7 +118,7 @@ class Provider:
         self._describe()
         return f"{self._rules.issuer} answers, with {len(self._fetch_keys().keys)} keys"
 
-    def _exchange(self, asked: Asked, code: str) -> str:
+    def _exchange(self, asked: LoginAsked, code: str) -> str:
         there = self._describe()
         body = prepare_token_request(
             "authorization_code",
@@ -140,7 +140,7 @@ class Provider:
             raise self._refusal()
         return token
 
-    def _verified(self, token: str, asked: Asked) -> Mapping[str, Any]:
+    def _verified(self, token: str, asked: LoginAsked) -> Mapping[str, Any]:
         """The claims of an ID token that is good."""
         try:
             try:
@@ -169,7 +169,7 @@ class Provider:
             raise self._refusal() from error
         return dict(claims)
 
-    def _client(self, asked: Asked) -> OAuth2Client:
+    def _client(self, asked: LoginAsked) -> OAuth2Client:
         return OAuth2Client(
             None,
             client_id=self._rules.client_id,

@@ -23,7 +23,7 @@ from app.review.people.identities import require_none
 from app.review.people.links import look, take
 from app.review.people.logins import ASK_CODE, LOST, WRONG_CODE, Login, Logins, Way
 from app.review.people.names import checked_name, note
-from app.review.people.provider import Asked, Provider
+from app.review.people.provider import LoginAsked, Provider
 from app.review.people.second_factor import require_password
 from app.review.people.sign_on_rules import SignOnRules, shown_of
 from app.review.people.tokens import hash_of, new_token
@@ -58,7 +58,7 @@ class _Begun:
     """
 
     browser: str
-    asked: Asked
+    asked: LoginAsked
     to: str
     link: str | None = None
     name: str | None = None
@@ -73,7 +73,7 @@ class _Begun:
     def read(text: bytes) -> _Begun:
         """What ``text`` made."""
         values = json.loads(text)
-        return _Begun(**{**values, "asked": Asked(**values["asked"])})
+        return _Begun(**{**values, "asked": LoginAsked(**values["asked"])})
 
 
 @dataclass(frozen=True)
@@ -219,7 +219,7 @@ class SignOn:
         return Entered(token, begun.to)
 
     def _begin(self, asker: str, redirect: str, to: str, **more: Any) -> str:
-        asked = Asked(redirect, new_token(), new_token(), secrets.token_urlsafe(48))
+        asked = LoginAsked(redirect, new_token(), new_token(), secrets.token_urlsafe(48))
         address = self._provider.address(asked)
         self._begun.put(hash_of(asked.state), _Begun(hash_of(asker), asked, to, **more).text())
         return address

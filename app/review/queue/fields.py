@@ -11,7 +11,7 @@ from app.soccer.paint_evidence import PROPOSAL_OUTCOMES
 from app.soccer.reasons import REASONS
 from app.soccer.solution import GATES
 
-Kind = Literal["number", "flag", "choice", "text", "ids", "order"]
+FieldKind = Literal["number", "flag", "choice", "text", "ids", "order"]
 COMPARED = (":", "=", "<", "<=", ">", ">=")
 NAMED = (":", "=")
 
@@ -30,7 +30,7 @@ class QueryField:
     """
 
     name: str
-    kind: Kind
+    kind: FieldKind
     meaning: str
     unit: str = ""
     values: tuple[str, ...] = ()

@@ -16,7 +16,7 @@ from app.store.store import Store
 
 
 @dataclass(frozen=True)
-class Column:
+class HistogramColumn:
     """The bins of a number's histogram; the first bin has no lower end.
 
     Attributes:
@@ -30,12 +30,12 @@ class Column:
 
 
 COLUMNS = {
-    "jac": Column(even(0, 1, 20), open_high=False),
-    "error_percent": Column(ERROR_PERCENT, log=True),
-    "sigma": Column(SIGMA_M, log=True),
-    "parallax": Column(even(0, 180, 20), open_high=False),
-    "size_ratio": Column(even(0, 2, 20)),
-    "agreement": Column(even(0, 1, 20), open_high=False),
+    "jac": HistogramColumn(even(0, 1, 20), open_high=False),
+    "error_percent": HistogramColumn(ERROR_PERCENT, log=True),
+    "sigma": HistogramColumn(SIGMA_M, log=True),
+    "parallax": HistogramColumn(even(0, 180, 20), open_high=False),
+    "size_ratio": HistogramColumn(even(0, 2, 20)),
+    "agreement": HistogramColumn(even(0, 1, 20), open_high=False),
 }
 """The bins are fixed, so that they stay put while one filters."""
 
@@ -44,7 +44,7 @@ COLUMNS = {
 class Histogram:
     """Counts of a column over the groups that match; ``unknown`` ones have no such number."""
 
-    column: Column
+    column: HistogramColumn
     counts: tuple[int, ...]
     unknown: int
 
@@ -90,7 +90,7 @@ def summary(store: Store, dataset_id: int, query: str = "") -> Summary:
     )
 
 
-def _histogram(column: Column, values: Sequence[float | None]) -> Histogram:
+def _histogram(column: HistogramColumn, values: Sequence[float | None]) -> Histogram:
     numbers = np.array(values, float)
     place = places(column.edges, numbers, open_low=True, open_high=column.open_high)
     counts = np.bincount(place[place >= 0], minlength=len(column.edges) - 1)

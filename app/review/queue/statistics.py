@@ -36,7 +36,7 @@ class Measure:
 
 
 @dataclass(frozen=True)
-class Series:
+class MeasureSeries:
     """Counts of one split; ``unknown`` groups have no such number."""
 
     split: str
@@ -45,12 +45,12 @@ class Series:
 
 
 @dataclass(frozen=True)
-class Histogram:
+class MeasureHistogram:
     """A measure over the groups that match; ``queries`` open the queue at each bar."""
 
     measure: Measure
     queries: tuple[str, ...]
-    series: tuple[Series, ...]
+    series: tuple[MeasureSeries, ...]
 
 
 @dataclass(frozen=True)
@@ -79,7 +79,7 @@ class Statistics:
     """All of it, over the groups that match a query."""
 
     groups: int
-    histograms: tuple[Histogram, ...]
+    histograms: tuple[MeasureHistogram, ...]
     positions: Positions
     matches: tuple[Share, ...]
     splits: tuple[Share, ...]
@@ -228,19 +228,19 @@ def _cells(x: FloatArray, y: FloatArray) -> npt.NDArray[np.int16]:
     return np.where(np.isnan(x) | np.isnan(y), UNKNOWN, outside).astype(np.int16)
 
 
-def _histogram(measure: Measure, place: npt.NDArray[np.int8], found: Counted) -> Histogram:
+def _histogram(measure: Measure, place: npt.NDArray[np.int8], found: Counted) -> MeasureHistogram:
     bins = len(measure.edges) - 1
     # NOWHERE, UNKNOWN, and the bins, of each split.
     width = bins + 2
     code = found.split * width + (place - NOWHERE)
     counts = np.bincount(code, minlength=len(found.splits) * width).reshape(-1, width)
     series = tuple(
-        Series(split, tuple(row[2:].tolist()), int(row[UNKNOWN - NOWHERE]))
+        MeasureSeries(split, tuple(row[2:].tolist()), int(row[UNKNOWN - NOWHERE]))
         for split, row in sorted(zip(found.splits, counts, strict=True), key=_name)
         if row.any()
     )
     queries = tuple(bin_query(measure, number) for number in range(bins))
-    return Histogram(measure, queries, series)
+    return MeasureHistogram(measure, queries, series)
 
 
 def _name(pair: tuple[str, Any]) -> str:

@@ -18,8 +18,8 @@ from app.review.answers.saved_progress import SavedProgress
 from app.review.queue.query import MAX_LISTED_LENGTH, parse_query
 from app.review.verdicts.verdict import Verdict, check_verdict
 from app.store.batches import (
-    BulkVerdict,
     Spans,
+    StoredBulkVerdict,
     find_batch,
     insert_batch,
     pieces,
@@ -209,7 +209,7 @@ def _require_expected(found: SortedOut, expected: int | None) -> None:
         )
 
 
-def list_batches(store: Store, dataset_id: int, limit: int = 20) -> list[BulkVerdict]:
+def list_batches(store: Store, dataset_id: int, limit: int = 20) -> list[StoredBulkVerdict]:
     """The newest bulk verdicts of a dataset, the newest first."""
     with store.read() as session:
         return read_batches(session, dataset_id, limit)
@@ -324,7 +324,7 @@ class BatchRun:
         (log_id,) = append(session, [entry])
         update_batch(session, self.batch, log_id=log_id)
 
-    def _standing(self, session: Session) -> BulkVerdict | None:
+    def _standing(self, session: Session) -> StoredBulkVerdict | None:
         """The batch as it is stored, which others may go on with or take back; None before it is.
 
         Raises:

@@ -11,7 +11,7 @@ from app.review.answers.saved_progress import SavedProgress
 from app.review.verdicts.bulk import ASKED, BatchRun, Refusal, chunks, sort_out
 from app.review.verdicts.bulk_undo import read_batch
 from app.review.verdicts.verdict import check_verdict
-from app.store.batches import BulkVerdict, Spans, update_batch
+from app.store.batches import Spans, StoredBulkVerdict, update_batch
 from app.store.listing import read_columns
 from app.store.session import Session
 from app.store.solutions import present_keys
@@ -83,13 +83,13 @@ def redo_batch(
     return report
 
 
-def _report(batch: BulkVerdict, run: BatchRun, refused: Counter[str]) -> RedoReport:
+def _report(batch: StoredBulkVerdict, run: BatchRun, refused: Counter[str]) -> RedoReport:
     kept = batch.changed - run.changed - refused.total()
     reasons = tuple(Refusal(reason, groups) for reason, groups in refused.items())
     return RedoReport(run.batch, run.changed, kept, reasons)
 
 
-def _spans(batch: BulkVerdict) -> Spans:
+def _spans(batch: StoredBulkVerdict) -> Spans:
     """First and last id of the verdicts that took a batch back, chunk by chunk."""
     if batch.undone is None:
         raise ConflictError("this batch was not taken back, so there is nothing to give again")

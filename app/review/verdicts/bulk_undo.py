@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from app.errors import ConflictError, NotFoundError
 from app.review.answers.keep import Keep, keep_nothing
 from app.review.verdicts.bulk import chunks, save_verdicts
-from app.store.batches import BulkVerdict, Spans, find_batch, update_batch, with_span
+from app.store.batches import Spans, StoredBulkVerdict, find_batch, update_batch, with_span
 from app.store.clock import now
 from app.store.log import Entry, append
 from app.store.session import Session
@@ -70,7 +70,7 @@ def _verdicts_in(spans: Spans) -> int:
     return sum(last - first + 1 for first, last in spans)
 
 
-def _standing(session: Session, batch_id: int) -> BulkVerdict:
+def _standing(session: Session, batch_id: int) -> StoredBulkVerdict:
     """A batch that was not taken back, or not wholly.
 
     Raises:
@@ -83,7 +83,7 @@ def _standing(session: Session, batch_id: int) -> BulkVerdict:
     return batch
 
 
-def _close(session: Session, batch: BulkVerdict, report: UndoReport, actor: str) -> None:
+def _close(session: Session, batch: StoredBulkVerdict, report: UndoReport, actor: str) -> None:
     """Say of a batch, and in the log, that it was taken back."""
     at = now()
     update_batch(session, batch.id, undone=at, undone_by=actor)
@@ -91,7 +91,7 @@ def _close(session: Session, batch: BulkVerdict, report: UndoReport, actor: str)
     append(session, [entry])
 
 
-def read_batch(session: Session, batch_id: int) -> BulkVerdict:
+def read_batch(session: Session, batch_id: int) -> StoredBulkVerdict:
     """A batch by its id.
 
     Raises:
@@ -104,7 +104,7 @@ def read_batch(session: Session, batch_id: int) -> BulkVerdict:
 
 
 def _restore(
-    session: Session, batch: BulkVerdict, first: int, last: int, actor: str
+    session: Session, batch: StoredBulkVerdict, first: int, last: int, actor: str
 ) -> list[StoredVerdict]:
     """Take one chunk back; returns the verdicts that do it, of groups not judged since."""
     at, number = now(), next_verdict_id(session)

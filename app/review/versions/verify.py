@@ -51,7 +51,7 @@ _A_GROUP = 10
 
 
 @dataclass(frozen=True)
-class Difference:
+class VersionDifference:
     """Something that is not as it was frozen.
 
     Attributes:
@@ -77,7 +77,7 @@ class VerifyReport:
     solver_version: str
     equal: int = 0
     different: int = 0
-    differences: list[Difference] = field(default_factory=list)
+    differences: list[VersionDifference] = field(default_factory=list)
     solver_version_now: str = SOLVER_VERSION
 
     @property
@@ -104,7 +104,7 @@ class VerifyReport:
             )
         return f"{self.groups - self.equal} of {self.groups} groups came out differently{why}."
 
-    def add(self, found: Sequence[Difference]) -> None:
+    def add(self, found: Sequence[VersionDifference]) -> None:
         """Count differences, and keep the first."""
         self.different += len(found)
         self.differences += found[: max(NAMED - len(self.differences), 0)]
@@ -195,19 +195,19 @@ def keep_failure(store: Store, version_id: int, problem: str, *, actor: str) -> 
         keep_verification(store, version_id, actor=actor, problem=problem)
 
 
-def verify_task(task: VerifyTask) -> list[list[Difference]]:
+def verify_task(task: VerifyTask) -> list[list[VersionDifference]]:
     """The differences of each group of a task; runs in a worker."""
     known = {key: decode_calibration(body) for key, body in task.known.items()}
     return [list(islice(_differences(row, task, known), _A_GROUP)) for row in task.rows]
 
 
-def _version_differences(session: Session, version: Version) -> Iterator[Difference]:
+def _version_differences(session: Session, version: Version) -> Iterator[VersionDifference]:
     """What of the version's own row does not follow from its groups."""
     names = ("key", "member", "split", "splits", "verdict", "said")
     rows = ({name: getattr(row, name) for name in names} for row in said_rows(session, version.id))
     found = version_hash(version.policy, version.solver_version, rows)
     if found != version.hash:
-        yield Difference(None, "hash", version.hash, found)
+        yield VersionDifference(None, "hash", version.hash, found)
 
 
 class _Tasks:
@@ -281,10 +281,10 @@ def _texts(said: Json, frozen: Mapping[str, bytes]) -> dict[str, Json]:
 
 def _differences(
     row: VersionGroup, task: VerifyTask, known: Mapping[str, Calibration]
-) -> Iterator[Difference]:
+) -> Iterator[VersionDifference]:
     missing = _missing(row, task.frozen)
     if missing:
-        yield from (Difference(row.key, "missing", key, None) for key in missing)
+        yield from (VersionDifference(row.key, "missing", key, None) for key in missing)
         return
     try:
         yield from _frozen_differences(row, task)
@@ -294,19 +294,21 @@ def _differences(
         yield from _solution_differences(row, group, task, known)
     except Exception as error:
         # One broken group must not hide what the others say.
-        yield Difference(row.key, "error", None, f"{type(error).__name__}: {error}")
+        yield VersionDifference(row.key, "error", None, f"{type(error).__name__}: {error}")
 
 
-def _frozen_differences(row: VersionGroup, task: VerifyTask) -> Iterator[Difference]:
+def _frozen_differences(row: VersionGroup, task: VerifyTask) -> Iterator[VersionDifference]:
     """Parts that are not what their key says."""
     said, solution = row.said or "", row.solution or ""
     for key in (said, *named_texts(json_of(task.frozen[said])), solution):
         found = fitting_key(key, task.frozen[key])
         if found != key:
-            yield Difference(row.key, "digest", key, found)
+            yield VersionDifference(row.key, "digest", key, found)
 
 
-def _split_differences(row: VersionGroup, group: Group, splitter: Splitter) -> Iterator[Difference]:
+def _split_differences(
+    row: VersionGroup, group: Group, splitter: Splitter
+) -> Iterator[VersionDifference]:
     views = [view.key for view in group.views]
     split = splitter.group(group.match, group.split, views)
     for place, frozen, now in (
@@ -314,18 +316,18 @@ def _split_differences(row: VersionGroup, group: Group, splitter: Splitter) -> I
         ("splits", row.splits, splitter.views(views)),
     ):
         if frozen != now:
-            yield Difference(row.key, place, frozen, now)
+            yield VersionDifference(row.key, place, frozen, now)
 
 
 def _solution_differences(
     row: VersionGroup, group: Group, task: VerifyTask, known: Mapping[str, Calibration]
-) -> Iterator[Difference]:
+) -> Iterator[VersionDifference]:
     encoded = encode_solution(group, solve(group, task.policy, known))
     pairs = [("", task.frozen[row.solution or ""], encoded.body)]
     for key, body in sorted(encoded.calibrations.items()):
         frozen = task.frozen.get(CALIBRATION + key)
         if frozen is None:
-            yield Difference(row.key, "calibration", None, key)
+            yield VersionDifference(row.key, "calibration", None, key)
         else:
             pairs.append(("calibration.", frozen, body))
     for place, then, now in pairs:
@@ -334,7 +336,7 @@ def _solution_differences(
             yield from _unequal(row.key, place, _parsed(then), _parsed(now))
     point = json_of(encoded.body)["ball"]
     if row.ball != (tuple(point["point"]) if point else None):
-        yield Difference(row.key, "ball", row.ball, point and point["point"])
+        yield VersionDifference(row.key, "ball", row.ball, point and point["point"])
 
 
 def _parsed(body: bytes) -> Json:
@@ -344,7 +346,7 @@ def _parsed(body: bytes) -> Json:
         raise StorageError("a frozen part is damaged") from error
 
 
-def _unequal(group: str, place: str, then: Json, now: Json) -> Iterator[Difference]:
+def _unequal(group: str, place: str, then: Json, now: Json) -> Iterator[VersionDifference]:
     """Leaves at which two JSON values differ."""
     if isinstance(then, dict) and isinstance(now, dict) and then.keys() == now.keys():
         for name in then:
@@ -353,4 +355,4 @@ def _unequal(group: str, place: str, then: Json, now: Json) -> Iterator[Differen
         for index, (one, other) in enumerate(zip(then, now, strict=True)):
             yield from _unequal(group, f"{place}{index}.", one, other)
     elif repr(then) != repr(now):
-        yield Difference(group, place.rstrip("."), then, now)
+        yield VersionDifference(group, place.rstrip("."), then, now)

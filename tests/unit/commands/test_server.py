@@ -19,7 +19,7 @@ from app.api.server import listen, make_server
 from app.api.team import Team
 from app.commands.command_line import app
 from app.commands.remote_files import write_evaluation
-from app.commands.server import Server, _explained, connected, read_token
+from app.commands.server import ServerPlace, _explained, connected, read_token
 from app.config import Settings
 from app.datasets.soccernet_v3_writer import write_soccernet_v3
 from app.errors import InputError, UnsafePathError
@@ -219,7 +219,7 @@ class TestRefusals:
         path.chmod(mode)
         with (
             pytest.raises(InputError, match="other users can read"),
-            connected(Server(place.url, path)),
+            connected(ServerPlace(place.url, path)),
         ):
             pass
 
@@ -255,7 +255,7 @@ class TestRefusals:
         assert "cannot prove who it is" in str(done.exception)
 
     def test_an_answer_that_only_sounds_like_it_is_told_as_it_is(self) -> None:
-        server = Server("http://127.0.0.1:8000", None)
+        server = ServerPlace("http://127.0.0.1:8000", None)
         said = RequestError("there is no dataset crossland", None, 404)
         assert _explained(server, said).message == "there is no dataset crossland"
         broken = UnreachableError("the SSL handshake failed")

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from app.api.schemas.statistics import StatisticsHistogram
-from app.review.queue.statistics import Histogram, Measure, Series
+from app.review.queue.statistics import Measure, MeasureHistogram, MeasureSeries
 
 MEASURE = Measure("jac", "JaC", "", "jac", (0.0, 0.5, 1.0), open_high=False)
 
 
 class TestStatisticsHistogram:
     def test_has_the_bins_of_its_measure_and_its_own_counts_beside_them(self) -> None:
-        found = Histogram(MEASURE, ("jac<0.5", "jac>=0.5"), (Series("train", (1, 2), 0),))
+        found = MeasureHistogram(
+            MEASURE, ("jac<0.5", "jac>=0.5"), (MeasureSeries("train", (1, 2), 0),)
+        )
         assert StatisticsHistogram.model_validate(found).model_dump() == {
             "name": "jac",
             "label": "JaC",

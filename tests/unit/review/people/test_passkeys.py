@@ -17,7 +17,7 @@ from app.errors import ConflictError, InputError, NotFoundError, NotLoggedInErro
 from app.review.people import links, passwords
 from app.review.people.challenges import LASTS, MOST, Challenges, Remembered
 from app.review.people.logins import Login, Logins
-from app.review.people.passkeys import Passkeys, Site
+from app.review.people.passkeys import Passkeys, PasskeySite
 from app.review.people.people import change_person, find_person, invite
 from app.review.people.roles import Role
 from app.review.people.second_factor import SecondFactors
@@ -25,7 +25,7 @@ from app.store.store import Store
 from tests.authenticator import PRESENT, VERIFIED, Authenticator, b64
 
 SECRET = "correct horse battery"
-SITE = Site("localhost", "http://localhost")
+SITE = PasskeySite("localhost", "http://localhost")
 BROWSER = "a browser of anna's"
 
 

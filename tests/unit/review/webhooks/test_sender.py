@@ -96,7 +96,11 @@ class TestTelling:
         end_job(allowed, "failed")
         assert sender.look() == 3
         assert sender.send() == 3
-        assert sorted(receiver.kinds) == [Kind.CHANGED, Kind.JUDGED, Kind.JOB_FAILED]
+        assert sorted(receiver.kinds) == [
+            Kind.CHANGED,
+            Kind.JUDGED,
+            Kind.JOB_FAILED,
+        ]
         by_kind = {body["type"]: body["data"] for _, body in receiver.got}
         changed = by_kind[Kind.CHANGED]
         assert [entry["kind"] for entry in changed["entries"]] == ["edit", "undo"]
