@@ -13,6 +13,7 @@ from typing import Any
 from app.datasets import fields
 from app.datasets.camera_json import camera_from_json, camera_to_json
 from app.datasets.safe_path import check_name
+from app.datasets.soccernet_record import BALLS, GAME, IMAGE, RECORD, REST
 from app.errors import DatasetFormatError, InputError, UnknownMarkingError, UnsafePathError
 from app.geometry.camera import camera_covariance
 from app.soccer.annotation import BallAnnotation, Extras, Lines, make_lines
@@ -24,6 +25,8 @@ from app.soccer.reasons import LeftOut, left_out
 
 MAX_TEXT = 1000
 """Longest key or label, characters."""
+_SHAPES: Mapping[str, type] = {IMAGE: dict, RECORD: dict, GAME: dict, REST: dict, BALLS: list}
+"""Of what ``Extras.metadata`` holds under names of ours."""
 
 
 @dataclass(frozen=True)
@@ -311,8 +314,19 @@ def extras_from_json(value: Any) -> Extras:
         tuple(item for item in _listed(value.get(name)) if isinstance(item, dict))
         for name in ("boxes", "lines")
     )
-    metadata = value.get("metadata")
-    return Extras(boxes, lines, metadata if isinstance(metadata, dict) else {})
+    return Extras(boxes, lines, _metadata(value.get("metadata")))
+
+
+def _metadata(value: Any) -> dict[str, Any]:
+    """What a source said of an image; what has a name of ours and another shape is left out."""
+    if not isinstance(value, dict):
+        return {}
+    fit: dict[str, Any] = {
+        name: item for name, item in value.items() if isinstance(item, _SHAPES.get(name, object))
+    }
+    if BALLS in fit:
+        fit[BALLS] = [item if isinstance(item, dict) else {} for item in fit[BALLS]]
+    return fit
 
 
 def _listed(value: Any) -> list[Any]:

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from app.datasets.soccernet_v3_writer import labels_to_json
 from app.datasets.view_state import (
     StateReader,
     extras_from_json,
@@ -103,3 +104,15 @@ class TestExtras:
     def test_values_that_are_no_extras_are_left_out(self) -> None:
         assert extras_from_json({"boxes": 5, "lines": "text"}) == Extras()
         assert extras_from_json({"boxes": [1, {"a": 1}], "metadata": []}) == Extras(({"a": 1},))
+
+    @pytest.mark.parametrize("name", ["imageMetadata", "record", "balls", "GameMetadata", "labels"])
+    @pytest.mark.parametrize("odd", [None, 3, "text", [1], {"a": 1}])
+    def test_what_a_file_says_under_our_names_in_another_shape_ends_no_export(
+        self, soccer_group: Make, name: str, odd: Any
+    ) -> None:
+        group = soccer_group()
+        extras = extras_from_json({"metadata": {name: odd, "kept": odd}})
+        assert extras.metadata["kept"] == odd
+        views = tuple(replace(view, extras=extras) for view in group.views)
+        written = labels_to_json("m", [replace(group, views=views)])
+        assert list(written["actions"]) == [group.views[0].key]
