@@ -49,6 +49,21 @@ def test_a_smaller_picture_is_told_in_the_pixels_of_its_annotations(rendered) ->
     assert max(y for _, y in found.line_like) > 540
 
 
+def test_distances_are_those_of_the_annotations_where_the_picture_is_smaller(rendered) -> None:
+    start = Calibration("lines", panned(rendered.truth, 3.0))
+    twice = Calibration("lines", start.camera.scaled(2, 2))
+    same, found = seen(rendered.image, start), seen(rendered.image, twice, ImageSize(2560, 1440))
+    assert same.outcome == found.outcome == "snapped"
+    assert found.error_px == pytest.approx(2 * same.error_px, rel=1e-3)
+    assert found.moved_px == pytest.approx(2 * same.moved_px, rel=1e-3)
+    assert (found.supported, found.explained) == pytest.approx((same.supported, same.explained))
+    for marking, places in same.evidence.points.items():
+        larger = found.evidence.points[marking]
+        assert [sigma for *_, sigma in larger] == pytest.approx(
+            [2 * sigma for *_, sigma in places], rel=1e-3
+        )
+
+
 def test_nothing_is_believed_where_people_are_and_a_box_of_the_field_hides_none(rendered) -> None:
     whole = seen(rendered.image, rendered.clicked)
     places = max(whole.evidence.points.values(), key=len)
