@@ -57,7 +57,7 @@ def write_camera_files(
         UnsafePathError: A key would leave ``root``.
     """
     counts = {"groups": 0, "cameras": 0}
-    written: set[str] = set()
+    written: dict[str, int] = {}
     put = put or put_on_disk(root)
     for record in records:
         counts["groups"] += 1
@@ -65,7 +65,7 @@ def write_camera_files(
     return counts
 
 
-def put_view_cameras(put: PutText, record: ExportRecord, written: set[str]) -> int:
+def put_view_cameras(put: PutText, record: ExportRecord, written: dict[str, int]) -> int:
     """Write the cameras of a group that are not written yet; how many that were.
 
     Raises:
@@ -74,9 +74,12 @@ def put_view_cameras(put: PutText, record: ExportRecord, written: set[str]) -> i
     before = len(written)
     for view in record.group.views:
         place, camera = view_place(record.group, view), record.camera(view)
-        if camera is not None and place in written and not view.station.shared:
+        if camera is None or (view.station.shared and place in written):
+            continue
+        text = camera_text(camera)
+        if place not in written:
+            put(camera_name(place), text)
+        elif written[place] != hash(text):
             raise InputError(f"the cameras of two frames would both be called {place}")
-        if camera is not None and place not in written:
-            put(camera_name(place), camera_text(camera))
-            written.add(place)
+        written[place] = hash(text)
     return len(written) - before

@@ -124,6 +124,7 @@ def write_sn_calibration(
     """
     counts = {"groups": 0, "frames": 0, "cameras": 0}
     names, with_camera = _Names(), set[str]()
+    texts: dict[str, int] = {}
     put = put or put_on_disk(root)
     with MatchInfoWriter(root) as info:
         for record in records:
@@ -132,12 +133,15 @@ def write_sn_calibration(
                 place, camera = view_place(record.group, view), record.camera(view)
                 # A static camera that many groups share is written once.
                 known = place in names.of_place
-                if known and not view.station.shared:
-                    raise InputError(f"two frames would both be called {place}")
                 name = names.of(place, record.split(view), view.size)
-                if not known:
-                    lines, others = view.station.lines, view.extras.lines
-                    put(f"{LINES}/{name}.json", line_file_text(lines, view.size, others))
+                lines, others = view.station.lines, view.extras.lines
+                if known and not view.station.shared:
+                    if texts[place] != hash(line_file_text(lines, view.size, others)):
+                        raise InputError(f"two frames would both be called {place}")
+                elif not known:
+                    text = line_file_text(lines, view.size, others)
+                    texts[place] = hash(text)
+                    put(f"{LINES}/{name}.json", text)
                     said = {**record_of(record.group, view), PLACE: place}
                     info.add(f"{LINES}/{name}.jpg", said)
                     counts["frames"] += 1

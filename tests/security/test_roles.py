@@ -144,7 +144,7 @@ class TestEveryRoute:
         self, team: Team, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         """Should the table's addresses ever be read otherwise than the router reads them."""
-        taken = access.Row(f"GET {API}/session", OPEN, {})
+        taken = access.RuleRow(f"GET {API}/session", OPEN, {})
         monkeypatch.setattr(access._Rules, "find", lambda *_: taken)
         assert team.ask("GET", f"{API}/datasets").status == 403
         assert team.ask("GET", "/metrics").status == 403

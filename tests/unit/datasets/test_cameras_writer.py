@@ -43,8 +43,14 @@ class TestWriteCameraFiles:
     ) -> None:
         view = soccer_group(replays=0).views[0]
         groups = [Group(key, (replace(view, key=key),)) for key in ("a/7.png", "a/7.jpg")]
+        first, same = map(solved, groups)
+        assert write_camera_files(tmp_path, [first, same]) == {"groups": 2, "cameras": 1}
+        found = same.solution.views[0].calibration
+        moved = replace(found, camera=replace(found.camera, position=found.camera.position + 1.0))
+        views = (replace(same.solution.views[0], calibration=moved),)
+        other = replace(same, solution=replace(same.solution, views=views))
         with pytest.raises(InputError, match="cameras of two frames would both be called a/7"):
-            write_camera_files(tmp_path, map(solved, groups))
+            write_camera_files(tmp_path, [first, other])
 
     def test_a_match_that_leaves_the_folder_is_refused(
         self, tmp_path: Path, solved: Solved, soccer_group: Make

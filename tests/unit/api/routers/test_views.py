@@ -114,7 +114,7 @@ class TestLines:
             {},
             {"lines": {"Middle line": [{"x": "1", "y": 2}]}},
             {"lines": {"Middle line": [{"x": True, "y": 2}]}},
-            {"lines": {"Middle line": [{"x": 1e6, "y": 2}]}},
+            {"lines": {"Middle line": [{"x": 1e6 + 1, "y": 2}]}},
             {"lines": {"Middle line": [{"x": 1, "y": 2, "z": 3}]}},
             {"lines": {"Middle line": [[1, 2]]}},
             {"lines": {"Middle line": [{"x": 1, "y": 2}] * 1001}},
