@@ -55,7 +55,10 @@ class TestOpen:
         assert names(store) == ["passing"]
 
     def test_what_the_log_says_must_be_on_the_disk(self, store: Store) -> None:
-        with pytest.raises(RuntimeError, match="must be on the disk"), store.write(lasting=False) as session:
+        with (
+            pytest.raises(RuntimeError, match="must be on the disk"),
+            store.write(lasting=False) as session,
+        ):
             append(session, [Entry("work", "ada", "2026-11-23T10:00:00+00:00", {})])
         with store.read() as session:
             assert list(read_log(session)) == []
