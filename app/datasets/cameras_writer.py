@@ -79,7 +79,6 @@ def put_view_cameras(put: PutText, record: ExportRecord, written: dict[str, int]
         text = camera_text(camera)
         if place not in written:
             put(camera_name(place), text)
-        elif written[place] != hash(text):
+        if written.setdefault(place, hash(text)) != hash(text):
             raise InputError(f"the cameras of two frames would both be called {place}")
-        written[place] = hash(text)
     return len(written) - before

@@ -25,11 +25,11 @@ ProposalOutcome = Literal["proposed", "unsure", "nothing"]
 """What can become of a view for which lines are sought in the paint of its picture."""
 PredictionFormat = Literal["coco", "yolo", "csv"]
 """How files of predictions are written."""
-AnyPredictionFormat = Literal["auto", "coco", "yolo", "csv"]
+AnyPredictionFormat = Literal["auto", PredictionFormat]
 """The same, or as the endings of the files tell."""
 PicturesSent = Literal["none", "copy"]
 """What an export of a server does with frames."""
-PicturesWritten = Literal["none", "copy", "link"]
+PicturesWritten = Literal[PicturesSent, "link"]
 """What an export into a folder of this machine does with frames."""
 TrainingViews = Literal["valid", "all"]
 """Which views training data are made from: those in which the 3D ball holds, or all."""
