@@ -65,6 +65,18 @@ def write_camera_files(
     return counts
 
 
+def put_once(put: PutText, name: str, text: str, written: dict[str, int]) -> None:
+    """Write a file unless it is written, which ``written`` keeps by name.
+
+    Raises:
+        InputError: What has that name says something else.
+    """
+    if name not in written:
+        put(name, text)
+    if written.setdefault(name, hash(text)) != hash(text):
+        raise InputError(f"the files of two frames would both be called {name}")
+
+
 def put_view_cameras(put: PutText, record: ExportRecord, written: dict[str, int]) -> int:
     """Write the cameras of a group that are not written yet; how many that were.
 
@@ -74,11 +86,7 @@ def put_view_cameras(put: PutText, record: ExportRecord, written: dict[str, int]
     before = len(written)
     for view in record.group.views:
         place, camera = view_place(record.group, view), record.camera(view)
-        if camera is None or (view.station.shared and place in written):
+        if camera is None or (view.station.shared and camera_name(place) in written):
             continue
-        text = camera_text(camera)
-        if place not in written:
-            put(camera_name(place), text)
-        if written.setdefault(place, hash(text)) != hash(text):
-            raise InputError(f"the cameras of two frames would both be called {place}")
+        put_once(put, camera_name(place), camera_text(camera), written)
     return len(written) - before

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from app.datasets import fields
-from app.datasets.cameras_writer import camera_name, camera_text
+from app.datasets.cameras_writer import camera_name, camera_text, put_once
 from app.datasets.exact import exact_inverse
 from app.datasets.export_record import ExportRecord
 from app.datasets.frame_names import view_place
@@ -124,7 +124,7 @@ def write_sn_calibration(
     """
     counts = {"groups": 0, "frames": 0, "cameras": 0}
     names, with_camera = _Names(), set[str]()
-    texts: dict[str, int] = {}
+    written: dict[str, int] = {}
     put = put or put_on_disk(root)
     with MatchInfoWriter(root) as info:
         for record in records:
@@ -134,19 +134,18 @@ def write_sn_calibration(
                 # A static camera that many groups share is written once.
                 known = place in names.of_place
                 name = names.of(place, record.split(view), view.size)
-                lines, others = view.station.lines, view.extras.lines
-                if known and not view.station.shared:
-                    if texts[place] != hash(line_file_text(lines, view.size, others)):
-                        raise InputError(f"two frames would both be called {place}")
-                elif not known:
+                shared = view.station.shared
+                if not (known and shared):
+                    lines, others = view.station.lines, view.extras.lines
                     text = line_file_text(lines, view.size, others)
-                    texts[place] = hash(text)
-                    put(f"{LINES}/{name}.json", text)
+                    put_once(put, f"{LINES}/{name}.json", text, written)
+                if not known:
                     said = {**record_of(record.group, view), PLACE: place}
                     info.add(f"{LINES}/{name}.jpg", said)
                     counts["frames"] += 1
-                if camera is not None and name not in with_camera:
-                    put(camera_name(f"{CAMERAS}/{name}"), camera_text(camera))
+                if camera is not None and not (shared and name in with_camera):
+                    file = camera_name(f"{CAMERAS}/{name}")
+                    put_once(put, file, camera_text(camera), written)
                     with_camera.add(name)
     return counts | {"cameras": len(with_camera)}
 

@@ -108,7 +108,7 @@ class TestWriteSnCalibration:
             (tmp_path / name).mkdir()
         counts = write_sn_calibration(tmp_path / "same", map(solved, (first, same)))
         assert (counts["groups"], counts["frames"]) == (2, 1)
-        with pytest.raises(InputError, match="two frames would both be called a/7"):
+        with pytest.raises(InputError, match="two frames would both be called lines/"):
             write_sn_calibration(tmp_path / "other", map(solved, (first, second)))
 
     def test_the_layout_of_before_is_read_all_the_same(
