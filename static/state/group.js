@@ -197,12 +197,14 @@ const lastStations = stored('last stations', /** @type {{group: number, station:
 const MOST_STATIONS = 100;
 
 /**
- * The static camera that the last edit of this window on a group changed; null: it changed none.
- * Its edits have a line of their own, and undo has to ask there.
+ * The static camera that the last edit of this window on a group changed, answered or not; null: it
+ * changed none. Its edits have a line of their own, and undo has to ask there.
  *
  * @param {number | undefined} group
  */
 export function lastStationOf(group) {
+	const unanswered = outbox.value.findLast((item) => item.group === group && item.edit && !item.held);
+	if (unanswered) return unanswered.station;
 	return lastStations.value.find((one) => one.group === group)?.station ?? null;
 }
 

@@ -39,6 +39,7 @@ let receiver = { delivered: () => {}, refused: () => {} };
 /** @type {ReturnType<typeof setTimeout> | undefined} */
 let timer;
 let pause = FIRST_RETRY;
+let takenUp = Promise.resolve();
 
 /** @param {Receiver} one */
 export function hearFrom(one) {
@@ -53,7 +54,12 @@ export function startSending() {
 	effect(() => { if (!mustLogIn.value) untracked(wake); });
 	// Other rights: what they bar now is barred again.
 	effect(() => { if (me.value) untracked(tryBarred); });
-	takeUp();
+	takenUp = takeUp();
+}
+
+/** Wait until what an earlier page has left is this one's to send. */
+export function isTakenUp() {
+	return takenUp;
 }
 
 async function takeUp() {

@@ -9,7 +9,7 @@ import { actions, didAgain, forget, forgetEdit, nextBack, tookBack, undone } fro
 import { returnTo, reviewAddress } from './navigation.js';
 import { announce, complain } from './notice.js';
 import { discard, outbox } from './outbox.js';
-import { isAway, wake } from './sending.js';
+import { isAway, isTakenUp, wake } from './sending.js';
 import { giveVerdictAgain, takeVerdictBack } from './verdicts.js';
 
 /** @import {EditDone} from './last_action.js' */
@@ -17,10 +17,13 @@ import { giveVerdictAgain, takeVerdictBack } from './verdicts.js';
 const ownStation = computed(() => lastStationOf(groupDocument.value?.id));
 /** The group that the page is about, in the review as in the calibration editor. */
 const onScreen = computed(() => ('group' in page.value ? page.value.group : null));
+/** Whether the group that is loaded has an edit to take back, whoever made it. */
+const isEdited = computed(() => (
+	Boolean(groupDocument.value?.can_undo) || ownStation.value !== null || pending.value.length > 0
+));
 const next = computed(() => {
 	const shown = onScreen.value === groupDocument.value?.id ? groupDocument.value : null;
-	const edited = shown !== null && (shown.can_undo || ownStation.value !== null || pending.value.length > 0);
-	return nextBack(actions.value, onScreen.value, edited);
+	return nextBack(actions.value, onScreen.value, shown !== null && isEdited.value);
 });
 /** What undo would take back, in words; null when there is nothing. */
 export const undoable = computed(() => {
@@ -50,6 +53,8 @@ export function undo() {
 }
 
 async function undoOne() {
+	// What the page before this one did last may still wait for its answer.
+	await isTakenUp();
 	const action = next.value;
 	if (action === null) announce('Nothing to undo.');
 	else if (action === 'here') undoHere();
@@ -77,7 +82,7 @@ function undoHere() {
 /** Return to a group and undo its last edit. @param {EditDone} action */
 async function undoThere(action) {
 	if (!(await returnTo(action.group))) return;
-	if (groupDocument.value?.can_undo || ownStation.value !== null) undoHere();
+	if (isEdited.value) undoHere();
 	else forget(action);
 }
 

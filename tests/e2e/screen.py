@@ -144,6 +144,45 @@ def holding(page: Page, url: str | Pattern[str]) -> Iterator[Held]:
         held.release()
 
 
+class HeldAnswers:
+    """Answers that the server has given and the page does not get before a test says so."""
+
+    def __init__(self, page: Page):
+        self.page = page
+        self.kept: list[tuple[Route, APIResponse]] = []
+        self._goes_on = False
+
+    def hear(self, route: Route) -> None:
+        """Ask the server, and keep what it answers; after the release requests pass."""
+        if self._goes_on:
+            route.fallback()
+        else:
+            self.kept.append((route, route.fetch()))
+
+    def arrive(self) -> None:
+        """Wait until there is one."""
+        until(self.page, lambda: self.kept)
+
+    def release(self) -> None:
+        """Let the page have them; a page that has gone to another address meanwhile never does."""
+        self._goes_on = True
+        while self.kept:
+            route, response = self.kept.pop(0)
+            with suppress(Error):
+                route.fulfill(response=response)
+
+
+@contextmanager
+def holding_answers(page: Page, url: str | Pattern[str]) -> Iterator[HeldAnswers]:
+    """Hold the answers to what a page asks for at an address, to the end at the latest."""
+    held = HeldAnswers(page)
+    page.route(url, held.hear)
+    try:
+        yield held
+    finally:
+        held.release()
+
+
 @contextmanager
 def refusing(page: Page, *urls: str) -> Iterator[None]:
     """Let what a page asks for at some addresses fail; afterwards it passes, as with ``holding``."""

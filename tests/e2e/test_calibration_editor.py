@@ -12,6 +12,7 @@ from playwright.sync_api import Page, expect
 from app.soccer.pitch import MARKINGS
 from tests.e2e.screen import (
     at_rest,
+    holding_answers,
     jobs_end,
     on_present,
     passing,
@@ -358,6 +359,45 @@ class TestStation:
         editor.saved()
         assert editor.lines != before
         page.goto(f"{film}/review/{groups[5]}")
+        page.wait_for_selector(".strip__tabs")
+        page.keyboard.press("Control+z")
+        expect(page).to_have_url(re.compile(rf"/review/{groups[0]}\b"))
+        until(page, lambda: editor.lines == before)
+        jobs_end(page, film)
+
+    def test_undo_takes_back_an_edit_whose_answer_is_still_on_its_way(
+        self, open_page: OpenPage, film: str
+    ) -> None:
+        page = open_page(None)
+        groups = page.request.get(f"{film}/api/v1/datasets/film/timeline").json()["id"]
+        editor = Editor(page, film, groups[0], 3)
+        before = editor.lines
+        with holding_answers(page, "**/stations/*/lines*") as held:
+            editor.choose(longest(before))
+            editor.press(".", "Shift+ArrowDown")
+            editor.staged(1)
+            editor.press("Control+s")
+            held.arrive()
+            assert editor.lines != before
+            editor.press("Control+z")
+        until(page, lambda: editor.lines == before)
+        jobs_end(page, film)
+
+    def test_undo_takes_back_an_edit_whose_answer_the_page_before_never_got(
+        self, open_page: OpenPage, film: str
+    ) -> None:
+        page = open_page(None)
+        groups = page.request.get(f"{film}/api/v1/datasets/film/timeline").json()["id"]
+        editor = Editor(page, film, groups[0], 3)
+        before = editor.lines
+        with holding_answers(page, "**/stations/*/lines*") as held:
+            editor.choose(longest(before))
+            editor.press(".", "Shift+ArrowDown")
+            editor.staged(1)
+            editor.press("Control+s")
+            held.arrive()
+            assert editor.lines != before
+            page.goto(f"{film}/review/{groups[5]}")
         page.wait_for_selector(".strip__tabs")
         page.keyboard.press("Control+z")
         expect(page).to_have_url(re.compile(rf"/review/{groups[0]}\b"))
