@@ -15,6 +15,7 @@ import { discard, outbox } from './outbox.js';
 /**
  * @typedef {object} Field one thing that both could have changed
  * @property {string} key
+ * @property {'verdict' | Edit['kind']} kind
  * @property {string} name in words
  * @property {string | null} view
  * @property {unknown} base what both found
@@ -63,7 +64,7 @@ function fieldsOf(theirs, { edit, verdict, base }) {
 	}
 	if (!edit || !theirs.views.some(({ key }) => key === edit.view)) return [];
 	const view = viewOf(theirs, edit.view);
-	const about = { ...BLANK, view: edit.view };
+	const about = { ...BLANK, kind: edit.kind, view: edit.view };
 	if (edit.kind === 'include') {
 		return [{
 			...about, key: `include ${view.key}`, name: `View ${view.letter} used`, edit,
@@ -98,7 +99,7 @@ function insisting(edit) {
 
 /** @type {Field} */
 const BLANK = {
-	key: '', name: '', view: null, base: null, mine: null, theirs: null, overlaps: false,
+	key: '', kind: 'verdict', name: '', view: null, base: null, mine: null, theirs: null, overlaps: false,
 	edit: null, verdict: null,
 };
 

@@ -33,7 +33,7 @@ import { focused } from './workspace.js';
  * @property {number | null} largest_px
  * @property {number | null} largest_px_without
  */
-/** @template T @typedef {{key: string, items: T[]}} Known   key: what was asked about */
+/** @template T @typedef {{key: string, id: number, items: T[]}} Known   id: of the group or view; key: of its state */
 
 /** Whether the solver is still trying out what would mend the group on screen. */
 export const isSearching = signal(false);
@@ -48,18 +48,27 @@ export const influence = signal(/** @type {Known<Influence> | null} */ (null));
 
 /** @type {Kept<string, Known<any>>} */
 const kept = new Kept(40);
+const PATHS = {
+	remedies: (/** @type {number} */ group) => `/groups/${group}/remedies`,
+	influence: (/** @type {number} */ view) => `/views/${view}/influence`,
+};
 /** Addresses that this server does not have. @type {Set<string>} */
 const absent = new Set();
 
+/** @param {'remedies' | 'influence'} what @param {number} id @param {string} etag of the group */
+function keyOf(what, id, etag) {
+	return `${what} ${id} ${etag}`;
+}
+
 /**
- * @param {'remedies' | 'influence'} what @param {string} path @param {string} key @param {AbortSignal} signal
+ * @param {'remedies' | 'influence'} what @param {number} id @param {string} key @param {AbortSignal} signal
  * @returns {Promise<Known<any> | null>}
  */
-async function ask(what, path, key, signal) {
+async function ask(what, id, key, signal) {
 	const present = kept.get(key);
 	if (present || absent.has(what)) return present ?? null;
 	try {
-		const found = { key, items: (await request(path, { signal })).items };
+		const found = { key, id, items: (await request(PATHS[what](id), { signal })).items };
 		kept.set(key, found);
 		return found;
 	} catch (error) {
@@ -79,15 +88,16 @@ function needsHelp({ solution }) {
  * Ask after a while, unless the group has changed by then.
  *
  * @template T
- * @param {'remedies' | 'influence'} what @param {string} path @param {string} key
+ * @param {'remedies' | 'influence'} what @param {number} id @param {string} etag
  * @param {import('@preact/signals').Signal<Known<T> | null>} into
  * @param {() => void} [answered] called when the answer is there, or that there is none
  */
-function askLater(what, path, key, into, answered) {
+function askLater(what, id, etag, into, answered) {
+	const key = keyOf(what, id, etag);
 	const controller = new AbortController();
 	if (into.value?.key !== key) into.value = kept.get(key) ?? null;
 	const timer = setTimeout(async () => {
-		const found = await ask(what, path, key, controller.signal);
+		const found = await ask(what, id, key, controller.signal);
 		if (controller.signal.aborted) return;
 		if (found) into.value = found;
 		answered?.();
@@ -108,9 +118,8 @@ export function startInsight() {
 			return undefined;
 		}
 		return untracked(() => {
-			const key = `remedies ${at.id} ${at.etag}`;
-			isSearching.value = !kept.has(key);
-			return askLater('remedies', `/groups/${at.id}/remedies`, key, remedies, () => { isSearching.value = false; });
+			isSearching.value = !kept.has(keyOf('remedies', at.id, at.etag));
+			return askLater('remedies', at.id, at.etag, remedies, () => { isSearching.value = false; });
 		});
 	});
 	effect(() => {
@@ -121,6 +130,6 @@ export function startInsight() {
 			influence.value = null;
 			return undefined;
 		}
-		return untracked(() => askLater('influence', `/views/${view.id}/influence`, `influence ${view.id} ${at.etag}`, influence));
+		return untracked(() => askLater('influence', view.id, at.etag, influence));
 	});
 }

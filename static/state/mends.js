@@ -34,8 +34,8 @@ import { focused } from './workspace.js';
  * @property {PairJson | null} [point] where that point would have to stand, image pixels
  */
 /**
- * @typedef {Way & About & {title: string | null, sentence: string, passes: boolean}} Mend one thing that a person can do about a group;
- *   title null: that of the gate that fails; passes: whether the solver found that the group would pass
+ * @typedef {Way & About & {title: string | null, sentence: string, passes: boolean, finding?: FindingJson}} Mend one thing that a person can do
+ *   about a group; title null: that of the gate that fails; passes: whether the solver found that the group would pass; finding: that it mends
  */
 
 /** Which of them the card shows. */
@@ -100,7 +100,7 @@ function aboutOf({ view, marking = null, index = null, point = null }) {
 
 /** @param {GroupDocument} shown @param {FindingJson} finding @returns {Mend[]} */
 function ofFinding(shown, finding) {
-	const told = { title: findingTitle(shown, finding), sentence: finding.sentence, passes: false };
+	const told = { title: findingTitle(shown, finding), sentence: finding.sentence, passes: false, finding };
 	return waysOf(finding).map((way) => ({ ...aboutOf(finding.fix ?? finding), ...way, ...told }));
 }
 
@@ -142,7 +142,7 @@ function mendsOf(shown, solved, helping, proposed) {
 export const mends = computed(() => {
 	const shown = group.value;
 	if (!shown) return [];
-	const known = remedies.value?.key.startsWith(`remedies ${shown.id} `) ? remedies.value.items : [];
+	const known = remedies.value?.id === shown.id ? remedies.value.items : [];
 	return mendsOf(shown, solution.value, known, openProposals.value);
 });
 
@@ -159,10 +159,8 @@ export const mend = computed(() => (isHeld.value ? null : mends.value[mendIndex.
 
 /** The finding that the card speaks about; null where it speaks of something else. */
 export const toldFinding = computed(() => {
-	const findings = solution.value?.findings ?? [];
 	const meant = mend.value;
-	if (!meant?.title) return findings[0] ?? null;
-	return findings.find(({ sentence, view }) => sentence === meant.sentence && view === meant.view) ?? null;
+	return (meant?.title ? meant.finding : solution.value?.findings[0]) ?? null;
 });
 
 /** Show another one. @param {number} step */

@@ -18,10 +18,10 @@ import { leftOutText } from '../state/reasons.js';
  * @returns {string}
  */
 function wordsFor(field, value, base) {
-	if (field.verdict) return value?.state ?? '';
-	if (field.key.startsWith('include')) return includedWords(value);
-	if (field.key.startsWith('picture')) return value ? 'stretched or cropped' : 'as it was taken';
-	if (field.key.startsWith('ball')) return ballWords(value?.[0], base?.[0]);
+	if (field.kind === 'verdict') return value?.state ?? '';
+	if (field.kind === 'include') return includedWords(value);
+	if (field.kind === 'picture') return value ? 'stretched or cropped' : 'as it was taken';
+	if (field.kind === 'ball') return ballWords(value?.[0], base?.[0]);
 	return lineWords(value, base);
 }
 

@@ -65,7 +65,7 @@ export function ViewLines({ group, pictures }) {
 	if (!picture) return null;
 	const drawn = picture.markings.filter(({ points }) => points.length > 0);
 	const missing = picture.markings.length - drawn.length;
-	const known = influence.value?.key.startsWith(`influence ${picture.view.id} `) ? influence.value.items : [];
+	const known = influence.value?.id === picture.view.id ? influence.value.items : [];
 	const jac = jacOf(picture.solved);
 	return html`
 		<section class="card" aria-label=${`Lines of view ${picture.view.letter}`}>

@@ -54,7 +54,7 @@ describe('a kind of fix that nobody here has heard of', () => {
 	const offers = (findings, items) => {
 		show(LINES, 'd');
 		groupDocument.value = { ...groupDocument.value, solution: { ...groupDocument.value.solution, first_failing: null, passes: true, findings } };
-		remedies.value = { key: 'remedies 7 d', items };
+		remedies.value = { key: 'remedies 7 d', id: 7, items };
 		return mends.value;
 	};
 

@@ -53,7 +53,7 @@ const mark = (sure) => ({ id: sure ? 1 : 2, name: 'detector', score: sure ? 0.93
 /** @param {boolean} sure */
 const predicted = (sure) => sceneOf({ predictions: /** @type {any} */ ({ marks: [mark(sure)], fewer: 0, origin: null, draw: drawPredictions, at: () => null }) });
 const ghosts = /** @type {Field[]} */ (/** @type {unknown} */ ([{
-	view: KEY, key: 'ball', base: [{ box: [14, 22, 20, 20] }], mine: [{ box: [70, 12, 20, 20] }],
+	view: KEY, kind: 'ball', base: [{ box: [14, 22, 20, 20] }], mine: [{ box: [70, 12, 20, 20] }],
 }]));
 const PAINT = [...Array(30).keys()].map((i) => ({ x: 4 + 4.2 * i, y: 27 + Math.sin(i / 4) }));
 const strip = (/** @type {'ok' | 'bad'} */ grade, /** @type {number} */ off, /** @type {{x: number, y: number}[]} */ paint = []) => (/** @type {CanvasRenderingContext2D} */ context) => {
