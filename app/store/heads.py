@@ -9,7 +9,7 @@ from sqlalchemy import bindparam, func, select
 
 from app.store.session import Session
 from app.store.solutions import is_current
-from app.store.tables.groups import DatasetModel, GroupModel
+from app.store.tables.groups import DatasetModel, GroupModel, StationModel, ViewModel
 from app.store.tables.solutions import SolutionModel
 from app.store.tables.verdicts import VerdictModel
 
@@ -20,6 +20,14 @@ _LAST = (
     .correlate(_GROUP)
     .scalar_subquery()
     .label("last")
+)
+_STATIONS = (
+    select(func.coalesce(func.sum(StationModel.revision), 0))
+    .join_from(ViewModel, StationModel, StationModel.id == ViewModel.station_id)
+    .where(ViewModel.group_id == _GROUP.c.id)
+    .correlate(_GROUP)
+    .scalar_subquery()
+    .label("station_revisions")
 )
 _HEAD = (
     select(_GROUP.c.inputs_hash, _GROUP.c.revision, _DATASET.c.policy_hash, _LAST)
@@ -35,6 +43,7 @@ _HEADS = (
         _DATASET.c.policy_hash,
         SolutionModel.__table__.c.summary,
         _LAST,
+        _STATIONS,
     )
     .join_from(_GROUP, _DATASET, _DATASET.c.id == _GROUP.c.dataset_id)
     .outerjoin(SolutionModel.__table__, is_current())
@@ -48,5 +57,6 @@ def find_head(session: Session, group_id: int) -> Any | None:
 
 
 def read_heads(session: Session, group_ids: Sequence[int]) -> Sequence[Any]:
-    """Rows as of ``find_head`` with ``id``, the ``policy`` and the ``summary`` of the solution."""
+    """Rows as of ``find_head`` with ``id``, the ``policy``, the ``summary`` of the solution and the
+    sum of its views' stations' revisions, ``station_revisions``."""
     return session.execute(_HEADS, {"ids": list(group_ids)}).all()

@@ -21,22 +21,29 @@ def said_part(inputs_hash: str, revision: int, verdict_id: int) -> str:
 
 
 def group_etag(
-    said: str, policy_hash: str, policy_name: str, findings: Iterable[str] | None
+    said: str,
+    policy_hash: str,
+    policy_name: str,
+    findings: Iterable[str] | None,
+    station_revisions: int,
 ) -> str:
     """The ETag of a group, quoted.
 
-    Before the dash what people said, after it what was computed from that. A change builds on the
-    first part alone: a solution that arrives is no conflict, but a cached document without it is
-    out of date.
+    Before the dash what people said, after it what was computed from that, and in how many steps
+    its stations came to be as they are. A change builds on the first part alone: a solution that
+    arrives is no conflict, but a cached document without it is out of date, as is one with ETags of
+    stations that were changed and changed back.
 
     Args:
         said: ``said_part``.
         policy_hash: Of the dataset's policy.
         policy_name: Of the dataset's policy.
         findings: Kinds of the solution's findings; None without a solution.
+        station_revisions: Of the stations of its views, added up.
     """
     kinds = sorted(set(findings or ()))
-    computed = digest([policy_hash, policy_name, SOLVER_VERSION, findings is None, kinds])[:8]
+    parts = [policy_hash, policy_name, SOLVER_VERSION, findings is None, kinds, station_revisions]
+    computed = digest(parts)[:8]
     return f'"{said}-{computed}"'
 
 
@@ -115,5 +122,6 @@ def read_etags(session: Session, group_ids: Sequence[int]) -> dict[int, str]:
             kinds = [item.kind for item in noticed[row.id]]
             findings = [*json.loads(row.summary)["findings"], *kinds]
         name = policy_of(row.policy).name
-        etags[row.id] = group_etag(said, row.policy_hash, name, findings)
+        revisions = int(row.station_revisions)
+        etags[row.id] = group_etag(said, row.policy_hash, name, findings, revisions)
     return etags

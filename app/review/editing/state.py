@@ -127,6 +127,7 @@ class Record:
         ]
         kinds = None if solution is None else [item.kind for item in solution.findings]
         stations = stored.stations.values()
+        revisions = sum(item.revision for item in stations)
         return GroupState(
             id=stored.id,
             dataset_id=stored.dataset_id,
@@ -134,7 +135,7 @@ class Record:
             number=stored.number,
             key=stored.group.key,
             revision=stored.revision,
-            etag=group_etag(self.said, stored.policy.hash, stored.policy.name, kinds),
+            etag=group_etag(self.said, stored.policy.hash, stored.policy.name, kinds, revisions),
             group=stored.group,
             view_ids=stored.view_ids,
             station_ids={item.station.key: item.id for item in stations},

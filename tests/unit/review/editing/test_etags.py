@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from app.review.editing.edit import IncludeView
-from app.review.editing.etags import Head, group_etag, read_etags, read_head
+from app.review.editing.edit import IncludeView, SetStationLines
+from app.review.editing.etags import Head, group_etag, read_etags, read_head, said_of
 from app.review.editing.state import GroupState
+from app.review.editing.stations import load_station, submit_station, undo_station
 from app.review.editing.submit import load, submit
 from app.review.editing.undo import undo
 from app.review.importing.ingest import ingest
 from app.review.verdicts.verdict import set_verdict
+from app.soccer.frames import ImagePoint
 from app.store.store import Store
 
 
@@ -35,8 +37,25 @@ class TestReadEtags:
         assert undone.stored.inputs_hash == state.stored.inputs_hash
         assert etags_of(store, state.id) == {state.id: undone.etag} != {state.id: state.etag}
 
+    def test_a_static_camera_that_was_changed_and_changed_back_makes_a_cached_document_old(
+        self, store: Store, fill, make_static
+    ) -> None:
+        """Its own ETag is another, and whoever went on from the old one would be refused."""
+        (one, other) = fill(make_static(10), make_static(11))
+        before = load(store, one)
+        station = load_station(store, before.station_ids["cam1"])
+        edit = SetStationLines({"Middle line": (ImagePoint(1.5, 2.5), ImagePoint(3.0, 4.0))})
+        edited = submit_station(store, station.id, edit, if_match=station.etag, actor="ann")
+        undone = undo_station(store, station.id, if_match=edited.etag, actor="ann")
+        for number in (one, other):
+            assert load(store, number).station_etags["cam1"] == undone.etag != station.etag
+        after = load(store, one)
+        assert etags_of(store, one) == {one: after.etag} != {one: before.etag}
+        # What was said is the same: an edit of another view still goes through.
+        assert said_of(after.etag) == said_of(before.etag)
+
     def test_other_thresholds_under_the_same_name_are_another(self) -> None:
-        etags = {group_etag("said", policy, "custom", ()) for policy in ("one", "two")}
+        etags = {group_etag("said", policy, "custom", (), 0) for policy in ("one", "two")}
         assert len(etags) == 2
 
     def test_without_a_solution_is_another(self, store: Store, fill, make_group) -> None:
