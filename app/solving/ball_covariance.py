@@ -242,6 +242,12 @@ def longest_sigma(covariances: FloatArray) -> FloatArray:
     return sigma
 
 
+def is_certain(sigma: FloatArray, limit_m: float) -> BoolArray:
+    """Whether standard deviations along the longest axis are at most so many metres, NaN is not, (N,)."""
+    certain: BoolArray = limit_m - sigma >= 0
+    return certain
+
+
 def is_within(covariances: FloatArray, sigma_m: float) -> BoolArray:
     """Whether the standard deviation along the longest axis is at most so many metres, (N,).
 
@@ -254,7 +260,7 @@ def is_within(covariances: FloatArray, sigma_m: float) -> BoolArray:
     # The longest lies between the largest of the three and their sum: few need eigenvalues.
     within: BoolArray = variances.sum(axis=1) * (1 + _ROUNDING) < limit
     near = np.flatnonzero(~within & ~(variances.max(axis=1) * (1 - _ROUNDING) > limit))
-    within[near] = sigma_m - longest_sigma(covariances[near]) >= 0
+    within[near] = is_certain(longest_sigma(covariances[near]), sigma_m)
     return within
 
 

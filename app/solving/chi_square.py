@@ -83,6 +83,13 @@ def _tested(
     return Residuals(point, total, np.maximum(freedom, 0), p_value)
 
 
+def p_values(facts: Facts, used: BoolArray, start: FloatArray, policy: Policy) -> FloatArray:
+    """p-value of each group as of ``residuals_of``, infinite where it is ``untestable``, (G,)."""
+    found = residuals_of(facts, used, start, policy).p_value
+    found[untestable(facts, used, policy)] = np.inf
+    return found
+
+
 def untestable(facts: Facts, used: BoolArray, policy: Policy) -> BoolArray:
     """Groups whose residuals say nothing: nobody says how exact one of their cameras is, (G,).
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -11,8 +12,8 @@ from app.geometry.arrays import BoolArray, FloatArray, IntArray
 from app.geometry.triangulation import parallax_angle
 from app.soccer.policy import Policy
 from app.soccer.solution import GATES
-from app.solving.ball_covariance import MeanCovariance, is_within
-from app.solving.chi_square import residuals_of, untestable
+from app.solving.ball_covariance import MeanCovariance, is_certain, is_within
+from app.solving.chi_square import p_values
 from app.solving.facts import Facts
 
 MIN_VIEWS = 2
@@ -116,28 +117,32 @@ def judge_standing(
     """
     view_failed, pair_failed = standing
     left = facts.view_included & (view_failed == PASSES)
-    point, parallax, distance = _mean(facts, pair_failed == PASSES)
+    valid = pair_failed == PASSES
+    point, parallax, distance = _mean(facts, valid)
     baseline = _baseline(facts, left)
     failed = np.zeros((PASSES, facts.groups), bool)
     failed[_CALIBRATABLE : _BALL + 1] = _view_gates(facts, view_failed, left)
-    failed[_BASELINE] = ~(baseline >= policy.min_baseline_m)
     failed[_REPROJECTION] = np.isnan(point[:, 0])
-    if policy.min_parallax_degrees is not None:
-        failed[_PARALLAX] = ~(parallax >= policy.min_parallax_degrees)
-    before: BoolArray = failed[_REPROJECTION]
-    if first_alone:
-        before = np.any(failed[:_SIGMA], axis=0)
-    if policy.max_sigma_m is not None:
-        asked = np.flatnonzero(~before)
-        covariances = uncertainty.covariances(pair_failed == PASSES, asked, point[asked], policy)
-        failed[_SIGMA] = True
-        failed[_SIGMA, asked] = ~is_within(covariances, policy.max_sigma_m)
-    if policy.min_p_value is not None:
-        used = views_of(facts, pair_failed == PASSES)
+
+    def before() -> BoolArray:
+        """Groups whose sigma and p-value are not asked for."""
+        fallen: BoolArray = failed[_REPROJECTION]
+        return np.any(failed[:_SIGMA], axis=0) if first_alone else fallen
+
+    def certain(limit_m: float) -> BoolArray:
+        asked = np.flatnonzero(~before())
+        covariances = uncertainty.covariances(valid, asked, point[asked], policy)
+        found = np.zeros(facts.groups, bool)
+        found[asked] = is_within(covariances, limit_m)
+        return found
+
+    def p_value() -> FloatArray:
+        used = views_of(facts, valid)
         if first_alone:
-            used &= ~before[facts.view_group]
-        likely = residuals_of(facts, used, point, policy).p_value >= policy.min_p_value
-        failed[_CHI_SQUARE] = ~likely & ~untestable(facts, used, policy)
+            used &= ~before()[facts.view_group]
+        return p_values(facts, used, point, policy)
+
+    _compare(failed, policy, baseline, parallax, certain, p_value)
     return Judgement(jac, view_failed, pair_failed, failed, baseline, point, parallax, distance)
 
 
@@ -149,19 +154,50 @@ def compare_again(
     Args:
         known: What another policy makes of them.
         policy: The thresholds.
-        sigma: ``longest_sigma`` of each group, NaN without a ball, shape (G,); None: not asked for.
+        sigma: ``longest_sigma`` of each group, NaN without a ball, shape (G,); None where the
+            policy does not ask.
         p_value: Of each group, infinite where it cannot be tested, shape (G,); None likewise.
     """
     failed = known.failed.copy()
-    failed[_BASELINE] = ~(known.baseline >= policy.min_baseline_m)
-    failed[_PARALLAX:PASSES] = False
-    if policy.min_parallax_degrees is not None:
-        failed[_PARALLAX] = ~(known.parallax >= policy.min_parallax_degrees)
-    if sigma is not None and policy.max_sigma_m is not None:
-        failed[_SIGMA] = ~(policy.max_sigma_m - sigma >= 0)
-    if p_value is not None and policy.min_p_value is not None:
-        failed[_CHI_SQUARE] = ~(p_value >= policy.min_p_value)
+
+    def certain(limit_m: float) -> BoolArray:
+        assert sigma is not None
+        return is_certain(sigma, limit_m)
+
+    def known_p_value() -> FloatArray:
+        assert p_value is not None
+        return p_value
+
+    _compare(failed, policy, known.baseline, known.parallax, certain, known_p_value)
     return failed
+
+
+def _compare(
+    failed: BoolArray,
+    policy: Policy,
+    baseline: FloatArray,
+    parallax: FloatArray,
+    certain: Callable[[float], BoolArray],
+    p_value: Callable[[], FloatArray],
+) -> None:
+    """Judge by the gates that compare a number of the whole group with a threshold.
+
+    Args:
+        failed: Takes what they say, shape (10, G); in their order, the dear ones last.
+        policy: The thresholds.
+        baseline: As in ``Judgement``, like ``parallax``; NaN falls.
+        parallax: As there.
+        certain: Asked only where the policy asks: groups whose sigma is within a limit, metres, (G,).
+        p_value: Likewise: of each group, infinite where it cannot be tested, (G,).
+    """
+    failed[_BASELINE] = ~(baseline >= policy.min_baseline_m)
+    failed[_PARALLAX:] = False
+    if policy.min_parallax_degrees is not None:
+        failed[_PARALLAX] = ~(parallax >= policy.min_parallax_degrees)
+    if policy.max_sigma_m is not None:
+        failed[_SIGMA] = ~certain(policy.max_sigma_m)
+    if policy.min_p_value is not None:
+        failed[_CHI_SQUARE] = ~(p_value() >= policy.min_p_value)
 
 
 def failures(facts: Facts, jac: FloatArray, policy: Policy) -> tuple[IntArray, IntArray]:

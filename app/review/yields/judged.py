@@ -11,7 +11,7 @@ from app.geometry.arrays import BoolArray, FloatArray
 from app.soccer.policy import Policy
 from app.soccer.solution import GAMMAS_PERCENT
 from app.solving.ball_covariance import MeanCovariance, longest_sigma
-from app.solving.chi_square import residuals_of, untestable
+from app.solving.chi_square import p_values
 from app.solving.facts import Facts
 from app.solving.judgement import (
     Judgement,
@@ -173,7 +173,4 @@ def _sigma(
 
 
 def _p_value(facts: Facts, policy: Policy, judgement: Judgement) -> FloatArray:
-    used = views_of(facts, judgement.valid)
-    p_value = residuals_of(facts, used, judgement.point, policy).p_value
-    p_value[untestable(facts, used, policy)] = np.inf
-    return p_value
+    return p_values(facts, views_of(facts, judgement.valid), judgement.point, policy)

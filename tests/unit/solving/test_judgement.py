@@ -374,10 +374,11 @@ class TestCompareAgain:
         assert not failed[GATES.index("parallax") :].any()
         assert failed[GATES.index("baseline")].tolist() == [False, True, True, True]
 
-    def test_what_was_not_measured_fails_nobody(self, known):
-        failed = compare_again(known, EVERYTHING_ASKED, None, None)
-        assert not failed[GATES.index("sigma") :].any()
-        assert failed[GATES.index("parallax")].tolist() == [False, True, True, True]
+    def test_what_is_asked_for_and_not_measured_is_no_silent_pass(self, known):
+        with pytest.raises(AssertionError):
+            compare_again(known, EVERYTHING_ASKED, None, self.p_value)
+        with pytest.raises(AssertionError):
+            compare_again(known, EVERYTHING_ASKED, self.sigma, None)
 
     def test_gates_of_views_and_pairs_stay_and_the_verdict_that_is_known_stays_whole(self, known):
         failed = compare_again(known, EVERYTHING_ASKED, self.sigma, self.p_value)
