@@ -24,8 +24,8 @@ LOCAL = "tcp://127.0.0.1:8786"
 @commands.command()
 def scheduler(address: Address = None) -> None:
     """Carry work between servers and workers of other machines."""
-    from app.review.datasets.cluster import read_place
-    from app.review.datasets.cluster_serving import run_scheduler
+    from app.review.workers.cluster import read_place
+    from app.review.workers.cluster_serving import run_scheduler
 
     settings = read_settings()
     place = read_place(address or settings.cluster or LOCAL, settings.cluster_keys)
@@ -44,8 +44,8 @@ def worker(
     ] = None,
 ) -> None:
     """Solve on this machine for servers of others; it needs neither database nor frames."""
-    from app.review.datasets.cluster import read_place
-    from app.review.datasets.cluster_serving import run_workers
+    from app.review.workers.cluster import read_place
+    from app.review.workers.cluster_serving import run_workers
 
     settings = read_settings()
     place = read_place(address or settings.cluster or LOCAL, settings.cluster_keys)

@@ -8,7 +8,6 @@ from typing import Annotated
 
 import typer
 
-from app.commands.opened import process_pool
 from app.commands.options import Json, Size, Workers, read_settings
 from app.commands.terminal import print_values, show_progress
 
@@ -58,6 +57,7 @@ def calibrate(
 ) -> None:
     """Calibrate line files (folder or zip) to camera files; needs no dataset."""
     from app.review.datasets.calibrate_files import calibrate_files
+    from app.review.workers.processes import process_pool
 
     named, shape = _file(matches, "--matches"), _file(picture, "--picture")
     pool = process_pool(workers or read_settings().workers)

@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import shutil
 import tempfile
-import zipfile
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,10 +15,6 @@ from app.progress import TellProgress
 if TYPE_CHECKING:
     from app.review.evaluating.prediction_source import PredictionSource, SourcesRequest
     from touchline.client import Client
-
-PACKED = frozenset({".jpg", ".jpeg", ".png", ".webp", ".mp4", ".zip", ".parquet"})
-"""Endings of files that are compressed already."""
-_CHUNK = 1 << 20
 
 
 def import_values(
@@ -93,19 +86,14 @@ def export_values(
         report = _export_report(client.get(f"exports/{job['id']}"))
         return {"out": out, "format": request["format"], **report}
     from app.datasets.output import output_tree
-    from app.datasets.safe_path import resolve_inside
+    from app.datasets.packing import unpack
 
     with output_tree(out) as folder, tempfile.TemporaryDirectory() as held:
         job = client.post("exports", request)
         client.wait(job, progress=told(progress))
         found = client.get(f"exports/{job['id']}")
         content = client.download(f"exports/{job['id']}/content", Path(held) / "export.zip")
-        with zipfile.ZipFile(content) as archive:
-            for name in archive.namelist():
-                target = resolve_inside(folder, name)
-                target.parent.mkdir(parents=True, exist_ok=True)
-                with archive.open(name) as source, target.open("wb") as file:
-                    shutil.copyfileobj(source, file, _CHUNK)
+        unpack(content, folder)
     return {"out": str(out), "format": request["format"], **_export_report(found)}
 
 
@@ -185,30 +173,12 @@ def _set(client: Client, dataset: str, source: PredictionSource) -> dict[str, An
 
 def _send(client: Client, path: Path) -> str:
     """Id of an upload of a file, or of a folder as a zip; what is there already is not sent again."""
-    from app.store.uploads import UploadDigest
+    from app.datasets.packing import as_one_file
+    from app.store.uploads import upload_id
     from touchline.errors import NotFoundError as NotThere
 
-    with _as_file(path) as file:
-        # The server may write the name otherwise, and then the file is sent again.
-        digest = UploadDigest(file.name)
-        with file.open("rb") as content:
-            while chunk := content.read(_CHUNK):
-                digest.update(chunk)
+    with as_one_file(path) as file:
         try:
-            return str(client.get(f"uploads/{digest.id}")["id"])
+            return str(client.get(f"uploads/{upload_id(file)}")["id"])
         except NotThere:
             return client.upload(file)
-
-
-@contextmanager
-def _as_file(path: Path) -> Iterator[Path]:
-    from app.datasets.output import zip_files
-
-    if not path.is_dir():
-        yield path
-        return
-    with tempfile.TemporaryDirectory() as held:
-        packed = Path(held) / f"{path.resolve().name}.zip"
-        files = (file for file in sorted(path.rglob("*")) if file.is_file())
-        zip_files(((file.relative_to(path).as_posix(), file) for file in files), packed, PACKED)
-        yield packed

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from app.commands.opened import executor_of, opened_store
+from app.commands.opened import opened_store
 from app.commands.options import Json, Workers, acting, read_settings
 from app.commands.terminal import print_values, show_progress
 from app.private_file import keep_private
@@ -37,6 +37,7 @@ def sample(
 ) -> None:
     """Write a synthetic dataset with known truth in SoccerNet-v3 layout."""
     from app.review.practice.sample_dataset import SAMPLE, make_sample_dataset
+    from app.review.workers.executors import executor_of
 
     if out is None and dataset is None:
         raise typer.BadParameter("name a folder to write to, or a dataset to fill")

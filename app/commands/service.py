@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from contextlib import AbstractContextManager
 from functools import partial
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from app.commands.opened import cluster_of, executor_of, opened_store, process_pool
+from app.commands.opened import opened_store
 from app.commands.options import Cluster, acting, read_settings
 from app.commands.terminal import say, show_progress
 
 if TYPE_CHECKING:
-    from concurrent.futures import Executor
     from socket import socket
 
     from app.config import Settings
@@ -66,6 +63,7 @@ def serve(
     from app.log import log_to_stderr
     from app.review.jobs.vitals import file_sizes
     from app.review.people.people import require_no_people
+    from app.review.workers.executors import server_pool
     from app.store.dialect.dialect import dialect_of, require_processes
     from app.store.locks import server_lock
 
@@ -83,7 +81,7 @@ def serve(
                 _say_address(settings, address)
                 serve_with(settings.web_workers, _serve_part, settings, socket)
                 return
-            application = create_app(settings, pool=_pool_of(settings))
+            application = create_app(settings, pool=server_pool(settings))
             if file_sizes(settings).get("database", 0) <= QUICK_BYTES:
                 application.state.services.store.require_whole()
             say(f"Touchline is at {address}")
@@ -106,6 +104,7 @@ def _require_safe(settings: Settings) -> None:
 def _make_sample(settings: Settings) -> None:
     """The dataset ``sample``, where it is missing or not complete."""
     from app.review.practice.sample_dataset import SAMPLE, make_sample_dataset
+    from app.review.workers.executors import executor_of
     from app.sample.order import SampleOrder
 
     folder, pool = settings.home / SAMPLE, partial(executor_of, settings)
@@ -118,9 +117,10 @@ def _serve_part(settings: Settings, socket: socket) -> None:
     from app.api.application import create_app
     from app.api.server import run
     from app.log import log_to_stderr
+    from app.review.workers.executors import server_pool
 
     log_to_stderr()
-    run(create_app(settings, pool=_pool_of(settings)), socket)
+    run(create_app(settings, pool=server_pool(settings)), socket)
 
 
 def _say_address(settings: Settings, address: str) -> None:
@@ -128,14 +128,6 @@ def _say_address(settings: Settings, address: str) -> None:
     if settings.team:
         with opened_store(settings) as store:
             _say_first_link(store, settings.url or address)
-
-
-def _pool_of(settings: Settings) -> Callable[[], AbstractContextManager[Executor]]:
-    """Where large jobs of the server are solved."""
-    if settings.cluster is not None:
-        return lambda: cluster_of(settings)
-    # One processor is left for the requests.
-    return lambda: process_pool(max(1, settings.workers - 1))
 
 
 def _say_first_link(store: Store, base: str) -> None:

@@ -39,6 +39,7 @@ _MAX_SUFFIX = 20
 """With its dot; what is longer tells no kind of file, and is cut like the rest of a name."""
 _RECORD = "upload.json"
 _CONTENT = "content"
+_CHUNK = 1 << 20
 _WRITING = threading.Lock()
 WRITING_SECONDS = 10.0
 """So long one process waits for another that writes a record."""
@@ -249,6 +250,15 @@ class UploadDigest:
     def id(self) -> str:
         """The id for what was added until now."""
         return self._digest.hexdigest()[:32]
+
+
+def upload_id(file: Path) -> str:
+    """The id that a file gets where it is sent; a name that a server writes otherwise makes another."""
+    digest = UploadDigest(file.name)
+    with file.open("rb") as content:
+        while chunk := content.read(_CHUNK):
+            digest.update(chunk)
+    return digest.id
 
 
 class UploadWriter:

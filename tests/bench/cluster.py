@@ -11,10 +11,10 @@ from contextlib import AbstractContextManager, closing
 from functools import partial
 from pathlib import Path
 
-from app.commands.opened import process_pool
 from app.config import Settings
-from app.review.datasets.cluster import Cluster, SchedulerPlace
 from app.review.editing.recompute import solve_dataset
+from app.review.workers.cluster import Cluster, SchedulerPlace
+from app.review.workers.processes import process_pool
 from app.store.store import Store
 from tests.bench.table import print_table
 from tests.e2e.service import run_touchline

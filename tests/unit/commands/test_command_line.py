@@ -20,10 +20,8 @@ import typer
 from app import cli
 from app.commands import command_line
 from app.commands.command_line import YOUNG, app
-from app.commands.opened import process_pool
 from app.datasets.manifest import software_version
 from app.datasets.sn_calibration_writer import lines_to_json
-from app.errors import InputError
 from tests.scenes import make_scenes
 
 Run = Callable[..., tuple[int, str, str]]
@@ -156,43 +154,6 @@ class TestClosed:
         assert code == 1
         assert re.search(r"may not look at \W?/srv/closed/x\.json", err)
         assert "Traceback" not in err
-
-    def test_who_stands_in_a_folder_that_they_may_not_enter_is_told_before_processes_start(
-        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-    ) -> None:
-        """As with sudo from somebody else's home: each process would end with a traceback."""
-
-        def solve() -> str:
-            with pytest.raises(InputError) as refused, process_pool(2):
-                pass
-            return f"{refused.value.message} {refused.value.hint}"
-
-        closed = tmp_path / "closed"
-        closed.mkdir()
-        monkeypatch.chdir(closed)
-        closed.chmod(0)
-        said = as_nobody(solve)
-        closed.chmod(0o700)
-        assert "may not enter the folder" in said
-        assert "cd /" in said
-
-
-def as_nobody(work: Callable[[], str]) -> str:
-    """What a function says in a process of somebody else than root."""
-    read, write = os.pipe()
-    child = os.fork()
-    if not child:
-        try:
-            if os.getuid() == 0:
-                os.setuid(65534)
-            os.write(write, work().encode())
-        finally:
-            os._exit(0)
-    os.close(write)
-    with os.fdopen(read, encoding="utf-8") as said:
-        found = said.read()
-    os.waitpid(child, 0)
-    return found
 
 
 class TestNames:

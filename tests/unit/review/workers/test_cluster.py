@@ -12,8 +12,9 @@ from pathlib import Path
 import pytest
 
 from app.errors import ClusterError, InputError, NotFoundError
-from app.review.datasets import cluster
-from app.review.datasets.cluster import (
+from app.review.datasets.fan_out import fan_out
+from app.review.workers import cluster
+from app.review.workers.cluster import (
     Cluster,
     SchedulerPlace,
     build,
@@ -21,7 +22,6 @@ from app.review.datasets.cluster import (
     read_place,
     require_same,
 )
-from app.review.datasets.fan_out import fan_out
 from tests.certificates import write_keys
 from tests.waiting import SECONDS
 

@@ -11,7 +11,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from app.errors import ClusterError
-from app.review.datasets.cluster import SchedulerPlace, hush
+from app.review.workers.cluster import SchedulerPlace, hush
 
 AGAIN_S = 2.0
 """Seconds until a worker whose scheduler has gone looks for it again."""
