@@ -119,7 +119,8 @@ function show(next) {
 /** Show a newer state of the group on screen, unless the person is in the middle of something. @param {GroupDocument} newer */
 export function renew(newer) {
 	const present = groupDocument.value;
-	if (present && present.id !== newer.id) return;
+	// A late answer about the group before must not stand where another is waited for.
+	if (newer.id !== (present?.id ?? wanted)) return;
 	const untouched = own.value.length === 0 && draft.value === null && present?.etag !== newer.etag;
 	if (present === null || untouched) show(newer);
 }

@@ -41,7 +41,8 @@ async function catchUp() {
 	if (told.group !== at.id || told.etag === at.etag) return;
 	try {
 		const newer = await load(told.group);
-		if (newer.etag === at.etag) return;
+		// Whoever has gone on meanwhile is not told of what they left.
+		if (newer.etag === at.etag || groupDocument.value?.id !== at.id) return;
 		renew(newer);
 		changedElsewhere.value = { group: at.id, actor: told.actor, at: Date.now() };
 		announce('This group was changed elsewhere and is shown as it is now.');
