@@ -34,7 +34,9 @@ function Editor({ one, found, close }) {
 		const { id } = await postUpload(file, () => {});
 		const { digest } = await postGuidelinePicture(one.id, id);
 		const text = area.current;
-		text?.setRangeText(`\n\n![${file.name}](${digest})\n\n`, text.selectionEnd, text.selectionEnd, 'end');
+		// A bracket would end the words of the picture, and the picture with them.
+		const words = file.name.replace(/[[\]]/g, ' ').trim();
+		text?.setRangeText(`\n\n![${words}](${digest})\n\n`, text.selectionEnd, text.selectionEnd, 'end');
 		field.value = '';
 	}
 	return html`

@@ -11,7 +11,7 @@ from playwright.sync_api import Page, expect
 from app.review.people.people import list_people
 from app.review.people.roles import Role
 from app.review.takes.guidelines import read_guidelines, write_guidelines
-from tests.e2e.screen import Screen, hears, refusing, until
+from tests.e2e.screen import Screen, hears, holding, refusing, until
 from tests.e2e.team import (
     REFUSED,
     SECRET,
@@ -96,8 +96,13 @@ class TestPeople:
         mia.keyboard.type("no")
         expect(mia.get_by_role("option", name="@noa")).to_be_visible()
         mia.keyboard.press("Enter")
-        mia.keyboard.press("Control+Enter")
+        with holding(mia, "**/groups/4/threads") as held:
+            mia.keyboard.press("Control+Enter")
+            held.arrive()
+            # What is typed while it is sent is the next one's beginning.
+            mia.keyboard.type(" And")
         expect(mia.locator(".talk__text")).to_have_text("<b>Look</b> @noa")
+        expect(mia.locator("#comment-new")).to_have_value("And")
         assert serious_in_both(mia) == []
 
         expect(bell).to_contain_text("1")

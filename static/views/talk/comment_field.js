@@ -63,9 +63,11 @@ export function CommentField({ id, group, label, button, text = '', focus, send,
 	function submit(event) {
 		event?.preventDefault();
 		const at = field.current;
-		const said = at?.value.trim();
+		const written = at?.value ?? '';
+		const said = written.trim();
 		if (!at || !said || busy) { at?.focus(); return; }
-		attempt(send(said), () => { at.value = ''; });
+		// What was typed meanwhile stays.
+		attempt(send(said), () => { if (at.value.startsWith(written)) at.value = at.value.slice(written.length).trimStart(); });
 	}
 	/** @param {KeyboardEvent} event */
 	function key(event) {
