@@ -6,6 +6,7 @@ import { useEffect, useRef, useState } from 'preact/hooks';
 
 import { auditFile, getAudit } from '../../api/past.js';
 import { ApiError } from '../../api/problem.js';
+import { beginningOf } from '../../lib/day.js';
 import { withForm } from '../../lib/field.js';
 import { address, navigate, param } from '../../lib/router.js';
 import { datasets } from '../../state/datasets.js';
@@ -26,15 +27,9 @@ const FIELDS = /** @type {const} */ (['q', 'person', 'family', 'dataset', 'since
 function asked() {
 	const found = Object.fromEntries([...FIELDS, 'group'].map((name) => [name, param(name)]).filter(([, value]) => value));
 	// A day ends when the next one begins.
-	if (found.until) found.until = timeOf(found.until, 86_400_000);
-	if (found.since) found.since = timeOf(found.since, 0);
+	if (found.until) found.until = beginningOf(found.until, 1);
+	if (found.since) found.since = beginningOf(found.since);
 	return found;
-}
-
-/** A day as the server asks for it; what is none stays as it is, and is refused there. @param {string} day @param {number} later ms */
-function timeOf(day, later) {
-	const at = Date.parse(day);
-	return Number.isNaN(at) ? day : new Date(at + later).toISOString();
 }
 
 /** Entries, a page at a time. @param {AuditFilter} filter @param {string} key */
