@@ -124,6 +124,24 @@ class TestJudge:
         told = judge_standing(found, policy, uncertainty, jac, standing, first_alone=True)
         assert told.first.tolist() == judged(found, policy).first.tolist()
 
+    def test_a_view_that_does_not_count_has_no_part_in_sigma_and_residuals(self):
+        policy = replace(PAPER, max_sigma_m=0.1, min_p_value=0.05, given_sigma_px=1.0)
+        sigma, compared = GATES.index("sigma"), 0
+        for seed in range(200):
+            views, calibrations = random_views(seed)
+            whole = group_facts(views, calibrations)
+            judgement = judged(whole, policy)
+            counted = sorted(set(whole.pair_view[judgement.valid].ravel().tolist()))
+            if not counted or len(counted) == len(views):
+                continue
+            rest = group_facts(
+                [views[place] for place in counted], [calibrations[place] for place in counted]
+            )
+            alone = judged(rest, policy)
+            assert alone.failed[sigma:, 0].tolist() == judgement.failed[sigma:, 0].tolist(), seed
+            compared += 1
+        assert compared > 20
+
     @pytest.mark.parametrize("threshold", STRICTER)
     def test_each_stricter_threshold_stops_some_and_lets_nothing_more_through(self, threshold):
         whole, stopped = join([group_facts(*random_views(seed)) for seed in range(150)]), 0
