@@ -15,9 +15,9 @@ import resource
 import select
 import signal
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor
-from contextlib import closing, suppress
+from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass
 from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection
@@ -224,6 +224,35 @@ def abandon(executor: ProcessPoolExecutor) -> None:
     # holds the end from which nobody reads any more (https://github.com/python/cpython/issues/94777).
     if tasks is not None:
         tasks._reader.close()
+
+
+@contextmanager
+def spawned_pool(
+    workers: int, settle: Callable[[], object] | None = None
+) -> Iterator[ProcessPoolExecutor]:
+    """Processes that each start anew, because a fork of a process with threads may hang.
+
+    Ctrl+C reaches every process of a terminal, where this one alone decides; they end with it, and
+    with the work that fails.
+
+    Args:
+        workers: How many.
+        settle: Called in each before its first task.
+    """
+    context = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(workers, context, _settle_down, (settle,)) as pool:
+        try:
+            yield pool
+        except BaseException:
+            abandon(pool)
+            raise
+
+
+def _settle_down(settle: Callable[[], object] | None) -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    end_with_parent()
+    if settle is not None:
+        settle()
 
 
 def end_with_parent() -> None:

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import os
-import signal
 import zipfile
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from itertools import groupby
-from multiprocessing import get_context
 from pathlib import Path
 from shutil import rmtree
 from tempfile import mkdtemp
@@ -18,7 +16,7 @@ from typing import TypeVar
 
 import cv2
 
-from app.child import abandon, end_with_parent
+from app.child import spawned_pool
 from app.datasets.match_frames import ARCHIVE
 from app.datasets.soccernet_v3_writer import write_soccernet_v3
 from app.durable import PARTIAL
@@ -223,17 +221,9 @@ def _mapper(workers: int | None, jobs: int) -> Iterator[_Mapper]:
     if count == 1:
         yield _Mapper(None)
         return
-    # Spawned, not forked: a fork of a process with threads may hang.
-    with ProcessPoolExecutor(count, get_context("spawn"), _settle) as pool:
-        try:
-            yield _Mapper(pool)
-        except BaseException:
-            abandon(pool)
-            raise
+    with spawned_pool(count, _use_one_thread) as pool:
+        yield _Mapper(pool)
 
 
-def _settle() -> None:
-    """Ctrl+C reaches every process of a terminal, where the parent alone decides."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    end_with_parent()
+def _use_one_thread() -> None:
     cv2.setNumThreads(1)

@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-import multiprocessing
 import os
-import signal
 from collections.abc import Iterator
-from concurrent.futures import Executor, ProcessPoolExecutor
+from concurrent.futures import Executor
 from contextlib import contextmanager
 
-from app.child import abandon, end_with_parent
+from app.child import spawned_pool
 from app.errors import InputError
 
 
 @contextmanager
 def process_pool(workers: int) -> Iterator[Executor]:
-    """Processes that solve; each starts anew, because forking a process with threads is unsafe.
+    """Processes that solve; what is not done when the work fails is found again by the next run.
 
     Raises:
         InputError: They could not even enter the present folder.
@@ -26,19 +24,5 @@ def process_pool(workers: int) -> Iterator[Executor]:
             " that solve begin there",
             hint="Change to another folder first (cd /), or solve with --workers 1.",
         )
-    context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(
-        workers, mp_context=context, initializer=_belong_to_the_parent
-    ) as executor:
-        try:
-            yield executor
-        except BaseException:
-            # What waits, and what is not done yet, is found again by the next run.
-            abandon(executor)
-            raise
-
-
-def _belong_to_the_parent() -> None:
-    """End with it; and Ctrl+C reaches every process of a terminal, where it alone decides."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    end_with_parent()
+    with spawned_pool(workers) as pool:
+        yield pool
