@@ -3,6 +3,15 @@
 
 const PICTURE = /^!\[([^\]]*)\]\(([0-9a-f]{64})\)$/;
 
+/**
+ * The line of a picture: its words without what would end them.
+ *
+ * @param {string} words @param {string} digest
+ */
+export function pictureLine(words, digest) {
+	return `![${words.replace(/[[\]\s]+/g, ' ').trim()}](${digest})`;
+}
+
 /** @param {string} text @returns {{text: string, digest: string | null}[]} a picture's text is what it shows, in words */
 export function partsOf(text) {
 	/** @type {{text: string, digest: string | null}[]} */

@@ -45,9 +45,9 @@ export const outbox = signal(/** @type {Item[]} */ ([]));
 export const lasting = signal(true);
 
 const tab = idempotencyKey();
-const shownBefore = stored('tab', '', 'sessionStorage');
+const lastTab = stored('tab', '', 'sessionStorage');
 /** What the page before this one was called, where this one is loaded anew. */
-const predecessor = shownBefore.value;
+const predecessor = lastTab.value;
 
 /** @type {Promise<import('idb').IDBPDatabase | null> | null} */
 let opened = null;
@@ -115,12 +115,12 @@ export function discard(which) {
 
 /** Say that this tab lives, so that no other sends what it looks after. */
 export function claimTab() {
-	shownBefore.value = tab;
+	lastTab.value = tab;
 	navigator.locks?.request(lockOf(tab), () => new Promise(() => {}));
 }
 
 /** Wait for the end of a page; one that lives on, as beside a doubled tab, is waited for in vain. @param {string} other */
-async function isGone(other) {
+async function hasEnded(other) {
 	const signal = AbortSignal.timeout(PATIENCE);
 	return navigator.locks.request(lockOf(other), { signal }, () => true).catch(() => false);
 }
@@ -146,7 +146,7 @@ export async function adopt(again) {
 	const held = (await navigator.locks?.query())?.held ?? [];
 	const alive = new Set(held.map(({ name }) => name));
 	const isLeaving = alive.has(lockOf(predecessor)) && kept.some((item) => item.tab === predecessor);
-	if (isLeaving && await isGone(predecessor)) alive.delete(lockOf(predecessor));
+	if (isLeaving && await hasEnded(predecessor)) alive.delete(lockOf(predecessor));
 	const own = new Set(outbox.value.map(({ id }) => id));
 	// What somebody else has left waits for them.
 	const others = kept.filter((item) => item.tab !== tab && (item.person ?? null) === myName.value && !own.has(item.id));

@@ -57,9 +57,9 @@ export function startSending() {
 	takenUp = takeUp();
 }
 
-/** Wait until what an earlier page has left is this one's to send. */
-export function isTakenUp() {
-	return takenUp;
+/** Until what an earlier page has left is this one's to send, or cannot be. @returns {Promise<void>} */
+export function untilTakenUp() {
+	return takenUp.catch(() => {});
 }
 
 async function takeUp() {

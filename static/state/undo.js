@@ -9,7 +9,7 @@ import { actions, didAgain, forget, forgetEdit, nextBack, tookBack, undone } fro
 import { returnTo, reviewAddress } from './navigation.js';
 import { announce, complain } from './notice.js';
 import { discard, outbox } from './outbox.js';
-import { isAway, isTakenUp, wake } from './sending.js';
+import { isAway, untilTakenUp, wake } from './sending.js';
 import { giveVerdictAgain, takeVerdictBack } from './verdicts.js';
 
 /** @import {EditDone} from './last_action.js' */
@@ -54,7 +54,7 @@ export function undo() {
 
 async function undoOne() {
 	// What the page before this one did last may still wait for its answer.
-	await isTakenUp();
+	await untilTakenUp();
 	const action = next.value;
 	if (action === null) announce('Nothing to undo.');
 	else if (action === 'here') undoHere();

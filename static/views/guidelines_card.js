@@ -8,6 +8,7 @@ import { postUpload } from '../api/imports.js';
 import { getGuidelines, postGuidelinePicture, putGuidelines } from '../api/takes.js';
 import { useAttempt } from '../lib/attempt.js';
 import { plural } from '../lib/format.js';
+import { pictureLine } from '../lib/guideline_parts.js';
 import { useResource } from '../lib/resource.js';
 import { whyNot } from '../state/rights.js';
 import { FormError } from './form_error.js';
@@ -34,9 +35,7 @@ function Editor({ one, found, close }) {
 		const { id } = await postUpload(file, () => {});
 		const { digest } = await postGuidelinePicture(one.id, id);
 		const text = area.current;
-		// A bracket would end the words of the picture, and the picture with them.
-		const words = file.name.replace(/[[\]]/g, ' ').trim();
-		text?.setRangeText(`\n\n![${words}](${digest})\n\n`, text.selectionEnd, text.selectionEnd, 'end');
+		text?.setRangeText(`\n\n${pictureLine(file.name, digest)}\n\n`, text.selectionEnd, text.selectionEnd, 'end');
 		field.value = '';
 	}
 	return html`
