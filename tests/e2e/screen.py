@@ -104,19 +104,19 @@ def until(page: Page, happens: Callable[[], Any]) -> None:
 
 
 class Held:
-    """Requests that wait until a test lets them go."""
+    """Requests, or the answers to them, that wait until a test lets them go."""
 
-    def __init__(self, page: Page):
-        self.page = page
-        self.routes: list[Route] = []
+    def __init__(self, page: Page, *, answered: bool = False):
+        self.page, self.answered = page, answered
+        self.routes: list[tuple[Route, APIResponse | None]] = []
         self._goes_on = False
 
     def hear(self, route: Route) -> None:
-        """Keep a request; those that come after the release pass."""
+        """Keep a request, answered or not; those that come after the release pass."""
         if self._goes_on:
             route.fallback()
         else:
-            self.routes.append(route)
+            self.routes.append((route, route.fetch() if self.answered else None))
 
     def arrive(self) -> None:
         """Wait until there is one."""
@@ -126,60 +126,31 @@ class Held:
         """Let all of them go on."""
         self._goes_on = True
         while self.routes:
+            route, answer = self.routes.pop(0)
             # Its page may have gone to another address meanwhile.
             with suppress(Error):
-                self.routes.pop(0).fallback()
+                if answer is None:
+                    route.fallback()
+                else:
+                    route.fulfill(response=answer)
 
 
 @contextmanager
-def holding(page: Page, url: str | Pattern[str]) -> Iterator[Held]:
-    """Hold what a page asks for at an address; what is held goes on at the end at the latest."""
-    held = Held(page)
+def holding(page: Page, url: str | Pattern[str], *, answered: bool = False) -> Iterator[Held]:
+    """Hold what a page asks for at an address; what is held goes on at the end at the latest.
+
+    Args:
+        page: The page.
+        url: The address.
+        answered: The server is asked at once, and its answers are held.
+    """
+    held = Held(page, answered=answered)
     page.route(url, held.hear)
     try:
         yield held
     finally:
         # The route stays, and lets pass: a request that is on its way, of whatever address, when
         # the last route is taken away may never arrive.
-        held.release()
-
-
-class HeldAnswers:
-    """Answers that the server has given and the page does not get before a test says so."""
-
-    def __init__(self, page: Page):
-        self.page = page
-        self.kept: list[tuple[Route, APIResponse]] = []
-        self._goes_on = False
-
-    def hear(self, route: Route) -> None:
-        """Ask the server, and keep what it answers; after the release requests pass."""
-        if self._goes_on:
-            route.fallback()
-        else:
-            self.kept.append((route, route.fetch()))
-
-    def arrive(self) -> None:
-        """Wait until there is one."""
-        until(self.page, lambda: self.kept)
-
-    def release(self) -> None:
-        """Let the page have them; a page that has gone to another address meanwhile never does."""
-        self._goes_on = True
-        while self.kept:
-            route, response = self.kept.pop(0)
-            with suppress(Error):
-                route.fulfill(response=response)
-
-
-@contextmanager
-def holding_answers(page: Page, url: str | Pattern[str]) -> Iterator[HeldAnswers]:
-    """Hold the answers to what a page asks for at an address, to the end at the latest."""
-    held = HeldAnswers(page)
-    page.route(url, held.hear)
-    try:
-        yield held
-    finally:
         held.release()
 
 

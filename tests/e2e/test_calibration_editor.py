@@ -12,7 +12,7 @@ from playwright.sync_api import Page, expect
 from app.soccer.pitch import MARKINGS
 from tests.e2e.screen import (
     at_rest,
-    holding_answers,
+    holding,
     jobs_end,
     on_present,
     passing,
@@ -91,6 +91,13 @@ class Editor:
         row = self.page.locator(f'[data-compared="{name}"]')
         before, after = row.locator("td").all_inner_texts()[:2]
         return before, after, row.get_attribute("data-change") or ""
+
+    def save_a_moved_line(self) -> None:
+        """Move a point of the longest line and save it; the answer is not waited for."""
+        self.choose(longest(self.lines))
+        self.press(".", "Shift+ArrowDown")
+        self.staged(1)
+        self.press("Control+s")
 
     def saved(self) -> None:
         """Wait until the last write was answered."""
@@ -314,6 +321,13 @@ class TestPaint:
         until(editor.page, lambda: editor.drawn() == drawn)
 
 
+def of_static_camera(open_page: OpenPage, film: str) -> tuple[Editor, list[int]]:
+    """The editor of a static camera in the first group of the film, and the film's groups."""
+    page = open_page(None)
+    groups: list[int] = page.request.get(f"{film}/api/v1/datasets/film/timeline").json()["id"]
+    return Editor(page, film, groups[0], 3), groups
+
+
 class TestStation:
     def test_an_edit_reaches_all_views_of_the_camera(self, open_page: OpenPage, film: str) -> None:
         page = open_page(None)
@@ -348,14 +362,9 @@ class TestStation:
     def test_undo_returns_to_the_group_of_an_edit_also_after_the_page_was_loaded_anew(
         self, open_page: OpenPage, film: str
     ) -> None:
-        page = open_page(None)
-        groups = page.request.get(f"{film}/api/v1/datasets/film/timeline").json()["id"]
-        editor = Editor(page, film, groups[0], 3)
-        before = editor.lines
-        editor.choose(longest(before))
-        editor.press(".", "Shift+ArrowDown")
-        editor.staged(1)
-        editor.press("Control+s")
+        editor, groups = of_static_camera(open_page, film)
+        page, before = editor.page, editor.lines
+        editor.save_a_moved_line()
         editor.saved()
         assert editor.lines != before
         page.goto(f"{film}/review/{groups[5]}")
@@ -368,15 +377,10 @@ class TestStation:
     def test_undo_takes_back_an_edit_whose_answer_is_still_on_its_way(
         self, open_page: OpenPage, film: str
     ) -> None:
-        page = open_page(None)
-        groups = page.request.get(f"{film}/api/v1/datasets/film/timeline").json()["id"]
-        editor = Editor(page, film, groups[0], 3)
-        before = editor.lines
-        with holding_answers(page, "**/stations/*/lines*") as held:
-            editor.choose(longest(before))
-            editor.press(".", "Shift+ArrowDown")
-            editor.staged(1)
-            editor.press("Control+s")
+        editor, _ = of_static_camera(open_page, film)
+        page, before = editor.page, editor.lines
+        with holding(page, "**/stations/*/lines*", answered=True) as held:
+            editor.save_a_moved_line()
             held.arrive()
             assert editor.lines != before
             editor.press("Control+z")
@@ -386,15 +390,10 @@ class TestStation:
     def test_undo_takes_back_an_edit_whose_answer_the_page_before_never_got(
         self, open_page: OpenPage, film: str
     ) -> None:
-        page = open_page(None)
-        groups = page.request.get(f"{film}/api/v1/datasets/film/timeline").json()["id"]
-        editor = Editor(page, film, groups[0], 3)
-        before = editor.lines
-        with holding_answers(page, "**/stations/*/lines*") as held:
-            editor.choose(longest(before))
-            editor.press(".", "Shift+ArrowDown")
-            editor.staged(1)
-            editor.press("Control+s")
+        editor, groups = of_static_camera(open_page, film)
+        page, before = editor.page, editor.lines
+        with holding(page, "**/stations/*/lines*", answered=True) as held:
+            editor.save_a_moved_line()
             held.arrive()
             assert editor.lines != before
             page.goto(f"{film}/review/{groups[5]}")
