@@ -126,24 +126,26 @@ def compare_frames(
 
 
 def _compare(name: str, first: Table | None, second: Table | None) -> list[Difference]:
-    known = first or second
-    assert known is not None
-    rows = {row.name: row.label for table in (first, second) if table for row in table.rows}
+    both = [table for table in (first, second) if table is not None]
+    rows = {row.name: row.label for table in both for row in table.rows}
+    # A release may measure what the one before did not, and the other way round.
+    columns = {column.name: column.label for table in both for column in table.columns}
     return [
         Difference(
             name,
             row,
-            column.name,
-            f"{label}: {column.label}",
-            _cell(first, row, column.name),
-            _cell(second, row, column.name),
+            column,
+            f"{label}: {said}",
+            _cell(first, row, column),
+            _cell(second, row, column),
         )
         for row, label in rows.items()
-        for column in known.columns
+        for column, said in columns.items()
     ]
 
 
 def _cell(table: Table | None, row: str, column: str) -> Cell | None:
     if table is None or table.row(row) is None:
         return None
-    return table.cell(row, column)
+    has = any(known.name == column for known in table.columns)
+    return table.cell(row, column) if has else None
