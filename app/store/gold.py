@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, get_args
 
-from sqlalchemy import delete, select
+from sqlalchemy import delete, select, update
 
 from app.soccer.choices import GoldStart
 from app.store.clock import now
@@ -38,6 +38,12 @@ def mark_gold(
     values |= {"marked": now(), "marked_by": by}
     statement = insert(GoldModel).values(group_id=group_id, **values)
     session.execute(statement.on_conflict_do_update(index_elements=["group_id"], set_=values))
+
+
+def start_gold(session: Session, group_id: int, start: str) -> None:
+    """Let annotators of a gold group begin with something else; what is true of it stays."""
+    of = GoldModel.group_id == group_id
+    session.execute(update(GoldModel).where(of).values(start=start))
 
 
 def unmark_gold(session: Session, group_id: int) -> None:

@@ -36,6 +36,9 @@ export const getTakes = (dataset, signal) => request(`/datasets/${encodeURICompo
 /** @param {number} group @param {string} start @returns {Promise<GoldGroupJson>} */
 export const putGold = (group, start) => request(`/groups/${group}/gold`, { method: 'PUT', body: { start } });
 
+/** @param {number} group @param {string} start @returns {Promise<GoldGroupJson>} */
+export const patchGold = (group, start) => request(`/groups/${group}/gold`, { method: 'PATCH', body: { start } });
+
 /** @param {number} group @returns {Promise<GoldGroupJson>} */
 export const deleteGold = (group) => request(`/groups/${group}/gold`, { method: 'DELETE' });
 

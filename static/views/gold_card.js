@@ -3,7 +3,7 @@
 
 import { html } from 'htm/preact';
 
-import { deleteGold, getGold, putGold } from '../api/takes.js';
+import { deleteGold, getGold, patchGold } from '../api/takes.js';
 import { useAttempt } from '../lib/attempt.js';
 import { withValue } from '../lib/field.js';
 import { plural } from '../lib/format.js';
@@ -92,7 +92,7 @@ export function GoldCard({ dataset }) {
 			${value?.groups.length ? html`
 				<div class="table__scroll" tabindex="0" role="region" aria-label="Gold groups"><table class="table">
 					<thead><tr><th>Group</th><th>Annotators begin with</th><th>The truth is</th><th>Marked by</th><th><span class="hidden-text">Change</span></th></tr></thead>
-					<tbody>${value.groups.map((one) => html`<${GoldRow} key=${one.group} one=${one} change=${(/** @type {string} */ start) => told(putGold(one.group, start))} drop=${() => told(deleteGold(one.group))} />`)}</tbody>
+					<tbody>${value.groups.map((one) => html`<${GoldRow} key=${one.group} one=${one} change=${(/** @type {string} */ start) => told(patchGold(one.group, start))} drop=${() => told(deleteGold(one.group))} />`)}</tbody>
 				</table></div>` : null}
 		</section>
 	`;

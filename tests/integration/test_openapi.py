@@ -163,6 +163,7 @@ TAKES = (
     ("POST", "hand-back"),
     ("POST", "adoption"),
     ("DELETE", "gold"),
+    ("PATCH", "gold"),
 )
 """Routes about a copy or a gold group."""
 

@@ -65,6 +65,18 @@ def mark(group: Id, edit: GoldEdit, store: AppStore, actor: Actor, asked: AskedU
     return reply.of(gold.mark(store, group, edit.start, actor=actor, keep=reply.keep))
 
 
+@router.patch(
+    "/groups/{group}/gold",
+    operation_id="changeGold",
+    response_model=GoldGroupDocument,
+    responses=responses(404, 413, 415),
+)
+def change(group: Id, edit: GoldEdit, store: AppStore, actor: Actor, asked: AskedUnder) -> Response:
+    """Let annotators of a gold group begin with something else; what is true of it stays."""
+    reply = Reply(asked, _gold_answer)
+    return reply.of(gold.start_with(store, group, edit.start, actor=actor, keep=reply.keep))
+
+
 @router.delete(
     "/groups/{group}/gold",
     operation_id="unmarkGold",

@@ -220,6 +220,7 @@ _ROWS: Mapping[Action | None, tuple[str, ...]] = {
         "GET /api/v1/datasets/{dataset}/gold",
         "POST /api/v1/datasets/{dataset}/gold",
         "PUT /api/v1/groups/{group}/gold",
+        "PATCH /api/v1/groups/{group}/gold",
         "DELETE /api/v1/groups/{group}/gold",
         "PUT /api/v1/datasets/{dataset}/guidelines",
         "POST /api/v1/datasets/{dataset}/guidelines/pictures",

@@ -274,10 +274,14 @@ def _own(row: AuditRow, body: Mapping[str, Any]) -> str | None:
         ("agreement", "decided"): f"decided for {person}’s annotation",
         ("agreement", "limits"): "set the limits of agreement",
         ("gold", "marked"): f"marked group {group} as gold",
+        ("gold", "changed"): f"changed what annotators of gold group {group} begin with",
         ("gold", "unmarked"): f"group {group} is gold no longer",
     }
     if row.kind == "work" and did in _BATCH_DEEDS and "name" in body:
         return f"{_BATCH_DEEDS[did]} the batch “{body['name']}”"
+    if row.kind == "gold" and "groups" in body:
+        count = len(body["groups"])
+        return f"marked {count} group{'' if count == 1 else 's'} of a {body['source']} as gold"
     if row.kind == "guideline" and "number" in body:
         return f"wrote version {body['number']} of the guidelines"
     return said.get((row.kind, str(did)))

@@ -13,14 +13,14 @@ from app.errors import ConflictError, InputError, NotFoundError
 from app.review.answers.keep import Keep, keep_nothing
 from app.review.datasets.dataset import need_dataset
 from app.review.editing.state import GroupState, read_states
-from app.review.editing.submit import load_solved
+from app.review.editing.submit import load, load_solved
 from app.review.takes.copying import aligned
 from app.review.takes.errors import AnnotationError, TrueView, error_of, world_error
 from app.soccer.frames import ImagePoint
 from app.store.clock import now
 from app.store.codecs import group_from_json, group_to_json
 from app.store.copy_datasets import is_copy
-from app.store.gold import STARTS, gold_heads, gold_truth, mark_gold, unmark_gold
+from app.store.gold import STARTS, gold_heads, gold_truth, mark_gold, start_gold, unmark_gold
 from app.store.log import Entry, append
 from app.store.session import Session
 from app.store.store import Store
@@ -125,8 +125,7 @@ def mark(
         InputError: There is no such start.
         ConflictError: Nobody has judged the group as it is now, or it is a copy.
     """
-    if start not in STARTS:
-        raise InputError(f"annotators begin with {', '.join(STARTS)}", pointer="/start")
+    _check_start(start)
     state = load_solved(store, group_id)
     if state.verdict.state not in JUDGED or state.verdict.stale:
         raise ConflictError(
@@ -143,6 +142,34 @@ def mark(
         marked = _need_gold(session, state.dataset_id, group_id)
         keep(marked)(session)
     return marked
+
+
+def start_with(
+    store: Store,
+    group_id: int,
+    start: str,
+    *,
+    actor: str,
+    keep: Keep[GoldGroup] = keep_nothing,
+) -> GoldGroup:
+    """Let annotators of a gold group begin with something else; what is true of it stays.
+
+    Copies that were begun stay as they are. ``keep`` keeps the answer in its transaction.
+
+    Raises:
+        InputError: There is no such start.
+        NotFoundError: It is no gold group.
+    """
+    _check_start(start)
+    dataset_id = load(store, group_id).dataset_id
+    with store.write() as session:
+        _need_gold(session, dataset_id, group_id)
+        start_gold(session, group_id, start)
+        body = {"group": group_id, "did": "changed", "start": start}
+        append(session, [Entry(KIND, actor, now(), body, dataset_id)])
+        changed = _need_gold(session, dataset_id, group_id)
+        keep(changed)(session)
+    return changed
 
 
 def unmark(
@@ -224,6 +251,11 @@ def middle_of(values: Sequence[float | None]) -> Middle:
             break
         rank = k + 1
     return Middle(count, median, known[rank - 1], known[count - rank])
+
+
+def _check_start(start: str) -> None:
+    if start not in STARTS:
+        raise InputError(f"annotators begin with {', '.join(STARTS)}", pointer="/start")
 
 
 def _truth(state: GroupState) -> Json:

@@ -199,6 +199,11 @@ def gold(api: Any) -> Request:
     return "PUT", "/groups/1/gold", {"start": "bare"}, {}
 
 
+def gold_start(api: Any) -> Request:
+    send(api, gold(api))
+    return "PATCH", "/groups/1/gold", {"start": "imported"}, {}
+
+
 def no_gold(api: Any) -> Request:
     send(api, gold(api))
     return "DELETE", "/groups/1/gold", None, {}

@@ -56,6 +56,7 @@ KEPT: dict[str, Made] = {
     "handInTake": group_requests.take_handed_in,
     "makeBatch": dataset_requests.batch,
     "makeExport": dataset_requests.export,
+    "changeGold": group_requests.gold_start,
     "markGold": group_requests.gold,
     "proposeDatasetLines": dataset_requests.proposals,
     "readBell": dataset_requests.bell,

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+from dataclasses import replace
 from random import Random
 
 import numpy as np
@@ -10,11 +11,12 @@ from app.review.editing.edit import SetBall, SetLines
 from app.review.editing.past import history
 from app.review.editing.submit import load, submit
 from app.review.takes.errors import polyline_distance
-from app.review.takes.gold import mark, middle_of, read_report, unmark, wilson
+from app.review.takes.gold import mark, middle_of, read_report, start_with, unmark, wilson
 from app.review.takes.mixing import Terms, begin_next
 from app.review.verdicts.verdict import set_verdict
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import Box, ImagePoint
+from app.store.gold import gold_truth
 
 
 def judge(store, group_id, state="accepted", actor="lea", reason=None):
@@ -55,6 +57,30 @@ class TestMark:
         mark(store, state.id, "bare", actor="lea")
         assert [entry.kind for entry in history(store, state.id)] == before
         assert load(store, state.id).etag == etag
+
+
+class TestStartWith:
+    def test_what_is_true_stays_although_the_group_is_another_by_now(self, store, state) -> None:
+        judge(store, state.id)
+        marked = mark(store, state.id, "bare", actor="lea")
+        with store.read() as session:
+            truth = gold_truth(session, state.id)
+        view = state.group.views[0]
+        change(store, state.id, SetBall(view.key, BallAnnotation(box=Box(1, 1, 9, 9))), "ann")
+        changed = start_with(store, state.id, "without_balls", actor="max")
+        assert changed == replace(marked, start="without_balls")
+        assert read_report(store, state.dataset_id).groups == (changed,)
+        with store.read() as session:
+            assert gold_truth(session, state.id) == truth
+
+    def test_of_an_ordinary_group_there_is_nothing_to_begin_with(self, store, state) -> None:
+        with pytest.raises(NotFoundError, match="no gold group"):
+            start_with(store, state.id, "bare", actor="lea")
+        judge(store, state.id)
+        mark(store, state.id, "bare", actor="lea")
+        with pytest.raises(InputError) as refused:
+            start_with(store, state.id, "half", actor="lea")
+        assert refused.value.pointer == "/start"
 
 
 class TestMixing:

@@ -15,9 +15,10 @@ from app.review.editing.edit import SetBall, SetLines
 from app.review.editing.recompute import solve_dataset
 from app.review.editing.submit import load, submit
 from app.review.importing.ingest import ingest
+from app.review.people.audit import read_audit
 from app.review.people.people import invite
-from app.review.people.roles import Role
-from app.review.takes.gold import TruthSource, read_report
+from app.review.people.roles import EVERYTHING, Role
+from app.review.takes.gold import TruthSource, read_report, start_with
 from app.review.takes.known_truth import GoldChoice, mark_known
 from app.review.takes.mixing import Terms, begin_next
 from app.review.takes.take import begin_take, get_take_of
@@ -31,6 +32,7 @@ from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import Box, ImagePoint
 from app.soccer.media import Media
 from app.solving.jaccard import project_markings
+from app.store.audit import AuditQuery
 from app.store.store import Store
 from app.store.takes import GOLD
 from tests.scenes import make_scenes
@@ -107,6 +109,18 @@ class TestSample:
         ((result,),) = [person.results for person in read_report(store, "demo").people]
         assert result.error.ball_px == pytest.approx(6)
         assert result.error.line_px < 0.5 and result.error.ball_m > 0.05
+
+    def test_what_annotators_begin_with_changes_nothing_of_what_is_known(
+        self, store, scenes
+    ) -> None:
+        mark_known(store, "demo", replace(SAMPLE, query="", size=1), actor="lea")
+        judge(store, 1, "lea")
+        assert start_with(store, 1, "imported", actor="lea").source is TruthSource.SAMPLE
+        audit = read_audit(store, AuditQuery(), EVERYTHING).items
+        assert [one.sentence for one in audit if one.kind == "gold"] == [
+            "changed what annotators of gold group 1 begin with",
+            "marked 1 group of a sample as gold",
+        ]
 
     def test_other_groups_of_the_same_names_have_no_truth(self, store, scenes, tmp_path) -> None:
         truth = tmp_path / TRUTH
