@@ -7,6 +7,7 @@ import { useEffect, useState } from 'preact/hooks';
 import { endSession, getSessions, putPassword } from '../api/people.js';
 import { ApiError } from '../api/problem.js';
 import { getOwnWays } from '../api/sign_on.js';
+import { browserName } from '../lib/browser_name.js';
 import { logOut, me } from '../state/me.js';
 import { FormError } from './form_error.js';
 import { useSessionForm } from './login.js';
@@ -20,20 +21,11 @@ import { When } from './when.js';
 /** @import {OpenSessionJson} from '../api/people.js' */
 /** @import {OwnWaysJson} from '../api/sign_on.js' */
 
-/** The browser and the system of a session, as far as they say. @param {string} text */
-function browserOf(text) {
-	const browser = /(Edg|OPR|Firefox|Chrome|Safari)\/(\d+)/.exec(text);
-	const system = /\((?:X11; )?([^;)]+)/.exec(text);
-	const names = /** @type {{[name: string]: string}} */ ({ Edg: 'Edge', OPR: 'Opera' });
-	if (!browser) return text.slice(0, 60) || 'A browser without a name';
-	return `${names[browser[1]] ?? browser[1]} ${browser[2]}${system ? `, ${system[1]}` : ''}`;
-}
-
 /** @param {{one: OpenSessionJson, end: (id: number | null) => void}} props */
 function SessionRow({ one, end }) {
 	return html`
 		<tr>
-			<th scope="row">${browserOf(one.browser)}${one.this ? html` <strong>(this one)</strong>` : null}<small>${one.address}</small></th>
+			<th scope="row">${browserName(one.browser)}${one.this ? html` <strong>(this one)</strong>` : null}<small>${one.address}</small></th>
 			<td><${When} at=${one.created} /></td>
 			<td><${When} at=${one.seen} /></td>
 			<td><span class="table__actions">${one.this ? null : html`<button class="button button--small" type="button" onClick=${() => end(one.id)}>End</button>`}</span></td>

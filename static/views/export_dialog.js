@@ -78,7 +78,7 @@ export function ExportDialog({ one, version = null, onClose }) {
 				boxes: String(form.get('boxes')),
 				images: form.get('images') ? 'copy' : 'none',
 				views: form.get('views') ? 'all' : 'valid',
-				version: version?.id ?? null,
+				version: version?.name ?? null,
 			}, (job) => setState((before) => ({ ...before, job })), closed.current.signal);
 			// Whoever closed the dialog finds the export among the jobs.
 			if (closed.current.signal.aborted) return;

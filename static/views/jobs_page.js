@@ -39,7 +39,7 @@ function useJobs() {
 	const [jobs, setJobs] = useState(/** @type {JobJson[] | null} */ (null));
 	const [next, setNext] = useState(/** @type {string | null} */ (null));
 	const [error, setError] = useState(/** @type {ApiError | null} */ (null));
-	/** @param {string | null} cursor */
+	/** Where the next page begins; undefined where nothing could be read. @param {string | null} cursor */
 	async function read(cursor) {
 		try {
 			const found = await getJobs({ limit: PAGE, cursor });
@@ -49,10 +49,10 @@ function useJobs() {
 		} catch (problem) {
 			if (!(problem instanceof ApiError)) throw problem;
 			setError(problem);
-			return null;
+			return undefined;
 		}
 	}
-	const first = () => read(null).then((cursor) => setNext((before) => before ?? cursor));
+	const first = () => read(null).then((cursor) => setNext((before) => before ?? cursor ?? null));
 	useEffect(() => {
 		first();
 		return listen('job', (/** @type {JobJson} */ job) => setJobs((before) => merged(before ?? [], [job])), () => { read(null); });
@@ -66,7 +66,7 @@ function useJobs() {
 		const timer = setInterval(() => { if (!document.hidden) read(null); }, ASK);
 		return () => clearInterval(timer);
 	}, [connected.value]);
-	return { jobs, next, error, retry: first, more: () => read(next).then(setNext) };
+	return { jobs, next, error, retry: first, more: () => read(next).then((cursor) => setNext((before) => (cursor === undefined ? before : cursor))) };
 }
 
 /** What an import did not bring, in numbers. @param {JobJson} job */

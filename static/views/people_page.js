@@ -58,9 +58,14 @@ function FactorRule({ act }) {
 	const told = (said) => setOn(said.require_second_factor);
 	useEffect(() => { act(getTeam().then(told)); }, []);
 	if (on === null) return null;
+	/** @param {boolean} ticked */
+	const ask = (ticked) => {
+		setOn(ticked);
+		act(putTeam(ticked).then(told)).then((done) => { if (!done) setOn(!ticked); });
+	};
 	return html`
 		<p class="people__rule"><label class="form__check">
-			<input type="checkbox" checked=${on} onChange=${withTick((ticked) => act(putTeam(ticked).then(told)))} />
+			<input type="checkbox" checked=${on} onChange=${withTick(ask)} />
 			<span>Everybody needs a second factor: who has none makes one before anything else</span>
 		</label></p>
 	`;

@@ -61,14 +61,15 @@ function TeamBatch({ one, act, give }) {
 	`;
 }
 
-/** @param {{dataset: DatasetJson}} props */
-export function TeamCard({ dataset }) {
+/** @param {{dataset: DatasetJson, changed: () => void}} props */
+export function TeamCard({ dataset, changed }) {
 	const may = whyNot('lead', dataset.name) === '';
 	const found = useResource(async (signal) => (may ? getTeamWork(dataset.id, signal) : null), [dataset.id, may]);
 	const [giving, setGiving] = useState(/** @type {TeamBatchJson | null} */ (null));
 	const { error, attempt } = useAttempt();
+	const renew = () => { found.reload(); changed(); };
 	/** @param {Promise<unknown>} doing */
-	const act = (doing) => attempt(doing).then(found.reload);
+	const act = (doing) => attempt(doing).then(renew);
 	if (found.error) return html`<${Trouble} title="The batches cannot be shown" error=${found.error} retry=${found.reload} />`;
 	if (!may || !found.value) return null;
 	const { items } = found.value;
@@ -78,7 +79,7 @@ export function TeamCard({ dataset }) {
 			<p class="note">${items.length ? plural(items.length, 'batch').replace('batchs', 'batches') : 'None yet'}. Filter or tick groups in the <a class="link" href=${queueAddress(dataset.name, '')}>queue</a> and press “Give out…” to make one.</p>
 			${error ? html`<${FormError} error=${error} />` : null}
 			<ul class="work__list">${items.map((one) => html`<${TeamBatch} key=${one.batch.id} one=${one} act=${act} give=${setGiving} />`)}</ul>
-			${giving ? html`<${GiveOnDialog} one=${giving} onClose=${() => setGiving(null)} onDone=${found.reload} />` : null}
+			${giving ? html`<${GiveOnDialog} one=${giving} onClose=${() => setGiving(null)} onDone=${renew} />` : null}
 		</section>
 	`;
 }

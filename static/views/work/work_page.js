@@ -66,7 +66,7 @@ export function WorkPage() {
 		<${PageFrame} current="work" title="My work" where=${html`<strong>My work</strong>`}>
 			${mine.error ? html`<${Trouble} title="Your work cannot be shown" error=${mine.error} retry=${mine.reload} />` : null}
 			${mine.value ? html`<${Mine} items=${mine.value.items} />` : mine.error ? null : html`<${Loading} what="your work" />`}
-			${dataset.value ? html`<${TeamCard} dataset=${dataset.value} />` : null}
+			${dataset.value ? html`<${TeamCard} dataset=${dataset.value} changed=${mine.reload} />` : null}
 		<//>
 	`;
 }
