@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -18,11 +18,13 @@ from playwright.sync_api import (
     sync_playwright,
 )
 
+from tests.e2e.crew import CREW, Crew
 from tests.e2e.homes import build_film, build_sample, build_season
 from tests.e2e.install_chromium import ADVICE, find_chromium
 from tests.e2e.lateness import make_late
 from tests.e2e.screen import Screen, passing
 from tests.e2e.service import ROOT, serving
+from tests.e2e.team import join
 from tests.e2e.windows import TIMEOUT_MS, Windows
 from tests.homes import copy_home, once_for_all
 from tests.provider import CLIENT, Provider, providing
@@ -96,6 +98,15 @@ def team(team_home: Path, provider: Provider) -> Iterator[str]:
             patch.setenv(f"TOUCHLINE_SSO_{name}", value)
         with serving(team_home, "--team") as address:
             yield address
+
+
+@pytest.fixture(scope="module")
+def crew(team: str, team_home: Path) -> Iterator[Crew]:
+    """The team, at its server."""
+    for name, role in CREW.items():
+        join(team_home, name, role)
+    with ExitStack() as clients:
+        yield Crew(team, clients)
 
 
 @pytest.fixture(scope="session")
