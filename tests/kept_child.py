@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 
 from app.child import Allowance, Child
 
-USERS = ("app.child_pool", "app.review.datasets.picture_files", "app.store.store_child")
+USERS = ("app.child_pool", "app.review.datasets.picture_files", "app.store.child")
 """Modules that make children."""
 
 

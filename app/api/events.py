@@ -23,8 +23,8 @@ from pydantic import BaseModel
 from app.api.schemas.event import DatasetEvent, GroupEvent, PresenceDocument, WorkEvent
 from app.api.schemas.job import JobDocument
 from app.errors import OverloadedError, StorageError
-from app.review.jobs.job_records import Job
 from app.review.jobs.jobs import Jobs
+from app.review.jobs.records import Job
 from app.review.people.roles import EVERYTHING, Sight
 from app.review.queue.changes import (
     Change,

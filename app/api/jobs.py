@@ -9,7 +9,7 @@ from fastapi import Response
 from app.api.problem import Responses, responses
 from app.api.reply import document
 from app.api.schemas.job import JobDocument
-from app.review.jobs.job_records import Job
+from app.review.jobs.records import Job
 
 ACCEPTED: Responses = {
     202: {

@@ -28,7 +28,7 @@ from app.review.jobs.pictures import PICTURES
 from app.review.jobs.positions import POSITIONS
 from app.review.jobs.proposals import PROPOSALS
 from app.review.jobs.rig import make_rigs
-from app.review.jobs.shared_jobs import SharedJobs
+from app.review.jobs.shared import SharedJobs
 from app.review.jobs.solve import resume_solving, solve_leftovers
 from app.review.jobs.upkeep import Upkeep
 from app.review.jobs.versions import resume_versions

@@ -19,7 +19,7 @@ import httpx
 import pytest
 
 from app.config import Settings
-from app.review.jobs.job_records import need_job
+from app.review.jobs.records import need_job
 from app.store.store import Store
 from tests.databases import holding_the_write_lock
 from tests.e2e.service import serving

@@ -27,7 +27,7 @@ from app.api.stored_file import stored_file
 from app.errors import ConflictError, NotFoundError
 from app.review.datasets.dataset import dataset_id
 from app.review.jobs.exports import KIND, request_export
-from app.review.jobs.job_records import Job
+from app.review.jobs.records import Job
 from app.review.people.deeds import record_deed
 
 router = APIRouter(prefix="/exports", tags=["exports"])

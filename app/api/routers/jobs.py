@@ -13,7 +13,7 @@ from app.api.reply import AskedUnder, Reply, document
 from app.api.schemas.job import JobDocument, JobKind, JobPage
 from app.review.answers.keep import Kept
 from app.review.datasets.dataset import dataset_id
-from app.review.jobs.job_records import Job
+from app.review.jobs.records import Job
 from app.review.people.deeds import with_deed
 from app.soccer.choices import JobState
 

@@ -12,7 +12,7 @@ from app.api.schemas.job import JobDocument
 from app.api.schemas.version import VersionId
 from app.datasets.format_names import ExportFormat
 from app.review.exporting.folder import ExportEntry
-from app.review.jobs.job_records import DONE, Job
+from app.review.jobs.records import DONE, Job
 from app.soccer.choices import BoxKind, JobState, PicturesSent, TrainingViews
 
 

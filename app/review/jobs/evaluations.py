@@ -11,9 +11,9 @@ from app.review.datasets.dataset import get_dataset_head
 from app.review.evaluating.accept import AcceptReport, AcceptRequest, accept, plan_accept
 from app.review.evaluating.evaluation import list_evaluations
 from app.review.evaluating.evaluation_run import EvaluationRequest, check_evaluation, run_evaluation
-from app.review.jobs.job_child import carry_out_apart
-from app.review.jobs.job_run import JobProgress, Work
+from app.review.jobs.child import carry_out_apart
 from app.review.jobs.jobs import Jobs
+from app.review.jobs.run import JobProgress, Work
 from app.store.evaluations import StoredEvaluation
 from app.store.jobs import Job
 from app.store.store import Store

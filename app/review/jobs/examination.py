@@ -10,8 +10,8 @@ from app.review.editing.check import Check
 from app.review.editing.doctor import examine
 from app.review.editing.home_check import examine_home, examine_surroundings
 from app.review.talk.thread_check import examine_threads
-from app.review.versions.version_check import examine_versions
-from app.review.yields.yield_check import examine_yields
+from app.review.versions.check import examine_versions
+from app.review.yields.check import examine_yields
 from app.store.home import make_home
 from app.store.store import Store
 

@@ -12,12 +12,12 @@ from app.object_store.address import SCHEME
 from app.object_store.path import StoredPath, target_path
 from app.review.answers.keep import Keep, keep_nothing
 from app.review.datasets.dataset import get_dataset_head
+from app.review.exporting.child import export_asked
 from app.review.exporting.export import require_possible
-from app.review.exporting.export_child import export_asked
 from app.review.exporting.folder import ExportFolder
-from app.review.jobs.job_child import carry_out_apart
-from app.review.jobs.job_run import JobProgress, Work, counting
+from app.review.jobs.child import carry_out_apart
 from app.review.jobs.jobs import Jobs
+from app.review.jobs.run import JobProgress, Work, counting
 from app.store.frames import Frames
 from app.store.jobs import EXPORT, Job
 from app.store.store import Store

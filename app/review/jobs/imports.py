@@ -14,13 +14,13 @@ from app.review.answers.keep import Keep, keep_nothing
 from app.review.datasets.dataset import get_dataset_head
 from app.review.datasets.naming import require_name
 from app.review.editing.paint import has_pictures
+from app.review.importing.child import Outcome, import_apart
 from app.review.importing.folders import resolve_folder
-from app.review.importing.import_child import Outcome, import_apart
 from app.review.importing.sources import FORMATS, Source
-from app.review.jobs.job_child import left_to_the_next
-from app.review.jobs.job_run import FailedWithReportError, JobProgress, Work
+from app.review.jobs.child import left_to_the_next
 from app.review.jobs.jobs import Jobs
 from app.review.jobs.paint import PAINT
+from app.review.jobs.run import FailedWithReportError, JobProgress, Work
 from app.review.jobs.solve import request_solve
 from app.soccer.frames import ImageSize
 from app.soccer.policy import POLICIES

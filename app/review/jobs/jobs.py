@@ -26,8 +26,8 @@ from app.errors import (
     StorageError,
 )
 from app.review.answers.keep import Keep, keep_nothing
-from app.review.jobs.job_records import JobRecords, need_job
-from app.review.jobs.job_run import JobProgress, JobRun, RunQueue, Work
+from app.review.jobs.records import JobRecords, need_job
+from app.review.jobs.run import JobProgress, JobRun, RunQueue, Work
 from app.review.people.deeds import note_job
 from app.store.clock import now
 from app.store.jobs import (

@@ -7,9 +7,9 @@ from collections.abc import Mapping
 from app.review.answers.keep import Keep, keep_nothing
 from app.review.datasets.dataset import dataset_id
 from app.review.editing.pictures import apply_pictures, estimate_pictures
-from app.review.jobs.job_run import JobProgress, counting
 from app.review.jobs.jobs import Jobs
-from app.review.jobs.match_job import MatchesAsked, MatchJob
+from app.review.jobs.matches import MatchesAsked, MatchJob
+from app.review.jobs.run import JobProgress, counting
 from app.review.jobs.solve import solve_after
 from app.soccer.picture import PictureGeometry
 from app.store.codecs import picture_to_json

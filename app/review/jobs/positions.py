@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from app.review.answers.keep import Keep, keep_nothing
 from app.review.editing.positions import apply_take_back, require_sharable, share_positions
-from app.review.jobs.job_run import JobProgress, counting
 from app.review.jobs.jobs import Jobs
-from app.review.jobs.match_job import MatchesAsked, MatchJob
+from app.review.jobs.matches import MatchesAsked, MatchJob
+from app.review.jobs.run import JobProgress, counting
 from app.review.jobs.solve import request_solve
 from app.store.jobs import Job
 from app.store.session import Session

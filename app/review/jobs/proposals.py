@@ -7,9 +7,9 @@ from dataclasses import asdict
 from app.review.answers.keep import Keep, keep_nothing
 from app.review.datasets.dataset import dataset_id
 from app.review.editing.proposals import forget_proposals, propose_views
-from app.review.jobs.job_run import JobProgress, counting
 from app.review.jobs.jobs import Jobs
-from app.review.jobs.match_job import MatchesAsked, MatchJob
+from app.review.jobs.matches import MatchesAsked, MatchJob
+from app.review.jobs.run import JobProgress, counting
 from app.store.store import Store
 from app.store.stored_json import Json
 

@@ -6,8 +6,8 @@ from app.errors import ConflictError
 from app.review.answers.keep import Keep, keep_nothing
 from app.review.datasets.dataset import get_dataset_head
 from app.review.editing.rig import accept, adjustable, proposal_values, propose, take_back
-from app.review.jobs.job_run import JobProgress, Work
 from app.review.jobs.jobs import Jobs
+from app.review.jobs.run import JobProgress, Work
 from app.review.jobs.solve import request_solve
 from app.store.jobs import Job
 from app.store.store import Store

@@ -12,8 +12,8 @@ from app.review.datasets.dataset import get_dataset_head, list_datasets
 from app.review.editing.pitches import DatasetPitches, apply_pitches, stale_matches
 from app.review.editing.recompute import SolveReport, stale_groups
 from app.review.jobs.full_solve import count_yield, solve_fully
-from app.review.jobs.job_run import JobProgress, Work, counting
 from app.review.jobs.jobs import Jobs, Pool
+from app.review.jobs.run import JobProgress, Work, counting
 from app.review.policies.policy import PolicyState, apply_policy
 from app.soccer.pitch import Pitch
 from app.soccer.policy import Policy

@@ -9,9 +9,9 @@ from app.errors import OverloadedError
 from app.progress import TellProgress
 from app.review.answers.keep import Keep, keep_nothing
 from app.review.datasets.dataset import get_dataset_head
-from app.review.jobs.job_child import carry_out_apart
-from app.review.jobs.job_run import JobProgress, Work
+from app.review.jobs.child import carry_out_apart
 from app.review.jobs.jobs import Jobs
+from app.review.jobs.run import JobProgress, Work
 from app.review.versions.freeze import FreezeRequest, freeze, plan_freeze
 from app.review.versions.verify import keep_failure, verify_and_keep
 from app.review.versions.version import FREEZE, Version, get_version, list_versions

@@ -16,9 +16,9 @@ from app.review.datasets.delete import delete_dataset
 from app.review.editing.recompute import solve_dataset
 from app.review.editing.state import GroupState, read_states
 from app.review.importing.sources import Source, import_source
-from app.review.jobs.job_child import carry_out_apart
-from app.review.jobs.job_run import JobProgress, Work
+from app.review.jobs.child import carry_out_apart
 from app.review.jobs.jobs import Jobs
+from app.review.jobs.run import JobProgress, Work
 from app.review.practice.lessons import Feedback, judge, kind_of
 from app.review.practice.words import WORDS
 from app.sample.practice import LESSONS, write_practice

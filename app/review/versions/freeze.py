@@ -18,9 +18,9 @@ from app.progress import TellProgress
 from app.review.datasets.dataset import DatasetHead, read_dataset_head
 from app.review.datasets.licence import licence_text
 from app.review.datasets.naming import require_name
+from app.review.versions.hash import version_hash
 from app.review.versions.membership import RULES, Candidate, read_candidates, require_solved
 from app.review.versions.version import Version, calibration_names, next_name, read_version
-from app.review.versions.version_hash import version_hash
 from app.soccer.group import Group
 from app.soccer.reasons import checked_note
 from app.soccer.solution import SOLVER_VERSION

@@ -13,12 +13,12 @@ from typing import Any
 from app.errors import DamagedError, JobCancelled, ReviewError, StorageError
 from app.progress import TellProgress
 from app.review.datasets.fan_out import fan_out
+from app.review.versions.hash import version_hash
 from app.review.versions.version import (
     Version,
     calibration_names,
     read_version,
 )
-from app.review.versions.version_hash import version_hash
 from app.soccer.group import Group
 from app.soccer.policy import Policy
 from app.soccer.solution import SOLVER_VERSION, Calibration

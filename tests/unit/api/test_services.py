@@ -15,7 +15,7 @@ from app.config import Settings
 from app.errors import BusyError
 from app.review import jobs
 from app.review.jobs import upkeep
-from app.review.jobs.match_job import MatchJob
+from app.review.jobs.matches import MatchJob
 
 
 class TestServices:

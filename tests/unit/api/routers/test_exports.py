@@ -15,7 +15,7 @@ from app.api.routers import exports as module
 from app.review.datasets.dataset import dataset_id
 from app.review.editing.recompute import solve_dataset
 from app.review.importing.ingest import ingest
-from app.review.jobs import job_child
+from app.review.jobs import child
 from app.review.jobs.jobs import Jobs
 from app.soccer.frames import ImageSize
 from app.soccer.group import Group, Station, View
@@ -246,7 +246,7 @@ class TestRestart:
         here = api.get(job["content"]).content
 
         # A process of its own asks for the same frames, and writes the same bytes.
-        monkeypatch.setattr(job_child, "SMALL", 0)
+        monkeypatch.setattr(child, "SMALL", 0)
         again = api.post(API, json=order).json()
         assert services.jobs.wait(again["id"], SECONDS).state == "done"
         assert read[2:] == read[:2]

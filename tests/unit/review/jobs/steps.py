@@ -10,8 +10,8 @@ from typing import Any
 
 import pytest
 
-from app.review.jobs.job_run import JobProgress
 from app.review.jobs.jobs import Jobs
+from app.review.jobs.run import JobProgress
 from app.store.jobs import Job
 from app.store.stored_json import Json
 from tests.waiting import SECONDS

@@ -21,8 +21,8 @@ from app.errors import (
 )
 from app.review.importing.ingest import ensure_dataset
 from app.review.jobs import jobs as module
-from app.review.jobs.job_run import JobProgress
 from app.review.jobs.jobs import Jobs
+from app.review.jobs.run import JobProgress
 from app.review.people.roles import EVERYTHING, Sight
 from app.store.jobs import Job, NewJob, insert_job
 from app.store.session import Session
@@ -34,7 +34,7 @@ from tests.waiting import SECONDS
 
 @pytest.fixture(autouse=True)
 def _quick(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("app.review.jobs.job_records.TICK", 0.01)
+    monkeypatch.setattr("app.review.jobs.records.TICK", 0.01)
 
 
 @pytest.fixture
@@ -196,7 +196,7 @@ class TestProgress:
     def test_is_written_a_few_times_a_second_however_often_it_is_told(
         self, jobs: Jobs, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        monkeypatch.setattr("app.review.jobs.job_records.TICK", 0.05)
+        monkeypatch.setattr("app.review.jobs.records.TICK", 0.05)
         heard: list[Job] = []
         jobs.listen(heard.append)
 

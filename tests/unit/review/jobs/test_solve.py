@@ -14,8 +14,8 @@ from app.review.editing.recompute import SolveReport, stale_groups
 from app.review.importing.ingest import ensure_dataset
 from app.review.jobs import full_solve
 from app.review.jobs import solve as solve_job
-from app.review.jobs.job_run import JobProgress
 from app.review.jobs.jobs import Jobs
+from app.review.jobs.run import JobProgress
 from app.review.jobs.solve import request_solve, resume_solving, solve_leftovers
 from app.store.store import Store
 from tests.waiting import SECONDS

@@ -10,8 +10,8 @@ import pytest
 
 from app.child import Child
 from app.errors import JobCancelled, OverloadedError
-from app.review.jobs import job_child
-from app.review.jobs.job_run import JobProgress
+from app.review.jobs import child
+from app.review.jobs.run import JobProgress
 from app.review.jobs.versions import verify_work
 from app.review.versions.freeze import FreezeRequest, freeze
 from app.review.versions.version import Version, get_version
@@ -43,8 +43,8 @@ class Killed(JobProgress):
 
 @pytest.fixture(autouse=True)
 def _apart(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(job_child, "SMALL", 0)
-    monkeypatch.setattr(job_child, "STOP_SECONDS", 0.0)
+    monkeypatch.setattr(child, "SMALL", 0)
+    monkeypatch.setattr(child, "STOP_SECONDS", 0.0)
 
 
 class TestVerifyWork:
@@ -65,7 +65,7 @@ class TestVerifyWork:
             raise OverloadedError("no process could be started for this") from OSError(12, "memory")
 
         verify_work(store, version.id, "ann")(JobProgress(1, threading.Event()))
-        monkeypatch.setattr("app.store.store_child.Child.run", refuse)
+        monkeypatch.setattr("app.store.child.Child.run", refuse)
         with pytest.raises(OverloadedError, match="no process"):
             verify_work(store, version.id, "ben")(JobProgress(2, threading.Event()))
         kept = get_version(store, version.id).verified

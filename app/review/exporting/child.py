@@ -13,9 +13,9 @@ from typing import Any
 from app.datasets.file_tree import Root
 from app.review.exporting.export import ExportReport, export
 from app.soccer.media import Media
+from app.store.child import Caller
 from app.store.frames import SentPicture
 from app.store.store import Store
-from app.store.store_child import Caller
 
 
 def export_asked(

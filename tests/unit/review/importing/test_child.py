@@ -17,8 +17,8 @@ from app.datasets.soccernet_v3_writer import write_soccernet_v3
 from app.errors import DamagedError, JobCancelled, TooLargeError
 from app.progress import TellProgress
 from app.review.datasets.dataset import list_datasets
-from app.review.importing import import_child
-from app.review.importing.import_child import Outcome, import_apart
+from app.review.importing import child
+from app.review.importing.child import Outcome, import_apart
 from app.review.importing.sources import Source, import_source
 from app.soccer.group import Group
 from app.store.store import Store
@@ -170,7 +170,7 @@ class TestImportApart:
                 raise JobCancelled
 
         monkeypatch.setattr(store, "turn", Turn())
-        monkeypatch.setattr(import_child, "import_here", take_and_keep)
+        monkeypatch.setattr(child, "import_here", take_and_keep)
         with pytest.raises(JobCancelled):
             apart(store, tree, stop=stop)
         with store.write():
@@ -179,7 +179,7 @@ class TestImportApart:
     def test_damage_that_the_child_meets_ends_changes_here(
         self, there: Store, tree: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        monkeypatch.setattr(import_child, "import_here", meet_damage)
+        monkeypatch.setattr(child, "import_here", meet_damage)
         with pytest.raises(DamagedError, match=r"^touchline\.db is damaged$"):
             apart(there, tree)
         with pytest.raises(DamagedError, match="nothing can be changed now"), there.write():
@@ -188,7 +188,7 @@ class TestImportApart:
     def test_one_that_breaks_down_is_counted(
         self, store: Store, tree: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        monkeypatch.setattr(import_child, "import_here", break_down)
+        monkeypatch.setattr(child, "import_here", break_down)
         before = FIGURES["imports"].ended["crash"]
         with pytest.raises(TooLargeError, match="made its process crash"):
             apart(store, tree)

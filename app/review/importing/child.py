@@ -15,8 +15,8 @@ from app.errors import TooLargeError
 from app.progress import TellProgress
 from app.review.importing.sources import Source, import_source
 from app.soccer.policy import Policy
+from app.store.child import SILENCE, work_apart
 from app.store.store import Store
-from app.store.store_child import SILENCE, work_apart
 
 LIMITS_HINT = (
     "Import it in parts, or have the operator raise TOUCHLINE_IMPORT_MEMORY or "

@@ -9,7 +9,7 @@ from typing import Any
 
 from app.errors import ConflictError, NotFoundError, StorageError
 from app.review.answers.keep import Keep, keep_nothing
-from app.review.jobs.job_run import JobRun
+from app.review.jobs.run import JobRun
 from app.review.people.bell import RingKind, tell
 from app.soccer.actors import person_of
 from app.store.jobs import DONE as DONE

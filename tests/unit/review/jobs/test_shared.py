@@ -8,8 +8,8 @@ from collections.abc import Callable, Iterator
 import pytest
 
 from app.errors import ConflictError, JobCancelled
-from app.review.jobs.job_run import JobProgress
-from app.review.jobs.shared_jobs import SharedJobs
+from app.review.jobs.run import JobProgress
+from app.review.jobs.shared import SharedJobs
 from app.store.jobs import Job, update_job
 from app.store.store import Store
 from tests.waiting import SECONDS
@@ -68,7 +68,7 @@ class Work:
 def claims(store: Store, monkeypatch: pytest.MonkeyPatch) -> Claims:
     claims = Claims()
     monkeypatch.setattr(store, "sharing", claims)
-    monkeypatch.setattr("app.review.jobs.shared_jobs.LOOK_SECONDS", 0.05)
+    monkeypatch.setattr("app.review.jobs.shared.LOOK_SECONDS", 0.05)
     return claims
 
 
@@ -206,7 +206,7 @@ def update_and_cancel(store: Store, jobs: SharedJobs, number: int) -> None:
 
 
 def test_a_progress_whose_claim_is_lost_wants_nothing(store: Store, opened: Open) -> None:
-    from app.review.jobs.shared_jobs import SharedProgress
+    from app.review.jobs.shared import SharedProgress
 
     lost = threading.Event()
     progress = SharedProgress(ask(opened()).id, lost, store)

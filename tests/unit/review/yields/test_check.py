@@ -8,7 +8,7 @@ import pytest
 
 from app.config import Settings
 from app.review.yields.arrays_file import map_arrays, write_arrays
-from app.review.yields.yield_check import examine_yields
+from app.review.yields.check import examine_yields
 
 ARRAYS = {
     "jac": np.linspace(0, 1, 7),

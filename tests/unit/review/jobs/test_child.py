@@ -11,11 +11,11 @@ import pytest
 
 from app.errors import InputError, JobCancelled, OverloadedError
 from app.review.datasets.dataset import dataset_id
-from app.review.jobs import job_child as module
-from app.review.jobs.job_child import carry_out_apart
-from app.review.jobs.job_run import JobProgress
+from app.review.jobs import child as module
+from app.review.jobs.child import carry_out_apart
+from app.review.jobs.run import JobProgress
+from app.store.child import Caller
 from app.store.store import Store
-from app.store.store_child import Caller
 from tests.waiting import SECONDS
 
 

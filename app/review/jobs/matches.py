@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 from app.review.answers.keep import Keep, keep_nothing
 from app.review.datasets.dataset import Dataset, DatasetHead, dataset_id, require_matches
-from app.review.jobs.job_records import need_job
-from app.review.jobs.job_run import JobProgress, Work
 from app.review.jobs.jobs import Jobs
+from app.review.jobs.records import need_job
+from app.review.jobs.run import JobProgress, Work
 from app.review.jobs.solve import solve_after
 from app.store.clock import now
 from app.store.jobs import Job

@@ -19,11 +19,11 @@ from app.errors import DamagedError, InputError, JobCancelled, NotFoundError
 from app.progress import TellProgress
 from app.review.datasets.dataset import list_datasets
 from app.soccer.policy import PAPER
-from app.store import store_child as module
+from app.store import child as module
+from app.store.child import Caller, patiently, work_apart
 from app.store.clock import now
 from app.store.datasets import insert_dataset_row
 from app.store.store import Store
-from app.store.store_child import Caller, patiently, work_apart
 from tests.waiting import SECONDS
 
 KIND = "exports"

@@ -17,9 +17,9 @@ import structlog
 
 from app.errors import ConflictError, JobCancelled, ReviewError, StorageError
 from app.review.answers.keep import Keep, keep_nothing
-from app.review.jobs.job_records import need_job
-from app.review.jobs.job_run import JobProgress, JobRun, Work
 from app.review.jobs.jobs import CLOSE_SECONDS, KEPT, Jobs, Pool
+from app.review.jobs.records import need_job
+from app.review.jobs.run import JobProgress, JobRun, Work
 from app.store.clock import now
 from app.store.jobs import (
     CANCELLED,

@@ -7,8 +7,8 @@ from sqlalchemy import text
 
 from app.review.datasets.delete import delete_dataset
 from app.review.editing.check import Check
+from app.review.versions.check import examine_versions
 from app.review.versions.freeze import FreezeRequest, freeze
-from app.review.versions.version_check import examine_versions
 from app.store.dialect.dialect import dialect_of
 from app.store.frozen import body_of
 from app.store.store import Store

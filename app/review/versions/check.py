@@ -7,8 +7,8 @@ from typing import Any
 
 from app.errors import StorageError
 from app.review.editing.check import Check, compared
+from app.review.versions.hash import version_hash
 from app.review.versions.version import calibration_names
-from app.review.versions.version_hash import version_hash
 from app.store.aliases import shown_entries
 from app.store.codecs import policy_from_json
 from app.store.frozen import SAID, SOLUTION, fitting_key, json_of, known_frozen, named_texts

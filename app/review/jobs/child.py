@@ -9,10 +9,10 @@ from typing import Any, TypeVar
 from app.child import ChildEnded, EndReason
 from app.errors import OverloadedError, TooLargeError
 from app.progress import TellProgress
-from app.review.jobs.job_run import JobProgress
+from app.review.jobs.run import JobProgress
+from app.store.child import nothing, patiently, work_apart, work_here
 from app.store.datasets import has_more_groups
 from app.store.store import Store
-from app.store.store_child import nothing, patiently, work_apart, work_here
 
 Result = TypeVar("Result")
 
@@ -44,7 +44,7 @@ def carry_out_apart(
     told: TellProgress | None = None,
     answer: Callable[[Any], Any] = nothing,
 ) -> Result:
-    """The result of ``work(store, *arguments, caller)``, as ``store.store_child.work_apart`` has it.
+    """The result of ``work(store, *arguments, caller)``, as ``store.child.work_apart`` has it.
 
     Args:
         store: The database.
