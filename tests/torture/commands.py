@@ -20,7 +20,7 @@ from sqlalchemy import text
 
 from app.config import Settings
 from app.datasets.manifest import MANIFEST
-from app.review.editing.doctor import examine
+from app.review.doctor.database import examine
 from app.store.store import Store
 from tests.e2e.service import ROOT, SERVE, run_touchline
 from tests.starting import Process

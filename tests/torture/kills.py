@@ -24,7 +24,7 @@ import httpx
 
 from app.config import Settings
 from app.review.datasets.dataset import list_datasets
-from app.review.editing.doctor import examine
+from app.review.doctor.database import examine
 from app.store.log import read_log
 from app.store.store import Store
 from tests.e2e.service import ROOT, SERVE, free_port, run_touchline

@@ -12,7 +12,7 @@ from sqlalchemy import text
 
 from app.config import Settings
 from app.review.datasets.dataset import list_datasets
-from app.review.editing.doctor import examine
+from app.review.doctor.database import examine
 from app.review.editing.edit import SetBall
 from app.review.editing.submit import load, submit
 from app.review.verdicts.verdict import set_verdict

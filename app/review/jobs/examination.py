@@ -6,10 +6,10 @@ from contextlib import closing
 
 from app.config import Settings
 from app.errors import StorageError
-from app.review.editing.check import Check
-from app.review.editing.doctor import examine
-from app.review.editing.home_check import examine_home, examine_surroundings
-from app.review.talk.thread_check import examine_threads
+from app.review.doctor.check import Check
+from app.review.doctor.database import examine
+from app.review.doctor.home import examine_home, examine_surroundings
+from app.review.talk.check import examine_threads
 from app.review.versions.check import examine_versions
 from app.review.yields.check import examine_yields
 from app.store.home import make_home

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from app.errors import StorageError
-from app.review.editing.check import Check, compared
+from app.review.doctor.check import Check, compared
 from app.review.versions.hash import version_hash
 from app.review.versions.version import calibration_names
 from app.store.aliases import shown_entries

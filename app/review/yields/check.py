@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from app.config import Settings
-from app.review.editing.check import Check
+from app.review.doctor.check import Check
 from app.review.yields.arrays_file import map_arrays
 from app.review.yields.cache import ARRAYS
 

@@ -22,7 +22,7 @@ from app.errors import InputError, NotFoundError, ReviewError, StorageError
 from app.object_store.address import split_address
 from app.object_store.path import find_path
 from app.object_store.store import open_store
-from app.review.editing.store_check import examine_stores
+from app.review.doctor.stores import examine_stores
 from app.review.importing.folders import list_folder, resolve_folder
 from app.soccer.group import Group
 from app.soccer.media import Media

@@ -10,7 +10,7 @@ from app.review.agreement import weigh
 from app.review.agreement.adjudicate import decide, get_case, hand_back, list_waiting, take_over
 from app.review.agreement.limits import read_limits, set_limits
 from app.review.agreement.weigh import BY_ITSELF, after_hand_in
-from app.review.editing.doctor import examine
+from app.review.doctor.database import examine
 from app.review.editing.edit import SetBall
 from app.review.editing.past import history
 from app.review.editing.state import GroupState

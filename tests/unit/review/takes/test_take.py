@@ -8,7 +8,7 @@ import pytest
 from app.errors import ConflictError, ForbiddenError, NotFoundError
 from app.review.datasets.dataset import insert_dataset, list_datasets
 from app.review.datasets.delete import delete_dataset
-from app.review.editing.doctor import examine
+from app.review.doctor.database import examine
 from app.review.editing.edit import IncludeView, SetBall, SetLines, SetStationLines
 from app.review.editing.past import history
 from app.review.editing.replay import rebuild

@@ -6,7 +6,7 @@ import pytest
 from sqlalchemy import text
 
 from app.review.datasets.delete import delete_dataset
-from app.review.editing.check import Check
+from app.review.doctor.check import Check
 from app.review.versions.check import examine_versions
 from app.review.versions.freeze import FreezeRequest, freeze
 from app.store.dialect.dialect import dialect_of

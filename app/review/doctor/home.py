@@ -11,8 +11,8 @@ import pysqlite3.dbapi2
 
 from app.config import Settings
 from app.errors import ConflictError, InputError, StorageError
-from app.review.editing.check import Check
-from app.review.editing.store_check import examine_stores
+from app.review.doctor.check import Check
+from app.review.doctor.stores import examine_stores
 from app.review.people.identities import linked_admins
 from app.review.people.provider import Provider
 from app.review.people.sign_on_rules import read_rules

@@ -10,8 +10,8 @@ from typing import Any
 import pytest
 from sqlalchemy import text
 
-from app.review.editing.check import Check
-from app.review.editing.doctor import REBUILD, examine
+from app.review.doctor.check import Check
+from app.review.doctor.database import REBUILD, examine
 from app.review.editing.replay import rebuild
 from app.review.editing.submit import load
 from app.review.verdicts.verdict import set_verdict

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
-from app.review.editing.check import Check, as_logged
+from app.review.doctor.check import Check, as_logged
 from app.review.people.names import PERSON
 from app.store.aliases import given_aliases
 from app.store.dataset_roles import all_dataset_roles

@@ -1,11 +1,11 @@
-"""Guideline check: whether what annotators are told is what somebody wrote, by the log's digests."""
+"""Guidelines: whether what annotators are told is what somebody wrote, by the log's digests."""
 
 from __future__ import annotations
 
 import hashlib
 
-from app.review.editing.check import Check, as_logged
-from app.review.editing.people_check import DELETED
+from app.review.doctor.check import Check, as_logged
+from app.review.doctor.people import DELETED
 from app.store.guidelines import GUIDELINE, all_guidelines
 from app.store.log import entries_of_kinds
 from app.store.session import Session

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from app.review.editing.check import Check, as_logged
+from app.review.doctor.check import Check, as_logged
 
 WHOLE = Check("findings", True, "2, as the log says")
 

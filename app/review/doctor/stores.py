@@ -9,7 +9,7 @@ from app.config import Settings
 from app.errors import ReviewError
 from app.object_store.refusal import ChangedObjectError
 from app.object_store.store import ObjectStore, open_store
-from app.review.editing.check import Check
+from app.review.doctor.check import Check
 
 KEYS = "Correct TOUCHLINE_STORES or the file of keys: docs/operations.md says what a store needs."
 CONDITIONS = "Update the store, or use another one: docs/operations.md says which."

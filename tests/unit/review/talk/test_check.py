@@ -10,7 +10,7 @@ from app.review.people.local_deeds import adopt
 from app.review.people.people import invite
 from app.review.people.roles import Role
 from app.review.talk import comments
-from app.review.talk.thread_check import examine_threads
+from app.review.talk.check import examine_threads
 from app.store.dialect.dialect import dialect_of
 from app.store.people import person_by_name
 from app.store.store import Store

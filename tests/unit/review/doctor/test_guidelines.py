@@ -6,8 +6,8 @@ import pytest
 from sqlalchemy import text
 
 from app.review.datasets.delete import delete_dataset
-from app.review.editing.check import Check
-from app.review.editing.doctor import examine
+from app.review.doctor.check import Check
+from app.review.doctor.database import examine
 from app.review.takes.guidelines import write_guidelines
 from app.store.store import Store
 from tests.databases import said_for_sqlite

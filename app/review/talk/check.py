@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from app.errors import StorageError
-from app.review.editing.check import Check, compared
+from app.review.doctor.check import Check, compared
 from app.review.talk.comments import COMMENT
 from app.store.log import LogEntry, entries_of_kinds
 from app.store.session import Session

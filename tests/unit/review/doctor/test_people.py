@@ -8,8 +8,8 @@ from sqlalchemy import text
 from app.review.datasets import delete
 from app.review.datasets.dataset import dataset_id
 from app.review.datasets.delete import delete_dataset
-from app.review.editing.check import Check
-from app.review.editing.doctor import examine
+from app.review.doctor.check import Check
+from app.review.doctor.database import examine
 from app.review.importing.ingest import ensure_dataset
 from app.review.people.local_deeds import adopt
 from app.review.people.members import give_role

@@ -12,9 +12,9 @@ import pytest
 from sqlalchemy import text
 
 from app.config import Settings
-from app.review.editing import home_check
-from app.review.editing.check import Check
-from app.review.editing.home_check import examine_home, examine_surroundings
+from app.review.doctor import home
+from app.review.doctor.check import Check
+from app.review.doctor.home import examine_home, examine_surroundings
 from app.review.people.people import invite
 from app.review.people.roles import Role
 from app.store.home import make_home
@@ -110,7 +110,7 @@ class TestExamineHome:
     def test_an_old_sqlite_is_named(
         self, settings: Settings, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        monkeypatch.setattr(home_check, "MIN_SQLITE", (99, 0, 0))
+        monkeypatch.setattr(home, "MIN_SQLITE", (99, 0, 0))
         assert "versions" in faults(settings)
 
 

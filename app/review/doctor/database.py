@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from app.errors import StorageError
 from app.review.datasets.dataset import list_datasets
-from app.review.editing.check import Check, as_logged, compared
-from app.review.editing.guideline_check import examine_guidelines
+from app.review.doctor.check import Check, as_logged, compared
+from app.review.doctor.guidelines import examine_guidelines
+from app.review.doctor.people import examine_people
+from app.review.doctor.solutions import examine_computed
 from app.review.editing.ledger import Ledger, read_ledger
-from app.review.editing.people_check import examine_people
 from app.review.editing.recompute import stale_groups
 from app.review.editing.replay import replay
-from app.review.editing.solution_check import examine_computed
 from app.store.codecs import paint_to_json
 from app.store.digest import group_inputs_hash, station_digest, view_digest
 from app.store.log import newest_entry

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
 from typing import Any
 
 from app.errors import StorageError
-from app.review.editing.check import Check, compared
+from app.review.doctor.check import Check, compared
 from app.soccer.group import Group
 from app.soccer.policy import Policy
 from app.soccer.solution import Solution
