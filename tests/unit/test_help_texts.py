@@ -29,7 +29,7 @@ PLAIN_WORDS = """
     adjudicate compare differences distance limits other panel rater summary weigh workspace
     comment comments talk threads mentions bells past deeds window before after
     full tall scroll stalls settling exposure ends many naming tracing local lookup css
-    cluster serving hosts executors packing day
+    cluster serving hosts executors packing day browser database
     private kept another smaller
     stored tree trees safe path refusal attempt cookie fit
     compiler dialect postgresql sqlite statements transfer triggers
