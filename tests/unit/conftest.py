@@ -44,11 +44,11 @@ def _no_setting_of_tests() -> None:
 
 ON_BOTH = frozenset(
     {
-        "review/editing/test_doctor.py",
+        "review/doctor/test_database.py",
         "review/editing/test_submit.py",
         "review/verdicts/test_verdict.py",
+        "review/versions/test_check.py",
         "review/versions/test_freeze.py",
-        "review/versions/test_version_check.py",
         "store/test_answers.py",
         "store/test_conditions.py",
         "store/test_listing.py",

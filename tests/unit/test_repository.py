@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.unit.conftest import WHEN_ALL
+
 ROOT = Path(__file__).parents[2]
 MOST_BYTES = 300_000
 """Of a file that is no text."""
@@ -23,3 +25,8 @@ def test_no_file_that_is_no_text_is_large():
     binary = [path for path in files if b"\0" in path.read_bytes()]
     assert any(path.suffix == ".jpg" for path in binary)
     assert [path.name for path in binary if path.stat().st_size > MOST_BYTES] == []
+
+
+def test_every_file_whose_tests_run_on_both_databases_is_there():
+    folder = Path(__file__).parent
+    assert [name for name in sorted(WHEN_ALL) if not (folder / name).is_file()] == []
