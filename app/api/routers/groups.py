@@ -1,4 +1,4 @@
-"""Groups: lists, the whole document, what-if, undo, verdict and history."""
+"""Groups: lists, the whole document, what-if, undo and history."""
 
 from __future__ import annotations
 
@@ -34,12 +34,10 @@ from app.api.schemas.queue import (
     Neighbours,
 )
 from app.api.schemas.solution import SolutionDocument
-from app.api.schemas.verdict import VerdictEdit
 from app.api.security.access import login_of
 from app.api.services import Services
 from app.errors import NotFoundError
 from app.finite import MAX_ID
-from app.review.agreement.weigh import after_hand_in
 from app.review.datasets.dataset import dataset_id
 from app.review.editing import submit
 from app.review.editing import undo as undoing
@@ -47,7 +45,6 @@ from app.review.editing.past import history, read_step
 from app.review.editing.state import GroupState
 from app.review.people.roles import Action, may
 from app.review.queue import listing as queue
-from app.review.verdicts.verdict import set_verdict
 from app.store.store import Store
 
 router = APIRouter(prefix="/groups", tags=["groups"])
@@ -251,29 +248,3 @@ def _step(
     store = services.store
     change = partial(step, store, group, if_match=if_match, actor=actor, paint=services.paint)
     return change_group(asked, lambda: load_document(store, group), change)
-
-
-@router.put(
-    "/{group}/verdict",
-    operation_id="setVerdict",
-    response_model=GroupDocument,
-    responses={**responses(*CONFLICTS), **CHANGED},
-)
-def put_verdict(
-    group: Id,
-    verdict: VerdictEdit,
-    services: AppServices,
-    actor: Actor,
-    if_match: IfMatch,
-    asked: AskedUnder,
-) -> Response:
-    """Accept, reject with a reason, defer, or take a verdict back."""
-    said = (verdict.state, verdict.reason, verdict.note)
-    change = partial(set_verdict, services.store, group, *said, if_match=if_match, actor=actor)
-
-    def hand_in(state: GroupState) -> None:
-        """A verdict on one's own annotation of a group, and on nothing else, hands that in."""
-        if state.is_copy:
-            after_hand_in(services.store, group, services.paint)
-
-    return change_group(asked, lambda: load_document(services.store, group), change, hand_in)

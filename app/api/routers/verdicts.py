@@ -1,14 +1,16 @@
-"""Verdicts for every group that a query matches, their undo and redo."""
+"""Verdicts: on a group, and on every group that a query matches, with undo and redo of these."""
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Annotated
 
 from fastapi import APIRouter, Query, Response
 
-from app.api.deps import Actor, AppStore, DatasetPath, DryRun, Id
+from app.api.deps import Actor, AppServices, AppStore, DatasetPath, DryRun, Id, IfMatch
 from app.api.problem import responses
 from app.api.reply import AskedUnder, Reply, document
+from app.api.routers.groups import CHANGED, CONFLICTS, change_group, load_document
 from app.api.schemas.bulk import (
     BatchList,
     BulkResult,
@@ -16,14 +18,47 @@ from app.api.schemas.bulk import (
     RedoDocument,
     UndoDocument,
 )
+from app.api.schemas.group import GroupDocument
+from app.api.schemas.verdict import VerdictEdit
+from app.review.agreement.weigh import after_hand_in
 from app.review.datasets.dataset import dataset_id
+from app.review.editing.state import GroupState
 from app.review.verdicts import bulk, bulk_redo, bulk_undo
+from app.review.verdicts.verdict import set_verdict
 
-router = APIRouter(tags=["verdicts"])
+router = APIRouter()
+
+
+@router.put(
+    "/groups/{group}/verdict",
+    tags=["groups"],
+    operation_id="setVerdict",
+    response_model=GroupDocument,
+    responses={**responses(*CONFLICTS), **CHANGED},
+)
+def put_verdict(
+    group: Id,
+    verdict: VerdictEdit,
+    services: AppServices,
+    actor: Actor,
+    if_match: IfMatch,
+    asked: AskedUnder,
+) -> Response:
+    """Accept, reject with a reason, defer, or take a verdict back."""
+    said = (verdict.state, verdict.reason, verdict.note)
+    change = partial(set_verdict, services.store, group, *said, if_match=if_match, actor=actor)
+
+    def hand_in(state: GroupState) -> None:
+        """A verdict on one's own annotation of a group, and on nothing else, hands that in."""
+        if state.is_copy:
+            after_hand_in(services.store, group, services.paint)
+
+    return change_group(asked, lambda: load_document(services.store, group), change, hand_in)
 
 
 @router.post(
     "/datasets/{dataset}/verdicts",
+    tags=["verdicts"],
     operation_id="setVerdicts",
     response_model=BulkResult,
     responses=responses(404, 409, 413, 415),
@@ -61,6 +96,7 @@ def post_verdicts(
 
 @router.get(
     "/datasets/{dataset}/verdict-batches",
+    tags=["verdicts"],
     operation_id="listVerdictBatches",
     responses=responses(404),
 )
@@ -74,6 +110,7 @@ def list_batches(
 
 @router.post(
     "/verdict-batches/{batch}/redo",
+    tags=["verdicts"],
     operation_id="redoVerdictBatch",
     response_model=RedoDocument,
     responses=responses(404, 409),
@@ -95,6 +132,7 @@ def redo_batch(batch: Id, store: AppStore, actor: Actor, asked: AskedUnder) -> R
 
 @router.post(
     "/verdict-batches/{batch}/undo",
+    tags=["verdicts"],
     operation_id="undoVerdictBatch",
     response_model=UndoDocument,
     responses=responses(404, 409),
