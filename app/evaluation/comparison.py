@@ -25,12 +25,17 @@ _MEASURES = (
 
 @dataclass(frozen=True)
 class Difference:
-    """One number of both runs; ``change`` is the second minus the first."""
+    """One number of both runs; ``change`` is the second minus the first.
+
+    ``unit`` and ``better`` are those of its column.
+    """
 
     table: str
     row: str
     column: str
     label: str
+    unit: str
+    better: str
     first: Cell | None
     second: Cell | None
 
@@ -129,18 +134,12 @@ def _compare(name: str, first: Table | None, second: Table | None) -> list[Diffe
     both = [table for table in (first, second) if table is not None]
     rows = {row.name: row.label for table in both for row in table.rows}
     # A release may measure what the one before did not, and the other way round.
-    columns = {column.name: column.label for table in both for column in table.columns}
+    columns = {column.name: column for table in both for column in table.columns}
     return [
-        Difference(
-            name,
-            row,
-            column,
-            f"{label}: {said}",
-            _cell(first, row, column),
-            _cell(second, row, column),
-        )
+        Difference(name, row, column, f"{label}: {head.label}", head.unit, head.better, *cells)
         for row, label in rows.items()
-        for column, said in columns.items()
+        for column, head in columns.items()
+        if (cells := (_cell(first, row, column), _cell(second, row, column))) != (None, None)
     ]
 
 

@@ -66,7 +66,7 @@ import { idempotencyKey, queryText, request } from './client.js';
  * @property {EvaluationRow} second
  * @property {boolean} same_truth
  * @property {string[]} differs what was pinned differently, by name
- * @property {{table: string, row: string, column: string, label: string, first: CellJson | null, second: CellJson | null, change: number | null}[]} numbers
+ * @property {{table: string, row: string, column: string, label: string, unit: string, better: string, first: CellJson | null, second: CellJson | null, change: number | null}[]} numbers
  * @property {string} field
  * @property {number} shared
  * @property {number} better

@@ -24,32 +24,26 @@ const FIELDS = [
 /** @param {number | null} value */
 const signed = (value) => (value === null ? '–' : `${value > 0 ? '+' : ''}${number(value)}`);
 
-/** What a number is counted in, and which way is better. @param {EvaluationJson} run @param {ComparisonJson['numbers'][number]} one */
-function columnOf(run, { table, column }) {
-	return run.tables.find(({ name }) => name === table)?.columns.find(({ name }) => name === column);
-}
-
-/** @param {number | null} change @param {string | undefined} better @returns {{grade?: string, word: string}} */
+/** @param {number | null} change @param {string} better `higher`, `lower` or empty @returns {{grade?: string, word: string}} */
 function judged(change, better) {
 	if (!change || !better) return { word: '' };
 	return (change > 0) === (better === 'higher') ? { grade: 'ok', word: 'better' } : { grade: 'warn', word: 'worse' };
 }
 
-/** @param {{run: EvaluationJson, one: ComparisonJson['numbers'][number]}} props */
-function NumberRow({ run, one }) {
-	const column = columnOf(run, one);
-	const { grade, word } = judged(one.change, column?.better);
+/** @param {{one: ComparisonJson['numbers'][number]}} props */
+function NumberRow({ one }) {
+	const { grade, word } = judged(one.change, one.better);
 	return html`
 		<tr>
-			<th scope="row">${one.label}${column?.unit ? `, ${column.unit}` : ''}<small>${words(one.table)} · ${words(one.row)}</small></th>
+			<th scope="row">${one.label}${one.unit ? `, ${one.unit}` : ''}<small>${words(one.table)} · ${words(one.row)}</small></th>
 			<td data-numeric="true"><${Cell} cell=${one.first} /></td><td data-numeric="true"><${Cell} cell=${one.second} /></td>
 			<td data-numeric="true" data-grade=${grade}>${signed(one.change)}<small>${word}</small></td>
 		</tr>
 	`;
 }
 
-/** @param {{run: EvaluationJson, found: ComparisonJson}} props */
-function Numbers({ run, found }) {
+/** @param {{found: ComparisonJson}} props */
+function Numbers({ found }) {
 	const [all, showAll] = useState(false);
 	const moved = found.numbers.filter(({ change }) => change !== 0);
 	const still = found.numbers.length - moved.length;
@@ -57,7 +51,7 @@ function Numbers({ run, found }) {
 		<div class="table__scroll" tabindex="0" role="region" aria-label="Numbers of both runs">
 			<table class="table">
 				<thead><tr><th>number</th><th data-numeric="true">${found.first.name}</th><th data-numeric="true">${found.second.name}</th><th data-numeric="true">change</th></tr></thead>
-				<tbody>${(all ? found.numbers : moved).map((one) => html`<${NumberRow} key=${`${one.table} ${one.row} ${one.column}`} run=${run} one=${one} />`)}</tbody>
+				<tbody>${(all ? found.numbers : moved).map((one) => html`<${NumberRow} key=${`${one.table} ${one.row} ${one.column}`} one=${one} />`)}</tbody>
 			</table>
 		</div>
 		${still && !all ? html`<p class="yield__note">${plural(still, 'number')} did not change. <button class="link-button" type="button" onClick=${() => showAll(true)}>Show ${still === 1 ? 'it' : 'them'}</button></p>` : null}
@@ -96,7 +90,7 @@ export function Comparison({ run, other, onClose }) {
 			${found.value && !found.value.same_truth ? html`<p class="yield__note" data-grade="warn">The runs judged other frames, or under other thresholds: their numbers cannot be compared straight away.</p>` : null}
 			${found.value?.differs.length ? html`<p class="note">Pinned differently: ${found.value.differs.map(words).join(', ')}.</p>` : null}
 			${found.value ? html`
-				<${Numbers} run=${run} found=${found.value} />
+				<${Numbers} found=${found.value} />
 				<div class="form__row comparison__field"><label for="comparison-field">Frame by frame</label>
 					<select class="field" id="comparison-field" value=${field} onChange=${withValue(setField)}>
 						${FIELDS.map(({ name, label }) => html`<option key=${name} value=${name}>${label}</option>`)}

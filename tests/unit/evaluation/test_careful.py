@@ -151,7 +151,7 @@ class TestBoxesFigure:
         (figure,) = [figure for figure in result.figures if figure.name == "box_overlap"]
         assert [len(series.x) for series in figure.panels[0].series] == [1, 1, 1]
 
-    def test_axes_say_what_they_show_and_no_share_ends_its_axis(self, make_frame) -> None:
+    def test_axes_say_what_they_show_and_that_of_iou_alone_ends(self, make_frame) -> None:
         frame = make_frame(1)
         overlap, size = boxes_figure([frame], {1: frame.boxes["exact"]}, {1: 30.0}).panels
         assert [panel.x.unit for panel in (overlap, size)] == ["m", "m"]

@@ -77,6 +77,12 @@ class TestCompareTables:
         (found,) = compare_tables([table("t", ap=0.5)], [table("t", ap=0.5)])
         assert found.label == "All: AP"
 
+    def test_a_number_says_its_unit_and_which_way_is_better(self) -> None:
+        column = Column("error", "Error", "m", "lower")
+        runs = [Table("t", "t", (column,), (Row("all", "All", (Cell(0.5),)),))]
+        for found in (compare_tables(runs, []), compare_tables([], runs)):
+            assert [(one.unit, one.better) for one in found] == [("m", "lower")]
+
     @pytest.mark.parametrize(("before", "after"), [(0.0, 0.25), (0.25, 0.0), (0.0, 0.0)])
     def test_zero_is_a_number_that_changes(self, before: float, after: float) -> None:
         (found,) = compare_tables([table("t", ap=before)], [table("t", ap=after)])
@@ -85,6 +91,10 @@ class TestCompareTables:
     def test_a_column_that_only_the_newer_run_has_hides_no_other(self) -> None:
         found = compare_tables([table("t", ap=0.5)], [table("t", recall=0.9, ap=0.75)])
         assert [(item.column, item.change) for item in found] == [("ap", 0.25), ("recall", None)]
+
+    def test_what_stands_in_neither_run_is_told_of_none(self) -> None:
+        found = compare_tables([table("t", ap=0.5)], [table("t", row="new", recall=0.9)])
+        assert [(item.row, item.column) for item in found] == [("all", "ap"), ("new", "recall")]
 
     def test_a_column_that_only_the_older_run_has_is_told_of_it(self) -> None:
         (recall, ap) = compare_tables([table("t", recall=0.9, ap=0.5)], [table("t", ap=0.75)])
