@@ -18,6 +18,7 @@ from app.review.exporting.folder import ExportFolder
 from app.review.jobs.child import carry_out_apart
 from app.review.jobs.jobs import Jobs
 from app.review.jobs.run import JobProgress, Work, counting
+from app.review.versions.version import find_version
 from app.store.frames import Frames
 from app.store.jobs import EXPORT, Job
 from app.store.store import Store
@@ -53,7 +54,7 @@ def request_export(
         OverloadedError: Too many jobs wait.
     """
     found = get_dataset_head(store, request["dataset"])
-    version = request.get("version")
+    version = None if request.get("version") is None else str(request["version"])
     if request.get("to") is not None:
         require_absent(_target(store, request["to"]))
     require_possible(
@@ -64,9 +65,11 @@ def request_export(
         boxes=request["boxes"],
         images=request["images"],
         views=request.get("views", "valid"),
-        version=None if version is None else str(version),
+        version=version,
     )
-    asked = {**request, "dataset": found.name}
+    # Listed by its name, whatever it was called.
+    named = None if version is None else find_version(store, found.id, version).name
+    asked = {**request, "dataset": found.name, "version": named}
     return jobs.submit(
         KIND,
         f"Export {found.name} as {request['format']}",

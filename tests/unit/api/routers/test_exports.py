@@ -15,8 +15,9 @@ from app.api.routers import exports as module
 from app.review.datasets.dataset import dataset_id
 from app.review.editing.recompute import solve_dataset
 from app.review.importing.ingest import ingest
-from app.review.jobs import child
+from app.review.jobs import child as job_child
 from app.review.jobs.jobs import Jobs
+from app.review.versions.freeze import FreezeRequest, freeze
 from app.soccer.frames import ImageSize
 from app.soccer.group import Group, Station, View
 from app.soccer.media import Media
@@ -80,6 +81,17 @@ class TestMakeExport:
         assert api.post(API, json={**ORDER, "dataset": "x"}).status_code == 404
         assert api.post(API, json={**ORDER, "all": False, "version": 7}).status_code == 404
         assert app.state.services.jobs.find() == []
+
+    @pytest.mark.parametrize("called_by", ["id", "hash", "name"])
+    def test_an_export_of_a_version_is_listed_by_its_name(self, app, api, called_by: str) -> None:
+        request = FreezeRequest("v1", groups="passing")
+        version = freeze(app.state.services.store, "broadcast", request, actor="local")
+        called = {"id": version.id, "hash": version.hash[:12], "name": "v1"}[called_by]
+        answer = api.post(API, json={**ORDER, "all": False, "version": called})
+        assert answer.status_code == 202
+        assert api.get(answer.json()["content"]).status_code == 200
+        (row,) = api.get(API).json()["items"]
+        assert row["request"]["version"] == "v1"
 
     @pytest.mark.parametrize(
         ("order", "status", "pointer", "words"),
@@ -246,7 +258,7 @@ class TestRestart:
         here = api.get(job["content"]).content
 
         # A process of its own asks for the same frames, and writes the same bytes.
-        monkeypatch.setattr(child, "SMALL", 0)
+        monkeypatch.setattr(job_child, "SMALL", 0)
         again = api.post(API, json=order).json()
         assert services.jobs.wait(again["id"], SECONDS).state == "done"
         assert read[2:] == read[:2]
