@@ -63,6 +63,11 @@ def gold_heads(session: Session, dataset_id: int) -> Sequence[Any]:
     return session.execute(statement).all()
 
 
+def gold_head(session: Session, group_id: int) -> Any | None:
+    """A gold group without what is true of it; None: it is none."""
+    return session.execute(_HEADS.where(GoldModel.group_id == group_id)).one_or_none()
+
+
 def gold_truth(session: Session, group_id: int) -> Json | None:
     """What is true of a gold group."""
     packed = session.scalar(select(GoldModel.truth).where(GoldModel.group_id == group_id))

@@ -260,6 +260,13 @@ def _deed(_row: AuditRow, body: Mapping[str, Any]) -> str:
 _BATCH_DEEDS = {"made": "gave out", "changed": "changed", "closed": "closed", "deleted": "deleted"}
 
 
+_STARTS = {
+    "imported": "what its dataset brought",
+    "without_balls": "its lines, without balls",
+    "bare": "its pictures alone",
+}
+
+
 def _own(row: AuditRow, body: Mapping[str, Any]) -> str | None:
     """What became of batches, of somebody's own annotation, of gold groups and of guidelines; None: none of these."""
     did, person, group = (body.get(name) for name in ("did", "person", "group"))
@@ -274,7 +281,10 @@ def _own(row: AuditRow, body: Mapping[str, Any]) -> str | None:
         ("agreement", "decided"): f"decided for {person}’s annotation",
         ("agreement", "limits"): "set the limits of agreement",
         ("gold", "marked"): f"marked group {group} as gold",
-        ("gold", "changed"): f"changed what annotators of gold group {group} begin with",
+        (
+            "gold",
+            "changed",
+        ): f"lets annotators of gold group {group} begin with {_STARTS.get(str(body.get('start')))}",
         ("gold", "unmarked"): f"group {group} is gold no longer",
     }
     if row.kind == "work" and did in _BATCH_DEEDS and "name" in body:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Any
 
@@ -13,14 +13,22 @@ from app.errors import ConflictError, InputError, NotFoundError
 from app.review.answers.keep import Keep, keep_nothing
 from app.review.datasets.dataset import need_dataset
 from app.review.editing.state import GroupState, read_states
-from app.review.editing.submit import load, load_solved
+from app.review.editing.submit import load_solved
 from app.review.takes.copying import aligned
 from app.review.takes.errors import AnnotationError, TrueView, error_of, world_error
 from app.soccer.frames import ImagePoint
 from app.store.clock import now
 from app.store.codecs import group_from_json, group_to_json
 from app.store.copy_datasets import is_copy
-from app.store.gold import STARTS, gold_heads, gold_truth, mark_gold, start_gold, unmark_gold
+from app.store.gold import (
+    STARTS,
+    gold_head,
+    gold_heads,
+    gold_truth,
+    mark_gold,
+    start_gold,
+    unmark_gold,
+)
 from app.store.log import Entry, append
 from app.store.session import Session
 from app.store.store import Store
@@ -125,7 +133,7 @@ def mark(
         InputError: There is no such start.
         ConflictError: Nobody has judged the group as it is now, or it is a copy.
     """
-    _check_start(start)
+    check_start(start)
     state = load_solved(store, group_id)
     if state.verdict.state not in JUDGED or state.verdict.stale:
         raise ConflictError(
@@ -139,7 +147,7 @@ def mark(
         # Not an entry of the group: everybody who sees it reads its history.
         body = {"group": group_id, "did": "marked", "start": start}
         append(session, [Entry(KIND, actor, now(), body, state.dataset_id)])
-        marked = _need_gold(session, state.dataset_id, group_id)
+        _, marked = _need_gold(session, group_id)
         keep(marked)(session)
     return marked
 
@@ -160,14 +168,14 @@ def start_with(
         InputError: There is no such start.
         NotFoundError: It is no gold group.
     """
-    _check_start(start)
-    dataset_id = load(store, group_id).dataset_id
+    check_start(start)
     with store.write() as session:
-        _need_gold(session, dataset_id, group_id)
-        start_gold(session, group_id, start)
-        body = {"group": group_id, "did": "changed", "start": start}
-        append(session, [Entry(KIND, actor, now(), body, dataset_id)])
-        changed = _need_gold(session, dataset_id, group_id)
+        dataset_id, gold = _need_gold(session, group_id)
+        changed = replace(gold, start=start)
+        if changed != gold:
+            start_gold(session, group_id, start)
+            body = {"group": group_id, "did": "changed", "start": start}
+            append(session, [Entry(KIND, actor, now(), body, dataset_id)])
         keep(changed)(session)
     return changed
 
@@ -182,12 +190,11 @@ def unmark(
     Raises:
         NotFoundError: It is none.
     """
-    state = load_solved(store, group_id)
     with store.write() as session:
-        gone = _need_gold(session, state.dataset_id, group_id)
+        dataset_id, gone = _need_gold(session, group_id)
         unmark_gold(session, group_id)
         body = {"group": group_id, "did": "unmarked"}
-        append(session, [Entry(KIND, actor, now(), body, state.dataset_id)])
+        append(session, [Entry(KIND, actor, now(), body, dataset_id)])
         keep(gone)(session)
     return gone
 
@@ -253,7 +260,8 @@ def middle_of(values: Sequence[float | None]) -> Middle:
     return Middle(count, median, known[rank - 1], known[count - rank])
 
 
-def _check_start(start: str) -> None:
+def check_start(start: str) -> None:
+    """Raises InputError where annotators cannot begin with that."""
     if start not in STARTS:
         raise InputError(f"annotators begin with {', '.join(STARTS)}", pointer="/start")
 
@@ -281,11 +289,12 @@ def _known(session: Session, row: Any) -> tuple[GoldGroup, Json]:
     return gold, truth
 
 
-def _need_gold(session: Session, dataset_id: int, group_id: int) -> GoldGroup:
-    for row in gold_heads(session, dataset_id):
-        if row.group_id == group_id:
-            return _known(session, row)[0]
-    raise NotFoundError(f"group {group_id} is no gold group")
+def _need_gold(session: Session, group_id: int) -> tuple[int, GoldGroup]:
+    """A gold group and the id of its dataset."""
+    row = gold_head(session, group_id)
+    if row is None:
+        raise NotFoundError(f"group {group_id} is no gold group")
+    return row.dataset_id, _known(session, row)[0]
 
 
 def _result(gold: GoldGroup, truth: Json, take: Any, state: GroupState) -> GoldResult:

@@ -19,7 +19,7 @@ from app.errors import ConflictError, InputError
 from app.review.answers.keep import Keep, keep_nothing
 from app.review.datasets.dataset import dataset_id
 from app.review.queue.query import MAX_LISTED_LENGTH, parse_query
-from app.review.takes.gold import KIND, TruthSource
+from app.review.takes.gold import KIND, TruthSource, check_start
 from app.review.versions.version import Version, find_version, thaw
 from app.sample.scene import SceneTruth
 from app.sample.truth import TRUTH, read_truth
@@ -28,7 +28,7 @@ from app.store.agreement import AGREED, DECIDED, states_of
 from app.store.clock import now
 from app.store.codecs import group_to_json
 from app.store.copy_datasets import is_copy
-from app.store.gold import STARTS, mark_gold
+from app.store.gold import mark_gold
 from app.store.groups import StoredGroup, read_groups
 from app.store.listing import Listing
 from app.store.log import Entry, append
@@ -90,8 +90,7 @@ def mark_known(
         InputError: There is no such start, version or query, or nothing is known of any group.
         ConflictError: The dataset holds copies.
     """
-    if choice.start not in STARTS:
-        raise InputError(f"annotators begin with {', '.join(STARTS)}", pointer="/start")
+    check_start(choice.start)
     number = dataset_id(store, dataset)
     query = parse_query(choice.query, longest=MAX_LISTED_LENGTH)
     version = _version(store, dataset, choice)
