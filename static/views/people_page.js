@@ -2,7 +2,7 @@
 /** Everybody with an account: inviting, roles, disabling, links for new passwords. */
 
 import { html } from 'htm/preact';
-import { useEffect, useState } from 'preact/hooks';
+import { useEffect, useRef, useState } from 'preact/hooks';
 
 import { deleteSecondFactorOf, getTeam, getUsers, patchUser, postAdoption, postUser, postUserLink, putTeam } from '../api/people.js';
 import { ApiError } from '../api/problem.js';
@@ -54,18 +54,21 @@ function LinkCard({ made, close }) {
 /** Whether everybody needs a second factor. @param {{act: (doing: Promise<unknown>) => Promise<boolean>}} props */
 function FactorRule({ act }) {
 	const [on, setOn] = useState(/** @type {boolean | null} */ (null));
+	const [asked, setAsked] = useState(/** @type {boolean | null} */ (null));
+	const last = useRef(/** @type {Promise<unknown>} */ (Promise.resolve()));
 	/** @param {{require_second_factor: boolean}} said */
 	const told = (said) => setOn(said.require_second_factor);
 	useEffect(() => { act(getTeam().then(told)); }, []);
 	if (on === null) return null;
-	/** @param {boolean} ticked */
+	/** One after the other; what is ticked last stands until it is answered. @param {boolean} ticked */
 	const ask = (ticked) => {
-		setOn(ticked);
-		act(putTeam(ticked).then(told)).then((done) => { if (!done) setOn(!ticked); });
+		setAsked(ticked);
+		const mine = last.current.then(() => act(putTeam(ticked).then(told))).then(() => { if (last.current === mine) setAsked(null); });
+		last.current = mine;
 	};
 	return html`
 		<p class="people__rule"><label class="form__check">
-			<input type="checkbox" checked=${on} onChange=${withTick(ask)} />
+			<input type="checkbox" checked=${asked ?? on} onChange=${withTick(ask)} />
 			<span>Everybody needs a second factor: who has none makes one before anything else</span>
 		</label></p>
 	`;

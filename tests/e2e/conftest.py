@@ -102,7 +102,7 @@ def team(team_home: Path, provider: Provider) -> Iterator[str]:
 
 @pytest.fixture(scope="module")
 def crew(team: str, team_home: Path) -> Iterator[Crew]:
-    """The team, at its server."""
+    """Eight people with roles and passwords, and the server of their team."""
     for name, role in CREW.items():
         join(team_home, name, role)
     with ExitStack() as clients:

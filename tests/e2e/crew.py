@@ -1,9 +1,10 @@
-"""A team whose people have passwords, and ask its server without its pages, too."""
+"""People of a team with passwords: scripts of theirs log in here, their browsers by ``open_as``."""
 
 from __future__ import annotations
 
 from contextlib import ExitStack
 from dataclasses import dataclass
+from time import monotonic
 
 import httpx
 import pyotp
@@ -11,7 +12,9 @@ from playwright.sync_api import Page
 
 from app.review.people.roles import Role
 from tests.e2e.forms import API, Json
+from tests.e2e.screen import CHANGED_MEANWHILE
 from tests.e2e.team import SECRET, OpenPage
+from tests.e2e.windows import TIMEOUT_MS
 
 CREW = {
     "ada": Role.ADMIN,
@@ -27,7 +30,7 @@ CREW = {
 
 @dataclass
 class Crew:
-    """A team whose people have passwords, and ask its server without its pages, too."""
+    """The server of a team; ``log_in`` gives a client of somebody's."""
 
     address: str
     clients: ExitStack
@@ -65,8 +68,11 @@ def enrol(client: httpx.Client) -> None:
 
 
 def judged(client: httpx.Client, group: int, state: str, **more: str) -> None:
-    """Let somebody judge a group in its present state."""
-    etag = client.get(f"/groups/{group}").headers["etag"]
-    said = {"state": state, **more}
-    answer = client.put(f"/groups/{group}/verdict", json=said, headers={"If-Match": etag})
+    """Let somebody judge a group in its present state, which may be solved anew meanwhile."""
+    said, end = {"state": state, **more}, monotonic() + TIMEOUT_MS / 1000
+    while True:
+        etag = client.get(f"/groups/{group}").headers["etag"]
+        answer = client.put(f"/groups/{group}/verdict", json=said, headers={"If-Match": etag})
+        if answer.status_code != CHANGED_MEANWHILE or monotonic() > end:
+            break
     assert answer.is_success, answer.text

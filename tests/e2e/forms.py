@@ -10,7 +10,7 @@ from urllib.parse import urlsplit
 
 from playwright.sync_api import Page, Request, expect
 
-from tests.e2e.screen import until
+from tests.e2e.screen import settled, until
 
 Json = Any
 Step = Callable[[Page], Any]
@@ -95,6 +95,12 @@ def carry_out(page: Page, row: Row, ids: Ids) -> None:
         for step in row.steps:
             step(page)
         until(page, lambda: len(told()) >= len(wanted))
+        for place, text in (row.shows or {}).items():
+            expect(page.locator(place).first, row.does).to_contain_text(text.format(**ids))
+        if row.hides:
+            expect(page.locator(row.hides.format(**ids)), row.does).to_have_count(0)
+        # What leaves once too often may leave later.
+        settled(page)
     sent = told()
     assert [(line_of(one), one.post_data_json) for one in sent] == list(wanted.items()), row.does
     for one in sent:
@@ -103,10 +109,6 @@ def carry_out(page: Page, row: Row, ids: Ids) -> None:
         assert answer.ok, f"{row.does}: {answer.text()}"
         if etag is not None:
             assert one.headers["if-match"] == etag, row.does
-    for place, text in (row.shows or {}).items():
-        expect(page.locator(place).first, row.does).to_contain_text(text.format(**ids))
-    if row.hides:
-        expect(page.locator(row.hides.format(**ids)), row.does).to_have_count(0)
 
 
 def read(page: Page, path: str) -> Json:

@@ -14,6 +14,7 @@ from app.review.people.roles import Role
 from app.review.people.second_factor import SecondFactors
 from app.store.identities import put_identity
 from app.store.store import Store
+from tests.e2e.conftest import Console
 from tests.e2e.crew import Crew, enrol, judged, open_as, sent
 from tests.e2e.forms import Row, carry_out, choose, fill, press, read, tick
 from tests.e2e.team import SECRET, OpenPage, in_store, join
@@ -105,7 +106,7 @@ PEOPLE = [
         "asks a second factor of everybody",
         [tick("Everybody needs a second factor: who has none makes one before anything else")],
         {"PUT /team": {"require_second_factor": True}},
-        hides=".people__rule input:not(:checked)",
+        {".people__rule:has(input:checked)": "Everybody needs a second factor"},
     ),
     Row(
         "asks it of nobody any more",
@@ -116,7 +117,7 @@ PEOPLE = [
             )
         ],
         {"PUT /team": {"require_second_factor": False}},
-        hides=".people__rule input:checked",
+        {".people__rule:not(:has(input:checked))": "Everybody needs a second factor"},
     ),
     Row(
         "gives a role in one dataset",
@@ -159,6 +160,18 @@ class TestPeople:
             carry_out(page, row, {**users, "token": nightly})
         told = {one["name"]: one for one in read(page, "/users")["items"]}
         assert (told["finn"]["role"], told["nils"]["role"]) == ("viewer", "annotator")
+
+    def test_a_rule_that_the_server_does_not_take_is_not_shown_as_in_force(
+        self, open_page: OpenPage, crew: Crew, console: Console
+    ) -> None:
+        console.expect("503")
+        page = open_as(open_page, crew.log_in("ada"), "/people")
+        rule = page.get_by_label("Everybody needs a second factor")
+        expect(rule).not_to_be_checked()
+        page.route("**/api/v1/team", lambda route: route.fulfill(status=503), times=1)
+        rule.click()
+        expect(page.get_by_role("alert").first).to_be_visible()
+        expect(rule).not_to_be_checked()
 
     def shows_everybody(self, page: Page) -> None:
         users = read(page, "/users")["items"]
@@ -375,3 +388,8 @@ class TestMembers:
         for row in MEMBERS:
             users = {one["name"]: one["id"] for one in read(page, "/datasets/1/members")["items"]}
             carry_out(page, row, users)
+        before = {one["group"]: one for one in gold}
+        before[4]["start"] = "bare"
+        del before[3]
+        after = {one["group"]: one for one in read(page, "/datasets/1/gold")["groups"]}
+        assert after == before

@@ -10,7 +10,7 @@ from playwright.sync_api import Page, expect
 
 from tests.e2e.crew import Crew, judged, open_as, sent
 from tests.e2e.forms import DIALOG, Json, Row, carry_out, choose, fill, fixed, press, read, tick
-from tests.e2e.screen import JOB_IS_OVER, until
+from tests.e2e.screen import jobs_end
 from tests.e2e.team import OpenPage
 
 DUE = date(2040, 5, 20)
@@ -182,7 +182,9 @@ class TestBatches:
             carry_out(page, row, {one["name"]: one["id"] for one in batches})
 
     def shows_how_far_they_are(self, page: Page) -> None:
-        for one in read(page, "/datasets/1/team-work")["items"]:
+        items = read(page, "/datasets/1/team-work")["items"]
+        assert {one["batch"]["name"] for one in items} == {"Everything", "Friday", "Twice"}
+        for one in items:
             batch = one["batch"]
             item = page.locator(f"{TEAM} .work__item")
             item = item.filter(has=page.get_by_role("link", name=batch["name"], exact=True))
@@ -257,7 +259,7 @@ class TestPolicy:
             self.shows_what_is_in_force(page, name)
 
     def shows_what_is_in_force(self, page: Page, name: str) -> None:
-        until(page, lambda: all_over(page))
+        jobs_end(page)
         policy = read(page, "/datasets/1/policy")
         assert policy["name"] == name
         title = page.locator("#values-title")
@@ -281,12 +283,6 @@ class TestPolicy:
         expect(past).to_have_count(len(rows))
         cells = [line.split("\t") for line in past.all_inner_texts()]
         assert [[*line[:3], line[4]] for line in cells] == rows
-
-
-def all_over(page: Page) -> bool:
-    return all(
-        one["state"] in JOB_IS_OVER for one in read(page, "/jobs?kind=solve&limit=100")["items"]
-    )
 
 
 def value_text(value: Json, unit: str) -> str:

@@ -26,8 +26,8 @@ import { TeamCard } from './team_card.js';
 function MyBatch({ one: { batch, parts, left, handed_back: back }, first }) {
 	const button = useRef(/** @type {HTMLButtonElement | null} */ (null));
 	const { error, attempt } = useAttempt();
-	// Who is at something else already stays there.
-	useEffect(() => { if (first && document.activeElement === document.body) button.current?.focus(); }, [first]);
+	// Who is at something else already stays there; where another one becomes the first, nobody is taken to it.
+	useEffect(() => { if (first && document.activeElement === document.body) button.current?.focus(); }, []);
 	const go = () => attempt(goOn(batch.id), (some) => {
 		if (!some) inform(`Nothing waits for you in “${batch.name}” now: others have the rest open, or it waits for somebody else.`);
 	});
