@@ -31,7 +31,7 @@ STRICT_ROUNDS = 3
 COARSE_PX = 8.0
 """Pixels between the places of the first rounds."""
 LEAST_POINTS, LEAST_MARKINGS = 24, 3
-"""Fewer points of paint, or markings with some, determine no camera, however far apart they lie."""
+"""Fewer points of paint, or markings with ``LEAST_ON_MARKING``, determine no camera, however far apart they lie."""
 LEAST_ON_MARKING = 4
 LEAST_ON_CIRCLE = 60
 """Places of a circle, ``SPACING_PX`` apart, from which on it tells as much as two lines."""

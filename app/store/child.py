@@ -1,4 +1,4 @@
-"""Store child: long work on the database in a process of its own, so that requests do not wait for it.
+"""Long work on the database in a process of its own, so that requests do not wait for it.
 
 One interpreter computes one thing at a time: what a thread works on for a minute, everybody who asks
 something feels. The process opens the database itself and takes its turn among the writers here, so

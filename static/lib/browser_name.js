@@ -4,7 +4,7 @@
 /** Those that call themselves Chrome or Safari, too, stand before these. @type {[string, RegExp][]} */
 const BROWSERS = [
 	['Edge', /\bEdg(?:A|iOS)?\/(\d+)/], ['Opera', /\bOPR\/(\d+)/], ['Firefox', /\b(?:Firefox|FxiOS)\/(\d+)/],
-	['Chrome', /\b(?:Chrome|CriOS)\/(\d+)/], ['Safari', /\bVersion\/(\d+).* Safari\//],
+	['Chrome', /\b(?:Headless)?(?:Chrome|CriOS)\/(\d+)/], ['Safari', /\bVersion\/(\d+).* Safari\//], ['Safari', /\bSafari\/(\d+)/],
 ];
 const LONGEST = 60;
 

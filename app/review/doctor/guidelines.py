@@ -1,4 +1,4 @@
-"""Guidelines: whether what annotators are told is what somebody wrote, by the log's digests."""
+"""Whether what annotators are told is what somebody wrote, by the log's digests."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Home check: a home beside its tables: settings, permissions, room, clock, leftovers, versions."""
+"""A home beside its tables: settings, permissions, room, clock, leftovers, versions."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""People check: whether accounts and roles are what the log says.
+"""Whether accounts and roles are what the log says.
 
 A row that somebody writes past the service, to make themselves an admin, has no word in the log.
 """

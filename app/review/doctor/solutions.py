@@ -1,4 +1,4 @@
-"""Solution check: whether what was computed is what was written, told without solving anything anew."""
+"""Whether what was computed is what was written, told without solving anything anew."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Export child: an export as it was asked for, written by a process that keeps no request waiting.
+"""An export as it was asked for, written by a process that keeps no request waiting.
 
 Frames are files of somebody else. They are made where they are made for requests, in children with
 limits, and travel from there.

@@ -1,4 +1,4 @@
-"""Job child: the work of a job in a process of its own, so that requests do not wait for it."""
+"""The work of a job in a process of its own, so that requests do not wait for it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Match job: work over the matches of a dataset, asked for, gone on with, and taken back."""
+"""Work over the matches of a dataset, asked for, gone on with, and taken back."""
 
 from __future__ import annotations
 

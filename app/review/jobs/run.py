@@ -1,4 +1,4 @@
-"""Job run: the work of one job in this process, how far it is, and how it ended."""
+"""The work of one job in this process, how far it is, and how it ended."""
 
 from __future__ import annotations
 

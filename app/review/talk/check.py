@@ -1,4 +1,4 @@
-"""Thread check: whether what people said to each other stands in the tables as the log has it."""
+"""Whether what people said to each other stands in the tables as the log has it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Version check: whether versions are as they were frozen, told without solving anything anew."""
+"""Whether versions are as they were frozen, told without solving anything anew."""
 
 from __future__ import annotations
 

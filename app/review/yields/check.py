@@ -1,4 +1,4 @@
-"""Yield check: whether the tables that yields are counted from are what was written."""
+"""Whether the tables that yields are counted from are what was written."""
 
 from __future__ import annotations
 

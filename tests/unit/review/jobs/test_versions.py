@@ -10,7 +10,7 @@ import pytest
 
 from app.child import Child
 from app.errors import JobCancelled, OverloadedError
-from app.review.jobs import child
+from app.review.jobs import child as job_child
 from app.review.jobs.run import JobProgress
 from app.review.jobs.versions import verify_work
 from app.review.versions.freeze import FreezeRequest, freeze
@@ -43,8 +43,8 @@ class Killed(JobProgress):
 
 @pytest.fixture(autouse=True)
 def _apart(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(child, "SMALL", 0)
-    monkeypatch.setattr(child, "STOP_SECONDS", 0.0)
+    monkeypatch.setattr(job_child, "SMALL", 0)
+    monkeypatch.setattr(job_child, "STOP_SECONDS", 0.0)
 
 
 class TestVerifyWork:
