@@ -18,7 +18,6 @@ from app.review.exporting.folder import ExportFolder
 from app.review.jobs.child import carry_out_apart
 from app.review.jobs.jobs import Jobs
 from app.review.jobs.run import JobProgress, Work, counting
-from app.review.versions.version import find_version
 from app.store.frames import Frames
 from app.store.jobs import EXPORT, Job
 from app.store.store import Store
@@ -54,7 +53,7 @@ def request_export(
         OverloadedError: Too many jobs wait.
     """
     found = get_dataset_head(store, request["dataset"])
-    version = None if request.get("version") is None else str(request["version"])
+    version = request.get("version")
     if request.get("to") is not None:
         require_absent(_target(store, request["to"]))
     require_possible(
@@ -65,11 +64,9 @@ def request_export(
         boxes=request["boxes"],
         images=request["images"],
         views=request.get("views", "valid"),
-        version=version,
+        version=None if version is None else str(version),
     )
-    # Listed by its name, whatever it was called.
-    named = None if version is None else find_version(store, found.id, version).name
-    asked = {**request, "dataset": found.name, "version": named}
+    asked = {**request, "dataset": found.name}
     return jobs.submit(
         KIND,
         f"Export {found.name} as {request['format']}",

@@ -34,6 +34,7 @@ from app.store.session import Session
 from app.store.store import Store
 from app.store.stored_json import Json
 from app.store.takes import GOLD, takes_in
+from app.store.views import group_dataset
 
 KIND = "gold"
 JUDGED = ("accepted", "rejected")
@@ -292,6 +293,8 @@ def _known(session: Session, row: Any) -> tuple[GoldGroup, Json]:
 def _need_gold(session: Session, group_id: int) -> tuple[int, GoldGroup]:
     """A gold group and the id of its dataset."""
     row = gold_head(session, group_id)
+    if row is None and group_dataset(session, group_id) is None:
+        raise NotFoundError.group(group_id)
     if row is None:
         raise NotFoundError(f"group {group_id} is no gold group")
     return row.dataset_id, _known(session, row)[0]

@@ -15,7 +15,7 @@ from sqlalchemy import update
 from structlog.testing import capture_logs
 
 from app.api.idempotency import Idempotency
-from app.api.routers import groups
+from app.api.routers import verdicts
 from app.api.security.lanes import EDITS
 from app.api.server import Server, listen
 from app.errors import StorageError
@@ -231,7 +231,7 @@ class TestRepetitionsThatWait:
                 assert finish.wait(SECONDS)
             return set_verdict(store, group, *said, **options)
 
-        monkeypatch.setattr(groups, "set_verdict", slow)
+        monkeypatch.setattr(verdicts, "set_verdict", slow)
 
         async def ask() -> tuple[int, list[int]]:
             transport = httpx.ASGITransport(app)

@@ -83,7 +83,9 @@ class TestMakeExport:
         assert app.state.services.jobs.find() == []
 
     @pytest.mark.parametrize("called_by", ["id", "hash", "name"])
-    def test_an_export_of_a_version_is_listed_by_its_name(self, app, api, called_by: str) -> None:
+    def test_an_export_of_a_version_says_it_as_it_was_asked_for(
+        self, app, api, called_by: str
+    ) -> None:
         request = FreezeRequest("v1", groups="passing")
         version = freeze(app.state.services.store, "broadcast", request, actor="local")
         called = {"id": version.id, "hash": version.hash[:12], "name": "v1"}[called_by]
@@ -91,7 +93,7 @@ class TestMakeExport:
         assert answer.status_code == 202
         assert api.get(answer.json()["content"]).status_code == 200
         (row,) = api.get(API).json()["items"]
-        assert row["request"]["version"] == "v1"
+        assert row["request"]["version"] == called
 
     @pytest.mark.parametrize(
         ("order", "status", "pointer", "words"),
