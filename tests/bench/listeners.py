@@ -13,7 +13,7 @@ import httpx
 import numpy as np
 
 from app.api.events import PAUSE
-from tests.bench.requests import Group, cost, sample_served
+from tests.bench.requests import Group, Served, sample_served
 from tests.bench.table import print_table
 
 WINDOWS = 50
@@ -23,16 +23,16 @@ EVENTS = "/api/v1/events"
 
 def bench_listeners() -> None:
     """Measure and print verdicts, one after the other, with and without windows that listen."""
-    with sample_served() as (address, client):
+    with sample_served() as served:
         print_table(
             "Changes that are heard, processor time of the server a change",
             ("windows", "ms", "times nobody"),
-            _measured(address, client),
+            _measured(served),
         )
 
 
-def _measured(address: str, client: httpx.Client) -> list[tuple[int, float, float]]:
-    group = Group(client)
+def _measured(served: Served) -> list[tuple[int, float, float]]:
+    group = Group(served.client)
 
     def judge() -> httpx.Response:
         # Each is told by itself.
@@ -41,8 +41,8 @@ def _measured(address: str, client: httpx.Client) -> list[tuple[int, float, floa
 
     spent: dict[int, list[float]] = {0: [], WINDOWS: []}
     for number, windows in itertools.product(range(ROUNDS + 1), spent):
-        with _listening(address, windows):
-            milliseconds = cost(judge)
+        with _listening(served.address, windows):
+            milliseconds = served.cost(judge)
         # The first round compiles statements and fills caches.
         if number:
             spent[windows].append(milliseconds)

@@ -12,6 +12,7 @@ import tempfile
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -30,17 +31,37 @@ API = "/api/v1"
 
 def bench_requests() -> None:
     """Measure and print, on a group of four views of the sample."""
-    with sample_served() as (_, client):
+    with sample_served() as served:
         print_table(
             "Requests, processor time of the server a request",
             ("what", "ms", "times healthz", "limit, ms on a quiet machine"),
-            _measured(client),
+            _measured(served),
         )
 
 
+@dataclass(frozen=True)
+class Served:
+    """A server over a solved sample: its address, a client of it, and the number of its process."""
+
+    address: str
+    client: httpx.Client
+    process: int
+
+    def cost(self, ask: Callable[[], httpx.Response]) -> float:
+        """Milliseconds of the server's processor time for one request, over many."""
+        before = self._cpu_seconds()
+        for _ in range(TURNS):
+            ask().raise_for_status()
+        return 1000 * (self._cpu_seconds() - before) / TURNS
+
+    def _cpu_seconds(self) -> float:
+        # The processor clock of another process, as clock_getcpuclockid(3) numbers it.
+        return time.clock_gettime((~self.process << 3) | 2)
+
+
 @contextmanager
-def sample_served() -> Iterator[tuple[str, httpx.Client]]:
-    """The address of a server over a solved sample, and a client of it."""
+def sample_served() -> Iterator[Served]:
+    """A server over a solved sample."""
     with tempfile.TemporaryDirectory() as folder:
         home = Path(folder)
         tree = home / "tree"
@@ -51,13 +72,22 @@ def sample_served() -> Iterator[tuple[str, httpx.Client]]:
             f"import soccernet-v3 {tree} --dataset sample",
             "solve --dataset sample",
         )
+        # Pools of benchmarks before this one have left a process that watches what they shared.
+        others = _children()
         with serving(home) as address, httpx.Client(base_url=address, timeout=60) as client:
-            # The server is the one child of this process then.
             end_nursery()
-            yield address, client
+            (server,) = _children() - others
+            yield Served(address, client, server)
 
 
-def _measured(client: httpx.Client) -> list[tuple[str, float, float, str]]:
+def _children() -> set[int]:
+    """Numbers of the processes that this one has started (Linux tells them)."""
+    listed = Path(f"/proc/self/task/{os.getpid()}/children").read_text()
+    return {int(number) for number in listed.split()}
+
+
+def _measured(served: Served) -> list[tuple[str, float, float, str]]:
+    client = served.client
     group = Group(client)
     kinds: list[tuple[str, Callable[[], httpx.Response], str]] = [
         ("GET /healthz, the reference", lambda: client.get("/healthz"), ""),
@@ -69,28 +99,13 @@ def _measured(client: httpx.Client) -> list[tuple[str, float, float, str]]:
     spent: dict[str, list[float]] = {what: [] for what, _, _ in kinds}
     for number in range(ROUNDS + 1):
         for what, ask, _ in kinds:
-            milliseconds = cost(ask)
+            milliseconds = served.cost(ask)
             # The first round compiles statements and fills caches.
             if number:
                 spent[what].append(milliseconds)
     medians = {what: float(np.median(values)) for what, values in spent.items()}
     reference = medians[kinds[0][0]]
     return [(what, medians[what], medians[what] / reference, limit) for what, _, limit in kinds]
-
-
-def cost(ask: Callable[[], httpx.Response]) -> float:
-    """Milliseconds of the server's processor time for one request, over many."""
-    before = _cpu_seconds()
-    for _ in range(TURNS):
-        ask().raise_for_status()
-    return 1000 * (_cpu_seconds() - before) / TURNS
-
-
-def _cpu_seconds() -> float:
-    """Processor time of the server, the one child of this process, so far (Linux tells it)."""
-    (server,) = Path(f"/proc/self/task/{os.getpid()}/children").read_text().split()
-    # The processor clock of another process, as clock_getcpuclockid(3) numbers it.
-    return time.clock_gettime((~int(server) << 3) | 2)
 
 
 class Group:
