@@ -58,6 +58,10 @@ def transfer(
     target: Annotated[
         str, typer.Argument(metavar="TO", help="The same: a new folder, or an empty database.")
     ],
+    replace_null: Annotated[
+        bool,
+        typer.Option("--replace-null", help="Write U+FFFD where texts of FROM hold U+0000."),
+    ] = False,
     json_: Json = False,
 ) -> None:
     """Copy a whole database between SQLite and PostgreSQL, and compare every row and the log.
@@ -77,7 +81,7 @@ def transfer(
             say(f"  {table}")
         told.add(table)
 
-    done = run_transfer(*ends_of(source, target, settings), tell)
+    done = run_transfer(*ends_of(source, target, settings), tell, replace_null=replace_null)
     if json_:
         print_json(vars(done))
         return

@@ -9,9 +9,9 @@ from sqlalchemy import Engine
 from sqlalchemy.exc import DBAPIError, OperationalError
 
 from app.config import Settings
-from app.errors import EXAMINE, BusyError, DamagedError, InputError, StorageError
+from app.errors import EXAMINE, BusyError, DamagedError, StorageError
 from app.store.dialect.dialect import WRITE as WRITE
-from app.store.dialect.dialect import Failure, dialect_of
+from app.store.dialect.dialect import Failure, dialect_of, unkeepable_text
 
 
 def make_engine(settings: Settings, *, lasting: bool = True) -> Engine:
@@ -38,10 +38,7 @@ def reported(settings: Settings) -> Iterator[None]:
     except DBAPIError as error:
         kind, name = dialect_of(settings).failure(error)
         if kind is Failure.TEXT:
-            raise InputError(
-                "a text holds a character that the database cannot keep, such as U+0000",
-                hint="Leave it out.",
-            ) from error
+            raise unkeepable_text() from error
         if kind is not Failure.OTHER or isinstance(error, OperationalError):
             raise _storage_error(error, kind, name, settings) from error
         raise StorageError(

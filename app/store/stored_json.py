@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -17,6 +18,8 @@ from app.errors import EXAMINE, DamagedError, GeometryError, InputError
 Json = Any
 """What ``json`` makes: dict, list, str, int, float, bool or None."""
 _LOOKING = Lock()
+_NULL_CHARACTERS = re.compile(rb"((?<!\\)(?:\\\\)*)\\u0000")
+"""U+0000 as JSON writes it, behind an even number of backslashes; tables cannot keep it."""
 _MISSHAPEN = (
     ArithmeticError,
     AttributeError,
@@ -74,7 +77,8 @@ def unpack(data: bytes) -> Json:
     Raises:
         DamagedError: The bytes are not what was written.
     """
-    return parse(inflate(data))
+    text = inflate(data)
+    return parse(_NULL_CHARACTERS.sub(rb"\1\\ufffd", text) if b"\\u0000" in text else text)
 
 
 def inflate(data: bytes) -> bytes:

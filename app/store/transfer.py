@@ -27,6 +27,12 @@ from app.store.home import make_file
 from app.store.locks import database_alone, server_lock
 from app.store.log import verify_chain
 from app.store.migrate import UNFINISHED, make_schema, schema_revision
+from app.store.null_characters import (
+    NullCharacter,
+    find_null_characters,
+    named,
+    without_null_characters,
+)
 from app.store.session import Session
 from app.store.store import Store
 from app.store.tables import Base
@@ -54,7 +60,11 @@ class Transferred:
 
 
 def transfer(
-    source: Settings, target: Settings, tell: Callable[[str, int], None] = lambda *_: None
+    source: Settings,
+    target: Settings,
+    tell: Callable[[str, int], None] = lambda *_: None,
+    *,
+    replace_null: bool = False,
 ) -> Transferred:
     """Copy a database into an empty one, or go on with a copy that was stopped.
 
@@ -62,9 +72,11 @@ def transfer(
         source: What is copied; no server may run on its home.
         target: Where to.
         tell: Told the name of each table, and how many rows of it have been copied.
+        replace_null: Write U+FFFD where texts of the source hold U+0000.
 
     Raises:
-        InputError: They are the same, or the target holds something else.
+        InputError: They are the same, the target holds something else, or texts of the source
+            hold U+0000 and are not to be replaced.
         StorageError: A server runs, or one of them cannot be read or written.
         DamagedError: The source is damaged, or the copy is not equal to it.
     """
@@ -86,7 +98,17 @@ def transfer(
         dialect.require_promises(engine)
         with store.read() as session:
             writer = engine.execution_options(**WRITE)
+            if not replace_null and (found := find_null_characters(session)):
+                raise _unkeepable(found)
             return _transfer(session, writer, dialect, target.yields, tell)
+
+
+def _unkeepable(found: Sequence[NullCharacter]) -> InputError:
+    count = "1 text holds" if len(found) == 1 else f"{len(found):,} texts hold"
+    return InputError(
+        f"{count} U+0000, which no database takes any more: {named(found)}",
+        hint="Run touchline transfer with --replace-null: it writes U+FFFD in its place.",
+    )
 
 
 def _transfer(
@@ -187,7 +209,7 @@ def _rows(connection: Connection, table: Table, after: int = 0) -> Iterator[dict
     statement = select(table).order_by(*table.primary_key.columns).offset(after)
     found = connection.execute(statement, execution_options={"yield_per": _BATCH})
     for row in found:
-        yield dict(row._mapping)
+        yield without_null_characters(row._mapping)
 
 
 def _require_equal(session: Session, connection: Connection) -> dict[str, int]:

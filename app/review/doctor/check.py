@@ -50,6 +50,11 @@ def spelt(key: object) -> str:
     return str(key)
 
 
+def _equal(said: Any, present: Any) -> bool:
+    """Whether two values are the same, but for U+0000, which is read from the log as U+FFFD."""
+    return bool(said == present) or repr(said) == repr(present).replace(r"\x00", "\ufffd")
+
+
 def as_logged(
     name: str, said: Any, present: Any, mend: str, call: Callable[[Any], str] = spelt
 ) -> Check:
@@ -64,7 +69,7 @@ def as_logged(
     """
     if isinstance(said, Mapping):
         keys = sorted(said.keys() | present)
-        names = [call(key) for key in keys if said.get(key) != present.get(key)]
+        names = [call(key) for key in keys if not _equal(said.get(key), present.get(key))]
     else:
         # Parts of what is in a set may be missing, and missing parts have no order.
         names = sorted(map(call, said ^ present))

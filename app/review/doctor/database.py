@@ -14,6 +14,7 @@ from app.review.editing.replay import replay
 from app.store.codecs import paint_to_json
 from app.store.digest import group_inputs_hash, station_digest, view_digest
 from app.store.log import newest_entry
+from app.store.null_characters import find_null_characters, named
 from app.store.projection import all_groups, all_stations
 from app.store.queue import rows_apart
 from app.store.session import Session
@@ -48,6 +49,7 @@ def examine(store: Store) -> list[Check]:
             checks.append(Check("log", False, error.message, error.hint or restore))
         else:
             checks.append(Check("log", True, f"{entries:,} entries, each as it was written"))
+            checks.append(_texts(session))
             checks += _compared_tables(session, said, restore)
             checks += [*examine_people(session, restore), examine_guidelines(session, restore)]
         computed = examine_computed(session, restore)
@@ -64,6 +66,15 @@ def _file(session: Session, restore: str) -> Check:
     if lost:
         return Check("file", False, f"{lost} rows refer to rows that are gone", restore)
     return Check("file", True, no_fault(session))
+
+
+def _texts(session: Session) -> Check:
+    """Texts from before U+0000 was refused: no fault here, and nothing that PostgreSQL can keep."""
+    found = find_null_characters(session)
+    if not found:
+        return Check("texts", True, "SQLite and PostgreSQL can keep each")
+    sentence = f"{len(found):,} with U+0000, which PostgreSQL cannot keep: {named(found)}"
+    return Check("texts", True, sentence, "touchline transfer --replace-null writes U+FFFD there.")
 
 
 def _compared_tables(session: Session, said: Ledger, restore: str) -> list[Check]:

@@ -27,6 +27,14 @@ GLANCE = {"touchline_glance": True}
 """Options of an engine that begins no transactions: each statement is one."""
 
 
+def unkeepable_text() -> InputError:
+    """What is said of a text that one of the databases cannot keep; both refuse it."""
+    return InputError(
+        "a text holds a character that the database cannot keep, such as U+0000",
+        hint="Leave it out.",
+    )
+
+
 class Failure(Enum):
     """Why a database did not do what it was asked."""
 

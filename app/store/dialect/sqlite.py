@@ -15,7 +15,7 @@ from sqlalchemy.exc import DBAPIError, OperationalError
 
 from app.config import Settings
 from app.errors import StorageError
-from app.store.dialect.dialect import GLANCE, Failure
+from app.store.dialect.dialect import GLANCE, Failure, unkeepable_text
 from app.store.dialect.sharing import Alone
 from app.store.session import Session
 
@@ -161,7 +161,18 @@ def _make_engine(settings: Settings, lasting: bool, **pool: int) -> Engine:
     event.listen(engine, "connect", partial(_set_pragmas, lasting))
     event.listen(engine, "begin", _begin)
     event.listen(engine, "commit", _count)
+    event.listen(engine, "before_cursor_execute", _refuse_null_characters)
     return engine
+
+
+def _refuse_null_characters(
+    _connection: object, _cursor: object, _statement: str, values: Any, _context: object, many: bool
+) -> None:
+    """PostgreSQL cannot keep U+0000: what SQLite took could never be transferred."""
+    for row in values if many else (values,):
+        for value in row.values() if isinstance(row, dict) else row:
+            if isinstance(value, str) and "\0" in value:
+                raise unkeepable_text()
 
 
 def _wait_for_nobody(connection: Any, _record: object) -> None:

@@ -30,3 +30,12 @@ def test_what_is_not_as_it_was_written_is_damage() -> None:
 def test_a_value_of_another_shape_than_was_written_is_damage(spoilt: object) -> None:
     with pytest.raises(DamagedError, match="not what was written"), as_written():
         float(spoilt["ball"][0])  # type: ignore[index]
+
+
+class TestNullCharacters:
+    def test_u_0000_is_read_as_the_replacement_character(self) -> None:
+        assert unpack(pack({"note": "a\0b\0\0"})) == {"note": "a\ufffdb\ufffd\ufffd"}
+
+    def test_what_only_looks_like_it_stays(self) -> None:
+        value = {"note": "\\u0000", "other": "\\\\u0000 \\\0"}
+        assert unpack(pack(value)) == {"note": "\\u0000", "other": "\\\\u0000 \\\ufffd"}

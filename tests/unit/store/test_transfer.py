@@ -111,3 +111,28 @@ class TestTransfer:
     def test_the_command_says_what_is_equal(self, source: Settings, databases, touchline) -> None:
         code, out, _ = touchline("transfer", source.home, databases.new(), "--json")
         assert (code, json.loads(out)["entries"]) == (0, 3)
+
+
+class TestNullCharacters:
+    @pytest.fixture
+    def older(self, source: Settings) -> Settings:
+        """A home from before U+0000 was refused."""
+        with closing(Store.open(source)) as store, store.write() as session:
+            session.execute(text("UPDATE groups SET label = 'a' || char(0) || 'b' WHERE id = 1"))
+        return source
+
+    def test_they_are_named_before_anything_is_copied(self, older: Settings, databases) -> None:
+        target = older.model_copy(update={"database_url": databases.new()})
+        with pytest.raises(InputError, match="groups id=1 column label") as caught:
+            transfer(older, target)
+        assert "--replace-null" in (caught.value.hint or "")
+
+    def test_they_are_replaced_when_that_is_asked_for(
+        self, older: Settings, databases, touchline
+    ) -> None:
+        url = databases.new()
+        code, out, _ = touchline("transfer", older.home, url, "--replace-null", "--json")
+        assert (code, json.loads(out)["entries"]) == (0, 3)
+        target = older.model_copy(update={"database_url": url})
+        with closing(Store.open(target)) as store, store.read() as session:
+            assert session.scalar(text("SELECT label FROM groups WHERE id = 1")) == "a\ufffdb"

@@ -272,3 +272,24 @@ def _ask(method: str, kind: bytes) -> Any:
     guarded = JsonBodies(app, streamed=frozenset({"/up"}))
     asyncio.run(guarded(scope, receive, send))
     return statuses[0] if statuses else seen
+
+
+class TestNullCharacters:
+    """PostgreSQL cannot keep U+0000 in a text; SQLite could, and its home could then not be moved."""
+
+    @pytest.mark.parametrize(
+        ("body", "place"),
+        [
+            (rb'{"text": "a\u0000b"}', "/text"),
+            (rb'{"lines": [{"x": 1}, {"note": "\u0000"}]}', "/lines/1/note"),
+            (rb'"\u0000"', "/"),
+            (rb'{"a": {"\u0000": 1}}', "/a"),
+        ],
+    )
+    def test_a_text_that_holds_one_is_refused_by_its_place(self, body: bytes, place: str) -> None:
+        assert (
+            refusal(body) == f'the text at "{place}" in the body holds U+0000, which is not stored'
+        )
+
+    def test_a_backslash_before_it_makes_it_a_text_about_it(self) -> None:
+        assert read_json(rb'{"text": "\\u0000"}') == {"text": r"\u0000"}
