@@ -24,7 +24,7 @@ from app.store.aliases import shown_actor
 from app.store.dialect.statements import insert_or_replace
 from app.store.groups import StoredGroup
 from app.store.session import Session
-from app.store.solutions import is_current, read_summary
+from app.store.solutions import fitting_solution, read_summary
 from app.store.summary import SolutionSummary
 from app.store.tables.groups import (
     DatasetModel,
@@ -163,11 +163,14 @@ def _rows(session: Session, ids: Sequence[int]) -> list[dict[str, Any]]:
 
 
 def _heads(session: Session, ids: Sequence[int]) -> list[tuple[Any, SolutionSummary | None]]:
-    """Groups with the summary of the solution that fits their present state, if there is one."""
+    """Groups with the summary of the newest solution of their present state, if there is one.
+
+    That of an earlier solver counts until the group is solved again: its numbers stay in the queue.
+    """
     statement = (
         select(*GroupModel.__table__.columns, SolutionModel.summary)
         .join(DatasetModel, DatasetModel.id == GroupModel.dataset_id)
-        .outerjoin(SolutionModel, is_current())
+        .outerjoin(SolutionModel, SolutionModel.id == fitting_solution())
         .where(GroupModel.id.in_(ids))
     )
     return [

@@ -7,7 +7,16 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any, cast
 
-from sqlalchemy import BindParameter, ColumnElement, Table, and_, bindparam, func, select
+from sqlalchemy import (
+    BindParameter,
+    ColumnElement,
+    ScalarSelect,
+    Table,
+    and_,
+    bindparam,
+    func,
+    select,
+)
 from zlib_ng import zlib_ng
 
 from app.errors import ConflictError
@@ -52,6 +61,26 @@ def is_current() -> ColumnElement[bool]:
         SolutionModel.inputs_hash == GroupModel.inputs_hash,
         SolutionModel.policy_hash == DatasetModel.policy_hash,
         SolutionModel.solver_version == SOLVER_VERSION,
+    )
+
+
+def fitting_solution() -> ScalarSelect[int]:
+    """Id of the solution of a group's present state under its dataset's policy: of this solver, else of
+    the newest one that solved it.
+
+    Where ``GroupModel`` and ``DatasetModel`` are joined already.
+    """
+    return (
+        select(SolutionModel.id)
+        .where(
+            SolutionModel.group_id == GroupModel.id,
+            SolutionModel.inputs_hash == GroupModel.inputs_hash,
+            SolutionModel.policy_hash == DatasetModel.policy_hash,
+        )
+        .order_by((SolutionModel.solver_version == SOLVER_VERSION).desc(), SolutionModel.id.desc())
+        .limit(1)
+        .correlate(GroupModel, DatasetModel)
+        .scalar_subquery()
     )
 
 

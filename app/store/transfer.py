@@ -209,7 +209,7 @@ def _rows(connection: Connection, table: Table, after: int = 0) -> Iterator[dict
     statement = select(table).order_by(*table.primary_key.columns).offset(after)
     found = connection.execute(statement, execution_options={"yield_per": _BATCH})
     for row in found:
-        yield without_null_characters(row._mapping)
+        yield without_null_characters(dict(row._mapping))
 
 
 def _require_equal(session: Session, connection: Connection) -> dict[str, int]:

@@ -12,6 +12,7 @@ from sqlalchemy import text
 
 from app.review.doctor.check import Check
 from app.review.doctor.database import REBUILD, examine
+from app.review.editing.recompute import solve_dataset
 from app.review.editing.replay import rebuild
 from app.review.editing.submit import load
 from app.review.verdicts.verdict import set_verdict
@@ -175,6 +176,28 @@ class TestQueue:
         assert found["queue"].sentence.endswith(f": {ids[1]}")
         assert found["queue"].mend == REBUILD
         rebuild(store)
+        assert faults(store) == {}
+
+    def test_after_an_upgrade_with_another_solver_groups_wait_and_keep_their_numbers(
+        self, store: Store, ids
+    ) -> None:
+        change(
+            store,
+            "DROP TRIGGER solution_refuses_update",
+            "UPDATE solution SET solver_version = '1'",
+        )
+        row = f"SELECT error_px FROM queue WHERE group_id = {ids[1]}"
+        number = first(store, row)
+        assert number is not None
+        assert faults(store) == {}
+        (found,) = (check for check in examine(store) if check.name == "solutions of demo")
+        assert found.sentence == "2 of 2 groups wait to be solved"
+        assert found.mend == 'touchline solve --dataset "demo"'
+        rebuild(store)
+        assert first(store, row) == number
+        assert faults(store) == {}
+        solve_dataset(store, "demo")
+        assert first(store, row) == number
         assert faults(store) == {}
 
 
