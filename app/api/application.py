@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager, nullcontext
 from pathlib import Path
@@ -11,7 +12,7 @@ from fastapi import Depends, FastAPI
 
 from app.api.errors import install_handlers
 from app.api.idempotency import Idempotency
-from app.api.metrics import install_metrics
+from app.api.metrics import SharedNumbers, install_metrics
 from app.api.openapi import describe
 from app.api.pages import install_pages
 from app.api.request_log import RequestLog
@@ -205,5 +206,9 @@ def _add_middleware(app: FastAPI, settings: Settings, site: Site, team: Team | N
 async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
     current_default_thread_limiter().total_tokens = THREADS
     app.state.services.start()
+    shared: SharedNumbers | None = getattr(app.state, "shared_metrics", None)
+    keeping = None if shared is None else asyncio.create_task(shared.keep_fresh())
     yield
+    if keeping is not None:
+        keeping.cancel()
     app.state.services.close()

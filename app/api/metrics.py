@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import asyncio
+import os
 import re
 from collections.abc import Iterator
 from contextlib import suppress
 from typing import Any
 
 from fastapi import FastAPI, Request
-from prometheus_client import CollectorRegistry
+from prometheus_client import CollectorRegistry, Counter, Gauge
 from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metric
+from prometheus_client.multiprocess import MultiProcessCollector
 from prometheus_client.registry import Collector
+from prometheus_client.samples import Sample
 from prometheus_fastapi_instrumentator.middleware import PrometheusInstrumentatorMiddleware
 
 from app.api.events import Counts
@@ -26,13 +30,30 @@ MAX_ADDRESSES = 2000
 """Whose routes are remembered: addresses hold names of datasets, too."""
 MAX_LETTERS = 200
 """Of a path that is remembered; a person's are shorter."""
+MULTIPROCESS = "PROMETHEUS_MULTIPROC_DIR"
+"""Where web processes count together; unset where there is one."""
+REFRESH_SECONDS = 1.0
+"""Between two looks at the numbers that another process may be asked for."""
 _NUMBER = re.compile(r"/[0-9]+(?=/|$)")
 
 
 def install_metrics(app: FastAPI, doors: Doors) -> None:
-    """Count requests by route, each application for itself, and watch its services."""
+    """Count requests by route, each application for itself, and watch its services.
+
+    Of several web processes each counts in a file that all of them read, and whichever answers adds
+    them up (``web_processes``): a number never depends on who was asked.
+    """
     registry = app.state.metrics = CollectorRegistry()
-    registry.register(ServerCollector(app, doors))
+    own = ProcessCollector(app, doors)
+    if MULTIPROCESS in os.environ:
+        app.state.shared_metrics = SharedNumbers(own)
+        answered = CollectorRegistry()
+        MultiProcessCollector(answered)  # type: ignore[no-untyped-call]
+    else:
+        registry.register(own)
+        answered = registry
+    answered.register(DatabaseCollector(app))
+    app.state.answered_metrics = answered
     excluded = [re.compile(path) for path in ("/metrics", "/healthz", "/readyz")]
     app.add_middleware(RequestMetrics, registry=registry, excluded_handlers=excluded)
 
@@ -67,8 +88,24 @@ class RequestMetrics(PrometheusInstrumentatorMiddleware):
         return route, found
 
 
-class ServerCollector(Collector):
-    """Reads the server's own numbers when it is asked; those of the database while it answers."""
+class DatabaseCollector(Collector):
+    """Reads what the database says while it is asked: the same whichever process answers."""
+
+    def __init__(self, app: FastAPI):
+        self._app = app
+
+    def describe(self) -> Iterator[Metric]:
+        """Nothing beforehand: what there is is read when it is asked for."""
+        return iter(())
+
+    def collect(self) -> Iterator[Metric]:
+        """Every number of this moment."""
+        services: Services = self._app.state.services
+        yield from _database(services.store)
+
+
+class ProcessCollector(Collector):
+    """Reads the numbers of this process: its requests at work, its event streams, its children."""
 
     def __init__(self, app: FastAPI, doors: Doors):
         self._app, self._doors = app, doors
@@ -83,7 +120,6 @@ class ServerCollector(Collector):
         yield from self._lanes()
         yield from _streams(services.events.counts)
         yield from _children()
-        yield from _database(services.store)
 
     def _lanes(self) -> Iterator[Metric]:
         doors = self._doors.all
@@ -93,6 +129,60 @@ class ServerCollector(Collector):
         yield _gauges("lane_waiting", "Requests that wait for their turn.", "lane", waiting)
         refused = {door.lane.name: door.refused for door in doors}
         yield _counter("lane_refused", "Requests that were told to come back.", "lane", refused)
+
+
+class SharedNumbers:
+    """Keeps the numbers of this process where the other web processes read them.
+
+    Numbers of this moment are added up over the processes that live; what is counted also over those
+    that have died.
+    """
+
+    def __init__(self, own: ProcessCollector):
+        self._own = own
+        self._gauges: dict[str, Gauge] = {}
+        self._counters: dict[str, Counter] = {}
+        self._counted: dict[tuple[str, tuple[str, ...]], float] = {}
+
+    def refresh(self) -> None:
+        """Write down every number of this moment."""
+        for family in self._own.collect():
+            for sample in family.samples:
+                if family.type == "gauge":
+                    self._gauge(family, sample)
+                else:
+                    self._count(family, sample)
+
+    async def keep_fresh(self) -> None:
+        """Refresh every second, without an end."""
+        while True:
+            self.refresh()
+            await asyncio.sleep(REFRESH_SECONDS)
+
+    def _gauge(self, family: Metric, sample: Sample) -> None:
+        names = tuple(sample.labels)
+        if family.name not in self._gauges:
+            self._gauges[family.name] = Gauge(
+                family.name,
+                family.documentation,
+                names,
+                registry=None,
+                multiprocess_mode="livesum",
+            )
+        gauge = self._gauges[family.name]
+        (gauge.labels(**sample.labels) if names else gauge).set(sample.value)
+
+    def _count(self, family: Metric, sample: Sample) -> None:
+        names = tuple(sample.labels)
+        if family.name not in self._counters:
+            self._counters[family.name] = Counter(
+                family.name, family.documentation, names, registry=None
+            )
+        key = family.name, tuple(sample.labels.values())
+        counter = self._counters[family.name]
+        more = sample.value - self._counted.get(key, 0)
+        (counter.labels(**sample.labels) if names else counter).inc(more)
+        self._counted[key] = sample.value
 
 
 def _streams(counts: Counts) -> Iterator[Metric]:

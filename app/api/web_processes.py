@@ -15,11 +15,14 @@ from contextlib import contextmanager
 from multiprocessing import get_context, parent_process
 from multiprocessing.connection import wait
 from multiprocessing.process import BaseProcess
+from tempfile import TemporaryDirectory
 from threading import Event, Thread
 from typing import Any
 
 import structlog
+from prometheus_client.multiprocess import mark_process_dead
 
+from app.api.metrics import MULTIPROCESS
 from app.config import Settings
 
 log = structlog.get_logger("touchline")
@@ -44,7 +47,7 @@ def serve_with(count: int, part: Part, settings: Settings, listening: socket.soc
         listening: The socket that all of them take connections from.
     """
     asked = (part, settings, listening)
-    with _told_to_stop() as stopping:
+    with _told_to_stop() as stopping, _shared_metrics() as metrics:
         running = [_start(*asked) for _ in range(count)]
         try:
             while not stopping.is_set():
@@ -52,6 +55,8 @@ def serve_with(count: int, part: Part, settings: Settings, listening: socket.soc
                 for place, process in enumerate(running):
                     if not process.is_alive() and not stopping.is_set():
                         log.error("a process of the server died", process=process.pid)
+                        # What it has counted stays counted; what it was at is over.
+                        mark_process_dead(process.pid, metrics)  # type: ignore[no-untyped-call]
                         stopping.wait(AGAIN_SECONDS)
                         running[place] = _start(*asked)
         finally:
@@ -72,6 +77,20 @@ def _stop(running: list[BaseProcess]) -> None:
         if process.is_alive():
             log.error("a process of the server did not stop", process=process.pid)
             process.kill()
+
+
+@contextmanager
+def _shared_metrics() -> Iterator[str]:
+    """A folder in which the processes count together: ``/metrics`` of any of them adds up all.
+
+    The library reads the variable when it is imported, which the processes do once they run.
+    """
+    with TemporaryDirectory(prefix="touchline-metrics-") as folder:
+        os.environ[MULTIPROCESS] = folder
+        try:
+            yield folder
+        finally:
+            del os.environ[MULTIPROCESS]
 
 
 @contextmanager

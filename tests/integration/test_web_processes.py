@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import signal
 import subprocess
 import sys
 import time
@@ -14,7 +15,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import httpx
+import psutil
 import pytest
+from prometheus_client.parser import text_string_to_metric_families
 
 from tests.cluster import ADVICE, find_programs, running_cluster
 from tests.integration.conftest import COMMAND
@@ -80,10 +83,15 @@ def environment(tree: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterato
 
 
 @contextmanager
-def serving(environment: dict[str, str], log: Path, *options: str) -> Iterator[Server]:
+def serving(
+    environment: dict[str, str],
+    log: Path,
+    *options: str,
+    start: type[subprocess.Popen[str]] = Process,
+) -> Iterator[Server]:
     """A server, once it answers."""
     with log.open("w") as file, ExitStack() as ended:
-        process = Process(
+        process = start(
             [sys.executable, "-c", COMMAND, "serve", "--port", "0", *options],
             stdout=subprocess.PIPE,
             stderr=file,
@@ -170,3 +178,78 @@ class TestTwoServers:
         for asked in (before, after):
             assert second.ended(asked.json()["id"])["state"] == "done"
         assert second.leads()
+
+
+class TestMetrics:
+    def test_of_two_processes_they_are_the_same_whichever_answers_and_never_go_back(
+        self, environment: dict[str, str], tmp_path: Path
+    ) -> None:
+        # Cold: the library of metrics reads the environment when it is imported.
+        cold = subprocess.Popen
+        with serving(environment, tmp_path / "log", "--workers", "2", start=cold) as server:
+            reader = Metrics(server)
+            group = first_group(server)["id"]
+            handler = "/api/v1/groups/{group}"
+
+            def ask(times: int) -> None:
+                for _ in range(times):
+                    # A connection of its own each time: the kernel chooses who answers.
+                    httpx.get(f"{server.client.base_url}groups/{group}").raise_for_status()
+
+            ask(20)
+            pids = server.until(reader.two_processes)
+            before = reader.requests(handler)
+            assert before >= 21
+            assert reader.readings(handler) == {before}
+            ask(10)
+            assert reader.readings(handler) == {before + 10}
+            with server.client.stream("GET", "/events", params={"dataset": "small"}) as stream:
+                lines = stream.iter_lines()
+                assert next(line for line in lines if "listening" in line)
+                server.until(lambda: reader.number("touchline_event_streams") == 1)
+            server.until(lambda: reader.number("touchline_event_streams") == 0)
+            assert reader.number("touchline_event_stream_total", what="opened") == 1
+            os.kill(pids[0], signal.SIGKILL)
+            server.until(lambda: "a process of the server died" in server.log.read_text())
+            server.until(lambda: reader.settled(handler) == before + 10)
+            ask(5)
+            assert reader.requests(handler) == before + 15
+
+
+class Metrics:
+    """Reads the numbers of a server whose processes answer in turn."""
+
+    def __init__(self, server: Server):
+        self._server = server
+
+    def number(self, name: str, **labels: str) -> float:
+        text = httpx.get(self._server.client.base_url.join("/metrics")).raise_for_status().text
+        families = text_string_to_metric_families(text)
+        found = [
+            sample.value
+            for family in families
+            for sample in family.samples
+            if sample.name == name and sample.labels == labels
+        ]
+        assert len(found) == 1, (name, labels, found)
+        return found[0]
+
+    def requests(self, handler: str) -> float:
+        return self.number("http_requests_total", handler=handler, method="GET", status="2xx")
+
+    def readings(self, handler: str) -> set[float]:
+        """What is said ten times, by whichever process it is asked."""
+        return {self.requests(handler) for _ in range(10)}
+
+    def settled(self, handler: str) -> float | None:
+        """What is said once a process answers again."""
+        try:
+            return self.requests(handler)
+        except httpx.HTTPError:
+            return None
+
+    def two_processes(self) -> list[int] | None:
+        """Ids of the web processes, once there are two."""
+        children = psutil.Process(self._server.process.pid).children()
+        found = [child.pid for child in children if "spawn_main" in " ".join(child.cmdline())]
+        return found if len(found) == 2 else None

@@ -6,6 +6,7 @@ from fastapi import APIRouter, Request, Response
 from prometheus_client import CONTENT_TYPE_LATEST, CollectorRegistry, generate_latest
 
 from app.api.deps import AppStore
+from app.api.metrics import SharedNumbers
 from app.api.problem import responses
 from app.api.schemas.health import Health, Readiness
 from app.review.queue.changes import read_position
@@ -35,5 +36,8 @@ def get_readiness(store: AppStore) -> Readiness:
 )
 def get_metrics(request: Request) -> Response:
     """Requests, lanes, event streams, processes, jobs, files and room, in Prometheus' text format."""
-    registry: CollectorRegistry = request.app.state.metrics
+    shared: SharedNumbers | None = getattr(request.app.state, "shared_metrics", None)
+    if shared is not None:
+        shared.refresh()
+    registry: CollectorRegistry = request.app.state.answered_metrics
     return Response(generate_latest(registry), media_type=CONTENT_TYPE_LATEST)

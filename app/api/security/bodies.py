@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 from collections import Counter
+from collections.abc import Iterable
 from typing import Any, NoReturn
 
 import numpy as np
@@ -72,10 +73,10 @@ def read_json(body: bytes) -> Any:
         raise BodyError(400, f"the body is not JSON{place}") from None
     if _DOUBTFUL.search(body):
         _refuse_what_cannot_be_written(value)
-    if rb"\u0000" in body and (place := _null_character(value)) is not None:
+    if rb"\u0000" in body and (where := _null_character(value)) is not None:
         raise BodyError(
             400,
-            f"the text at {quoted(place, 80)} in the body holds U+0000, which is not stored",
+            f"the text at {quoted(where, 80)} in the body holds U+0000, which is not stored",
             hint="Leave it out.",
         )
     return value
@@ -83,16 +84,17 @@ def read_json(body: bytes) -> Any:
 
 def _null_character(value: object, place: str = "") -> str | None:
     """JSON pointer to a text, or to a name, that holds U+0000; None where there is none."""
+    parts: Iterable[tuple[object, object]] = ()
     if isinstance(value, str):
         return place or "/" if "\0" in value else None
     if isinstance(value, dict):
         if any("\0" in name for name in value):
             return place or "/"
         parts = value.items()
-    else:
-        parts = enumerate(value) if isinstance(value, list) else ()
+    elif isinstance(value, list):
+        parts = enumerate(value)
     found = (_null_character(part, f"{place}/{name}") for name, part in parts)
-    return next((place for place in found if place is not None), None)
+    return next((one for one in found if one is not None), None)
 
 
 def _require_flat(body: bytes) -> None:

@@ -94,7 +94,7 @@ def test_every_lane_begins_with_nobody(read, lane: str) -> None:
 def test_says_who_is_at_work_who_waits_and_who_was_told_to_come_back(app: FastAPI) -> None:
     door = SimpleNamespace(lane=EDITS, busy=1, waiting=2, refused=3)
     registry = CollectorRegistry()
-    registry.register(metrics.ServerCollector(app, SimpleNamespace(all=(door,))))
+    registry.register(metrics.ProcessCollector(app, SimpleNamespace(all=(door,))))
     for name, value in (("busy", 1), ("waiting", 2), ("refused_total", 3)):
         assert registry.get_sample_value(f"touchline_lane_{name}", {"lane": "edits"}) == value
 
