@@ -234,13 +234,16 @@ class _Request:
         return {"type": "http.request", "body": b"".join(self._body), "more_body": False}
 
     def digest(self) -> str:
-        """Digest of method, address, body and actor; JSON in another order gives the same one.
+        """Digest of method, address, body, actor and If-Match; JSON in another order gives the same one.
 
         It is that of what was sent: what is deleted is asked for under another name afterwards.
         """
         sent = self.scope.get(SENT, self.scope)
         place = [sent["method"], sent["path"], sent["query_string"].decode()]
-        place += Headers(scope=sent).getlist(ACTOR_HEADER)
+        headers = Headers(scope=sent)
+        place += headers.getlist(ACTOR_HEADER)
+        # The same change of another state is another request.
+        place += [f"If-Match: {tag}" for tag in headers.getlist("if-match")]
         if self.streamed:
             body = self._sum.hexdigest()
         else:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from datetime import timedelta
 from ipaddress import ip_address
 from typing import Annotated, Any
 from urllib.parse import urlsplit
@@ -15,6 +16,7 @@ from app.config import Settings
 from app.errors import ConflictError, NotLoggedInError
 from app.review.people.access_tokens import AccessTokens
 from app.review.people.challenges import LASTS as CHALLENGE_LASTS
+from app.review.people.devices import Devices
 from app.review.people.logins import LASTS, Login, Logins, Way
 from app.review.people.passkeys import Passkeys, PasskeySite
 from app.review.people.second_factor import SecondFactors
@@ -28,6 +30,10 @@ ASKER = "touchline_passkey"
 """The cookie that says which browser was asked to sign with a passkey."""
 BEGUN = "touchline_sign_on"
 """The cookie that says which browser was sent to the provider of single sign-on."""
+DEVICE = "touchline_device"
+"""The cookie by which a browser is known in which somebody has logged in before."""
+DEVICE_LASTS = timedelta(days=400)
+"""Browsers keep no cookie for longer."""
 LANDING = "/login"
 """The page to which the provider sends people back."""
 
@@ -45,6 +51,7 @@ class Team:
         url: The address that people open; None: the one that they came by.
         proxies: Who is believed whom they forward.
         tries: Counts who tries too often.
+        devices: Browsers in which people have logged in before.
     """
 
     logins: Logins
@@ -55,6 +62,7 @@ class Team:
     url: str | None
     proxies: frozenset[str]
     tries: Tries
+    devices: Devices
 
     @staticmethod
     def of(settings: Settings, store: Store) -> Team | None:
@@ -76,6 +84,7 @@ class Team:
             settings.url,
             frozenset(settings.proxies),
             Tries(store),
+            Devices(store),
         )
 
     @property
@@ -100,6 +109,21 @@ class Team:
     def asker_values(self, asker: str) -> dict[str, Any]:
         """How it is told that."""
         return self._values(ASKER, asker, int(CHALLENGE_LASTS.total_seconds()))
+
+    def count_try(self, request: Request, name: str | None = None) -> None:
+        """Count that somebody asks whether a password is right.
+
+        Raises:
+            TooManyTriesError: There were too many.
+        """
+        device = None
+        if name is not None and (token := cookie_of(request.scope, self._cookie_name(DEVICE))):
+            device = self.devices.recognise(name, token)
+        self.tries.count(self.address(request), name, device)
+
+    def device_values(self, name: str) -> dict[str, Any]:
+        """How a browser is told that it is a known one of a person, who has just logged in there."""
+        return self._values(DEVICE, self.devices.make(name), int(DEVICE_LASTS.total_seconds()))
 
     def begun(self, request: Request) -> str:
         """What a browser alone knows that was sent to the provider; empty: it was not."""

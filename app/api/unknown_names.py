@@ -1,20 +1,21 @@
-"""Names that nobody knows: a parameter or field that would be ignored is refused, with the nearest one.
+"""Parameters as they are sent: unknown names, repeated names and odd spellings of numbers are refused.
 
-So is a parameter that stands there twice, of which one would be ignored.
+A parameter or field that would be ignored is refused with the nearest known name.
 """
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Callable, Iterator
 from difflib import get_close_matches
 from functools import lru_cache
-from typing import Any
+from typing import Any, get_args
 
 from fastapi import Request
 from fastapi.dependencies.utils import get_dependant, get_flat_params
 from fastapi.exceptions import RequestValidationError
-from fastapi.params import Query
+from fastapi.params import Path, Query
 from fastapi.routing import APIRoute
 from pydantic import TypeAdapter
 
@@ -23,6 +24,9 @@ UNKNOWN = "extra_forbidden"
 REPEATED = "repeated"
 """What we call a parameter that is there more than once."""
 _ONCE = "is there more than once; no parameter is a list"
+_NO_NUMBER = "must be a number in plain digits"
+_INT = re.compile(r"0|-?[1-9][0-9]*")
+_FLOAT = re.compile(r"-?[0-9]+(?:\.[0-9]+)?(?:[eE][+-]?[0-9]+)?")
 _FIELDS: dict[Callable[..., Any], frozenset[str]] = {}
 """Of each route by its function, once somebody misspelt one."""
 
@@ -31,15 +35,21 @@ async def refuse_unknown_parameters(request: Request) -> None:
     """Refuse a query parameter that its route does not read, or of which it would read one alone.
 
     Raises:
-        RequestValidationError: There is one; a misspelt ``dry_run`` must not become a deed.
+        RequestValidationError: There is one; a misspelt ``dry_run`` must not become a deed. Or a number
+            is spelled as Python's ``int`` reads it and nobody writes it: ``1_0``, ``+1``, `` 1``.
     """
-    known = _parameters(request.scope["route"])
+    route = request.scope["route"]
+    known = _parameters(route)
     given = Counter(name for name, _ in request.query_params.multi_items())
     problems = [
         {"type": REPEATED if name in known else UNKNOWN, "loc": ("query", name), "msg": _ONCE}
         for name, times in given.items()
         if name not in known or times > 1
     ]
+    for place, name, spelling in _numbers(route.path_format, route.endpoint):
+        sent = request.path_params if place == "path" else request.query_params
+        if name in sent and not spelling.fullmatch(str(sent[name])):
+            problems.append({"type": "int_parsing", "loc": (place, name), "msg": _NO_NUMBER})
     if problems:
         raise RequestValidationError(problems)
 
@@ -64,6 +74,21 @@ def _read_by(path: str, endpoint: Callable[..., Any]) -> frozenset[str]:
     dependant = get_dependant(path=path, call=endpoint)
     found = get_flat_params(dependant)
     return frozenset(item.alias for item in found if isinstance(item.field_info, Query))
+
+
+@lru_cache(maxsize=256)
+def _numbers(
+    path: str, endpoint: Callable[..., Any]
+) -> tuple[tuple[str, str, re.Pattern[str]], ...]:
+    """Place, name and spelling of each parameter of a route that is a number."""
+    found = []
+    for item in get_flat_params(get_dependant(path=path, call=endpoint)):
+        info, kind = item.field_info, item.field_info.annotation
+        place = "query" if isinstance(info, Query) else "path" if isinstance(info, Path) else ""
+        kinds = {kind, *get_args(kind)}
+        if place and kinds & {int, float} and bool not in kinds:
+            found.append((place, item.alias, _FLOAT if float in kinds else _INT))
+    return tuple(found)
 
 
 def _fields(route: APIRoute) -> frozenset[str]:

@@ -12,7 +12,8 @@ from app.errors import DamagedError
 from app.store.home import refused
 
 SECOND_FACTOR, WEBHOOKS, BEGUN = "second-factor.key", "webhooks.key", "begun.key"
-KEYS = SECOND_FACTOR, WEBHOOKS, BEGUN
+DEVICES = "devices.key"
+KEYS = SECOND_FACTOR, WEBHOOKS, BEGUN, DEVICES
 """Files of keys: each is made for something that a database holds."""
 _BYTES = 32
 

@@ -193,6 +193,13 @@ def read_entries(session: Session, ids: Sequence[int]) -> Iterator[LogEntry]:
         yield from read_log(session, LogModel.id.in_(ids[start : start + _BATCH]))
 
 
+def entries_after(session: Session, at: str) -> tuple[int, str | None]:
+    """How many entries were written after a time, by their own clock, and the latest of these times."""
+    statement = select(func.count(), func.max(LogModel.at)).where(LogModel.at > at)
+    count, latest = session.execute(statement).one()
+    return count, latest
+
+
 def last_time(session: Session) -> str | None:
     """When the last entry was written; None for an empty log."""
     return session.scalar(select(LogModel.at).order_by(LogModel.id.desc()).limit(1))

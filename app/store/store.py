@@ -8,7 +8,8 @@ from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import replace
 
 import structlog
-from sqlalchemy import Engine
+from sqlalchemy import Engine, update
+from sqlalchemy.exc import DBAPIError
 from sqlalchemy.exc import TimeoutError as NoConnectionError
 
 from app.config import Settings
@@ -38,9 +39,12 @@ from app.store.migrate import (
 from app.store.opened_file import OpenedFile
 from app.store.session import Session
 from app.store.soundness import file_faults
+from app.store.tables.installation import InstallationModel
 
 log = structlog.get_logger("touchline.store")
 
+_UNCHANGED = update(InstallationModel).values(created=InstallationModel.created)
+"""Writes a row as it is."""
 COMMITTED = "committed"
 """What other processes are told of a commit."""
 TURN_SECONDS = 10.0
@@ -103,6 +107,7 @@ class Store:
         file = settings.database_file
         self._file = OpenedFile(file) if dialect_of(settings).is_file else None
         self._damage: tuple[str, str] | None = None
+        self._refused: StorageError | None = None
 
     @staticmethod
     def open(settings: Settings, turn: AbstractContextManager[object] | None = None) -> Store:
@@ -175,7 +180,7 @@ class Store:
         """
         self.require_undamaged()
         writer = self._writer if lasting else self._passing
-        with self.turn, self._watched(), Session(writer) as session:
+        with self.turn, self._remembered(), self._watched(), Session(writer) as session:
             # Take the lock before anything is read, so that what is read is still true when it
             # is written.
             session.begin()
@@ -190,8 +195,30 @@ class Store:
                 self.sharing.tell(session, COMMITTED)
                 leave_slot()
             session.commit()
+            self._refused = None
             self._anchored(session)
         self.tell_listeners()
+
+    def require_writable(self) -> None:
+        """Raise StorageError while changes are refused, as on a full disk.
+
+        Once one was refused, a row is written as it is to know whether the next one would be.
+        """
+        if self._refused is not None:
+            with self.write(lasting=False) as session:
+                session.execute(_UNCHANGED)
+
+    @contextmanager
+    def _remembered(self) -> Iterator[None]:
+        """Note what keeps the database from being written."""
+        try:
+            yield
+        except (BusyError, DamagedError):
+            raise
+        except StorageError as error:
+            if isinstance(error.__cause__, DBAPIError):
+                self._refused = error
+            raise
 
     def tell_listeners(self) -> None:
         """Call all who listen: this process has committed, or another one that works for it."""

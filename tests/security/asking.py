@@ -27,7 +27,7 @@ JSON = {"Content-Type": "application/json"}
 
 @dataclass(frozen=True)
 class Answer:
-    """What came back; names of headers are small."""
+    """What came back; names of headers are small, and one that came twice has two lines."""
 
     status: int
     headers: Mapping[str, str]
@@ -87,7 +87,10 @@ class Asker:
             connection.putheader(name, value)
         connection.endheaders(body)
         answer = connection.getresponse()
-        lowered = {name.lower(): value for name, value in answer.getheaders()}
+        lowered: dict[str, str] = {}
+        for name, value in answer.getheaders():
+            before = lowered.get(name.lower())
+            lowered[name.lower()] = value if before is None else f"{before}\n{value}"
         found = Answer(answer.status, lowered, b"" if head else answer.read())
         if (
             head

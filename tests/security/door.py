@@ -66,10 +66,7 @@ def name_in(answer: Answer) -> str:
 
 def session_in(answer: Answer) -> str:
     """The cookie of the session that an answer begins."""
-    found = [
-        part.partition(";")[0]
-        for part in answer.headers["set-cookie"].replace(", touch", "\ntouch").split("\n")
-    ]
+    found = [part.partition(";")[0] for part in answer.headers["set-cookie"].split("\n")]
     return next(part for part in found if part.startswith("touchline_session="))
 
 

@@ -94,9 +94,13 @@ class Team:
         return self.bearers[(role, *scopes)]
 
 
-def cookie_in(answer: Answer) -> str:
+def cookie_in(answer: Answer, name: str = "") -> str:
+    """A cookie that an answer sets, as the next request sends it: of a login that of the session."""
     assert answer.status == 200, answer.body
-    return answer.headers["set-cookie"].partition(";")[0]
+    set_ = [line.partition(";")[0] for line in answer.headers["set-cookie"].split("\n")]
+    if not name and len(set_) == 1:
+        return set_[0]
+    return next(one for one in set_ if f"{name or 'touchline_session'}=" in one)
 
 
 def asked(team: Team, row: Row, role: str | None, **headers: str) -> Answer:

@@ -10,9 +10,10 @@ from contextlib import ExitStack, closing
 from pathlib import Path
 
 import pytest
+from limits import parse
 
 from app.api.pages import PAGES
-from app.api.security import access
+from app.api.security import access, tries
 from app.api.security.rules import OPEN, RULES
 from app.config import Settings
 from app.review.importing.ingest import ensure_dataset
@@ -265,6 +266,24 @@ class TestSessions:
         answer = team.log_in("tried")
         assert 0 < int(answer.headers["retry-after"]) <= 60
         assert team.log_in("viewer").status == 200, "others are let in"
+
+    def test_strangers_who_guess_lock_nobody_out_of_a_browser_that_is_known(
+        self, team: Team, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        team.add("guessed", Role.VIEWER)
+        known = cookie_in(team.log_in("guessed"), "touchline_device")
+        foreign = cookie_in(team.log_in("viewer"), "touchline_device")
+        monkeypatch.setattr(tries, "OF_A_NAME_BY_STRANGERS", parse("4/hour"))
+        team.forget_tries()
+        wrong = [team.log_in("guessed", "wrong wrong wrong").status for _ in range(5)]
+        assert wrong[-1] == 429
+        assert team.log_in("guessed").status == 429, "nor does the right password help a stranger"
+        for cookie in (foreign, known[:-1] + "0", "touchline_device=x.y", "touchline_device=é.é"):
+            assert team.log_in("guessed", Cookie=cookie).status == 429
+        assert team.log_in("guessed", Cookie=known).status == 200
+        told = [team.log_in("guessed", "wrong wrong wrong", Cookie=known).status for _ in range(10)]
+        assert told[-1] == 429, "a known browser has an end of its tries, too"
+        team.forget_tries()
 
     def test_a_link_sets_a_password_once_and_logs_in(self, team: Team) -> None:
         made = team.ask("POST", f"{API}/users", {"name": "new", "role": "viewer"}, role="admin")

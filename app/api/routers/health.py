@@ -9,6 +9,7 @@ from app.api.deps import AppStore
 from app.api.metrics import SharedNumbers
 from app.api.problem import responses
 from app.api.schemas.health import Health, Readiness
+from app.errors import BusyError, OverloadedError, StorageError
 from app.review.queue.changes import read_position
 
 router = APIRouter(tags=["health"])
@@ -22,9 +23,16 @@ async def get_health(request: Request) -> Health:
 
 @router.get("/readyz", operation_id="getReadiness", responses=responses())
 def get_readiness(store: AppStore) -> Readiness:
-    """Whether the database answers, and was not seen to be damaged; 503 while it does not."""
+    """Whether the database answers, keeps changes, and was not seen to be damaged; else 503."""
     store.require_undamaged()
     read_position(store)
+    try:
+        store.require_writable()
+    except BusyError:
+        # Others are writing: changes are kept.
+        pass
+    except StorageError as error:
+        raise OverloadedError(f"changes are refused: {error.message}", hint=error.hint) from error
     return Readiness(status="ready")
 
 

@@ -47,7 +47,7 @@ def list_passkeys(request: Request, team: AppTeam, me: Me) -> PasskeyList:
 def begin(said: PasswordOnly, request: Request, team: AppTeam, me: Me) -> CreationOptions:
     """What a browser needs to make a passkey; takes the password."""
     team.require_passwords()
-    team.tries.count(team.address(request), me.name)
+    team.count_try(request, me.name)
     return CreationOptions(options=team.passkeys.begin(me, said.password, team.site(request)))
 
 
@@ -69,7 +69,7 @@ def make(new: NewPasskey, request: Request, team: AppTeam, me: Me) -> PasskeyMad
 )
 def remove(passkey: Id, said: PasswordOnly, request: Request, team: AppTeam, me: Me) -> None:
     """Stop accepting a passkey; 409 for the last second factor, where everybody needs one."""
-    team.tries.count(team.address(request), me.name)
+    team.count_try(request, me.name)
     team.passkeys.remove(me, passkey, said.password)
 
 
@@ -99,7 +99,7 @@ def log_in(
     """Log in with a passkey: no name, no password, and no code."""
     team.require_passwords()
     address = team.address(request)
-    team.tries.count(address)
+    team.count_try(request)
     try:
         token = team.passkeys.log_in(
             team.asker(request),

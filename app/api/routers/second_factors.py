@@ -30,7 +30,7 @@ def get_second_factor(team: AppTeam, me: Me) -> SecondFactorDocument:
 @router.post(OWN, operation_id="beginSecondFactor", responses=responses(401, 409, 413, 415, 429))
 def begin(said: PasswordOnly, request: Request, team: AppTeam, me: Me) -> EnrolmentDocument:
     """What an authenticator has to know, shown this once; nothing is asked for before it is confirmed."""
-    team.tries.count(team.address(request), me.name)
+    team.count_try(request, me.name)
     return EnrolmentDocument.model_validate(team.factors.begin(me, said.password))
 
 
@@ -53,7 +53,7 @@ def confirm(said: CodeOnly, team: AppTeam, me: Me) -> RecoveryCodes:
 )
 def remove(said: PasswordOnly, request: Request, team: AppTeam, me: Me) -> None:
     """Stop asking for a code; 409 where everybody needs a second factor."""
-    team.tries.count(team.address(request), me.name)
+    team.count_try(request, me.name)
     team.factors.remove(me, said.password)
 
 

@@ -121,7 +121,7 @@ def _begin(
     code: str | None = None,
 ) -> SessionDocument:
     address = team.address(request)
-    team.tries.count(address, name)
+    team.count_try(request, name)
     try:
         token = team.logins.log_in(
             name,
@@ -140,6 +140,7 @@ def _begin(
     login = team.logins.find(token)
     if login is None:
         raise NotLoggedInError("the account was disabled meanwhile")
+    response.set_cookie(**team.device_values(login.name))
     return session_of(login, store)
 
 
@@ -170,7 +171,7 @@ def change_password(
 ) -> SessionDocument:
     """Give oneself another password; every session ends, and this browser gets a new one."""
     team.require_passwords()
-    team.tries.count(team.address(request), me.name)
+    team.count_try(request, me.name)
     token = team.logins.change_password(me, change.old, change.new)
     response.set_cookie(**team.cookie_values(token))
     return session_of(me, store)
@@ -208,7 +209,7 @@ def end_session(session: Id, team: AppTeam, me: Me) -> None:
 @router.post("/links/look", operation_id="lookAtLink", responses=responses(404, 409, 413, 415, 429))
 def look_at_link(asked: LinkLook, request: Request, store: AppStore, team: AppTeam) -> LinkMeaning:
     """Whom a link is for; 404 when it is not good any more."""
-    team.tries.count(team.address(request))
+    team.count_try(request)
     return LinkMeaning(**vars(links.look(store, asked.token)))
 
 
@@ -224,6 +225,6 @@ def use_link(
     `/code`: log in with the new password and a code.
     """
     team.require_passwords()
-    team.tries.count(team.address(request))
+    team.count_try(request)
     name = links.use(store, chosen.token, chosen.password, chosen.name)
     return _begin(team, store, request, response, name, chosen.password)

@@ -59,7 +59,7 @@ def finish(
     provider says, as the operator wants it, that it has asked for one.
     """
     sign_on, address = team.require_sign_on(), team.address(request)
-    team.tries.count(address)
+    team.count_try(request)
     try:
         entered = sign_on.finish(
             team.begun(request),
@@ -106,7 +106,7 @@ def begin_link(
 ) -> SignOnBegun:
     """Where to go to link an account of the provider with one's own; takes the password."""
     sign_on = team.require_sign_on()
-    team.tries.count(team.address(request), me.name)
+    team.count_try(request, me.name)
     asker = secrets.token_urlsafe()
     address = sign_on.begin_link(asker, me, said.password, redirect=team.landing(request))
     response.set_cookie(**team.begun_values(asker))
@@ -121,7 +121,7 @@ def begin_link(
 )
 def remove(said: PasswordOnly, request: Request, store: AppStore, team: AppTeam, me: Me) -> None:
     """Unlink one's account of the provider; 409 for whoever has no password. Takes the password."""
-    team.tries.count(team.address(request), me.name)
+    team.count_try(request, me.name)
     unlink(store, me, said.password, datetime.now(UTC))
 
 

@@ -12,15 +12,19 @@ from app.api.problem import make_problem, problem_response
 from app.api.security.bearer import bearer_of
 
 SAFE_METHODS = frozenset({"GET", "HEAD", "OPTIONS"})
+_HOST = re.compile(r"(\[[0-9a-f:.]+\]|[a-z0-9._-]+)(?::([0-9]{1,5}))?")
 _ORIGIN = re.compile(r"(https?)://([^/?#@\\\s]+)")
 
 
 def host_name(host: str) -> str:
-    """The name in a Host header, without the port, in lower case; brackets of IPv6 stay."""
-    host = host.strip().lower()
-    if host.startswith("["):
-        return host[: host.find("]") + 1]
-    return host.partition(":")[0]
+    """The name in a Host header, without the port, in lower case; brackets of IPv6 stay.
+
+    Empty where it is no host with a port from 1 to 65535 or without one (RFC 9110, 7.2).
+    """
+    found = _HOST.fullmatch(host.lower())
+    if found is None or (found[2] is not None and not 1 <= int(found[2]) <= 65535):
+        return ""
+    return found[1]
 
 
 def same_origin(origin: str, host: str, scheme: str) -> bool:
@@ -63,14 +67,16 @@ class SameOrigin:
 
     Args:
         app: Answers the others.
-        url: The address that people open, where a proxy stands in front.
+        url: The address that people open, where a proxy stands in front: under its name a change
+            comes from this very address, with its scheme and port.
         required: A change must say where it comes from, as browsers always do; one that brings a
             token instead of a cookie need not.
     """
 
     def __init__(self, app: ASGIApp, url: str | None = None, *, required: bool = False):
         self.app = app
-        self.url, self.required = url, required
+        self.url, self.required = url and url.lower(), required
+        self._name = "" if self.url is None else host_name(self.url.partition("://")[2])
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         if scope["type"] == "http" and not self._is_ours(scope):
@@ -89,6 +95,8 @@ class SameOrigin:
         origins = headers.getlist("origin")
         if self.required and not origins and bearer_of(scope) is None:
             return False
+        if self._name and host_name(host) == self._name:
+            return all(origin.lower() == self.url for origin in origins)
         return all(
             same_origin(origin, host, scheme) or origin.lower() == self.url for origin in origins
         )

@@ -14,6 +14,10 @@ from app.review.people.attempts import Attempts
 from app.store.store import Store
 
 OF_A_NAME = parse("10/minute")
+"""From one address, or from one browser in which the person has logged in before."""
+OF_A_NAME_BY_STRANGERS = parse("100/hour")
+"""From all addresses together: a password is guessed no faster by many machines. Browsers in which the
+person has logged in before are not counted, and not refused, so nobody can lock them out."""
 OF_AN_ADDRESS = parse("60/minute")
 """Many people may come from one address in the morning; each name has a limit of its own."""
 CODES_OF_A_NAME = parse("20/hour")
@@ -32,15 +36,26 @@ class Tries:
         self._shared = Attempts(store) if store is not None and shared else None
         self._windows = MovingWindowRateLimiter(MemoryStorage())
 
-    def count(self, address: str, name: str | None = None) -> None:
+    def count(self, address: str, name: str | None = None, device: str | None = None) -> None:
         """Count a try; whether it would have been right makes no difference.
+
+        Args:
+            address: Where it comes from.
+            name: Whose password it is.
+            device: The browser that it comes from, if the person has logged in there before.
 
         Raises:
             TooManyTriesError: There were too many of this name, or from this address.
         """
         self._count(OF_AN_ADDRESS, "address", address)
-        if name is not None:
-            self._count(OF_A_NAME, "name", name.strip().lower()[:200])
+        if name is None:
+            return
+        name = name.strip().lower()[:200]
+        if device is not None:
+            self._count(OF_A_NAME, "device", name, device)
+            return
+        self._count(OF_A_NAME, "name", name, address)
+        self._count(OF_A_NAME_BY_STRANGERS, "name", name)
 
     def count_code(self, name: str) -> None:
         """Count a code of a second factor.

@@ -9,7 +9,7 @@ from app.finite import quoted
 
 MAX_TITLE = 80
 """Characters of what only people read."""
-_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._ -]{0,99}")
+_NAME = re.compile(r"[A-Za-z0-9](?:[A-Za-z0-9._ -]{0,98}[A-Za-z0-9._-])?")
 
 
 def require_name(
@@ -30,7 +30,7 @@ def require_name(
         alone = "" if digits else ", not digits alone"
         raise InputError(
             f"{quoted(name)} cannot be the name of {what}",
-            hint=f"Use letters, digits, spaces and . _ -, up to 100{alone}.",
+            hint=f"Use letters, digits, spaces and . _ -, up to 100, with no space at either end{alone}.",
             pointer=pointer,
         )
 

@@ -17,10 +17,11 @@ from app.review.people.identities import linked_admins
 from app.review.people.provider import Provider
 from app.review.people.sign_on_rules import read_rules
 from app.store.anchor import read_anchor
+from app.store.clock import text_of
 from app.store.dialect.sqlite import MIN_SQLITE
 from app.store.home import open_to_others
 from app.store.leftovers import leftovers
-from app.store.log import last_time
+from app.store.log import entries_after, last_time
 from app.store.orphans import spare_calibrations, unread_uploads
 from app.store.session import Session
 from app.store.store import Store
@@ -141,13 +142,17 @@ def _anchor(settings: Settings) -> Check:
 
 
 def _clock(session: Session) -> Check:
-    last = last_time(session)
     now = datetime.now(UTC)
     # Two machines that edit in turn may differ by a little.
+    count, latest = entries_after(session, text_of(now + timedelta(minutes=5)))
+    if count == 0:
+        return Check("clock", True, "not behind the log")
+    sentence = f"{count:,} entries of the log are later than the clock, which says {text_of(now)}; the latest is of {latest}"
+    last = last_time(session)
     if last is not None and datetime.fromisoformat(last) > now + timedelta(minutes=5):
-        sentence = f"the log's last entry is of {last}, and the clock says {now.isoformat()}"
         return Check("clock", False, sentence, "Set the clock of this machine.")
-    return Check("clock", True, "not behind the log")
+    # Written while the clock was ahead: entries are in order all the same, and nothing can change them.
+    return Check("clock", True, f"{sentence}; the newest is not: the clock was set right since")
 
 
 def _leftovers(settings: Settings) -> Check:

@@ -13,7 +13,9 @@ from pwdlib.hashers.argon2 import Argon2Hasher
 from app.errors import InputError, OverloadedError
 
 SHORTEST, LONGEST = 10, 200
-"""Letters of a password. Length is what makes it hard to guess; nothing else is asked for."""
+"""Letters of a password. Length is what makes it hard to guess; no kinds of letters are asked for."""
+MOST_GUESSED = 72
+"""Letters that are looked at: no longer text is easy to guess, but by repeating itself."""
 T = TypeVar("T")
 
 HASHER = PasswordHash((Argon2Hasher(),))
@@ -28,7 +30,7 @@ def hash_password(password: str, name: str, *, pointer: str = "/password") -> st
     """The argon2 hash of a new password.
 
     Raises:
-        InputError: It is too short, too long, or the name itself.
+        InputError: It is too short, too long, the name itself, or easy to guess.
     """
     if not SHORTEST <= len(password) <= LONGEST:
         raise InputError(
@@ -38,7 +40,22 @@ def hash_password(password: str, name: str, *, pointer: str = "/password") -> st
         )
     if password.casefold() == name.casefold():
         raise InputError("a password is not the name itself", pointer=pointer)
+    if _is_easy_to_guess(password, name):
+        raise InputError(
+            "this password is easy to guess: it is one of the common ones, or made of few parts",
+            hint="Three or four words that nobody would put together are easy to keep in mind.",
+            pointer=pointer,
+        )
     return _in_turn(lambda: HASHER.hash(password))
+
+
+def _is_easy_to_guess(password: str, name: str) -> bool:
+    """Whether a million guesses find a password, by lists of common passwords, words and patterns."""
+    # Its lists take some tenths of a second to load, and few requests need them.
+    from zxcvbn import zxcvbn
+
+    found = zxcvbn(password[:MOST_GUESSED], user_inputs=[name, "touchline"])
+    return bool(found["score"] < 2)
 
 
 def is_password(password: str, known: str | None) -> bool:

@@ -38,9 +38,11 @@ def decode(query: Query, cursor: str) -> list[Key]:
 
 
 def _name(query: Query) -> str:
+    """What tells a query from others: its order, and a digest of its conditions."""
+    order = query.sort + ("-desc" if query.descending else "")
     if query.batch is not None:
-        return f"batch {query.batch}"
-    return query.sort + ("-desc" if query.descending else "")
+        order = f"batch {query.batch}"
+    return f"{order} {query.digest}"
 
 
 def _is_key(value: Any) -> bool:

@@ -18,6 +18,7 @@ import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
+from hashlib import sha256
 
 from app.errors import InputError
 from app.finite import MAX_ID
@@ -49,12 +50,21 @@ _TERM = re.compile(
 
 @dataclass(frozen=True)
 class Query:
-    """A parsed query: conditions that must all hold, and a sort; that of ``batch`` without one."""
+    """A parsed query: conditions that must all hold, and a sort; that of ``batch`` without one.
+
+    ``text`` is what was asked.
+    """
 
     conditions: tuple[Condition, ...] = field(default=())
     sort: str = "number"
     descending: bool = False
     batch: int | None = None
+    text: str = ""
+
+    @property
+    def digest(self) -> str:
+        """Short digest of what was asked, whatever white space stands between the terms."""
+        return sha256(" ".join(self.text.split()).encode()).hexdigest()[:16]
 
     @property
     def order(self) -> Order:
@@ -101,7 +111,7 @@ def parse_query(text: str, longest: int = MAX_LENGTH) -> Query:
             if term.field == "batch" and not negative and "," not in term.value:
                 batch = int(term.value)
             found.append(conditions.opposite(condition) if negative else condition)
-    return Query(tuple(found), sort or "number", descending, None if sort else batch)
+    return Query(tuple(found), sort or "number", descending, None if sort else batch, text)
 
 
 def _terms(text: str, longest: int) -> Iterator[tuple[bool, _Term]]:

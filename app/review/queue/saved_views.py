@@ -9,6 +9,7 @@ from app.errors import ConflictError, InputError, NotFoundError
 from app.review.answers.keep import Keep, keep_nothing
 from app.review.datasets.naming import checked_title
 from app.review.queue.query import parse_query
+from app.soccer.actors import LOCAL_USER, person_of
 from app.store.listing import Listing
 from app.store.saved_views import (
     dataset_saved_views,
@@ -21,6 +22,8 @@ from app.store.store import Store
 
 MAX_VIEWS = 200
 """Of one dataset: a list that people read."""
+MAX_OWN = 40
+"""Of one person in one dataset: nobody takes all the room."""
 
 
 @dataclass(frozen=True)
@@ -60,13 +63,22 @@ def save_view(
     name = checked_title(name, "a saved view")
     parse_query(query)
     with store.write() as session:
-        names = [row.name for row in dataset_saved_views(session, dataset_id)]
+        rows = dataset_saved_views(session, dataset_id)
+        names = [row.name for row in rows]
         if name in names:
             raise ConflictError(
                 f'there is a view "{name}" already', hint="Delete it, or choose another name."
             )
         if len(names) >= MAX_VIEWS:
-            raise ConflictError(f"a dataset has at most {MAX_VIEWS} saved views")
+            raise ConflictError(
+                f"a dataset has at most {MAX_VIEWS} saved views", hint="Delete one first."
+            )
+        own = sum(person_of(row.actor) == person_of(actor) for row in rows)
+        if own >= MAX_OWN and person_of(actor) != LOCAL_USER:
+            raise ConflictError(
+                f"one person has at most {MAX_OWN} saved views in a dataset",
+                hint="Delete one of yours first.",
+            )
         identity = insert_saved_view(session, dataset_id, name, query.strip(), actor=actor)
         saved = _read(session, identity)
         keep(saved)(session)

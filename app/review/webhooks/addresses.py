@@ -73,7 +73,9 @@ def require_allowed(text: str, allowed: Iterable[str], pointer: str | None = Non
 
 
 def _is_plain(text: str, parts: SplitResult) -> bool:
-    segments = parts.path.lower().replace("%2e", ".").split("/")
+    # Some servers cut parameters off a segment (RFC 3986, 3.3): "..;x" is ".." to them.
+    decoded = parts.path.lower().replace("%2e", ".").replace("%3b", ";")
+    segments = [segment.partition(";")[0] for segment in decoded.split("/")]
     return (
         text.isascii()
         and text.isprintable()

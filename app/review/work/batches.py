@@ -397,11 +397,11 @@ def _check_gold(every: int | None) -> None:
 
 def _nothing(found: Sequence[int]) -> InputError:
     if not found:
-        return InputError("no group matches that query", pointer="/query")
+        return InputError("no group matches that query", pointer="/q")
     return InputError(
         "every group that matches is in an open batch already",
         hint="Take them all the same, or ask for other groups.",
-        pointer="/query",
+        pointer="/q",
     )
 
 

@@ -39,9 +39,10 @@ def accept(api: Any, key: dict[str, str] = KEY, state: str = "deferred", **optio
 
 class TestRepetition:
     def test_gets_the_first_answer_after_others_have_changed_the_state(self, api) -> None:
-        first = accept(api)
+        etag = api.get(f"{API}/groups/1").headers["etag"]
+        first = accept(api, etag=etag)
         accept(api, {}, "unreviewed")
-        again = accept(api)
+        again = accept(api, etag=etag)
         assert again.content == first.content
         assert (again.status_code, again.json()["verdict"]["state"]) == (200, "deferred")
         for name in ("etag", "content-type", "cache-control"):
@@ -51,12 +52,19 @@ class TestRepetition:
         assert api.get(f"{API}/groups/1").json()["verdict"]["state"] == "unreviewed"
 
     def test_counts_once_when_the_first_answer_is_no_longer_kept(self, app, api) -> None:
-        accept(api)
+        etag = api.get(f"{API}/groups/1").headers["etag"]
+        accept(api, etag=etag)
         with app.state.services.store.write() as session:
             assert shorten_answers(session, 0) == 1
-        again = accept(api)
+        again = accept(api, etag=etag)
         assert (again.status_code, again.headers["idempotency-replayed"]) == (409, "true")
         assert "carried out, once" in again.json()["hint"]
+
+    def test_of_another_state_is_another_request(self, api) -> None:
+        assert accept(api).status_code == 200
+        again = accept(api)
+        assert again.status_code == 422
+        assert again.json()["detail"] == "this Idempotency-Key was used for another request"
 
     def test_is_known_by_what_it_says_and_not_by_how_it_is_written(self, api) -> None:
         body = '{"state": "rejected", "reason": "sides_confused"}'

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import re
+
 import pytest
 
 API = "/api/v1"
@@ -54,6 +56,33 @@ class TestParameters:
                 for one in operation.get("parameters", []):
                     kinds = one["schema"].get("anyOf", [one["schema"]])
                     assert "array" not in [kind.get("type") for kind in kinds], (path, one["name"])
+
+
+class TestNumbers:
+    """Python reads more as a number than anybody writes: an address has one spelling."""
+
+    @pytest.mark.parametrize("number", ["0_1", "+1", "%201", "1.0", "01", "\u0661"])
+    def test_an_id_in_a_path_is_plain_digits(self, api, number: str) -> None:
+        answer = api.get(f"{API}/groups/{number}")
+        assert answer.status_code == 404
+
+    def test_so_is_a_number_of_every_query(self, api, app) -> None:
+        found = 0
+        for path, operations in app.openapi()["paths"].items():
+            one = operations.get("get", {"parameters": []})
+            for item in one.get("parameters", []):
+                kinds = item["schema"].get("anyOf", [item["schema"]])
+                if item["in"] == "query" and "integer" in [kind.get("type") for kind in kinds]:
+                    address = path.replace("{dataset}", "broadcast")
+                    answer = api.get(re.sub(r"{\w+}", "1", address), params={item["name"]: "1_0"})
+                    assert answer.status_code == 422, (path, item["name"], answer.text)
+                    found += 1
+        assert found > 10
+
+    def test_plain_ones_are_read(self, api) -> None:
+        assert api.get(f"{API}/groups/1").status_code == 200
+        pitch = api.get(f"{API}/pitch", params={"length": "1.1e2", "width": "70.5"})
+        assert pitch.status_code == 200
 
 
 class TestFields:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import resource
 import zlib
 from collections.abc import Callable
 from contextlib import closing
@@ -18,6 +19,7 @@ from structlog.testing import capture_logs
 
 from app.api.services import Services
 from app.config import Settings
+from app.errors import StorageError
 
 API = "/api/v1"
 SLOW = ("/events", "/remedies", "/influence", "/yield")
@@ -40,6 +42,26 @@ class TestHealth:
             ready = api.get("/readyz")
         assert ready.status_code == 503
         assert ready.json()["detail"] == "touchline.db was moved or deleted while it was open"
+
+    @pytest.mark.file_of_sqlite("a disk that takes no more of a file")
+    def test_a_process_that_can_keep_no_change_is_not_ready_until_it_can(
+        self, app: FastAPI, api: TestClient
+    ) -> None:
+        store = app.state.services.store
+        soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+        # No file grows any more, as on a full disk.
+        resource.setrlimit(resource.RLIMIT_FSIZE, (1, hard))
+        try:
+            with pytest.raises(StorageError), store.write() as session:
+                session.exec_driver_sql("UPDATE dataset SET name = name")
+            with capture_logs():
+                ready = api.get("/readyz")
+            assert ready.status_code == 503
+            assert ready.json()["detail"].startswith("changes are refused: the disk ")
+            assert api.get("/healthz").status_code == 200
+        finally:
+            resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+        assert api.get("/readyz").json() == {"status": "ready"}
 
 
 @pytest.fixture

@@ -24,6 +24,26 @@ class TestHostName:
     def test_leaves_the_port_away(self, host: str, name: str) -> None:
         assert host_name(host) == name
 
+    @pytest.mark.parametrize(
+        "host",
+        [
+            "localhost:evil",
+            "localhost:",
+            "localhost:0",
+            "localhost:65536",
+            "localhost:80:80",
+            "user@localhost",
+            "[::1]evil",
+            "[::1",
+            "[localhost]",
+            " localhost",
+            "localhost/x",
+            "localhost,localhost",
+        ],
+    )
+    def test_what_is_no_host_has_no_name(self, host: str) -> None:
+        assert host_name(host) == ""
+
 
 class TestSameOrigin:
     @pytest.mark.parametrize(
@@ -72,6 +92,36 @@ def guarded(plain_app: FastAPI, client_of):
     plain_app.add_middleware(SameOrigin)
     plain_app.add_middleware(KnownHosts, allowed=ALLOWED)
     return client_of(plain_app)
+
+
+class TestOwnAddress:
+    """A server behind a proxy that is opened by https."""
+
+    @pytest.fixture
+    def proxied(self, plain_app: FastAPI, client_of):
+        @plain_app.api_route("/x", methods=["POST"])
+        def answer() -> str:
+            return "reached"
+
+        plain_app.add_middleware(SameOrigin, url="https://touchline.example.org")
+        return client_of(plain_app)
+
+    @pytest.mark.parametrize(
+        ("origin", "host", "status"),
+        [
+            ("https://touchline.example.org", "touchline.example.org", 200),
+            ("https://Touchline.example.org", "touchline.example.org", 200),
+            ("http://touchline.example.org", "touchline.example.org", 403),
+            ("https://touchline.example.org:8443", "touchline.example.org", 403),
+            ("http://touchline.example.org:443", "touchline.example.org:443", 403),
+            ("http://127.0.0.1:8000", "127.0.0.1:8000", 200),
+        ],
+    )
+    def test_under_its_name_its_scheme_and_port_are_meant_too(
+        self, proxied, origin: str, host: str, status: int
+    ) -> None:
+        answer = proxied.post("/x", headers={"Origin": origin, "Host": host})
+        assert answer.status_code == status
 
 
 class TestKnownHosts:

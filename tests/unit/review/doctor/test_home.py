@@ -126,6 +126,18 @@ class TestExamineSurroundings:
         found = around(store)["clock"]
         assert (found.ok, found.mend) == (False, "Set the clock of this machine.")
 
+    def test_entries_of_a_time_when_the_clock_was_ahead_are_counted(
+        self, store: Store, fill, make_group
+    ) -> None:
+        fill(make_group(7))
+        with store.write() as session, said_for_sqlite(session):
+            session.execute(text("DROP TRIGGER log_refuses_update"))
+            session.execute(text("UPDATE log SET at = '2999-01-01T00:00:00+00:00' WHERE id = 1"))
+        found = around(store)["clock"]
+        assert found.ok
+        assert found.sentence.startswith("1 entries of the log are later than the clock")
+        assert found.sentence.endswith("the newest is not: the clock was set right since")
+
     def test_what_nothing_uses_is_counted(self, there: Store) -> None:
         settings = there.settings
         writer = UploadWriter(settings, "frames.zip")

@@ -6,11 +6,12 @@ import json
 import pytest
 
 from app.errors import InputError
-from app.review.queue.cursor import decode
+from app.review.queue.cursor import decode, encode
 from app.review.queue.query import Query, parse_query
 
 
-def cursor(*values: object) -> str:
+def cursor(name: str, *keys: object) -> str:
+    values = [f"{name} {parse_query('sort:jac').digest}", *keys]
     return base64.urlsafe_b64encode(json.dumps(values).encode()).decode().rstrip("=")
 
 
@@ -35,3 +36,14 @@ class TestDecode:
         with pytest.raises(InputError, match="came from another query") as caught:
             decode(query, cursor("jac", key, 3))
         assert caught.value.pointer == "/cursor"
+
+    @pytest.mark.parametrize(
+        "other", ["sort:jac jac>0.5", "sort:jac status:accepted", "sort:sigma"]
+    )
+    def test_a_cursor_of_another_query_is_refused(self, query: Query, other: str) -> None:
+        with pytest.raises(InputError, match="came from another query"):
+            decode(parse_query(other), encode(query, [0.75, 3]))
+
+    def test_white_space_between_terms_makes_no_other_query(self) -> None:
+        given = encode(parse_query("jac>0.5  sort:jac"), [0.75, 3])
+        assert decode(parse_query(" jac>0.5 sort:jac"), given) == [0.75, 3]

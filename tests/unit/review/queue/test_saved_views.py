@@ -47,6 +47,18 @@ class TestSaveView:
         with pytest.raises(ConflictError, match="at most 1"):
             save_view(store, 1, "More", "", actor="ann")
 
+    def test_one_person_has_an_end_before_the_others(self, store, ids, monkeypatch) -> None:
+        monkeypatch.setattr(saved_views, "MAX_OWN", 2)
+        for name, actor in (("One", "ann"), ("Two", "ann (token nightly)")):
+            save_view(store, 1, name, "", actor=actor)
+        with pytest.raises(ConflictError, match="one person has at most 2"):
+            save_view(store, 1, "Three", "", actor="ann")
+        assert save_view(store, 1, "Three", "", actor="ben").name == "Three"
+
+    def test_who_works_alone_has_all_the_room(self, store, ids, monkeypatch) -> None:
+        monkeypatch.setattr(saved_views, "MAX_OWN", 0)
+        assert save_view(store, 1, "One", "", actor="local").name == "One"
+
 
 class TestListSavedViews:
     def test_a_query_of_another_version_finds_nothing_and_spoils_no_list(self, store, ids) -> None:
