@@ -21,6 +21,7 @@ from pydantic import (
 from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
 
 from app.errors import InputError
+from app.log import LogFormat
 from app.private_file import read_private
 
 
@@ -133,6 +134,8 @@ class Settings(BaseSettings):
     """Port the server listens on."""
     allowed_hosts: list[str] = ["127.0.0.1", "localhost", "[::1]"]
     """Host headers the server answers to, without the port."""
+    log_format: LogFormat = "text"
+    """Lines of the log: ``text`` (name=value) or ``json`` (an object a line, for a log collector)."""
     team: bool = False
     """People log in; without it everybody who reaches the server is the one user ``local``."""
     url: str | None = None

@@ -88,7 +88,7 @@ class Previews:
 
 def make_ready(settings: Settings) -> None:
     """In the process: open the database and load the solver's kernels."""
-    log_to_stderr()
+    log_to_stderr(settings.log_format)
     _opened(settings)
     warm_up()
     gc.collect()

@@ -16,10 +16,14 @@ from typing import Any
 
 import structlog
 from starlette.datastructures import Headers, MutableHeaders
+from starlette.requests import Request
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from app.api.problem import make_problem, problem_response
+from app.api.security.access import ASKS
 from app.api.security.origin import SAFE_METHODS
+from app.api.team import Team
+from app.soccer.actors import LOCAL_USER
 
 log = structlog.get_logger("touchline.requests")
 
@@ -68,6 +72,22 @@ class RefusalBound:
     def _tell_rest(self) -> None:
         log.warning("more requests were refused", count=self._untold)
         self._untold = 0
+
+
+def address_of(scope: Scope) -> str:
+    """Where a request comes from: behind a proxy of ours, the address that it forwards."""
+    team: Team | None = getattr(scope["app"].state, "team", None)
+    if team is not None:
+        return team.address(Request(scope))
+    client = scope.get("client")
+    return client[0] if client else ""
+
+
+def person_of_request(scope: Scope) -> str | None:
+    """Who asks, as the log of changes calls them; None for a stranger on a team's server."""
+    is_team = getattr(scope["app"].state, "team", None) is not None
+    found: str | None = scope.get(ASKS, None if is_team else LOCAL_USER)
+    return found
 
 
 def new_request_id() -> str:
@@ -128,6 +148,8 @@ class RequestLog:
                 "request answered",
                 method=scope["method"],
                 path=scope["path"],
+                person=person_of_request(scope),
+                address=address_of(scope),
                 status=status,
                 milliseconds=round(1000 * (time.perf_counter() - start), 1),
                 key=Headers(scope=scope).get("idempotency-key"),

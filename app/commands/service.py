@@ -68,7 +68,7 @@ def serve(
     from app.store.locks import server_lock
 
     require_processes(settings, settings.web_workers)
-    log_to_stderr()
+    log_to_stderr(settings.log_format)
     with server_lock(settings, shared=not dialect_of(settings).is_file):
         _prepare(settings)
         if not settings.team and team is None:
@@ -119,7 +119,7 @@ def _serve_part(settings: Settings, socket: socket) -> None:
     from app.log import log_to_stderr
     from app.review.workers.executors import server_pool
 
-    log_to_stderr()
+    log_to_stderr(settings.log_format)
     run(create_app(settings, pool=server_pool(settings)), socket)
 
 

@@ -210,7 +210,7 @@ def _work(
     arguments: tuple[Any, ...],
     tell: Callable[[Word], Answer],
 ) -> Any:
-    log_to_stderr()
+    log_to_stderr(settings.log_format)
     caller = Caller(tell)
     with (
         structlog.contextvars.bound_contextvars(**log_fields),

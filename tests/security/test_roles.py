@@ -10,6 +10,7 @@ from contextlib import ExitStack, closing
 from pathlib import Path
 
 import pytest
+import structlog
 from limits import parse
 
 from app.api.pages import PAGES
@@ -254,6 +255,20 @@ class TestSessions:
             assert team.ask("GET", address, role="reviewer").status == 200
         assert by_threads == [f"{API}/jobs/1", address]
         assert team.ask("GET", address, Cookie="touchline-session=nobody").status == 401
+
+    def test_the_log_says_who_asked_and_from_where(self, team: Team) -> None:
+        with structlog.testing.capture_logs() as lines:
+            address = f"{API}/datasets/broadcast/saved-views"
+            for who in ({"role": "admin"}, {"Authorization": team.bearer("admin")}, {}):
+                # Each is refused, for one reason or another.
+                assert team.ask("POST", address, {}, **who).status >= 400
+            # A line follows its answer.
+            end = time.monotonic() + SECONDS
+            while len(lines) < 4 and time.monotonic() < end:
+                time.sleep(0.01)
+        asked = [line for line in lines if line.get("path") == address]
+        assert {line["address"] for line in asked} == {"127.0.0.1"}
+        assert [line["person"] for line in asked] == ["admin", "admin (token admin admin)", None]
 
     def test_nobody_changes_their_own_rights(self, team: Team) -> None:
         me = find_person(team.store, "admin").id

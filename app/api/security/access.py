@@ -53,6 +53,8 @@ from app.store.store import Store
 log = structlog.get_logger("touchline.access")
 
 API = "/api/v1"
+ASKS = "touchline.asks"
+"""Where a request's scope says whose it is, also where it is refused."""
 LOGIN = "touchline.login"
 """Where a request's scope says who is logged in."""
 RULE = "touchline.rule"
@@ -224,10 +226,13 @@ class Access:
         login = self._login_at_once(scope)
         if login is None or (asked is not None and takes_looking(asked, login)):
             return await run_sync(self._look, scope, asked, action, limiter=self._threads)
+        scope[ASKS] = login.actor
         return self._let(login, asked, action)
 
     def _look(self, scope: Scope, asked: AskedAbout | None, action: Action | None) -> _Let:
-        return self._let(self._login(scope), asked, action)
+        login = self._login(scope)
+        scope[ASKS] = login.actor
+        return self._let(login, asked, action)
 
     def _login_at_once(self, scope: Scope) -> Login | None:
         """Whose session it is, where that can be said without waiting; else a thread says it.

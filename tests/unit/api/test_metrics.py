@@ -12,6 +12,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
+import yaml
 from anyio.from_thread import BlockingPortal
 from fastapi import FastAPI
 from prometheus_client import CollectorRegistry
@@ -34,6 +35,7 @@ from tests.waiting import SECONDS
 
 API = "/api/v1"
 PAGE = Path(__file__).parents[3] / "docs" / "operations.md"
+DOCKER = Path(__file__).parents[3] / "docker"
 
 
 @pytest.fixture
@@ -298,6 +300,22 @@ class TestOperations:
         own = {name for name in said if name.startswith("touchline_")}
         assert len(own) >= 17
         assert own - named == set()
+
+    def test_the_file_of_alerts_has_every_alarm_of_the_table_and_no_other(
+        self, said: set[str]
+    ) -> None:
+        rules = yaml.safe_load((DOCKER / "touchline-alerts.yaml").read_text("utf-8"))
+        alerts = [rule for group in rules["groups"] for rule in group["rules"]]
+        assert len({rule["alert"] for rule in alerts}) == len(alerts)
+        table = PAGE.read_text("utf-8").split("| alarm when |")[1].split("\n\n")[0]
+        rows = table.replace("\\|", "|").splitlines()[2:]
+        assert len(rows) == len(alerts)
+        for rule, row in zip(alerts, rows, strict=True):
+            metrics = set(re.findall(r"\b[a-z]+_[a-z_]+\b(?=[{\[ )])", rule["expr"]))
+            assert all(name in row for name in metrics), (rule["alert"], metrics)
+            ours = {name for name in metrics if name.startswith(("touchline_", "http_"))}
+            assert ours <= said, rule["alert"]
+            assert rule["annotations"]["summary"] and rule["labels"]["severity"]
 
     def test_every_lane_and_every_kind_of_children_has_a_line(self) -> None:
         text = PAGE.read_text("utf-8")

@@ -49,12 +49,13 @@ def test_a_change_is_one_line_from_the_click_to_the_new_state(logged, lines, mon
     saved, told = lines
     assert (saved["event"], saved["request"]) == ("saved", answer.headers["x-request-id"])
     assert told["milliseconds"] == 250.4
-    assert {
-        name: told[name] for name in ("request", "method", "path", "status", "key", "etag")
-    } == {
+    asked = ("request", "method", "path", "person", "address", "status", "key", "etag")
+    assert {name: told[name] for name in asked} == {
         "request": answer.headers["x-request-id"],
         "method": "PUT",
         "path": "/thing",
+        "person": "local",
+        "address": "testclient",
         "status": 200,
         "key": "click-1",
         "etag": '"after"',
