@@ -33,8 +33,22 @@ exit code.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from difflib import get_close_matches
+from types import MappingProxyType
 from typing import Any, Self
+
+
+def did_you_mean(name: str, known: Iterable[str]) -> str | None:
+    """A question that offers the known name nearest to one that is unknown; None where none is near.
+
+    Example:
+        >>> did_you_mean("circle centre", ["Circle central", "Middle line"])
+        'Did you mean "Circle central"?'
+    """
+    by_folded = {each.casefold(): each for each in known}
+    found = get_close_matches(name.strip().casefold(), by_folded, n=1)
+    return f'Did you mean "{by_folded[found[0]]}"?' if found else None
 
 
 class ReviewError(Exception):
@@ -72,10 +86,11 @@ class InputError(ReviewError):
 class UnknownMarkingError(InputError):
     """A marking name that is none of the 26 markings of the pitch."""
 
-    def __init__(self, marking: str):
+    def __init__(self, marking: str, known: Iterable[str] = ()):
+        meant = did_you_mean(marking, known)
+        where = "docs/glossary.md lists the 26 names; trailing spaces do not matter."
         super().__init__(
-            f'"{marking}" is not a pitch marking',
-            hint="docs/glossary.md lists the 26 names; trailing spaces do not matter.",
+            f'"{marking}" is not a pitch marking', hint=f"{meant} {where}" if meant else where
         )
         self.marking = marking
 
@@ -129,9 +144,21 @@ class NotFoundError(ReviewError):
         return cls(f"there is nobody with id {person_id}")
 
     @classmethod
-    def dataset(cls, name: str | int) -> Self:
-        """That there is no such dataset."""
-        return cls(f'there is no dataset "{name}"')
+    def dataset(cls, name: str | int, known: Mapping[int, str] | None = None) -> Self:
+        """That there is no such dataset; ``known`` are those that there are, names by id.
+
+        Whoever shows the error shows the near ones of those that its reader may see.
+        """
+        error = cls(f'there is no dataset "{name}"')
+        error.asked, error.known = str(name), known or {}
+        return error
+
+    asked: str = ""
+    known: Mapping[int, str] = MappingProxyType({})
+
+    def nearest(self, sees: Callable[[int], bool] = lambda _: True) -> str | None:
+        """A question whether another one was meant, of those that somebody may see."""
+        return did_you_mean(self.asked, [name for key, name in self.known.items() if sees(key)])
 
 
 class ConflictError(ReviewError):

@@ -14,6 +14,7 @@ from starlette.exceptions import HTTPException
 from app.api.problem import SCHEME, TITLES, make_problem, problem_response
 from app.api.schemas.event import PresenceDocument
 from app.api.schemas.problem import FieldProblem
+from app.api.security.access import sight_of
 from app.api.unknown_names import UNKNOWN, sentence_about
 from app.errors import (
     ClusterError,
@@ -104,10 +105,13 @@ def install_handlers(app: FastAPI) -> None:
 async def _review_error(request: Request, error: Exception) -> Response:
     assert isinstance(error, ReviewError)
     status = status_of(error)
+    hint = error.hint
+    if isinstance(error, NotFoundError) and error.known:
+        hint = hint or error.nearest(sight_of(request.scope).sees)
     problem = make_problem(
         status,
         error.message,
-        hint=error.hint,
+        hint=hint,
         pointer=error.pointer,
         station=error.station if isinstance(error, SharedStationError) else None,
         here=_presences(error) if isinstance(error, HeldGroupError) else None,

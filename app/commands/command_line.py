@@ -43,7 +43,7 @@ from app.commands import (
 from app.commands.options import act_as
 from app.commands.server import work_at
 from app.commands.terminal import complain, harmless, spell_out
-from app.errors import ReviewError
+from app.errors import NotFoundError, ReviewError
 from app.finite import quoted
 
 READER_GONE = 141
@@ -166,7 +166,8 @@ def run() -> None:
             sys.exit(READER_GONE)
         raise
     except ReviewError as error:
-        complain(error.message, error.hint)
+        near = error.nearest() if isinstance(error, NotFoundError) else None
+        complain(error.message, error.hint or near)
         sys.exit(1)
     except OSError as error:
         if error.filename is None:

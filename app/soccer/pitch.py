@@ -66,7 +66,7 @@ def canonical_marking(name: str) -> str:
     """
     stripped = name.strip()
     if stripped not in _KNOWN:
-        raise UnknownMarkingError(name)
+        raise UnknownMarkingError(name, MARKINGS)
     return stripped
 
 

@@ -270,6 +270,14 @@ class TestSessions:
         assert {line["address"] for line in asked} == {"127.0.0.1"}
         assert [line["person"] for line in asked] == ["admin", "admin (token admin admin)", None]
 
+    def test_no_dataset_is_offered_that_somebody_may_not_see(self, team: Team) -> None:
+        team.add("sees-none", Role.NONE)
+        ensure_dataset(team.store, "offered", "local")
+        address = f"{API}/datasets/oferred"
+        assert b"offered" in team.ask("GET", address, role="viewer").body
+        for who in ("sees-none", None):
+            assert b"offered" not in team.ask("GET", address, role=who).body
+
     def test_nobody_changes_their_own_rights(self, team: Team) -> None:
         me = find_person(team.store, "admin").id
         for edit in ({"role": "viewer"}, {"disabled": True}):

@@ -15,6 +15,7 @@ from app.store.clock import now
 from app.store.codecs import policy_to_json
 from app.store.copy_datasets import CopiesOf, insert_copy_dataset
 from app.store.datasets import (
+    dataset_names,
     dataset_rows,
     find_dataset,
     group_ids,
@@ -138,7 +139,7 @@ def save_policy(session: Session, dataset_id: int, policy: Policy, actor: str) -
 def _need(session: Session, dataset: str | int) -> Any:
     row = find_dataset(session, dataset)
     if row is None:
-        raise NotFoundError.dataset(dataset)
+        raise NotFoundError.dataset(dataset, dataset_names(session))
     return row
 
 

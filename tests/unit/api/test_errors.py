@@ -181,3 +181,10 @@ class TestValidationErrors:
         answer = client.patch(f"/lines/{view}", json={"lines": {}})
         assert answer.status_code == 404
         assert answer.json()["detail"] == "there is no view with such an id"
+
+
+class TestNearDatasets:
+    def test_the_dataset_that_was_meant_is_offered(self, api) -> None:
+        answer = api.get("/api/v1/datasets/brodcast/yield")
+        assert answer.status_code == 404
+        assert answer.json()["hint"] == 'Did you mean "broadcast"?'

@@ -298,6 +298,12 @@ class TestSolve:
         assert (code, out) == (1, "")
         assert 'there is no dataset "nothing"' in err
 
+    def test_the_dataset_that_was_meant_is_offered(self, run: Run, line_files: Path) -> None:
+        run("import", "sn-calibration", line_files, "--dataset", "broadcast")
+        code, _, err = run("solve", "--dataset", "Broadcasts")
+        assert code == 1
+        assert 'Did you mean "broadcast"?' in err
+
 
 class TestFindings:
     def test_findings_are_printed_as_a_list_of_plain_values(

@@ -71,6 +71,24 @@ class TestCanonicalMarking:
         with pytest.raises(UnknownMarkingError, match="Goal middle"):
             canonical_marking("Goal middle")
 
+    @pytest.mark.parametrize(
+        ("name", "meant"),
+        [
+            ("Circle centre", "Circle central"),
+            ("BIG RECT. LEFT TOP", "Big rect. left top"),
+            ("Goal left post_right", "Goal left post right"),
+        ],
+    )
+    def test_the_name_that_was_meant_is_offered(self, name: str, meant: str):
+        with pytest.raises(UnknownMarkingError) as caught:
+            canonical_marking(name)
+        assert caught.value.hint.startswith(f'Did you mean "{meant}"? ')
+
+    def test_where_no_name_is_near_the_list_is_offered_alone(self):
+        with pytest.raises(UnknownMarkingError) as caught:
+            canonical_marking("xyz")
+        assert caught.value.hint.startswith("docs/glossary.md lists")
+
 
 class TestSample:
     def test_steps_are_as_the_public_evaluator_counts_them(self):
