@@ -26,7 +26,7 @@ export async function revertSelected() {
 		if (groupDocument.value?.id === at.id) revert(object, items);
 	} catch (error) {
 		if (!(error instanceof ApiError)) throw error;
-		complain(`Cannot be reverted: ${error.message}`);
+		complain(`Not reset: ${error.message}`);
 	}
 }
 

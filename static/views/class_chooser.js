@@ -23,7 +23,7 @@ function choicesOf({ view, solved }) {
 	const rank = (/** @type {string} */ name) => (view.lines[name] ? 2 : seen.has(name) ? 0 : 1);
 	const markings = NAMES.toSorted((a, b) => rank(a) - rank(b)).map((name) => ({
 		marking: name, name, plain: plainMarking(name),
-		note: view.lines[name] ? `${view.lines[name].length} drawn` : seen.has(name) ? 'in sight, not drawn' : '',
+		note: view.lines[name] ? `${view.lines[name].length} drawn` : seen.has(name) ? 'visible, not drawn' : '',
 	}));
 	const ball = { marking: null, name: 'Ball', plain: '', note: view.balls.length ? 'again' : 'missing' };
 	return view.balls.length ? [...markings, ball] : [ball, ...markings];

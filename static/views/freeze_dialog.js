@@ -26,7 +26,7 @@ function freeName(taken) {
 
 const GROUPS = /** @type {{name: FreezeRequest['groups'], label: string, note: string}[]} */ ([
 	{ name: 'accepted', label: 'Accepted', note: 'by people; against a gate only with a reason' },
-	{ name: 'passing', label: 'Passing', note: 'whatever the policy passes and nobody refused' },
+	{ name: 'passing', label: 'Passing', note: 'all passing, not rejected' },
 ]);
 const SPLITS = /** @type {{kind: SplitRequest['kind'], label: string, note: string}[]} */ ([
 	{ kind: 'given', label: 'As given', note: 'the split of the source' },

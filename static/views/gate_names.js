@@ -32,7 +32,7 @@ export function gateLabel(gate, policy) {
 		reprojection: `Reprojection ≤ ${policy.tau_percent} %`,
 		parallax: threshold === null ? 'Parallax' : `Parallax ≥ ${threshold}°`,
 		sigma: threshold === null ? 'σ' : `σ ≤ ${threshold} m`,
-		chi_square: threshold === null ? 'Residuals by chance' : `Residuals by chance ≥ ${sharePercent(threshold)}`,
+		chi_square: threshold === null ? 'Consistency' : `Consistency p ≥ ${threshold}`,
 	});
 	return labels[gate.name] ?? gate.name;
 }
@@ -43,6 +43,6 @@ export function gateMargin(gate) {
 	if (margin === null || !active) return '';
 	const size = sharePercent(margin);
 	// A gate may ask for more than its threshold.
-	if (size === '0.0 %') return passed ? 'exactly as much as is asked' : 'exactly at the threshold, which is not enough';
+	if (size === '0.0 %') return passed ? 'equals the threshold' : 'equals the threshold; must be above it';
 	return margin < 0 ? `misses by ${size}` : `margin ${size.startsWith('over') ? '' : '+'}${size}`;
 }

@@ -82,7 +82,7 @@ export function GoldCard({ dataset }) {
 		<section class="card card--flush" aria-labelledby="gold-title">
 			<h2 id="gold-title"><${Term} word="gold-group">Gold groups<//></h2>
 			${error || refused ? html`<${FormError} error=${error ?? refused} />` : null}
-			<p class="gold__about">${value?.groups.length ? `${plural(value.groups.length, 'group')} whose truth is known.` : 'There is none yet.'} Judge a group, then <em>Gold group: its truth is known</em> in its palette (<kbd>Ctrl K</kbd>); or let <em>Give out…</em> take those of a sample or a version. Batches mix them in; nobody is told which they are.</p>
+			<p class="gold__about">${value?.groups.length ? `${plural(value.groups.length, 'group')} whose truth is known.` : 'There is none yet.'} Judge a group, then <em>Gold group: its truth is known</em> in its palette (<kbd>Ctrl K</kbd>); or let <em>Assign…</em> take those of a sample or a version. Batches mix them in; nobody is told which they are.</p>
 			${value?.people.length ? html`
 				<div class="table__scroll" tabindex="0" role="region" aria-label="People and gold groups"><table class="table">
 					<thead><tr><th>Person</th><th data-numeric="true">groups</th><th data-numeric="true">lines, px</th><th data-numeric="true">ball, px</th><th data-numeric="true">ball, m</th><th data-numeric="true">verdicts as true</th><th>over time</th></tr></thead>

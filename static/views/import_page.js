@@ -164,14 +164,14 @@ export function ImportPage() {
 							<${LinesField} source=${source} change=${(/** @type {ImportSource | undefined} */ lines) => setOptions({ ...options, lines })} />` : null}
 						<${PolicyField} kept=${kept} change=${setPolicy} />
 						<p class="buttons">
-							<button data-needs="lead" data-of="" class="button button--primary" type="submit" aria-disabled=${why !== ''} title=${why}>Try it out</button>
+							<button data-needs="lead" data-of="" class="button button--primary" type="submit" aria-disabled=${why !== ''} title=${why}>Dry run</button>
 							<button data-needs="lead" data-of="" class="button" type="button" aria-disabled=${why !== ''} title=${why} onClick=${() => start(false)}>Import</button>
 						</p>
 						${error ? html`<p class="form__error" role="alert">${error}</p>` : null}
 					</form>
 				</section>
 				${job ? html`<${Outcome} job=${job} dry=${dry} dataset=${imported} />` : html`
-					<section class="card empty"><h2>Nothing is changed before you say so</h2><p>Trying it out reads the files and reports what an import would do: what is new, what changed, and every record that cannot be read, with its file and place.</p></section>`}
+					<section class="card empty"><h2>Start with a dry run</h2><p>A dry run saves nothing. It reads the files and reports what an import would do: what is new, what changed, and every record that cannot be read, with its file and place.</p></section>`}
 			</div>
 		<//>
 	`;

@@ -40,8 +40,8 @@ export function MendBox({ group, solution }) {
 				<p class="mend__hint">To compare players and clock: <kbd>H</kbd> hides what is drawn on the pictures, <kbd>1</kbd> <kbd>1</kbd> and <kbd>2</kbd> show one alone, <kbd>0</kbd> all.</p>` : null}
 			${reason ? html`
 				<p class="mend__reject">
-					${offered ? 'If that is not it: ' : 'Nothing here mends it: '}
-					<button data-needs="review" class="mend__more" type="button" onClick=${askReason}>reject, ${reason.label.toLowerCase()} <kbd>X</kbd> <kbd>Enter</kbd></button>
+					${offered ? 'Not the cause? ' : 'Cannot be fixed here. '}
+					<button data-needs="review" class="mend__more" type="button" onClick=${askReason}>Reject: ${reason.label.toLowerCase()} <kbd>X</kbd> <kbd>Enter</kbd></button>
 				</p>` : null}
 		</div>
 	`;

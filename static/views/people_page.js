@@ -181,7 +181,7 @@ function LocalWork({ people, adoptedBy, give }) {
 						<select class="field" id="people-adopter" name="person">${people.map((one) => html`<option key=${one.id} value=${one.id}>${one.name}</option>`)}</select>
 						<small>This can be done once. The log keeps the name local.</small>
 					</div>
-					<p><button class="button" type="submit">Show it as theirs</button></p>
+					<p><button class="button" type="submit">Assign earlier work</button></p>
 				</form>`}
 		</section>
 	`;

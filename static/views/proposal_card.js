@@ -19,7 +19,7 @@ export function ProposalScores({ item }) {
 		supported === null ? null : html`<${Term} word="supported">supported<//> ${sharePercent(supported)}`,
 		explained === null ? null : html`<${Term} word="explained">explained<//> ${sharePercent(explained)}`,
 		error === null ? null : html`${fixed(error, 2)} px off`,
-		lead === null ? null : html`next best ${fixed(lead, 2)} behind`,
+		lead === null ? null : html`runner-up scores ${fixed(lead, 2)} less`,
 	].filter((part) => part !== null);
 	return html`<span class="proposals__scores">${parts.map((part, i) => html`<span key=${i}>${part}</span>`)}</span>`;
 }

@@ -129,7 +129,7 @@ export function QueueTools({ dataset, q, onQuery }) {
 			<${UndoButton} />
 			<${RedoButton} />
 			<${Ticked} ticked=${ticked} />
-			${whyNot('lead', dataset.name) ? null : html`<button class="button" type="button" aria-disabled=${reason !== ''} title=${reason || 'Make a batch of these groups for people to work on (Shift D)'} onClick=${give}>Give out…</button>`}
+			${whyNot('lead', dataset.name) ? null : html`<button class="button" type="button" aria-disabled=${reason !== ''} title=${reason || 'Make a batch of these groups for people to work on (Shift D)'} onClick=${give}>Assign…</button>`}
 			<button data-needs="review" class=${ticked > 0 ? 'button button--primary' : 'button'} type="button" aria-disabled=${reason !== ''} title=${reason} onClick=${open}>
 				${reason ? 'Decide…' : ticked > 0 ? `Decide ${count(ticked)} ticked…` : `Decide all ${count(total)}…`}
 			</button>

@@ -256,20 +256,20 @@ const VIEW = [
 		run: () => { boxes.value = !boxes.value; say('Ball boxes', boxes.value); },
 	},
 	{
-		keys: ['w'], label: 'Residual whiskers × 1, 5, 20', group: 'View',
-		run: () => { cycleGain(); announce(`Whiskers times ${gain.value}.`); },
+		keys: ['w'], label: 'Error lines × 1, 5, 20', group: 'View',
+		run: () => { cycleGain(); announce(`Error lines × ${gain.value}.`); },
 	},
 	{
-		keys: ['Shift+w'], label: 'Whiskers to the paint in the pictures, or to the clicks', group: 'View',
+		keys: ['Shift+w'], label: 'Error lines to the paint in the pictures, or to the annotated points', group: 'View',
 		run: () => {
 			paintWhiskers.value = !paintWhiskers.value;
-			announce(paintWhiskers.value ? 'Whiskers lead to the paint.' : 'Whiskers lead to the clicks.');
+			announce(paintWhiskers.value ? 'Error lines lead to the paint.' : 'Error lines lead to the annotated points.');
 		},
 	},
 	{ keys: ['Shift+t'], label: 'History of the group: who changed what, with pictures', group: 'View', run: openHistory },
 	{ keys: [','], label: 'The focused view one frame before, where the dataset has it', group: 'View', run: () => { stepInstant(-1); } },
 	{ keys: ['.'], label: 'The focused view one frame after', group: 'View', run: () => { stepInstant(1); } },
-	{ keys: ['t'], label: '3D ball: mean of pairs, or most likely point', group: 'View', run: otherEstimator },
+	{ keys: ['t'], label: '3D point: pair average, or most likely point', group: 'View', run: otherEstimator },
 	{ keys: ['g'], label: 'Gates: what they ask and by how much', group: 'View', run: showGates },
 	{
 		keys: ['Shift+l'], label: 'Main camera large, or all views equal', group: 'View',
@@ -305,7 +305,7 @@ const EDIT = [
 		when: () => !editing.value,
 		run: () => { editing.value = true; },
 	},
-	{ keys: ['Escape'], label: 'Leave, or give back what is held', group: 'Edit', typing: true, run: escape },
+	{ keys: ['Escape'], label: 'Leave, or cancel the drag', group: 'Edit', typing: true, run: escape },
 	{
 		keys: [], label: 'Move by 1 px; Shift 5 px; Alt 0.1 px', group: 'Edit', shown: '← ↑ → ↓',
 		run: () => {},
@@ -328,7 +328,7 @@ const EDIT = [
 	{ keys: ['y'], label: 'Take the predicted ball, else place it where the other views see it', group: 'Edit', needs: 'annotate', run: takeBall },
 	{ keys: ['Shift+y'], label: 'Accept predictions in every view without a ball', group: 'Edit', needs: 'annotate', run: acceptAll },
 	{ keys: ['Shift+p'], label: 'Accept the lines that are proposed for the view', group: 'Edit', needs: 'annotate', run: acceptProposed },
-	{ keys: ['u'], label: 'Give the selected object back what it was', group: 'Edit', needs: 'annotate', run: () => { revertSelected(); } },
+	{ keys: ['u'], label: 'Reset object', group: 'Edit', needs: 'annotate', run: () => { revertSelected(); } },
 	{ keys: ['m'], label: 'Swap left and right, in the view that a finding names', group: 'Edit', needs: 'annotate', run: swap },
 	{ keys: ['Shift+g'], label: 'Guidelines of the dataset', group: 'View', run: () => { guidelinesShown.value = !guidelinesShown.value; } },
 	{ keys: ['Shift+o'], label: 'Annotate the group on your own, on a copy', group: 'Edit', needs: 'annotate', run: annotateOwn },

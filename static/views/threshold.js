@@ -65,7 +65,7 @@ function Slider({ field, value, id, change }) {
 }
 
 /** What a choice is called, where it is a word of the policy's. */
-const CHOICES = /** @type {{[name: string]: string}} */ ({ mean: 'mean of pairs', best: 'most likely point', lines: 'annotated lines', paint: 'paint in the picture' });
+const CHOICES = /** @type {{[name: string]: string}} */ ({ mean: 'pair average', best: 'most likely point', lines: 'annotated lines', paint: 'paint in the picture' });
 
 /** @param {{field: PolicyField, id: string, value: Value, change: (value: Value) => void}} props */
 function Choice({ field, id, value, change }) {

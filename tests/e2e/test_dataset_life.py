@@ -72,7 +72,7 @@ def bring_in(page: Page, labels: Path) -> None:
     page.get_by_label("Dataset", exact=True).fill("passing through")
     page.set_input_files("#import-file", labels)
     expect(page.get_by_text("is uploaded")).to_be_visible()
-    page.get_by_role("button", name="Try it out").click()
+    page.get_by_role("button", name="Dry run").click()
     expect(page.get_by_role("region", name="What would happen")).to_be_visible()
     usable(page)
     page.get_by_role("button", name="Import", exact=True).click()

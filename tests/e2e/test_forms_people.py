@@ -133,7 +133,7 @@ PEOPLE = [
         "shows earlier work as somebody's",
         [
             choose("Show what local did until now as the work of", "dora"),
-            press("Show it as theirs"),
+            press("Assign earlier work"),
         ],
         {"POST /users/{dora}/adoption": None},
         {"section[aria-labelledby=people-local]": "It is shown as dora's."},

@@ -24,20 +24,20 @@ GIVEN: dict[str, Any] = {
 GIVEN |= {"verdicts": 1, "blind": True, "gold_every": None}
 ANNOTATORS = f"{DIALOG} fieldset:has(legend:text('Annotators'))"
 REVIEWERS = f"{DIALOG} fieldset:has(legend:text('Reviewers'))"
-PRESS_GIVE = press("Give out", DIALOG)
+PRESS_GIVE = press("Assign", DIALOG)
 GIVING = [
     Row(
         "gives all groups out",
-        [press("Give out…"), fill("Name", " Everything ", DIALOG), PRESS_GIVE],
+        [press("Assign…"), fill("Name", " Everything ", DIALOG), PRESS_GIVE],
         {"POST /datasets/1/batches": {**GIVEN, "name": "Everything", "q": ""}},
         hides=DIALOG,
     ),
     Row(
         "gives a few to some people until a day",
         [
-            press("Give out…"),
+            press("Assign…"),
             fill("Name", "Friday", DIALOG),
-            fill("The first so many", "3", DIALOG),
+            fill("Limit to first N", "3", DIALOG),
             fill("Due", DUE.isoformat(), DIALOG),
             tick("carl", ANNOTATORS),
             tick("bob", ANNOTATORS),
@@ -64,9 +64,9 @@ GIVING = [
     Row(
         "mixes gold groups in and lets two annotate who see each other",
         [
-            press("Give out…"),
+            press("Assign…"),
             fill("Name", "Twice", DIALOG),
-            fill("People who annotate each group on their own", "2", DIALOG),
+            fill("Annotators per group", "2", DIALOG),
             fill("One gold group in so many", "4", DIALOG),
             choose("Gold groups are", "sample", DIALOG),
             choose("People begin such a group with", "without_balls", DIALOG),
@@ -99,7 +99,7 @@ BATCHES = [
     Row(
         "gives a batch on",
         [
-            press("Give on… Friday"),
+            press("Reassign… Friday"),
             fill("Name", "Saturday", DIALOG),
             fill("Due", (DUE + timedelta(days=1)).isoformat(), DIALOG),
             fill("One gold group in so many", "5", DIALOG),
@@ -122,7 +122,7 @@ BATCHES = [
     Row(
         "takes its day and its gold groups away",
         [
-            press("Give on… Saturday"),
+            press("Reassign… Saturday"),
             fill("Due", "", DIALOG),
             fill("One gold group in so many", "", DIALOG),
             press("Save", DIALOG),

@@ -79,7 +79,7 @@ class TestPeople:
         Screen(mia).ready()
         noa = open_page("/groups", address=team)
         log_in(noa, "noa")
-        bell = noa.get_by_role("button", name="Bell")
+        bell = noa.get_by_role("button", name="Notifications")
         expect(bell).to_contain_text("nothing new")
         hears(noa)
         hears(mia)

@@ -33,12 +33,12 @@ class TestWork:
         join(team_home, "ivo", Role.REVIEWER)
         tove = open_page("/groups", address=team)
         log_in(tove, "tove")
-        expect(tove.get_by_role("button", name="Give out…")).to_be_enabled()
+        expect(tove.get_by_role("button", name="Assign…")).to_be_enabled()
         tove.keyboard.press("Shift+D")
-        dialog = tove.get_by_role("dialog", name="Give out groups")
+        dialog = tove.get_by_role("dialog", name="Assign groups")
         dialog.get_by_label("Name").fill("A few")
-        dialog.get_by_label("The first so many").fill("3")
-        dialog.get_by_role("button", name="Give out", exact=True).click()
+        dialog.get_by_label("Limit to first N").fill("3")
+        dialog.get_by_role("button", name="Assign", exact=True).click()
         tove.get_by_role("button", name="See the work").click()
         go_on = tove.get_by_role("button", name="Go on: 3 groups of A few")
         expect(go_on).to_be_focused()
@@ -142,7 +142,7 @@ class TestWork:
         expect(dialog).to_be_hidden()
         until(ralf, lambda: ralf.url.endswith("/work"))
 
-        bell = nora.get_by_role("button", name="Bell")
+        bell = nora.get_by_role("button", name="Notifications")
         expect(bell).to_contain_text("2")
         nora.goto("/work")
         back = nora.get_by_role("list", name="Handed back to you")
@@ -165,14 +165,14 @@ class TestWork:
         log_in(lotte, "lotte")
         for name in ("uma", "ulf"):
             join(team_home, name, Role.REVIEWER)
-        expect(lotte.get_by_role("button", name="Give out…")).to_be_enabled()
+        expect(lotte.get_by_role("button", name="Assign…")).to_be_enabled()
         lotte.keyboard.press("Shift+D")
-        dialog = lotte.get_by_role("dialog", name="Give out groups")
+        dialog = lotte.get_by_role("dialog", name="Assign groups")
         dialog.get_by_label("Name").fill("Twice")
         dialog.get_by_label("People who annotate each group").fill("2")
         for name in ("uma", "ulf"):
             dialog.get_by_role("group", name="Annotators").get_by_label(name).check()
-        dialog.get_by_role("button", name="Give out", exact=True).click()
+        dialog.get_by_role("button", name="Assign", exact=True).click()
         expect(lotte.get_by_role("button", name="See the work")).to_be_visible()
 
         copies: dict[str, int] = {}

@@ -49,7 +49,7 @@ WORDS = {
     ),
     "bad_point": LessonWords(
         question="One click of an annotator went astray. Find it.",
-        hint="Follow the whiskers: they lead from the line to each annotated point, and one is "
+        hint="Follow the error lines: they lead from the line to each annotated point, and one is "
         "much longer than the others.",
         fault="In view {view} a point of “{marking}” lies {amount:.0f} px beside its line.",
         best="Press Enter to do what the card offers, Shift Enter for another way (or drag the "

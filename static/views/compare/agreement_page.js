@@ -92,7 +92,7 @@ function PeopleCard({ found, dataset, batch }) {
 }
 
 const LIMITS = /** @type {{name: keyof LimitsJson, label: string, step: string}[]} */ ([
-	{ name: 'line_px', label: 'lines, px', step: '0.5' }, { name: 'markings', label: 'markings drawn once', step: '1' },
+	{ name: 'line_px', label: 'lines, px', step: '0.5' }, { name: 'markings', label: 'markings drawn by only one person', step: '1' },
 	{ name: 'ball_px', label: 'ball centre, px', step: '0.5' }, { name: 'diameter_px', label: 'ball diameter, px', step: '0.5' },
 	{ name: 'ball_m', label: '3D ball, m', step: '0.05' }, { name: 'jac', label: 'least JaC', step: '0.05' },
 ]);
@@ -215,7 +215,7 @@ function LeadCards({ dataset }) {
 	if (!found.value) return html`<${Loading} what="the agreement" />`;
 	return html`
 		<${BatchChoice} dataset=${dataset} batch=${batch} choose=${setBatch} />
-		${found.value.groups.length > 0 ? html`<${PeopleCard} found=${found.value} dataset=${dataset} batch=${batch} /><${GroupsCard} found=${found.value} />` : html`<p class="agreement__choice">Nothing was compared yet${batch === null ? '' : ' here'}. Give groups out to several people (<em>Give out…</em> in the queue, <em>People who annotate each group on their own</em>), or press <kbd>Shift O</kbd> in a group.</p>`}
+		${found.value.groups.length > 0 ? html`<${PeopleCard} found=${found.value} dataset=${dataset} batch=${batch} /><${GroupsCard} found=${found.value} />` : html`<p class="agreement__choice">Nothing was compared yet${batch === null ? '' : ' here'}. Give groups out to several people (<em>Assign…</em> in the queue, <em>Annotators per group</em>), or press <kbd>Shift O</kbd> in a group.</p>`}
 		<${TakesCard} dataset=${dataset} batch=${batch} />
 		<${LimitsCard} key=${dataset} limits=${found.value.limits} dataset=${dataset} saved=${found.reload} />
 	`;

@@ -71,7 +71,7 @@ const PICTURES = {
 		{ name: 'Annotated point', meaning: 'A click of a person. White with a dark ring.', tokens: 'canvas-point canvas-ink', draw: onGrass(sceneOf({ markings: [lineOf('ok', 1)] }), drawMarkings, drawPoints) },
 		{ name: 'Point of a wrong line', meaning: 'The ring is red.', tokens: 'canvas-bad', draw: onGrass(sceneOf({ markings: [lineOf('bad', 12)] }), drawMarkings, drawPoints) },
 		{ name: 'Point that is not used', meaning: 'The solver left its line out because it contradicts all others. Filled red.', tokens: 'canvas-bad', draw: onGrass(sceneOf({ markings: [lineOf('bad', 12, { used: false })] }), drawPoints) },
-		{ name: 'Whisker', meaning: 'Leads from the line to the annotated point; W makes it 1, 5 or 20 times as long as it is.', tokens: 'canvas-warn canvas-bad', draw: onGrass(sceneOf({ markings: [lineOf(gradeAt(12), 12)] }), drawMarkings, drawWhiskers, drawPoints) },
+		{ name: 'Error line', meaning: 'Leads from the line to the annotated point; W makes it 1, 5 or 20 times as long as it is.', tokens: 'canvas-warn canvas-bad', draw: onGrass(sceneOf({ markings: [lineOf(gradeAt(12), 12)] }), drawMarkings, drawWhiskers, drawPoints) },
 		{ name: 'Proposed line', meaning: 'Read from the paint of a picture without a camera. It counts for nothing until a person accepts it (Enter, Shift P). Violet, dashed, its name with a question mark.', tokens: 'canvas-predicted', draw: onGrass(sceneOf({}), proposalDrawing({ 'Side line': [{ x: 6, y: 34 }, { x: 40, y: 30 }, { x: 126, y: 20 }] })) },
 		{ name: 'Selected point', meaning: 'The yellow ring: arrows move this point.', tokens: 'canvas-selected', draw: onGrass(sceneOf({ markings: [lineOf('ok', 2, { marking: 'Side' })] }, { ...solid, viewport: { scale: 1, left: -50, top: 9 } }), drawPoints, drawSelectedPoint) },
 		{ name: 'Note', meaning: 'A remark that somebody left at this place.', tokens: 'canvas-warn canvas-point canvas-plate', draw: onGrass(sceneOf({ pins: [{ at: { x: 22, y: 40 }, text: 'check this' }] }), drawPins) },
@@ -175,7 +175,7 @@ const SCENE = {
 		{ name: 'Pair that fails', meaning: 'Where two views do not agree; red.', tokens: 'scene-invalid', part: scene(html`<circle class="legend__pair" cx="66" cy="26" r="4" />`) },
 		{ name: '3D ball, stem and shadow', meaning: 'The ball, the line down to the grass that shows its height, and its shadow.', tokens: 'scene-ball scene-stem scene-shadow', part: scene(html`<ellipse class="legend__shadow" cx="66" cy="42" rx="7" ry="2.5" /><path class="legend__stem" d="M66 12V42" /><circle class="legend__ball" cx="66" cy="12" r="5" />`) },
 		{ name: 'Uncertainty', meaning: 'The ball is inside with 95 % probability or so (two sigma).', tokens: 'scene-ellipsoid', part: scene(html`<ellipse class="legend__ellipsoid" cx="66" cy="26" rx="30" ry="9" />`) },
-		{ name: 'Most likely point', meaning: 'The point that fits all views at once, beside the mean of the pairs.', tokens: 'scene-best', part: scene(html`<circle class="legend__best" cx="66" cy="26" r="5" />`) },
+		{ name: 'Most likely point', meaning: 'The point that fits all views at once, beside the pair average.', tokens: 'scene-best', part: scene(html`<circle class="legend__best" cx="66" cy="26" r="5" />`) },
 		{ name: 'Pitch', meaning: 'Grass in stripes, lines and goals; around it ground and sky.', tokens: 'scene-sky scene-ground scene-grass scene-grass-stripe scene-line scene-goal', part: scene(html`<path class="legend__stripe" d="M44 22h44v30H44z" /><path class="legend__line" d="M4 46H128" /><path class="legend__goal" d="M50 30V14H82V30" />`) },
 	],
 };

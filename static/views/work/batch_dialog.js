@@ -78,15 +78,15 @@ export function BatchDialog({ dataset, q, total, ticked, onClose }) {
 	}
 	return html`
 		<${FormDialog}
-			title="Give out groups" onClose=${onClose} onSubmit=${send}
-			buttons=${html`<button class="button button--primary" type="submit" aria-disabled=${busy}>Give out</button>`}
+			title="Assign groups" onClose=${onClose} onSubmit=${send}
+			buttons=${html`<button class="button button--primary" type="submit" aria-disabled=${busy}>Assign</button>`}
 		>
 			<p>${ticked ? html`${count(ticked.count)} ticked groups` : q ? html`${plural(total, 'group')} that match <code>${q}</code>` : html`All ${plural(total, 'group')} of ${dataset.name}`}, in the order of the list. What comes to match later is not part of it.</p>
 			<div class="form__row"><label for="batch-name">Name</label><input class="field" id="batch-name" name="name" required maxlength="80" autocomplete="off" /></div>
 			<div class="form__columns batch-dialog__fields">
-			<div class="form__row"><label for="batch-size">The first so many</label><input class="field" id="batch-size" name="size" type="number" min="1" max="10000" placeholder=${`all ${count(matching)}`} /></div>
+			<div class="form__row"><label for="batch-size">Limit to first N</label><input class="field" id="batch-size" name="size" type="number" min="1" max="10000" placeholder=${`all ${count(matching)}`} /></div>
 			<div class="form__row"><label for="batch-due">Due</label><input class="field" id="batch-due" name="due" type="date" /></div>
-			<div class="form__row"><label for="batch-verdicts">People who annotate each group on their own</label><input class="field" id="batch-verdicts" name="verdicts" type="number" min="1" max="5" placeholder="1" /></div>
+			<div class="form__row"><label for="batch-verdicts">Annotators per group</label><input class="field" id="batch-verdicts" name="verdicts" type="number" min="1" max="5" placeholder="1" /></div>
 			<${GoldFields} dataset=${dataset} />
 			</div>
 			<label class="form__check"><input type="checkbox" name="blind" defaultChecked /> Where several people annotate, nobody sees what the others did</label>

@@ -24,7 +24,7 @@ export function GiveOnDialog({ one, onClose, onDone }) {
 		annotators: people.annotator, reviewers: people.reviewer, gold_every: Number(form.get('gold')) || null,
 	}), () => { onClose(); onDone(); });
 	return html`
-		<${FormDialog} title=${`Give on: ${batch.name}`} onClose=${onClose} onSubmit=${send} buttons=${html`<button class="button button--primary" type="submit">Save</button>`}>
+		<${FormDialog} title=${`Reassign: ${batch.name}`} onClose=${onClose} onSubmit=${send} buttons=${html`<button class="button button--primary" type="submit">Save</button>`}>
 			<p>What was handed in or judged stays; whoever has a group open keeps it until they leave.</p>
 			<div class="form__row"><label for="give-name">Name</label><input class="field" id="give-name" name="name" required maxlength="80" autocomplete="off" defaultValue=${batch.name} /></div>
 			<div class="form__columns">

@@ -51,7 +51,7 @@ function TeamBatch({ one, act, give }) {
 					<p class="note">${given}${several}${goldEvery ? ` · one gold group in ${goldEvery}` : ''}${here.length ? ` · here now: ${here.map(({ person }) => person).join(', ')}` : ''}${stalled ? html` · nobody since <${When} at=${stalled} />` : null}<${Due} due=${batch.due} /></p>
 				</div>
 				<span class="table__actions">
-					<button class=${stalled ? 'button button--small button--primary' : 'button button--small'} type="button" onClick=${() => give(one)}>Give on…<span class="hidden-text"> ${batch.name}</span></button>
+					<button class=${stalled ? 'button button--small button--primary' : 'button button--small'} type="button" onClick=${() => give(one)}>Reassign…<span class="hidden-text"> ${batch.name}</span></button>
 					<button class="button button--small" type="button" onClick=${() => act(patchBatch(batch.id, { state: open ? 'closed' : 'open' }))}>${open ? 'Close' : 'Open again'}<span class="hidden-text"> ${batch.name}</span></button>
 					<${ConfirmButton} label="Delete" question="Really delete?" what=${batch.name} small=${true} run=${() => act(deleteBatch(batch.id))} />
 				</span>
@@ -76,7 +76,7 @@ export function TeamCard({ dataset, changed }) {
 	return html`
 		<section class="card" aria-labelledby="team-title">
 			<h2 id="team-title"><${Term} word="batch">Batches<//> of ${dataset.name}</h2>
-			<p class="note">${items.length ? plural(items.length, 'batch').replace('batchs', 'batches') : 'None yet'}. Filter or tick groups in the <a class="link" href=${queueAddress(dataset.name, '')}>queue</a> and press “Give out…” to make one.</p>
+			<p class="note">${items.length ? plural(items.length, 'batch').replace('batchs', 'batches') : 'None yet'}. Filter or tick groups in the <a class="link" href=${queueAddress(dataset.name, '')}>queue</a> and press “Assign…” to make one.</p>
 			${error ? html`<${FormError} error=${error} />` : null}
 			<ul class="work__list">${items.map((one) => html`<${TeamBatch} key=${one.batch.id} one=${one} act=${act} give=${setGiving} />`)}</ul>
 			${giving ? html`<${GiveOnDialog} one=${giving} onClose=${() => setGiving(null)} onDone=${renew} />` : null}
