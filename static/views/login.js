@@ -108,7 +108,7 @@ export function LoginPage() {
 				<p class="login__brand">Touchline</p>
 				<h1 id="login-title">Log in</h1>
 				<${LoginForm} />
-				<p class="note">${ways.value.password ? 'No account, or no password?' : 'No account here?'} Whoever runs this server can send you a link.</p>
+				<p class="note">${ways.value.password ? 'No account, or no password?' : 'No account here?'} An admin of this server can send you a link.</p>
 			</section>
 		</main>
 	`;

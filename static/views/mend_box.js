@@ -32,7 +32,7 @@ export function MendBox({ group, solution }) {
 			<p class="mend__row">
 				${offered ? html`<button data-needs="annotate" class="button button--fix" type="button" onClick=${mendNow}>${offered.label} <kbd>Enter</kbd></button>` : null}
 				${offered && count > 1 ? html`
-					<button class="mend__more" type="button" title="Show another way to mend it (Shift+Enter)" onClick=${() => turnMend(1)}>
+					<button class="mend__more" type="button" title="Show another fix (Shift+Enter)" onClick=${() => turnMend(1)}>
 						${mendIndex.value + 1} of ${count}${isSearching.value ? ' or more' : ''} <kbd>Shift Enter</kbd>
 					</button>` : null}
 			</p>

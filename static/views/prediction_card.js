@@ -23,7 +23,7 @@ function Brackets() {
 function Choice({ predicted: { sets, set } }) {
 	return html`
 		<div class="predictions__choice">
-			${sets.length < 2 ? html`<span class="predictions__set" title=${sets[0]}>${sets[0] ?? 'No set any more'}</span>` : html`
+			${sets.length < 2 ? html`<span class="predictions__set" title=${sets[0]}>${sets[0] ?? 'Set deleted'}</span>` : html`
 				<select class="field" aria-label="Set of predictions" value=${set || EVERY_SET} onChange=${withValue((chosen) => { shownSet.value = chosen; })}>
 					<option value=${EVERY_SET}>All ${sets.length} sets</option>
 					${sets.map((name) => html`<option key=${name} value=${name}>${name}</option>`)}

@@ -100,7 +100,7 @@ export function Threshold({ field, value, present, switched, change, idle }) {
 			${field.optional ? html`
 				<label class="threshold__switch">
 					<input type="checkbox" checked=${value !== null} onChange=${withTick((ticked) => change(ticked ? switched : null))} />
-					<span class="hidden-text">${field.label} is asked</span>
+					<span class="hidden-text">Use the threshold “${field.label}”</span>
 				</label>` : null}
 			${field.choices.length
 				? html`<${Choice} field=${field} id=${id} value=${value} change=${change} />`

@@ -56,7 +56,7 @@ function ReasonList({ title, choose, again, keys, suggested = null }) {
 				${REASONS.map(({ name, label }, i) => html`
 					<li key=${name}>
 						<button type="button" data-last=${name === repeated} data-suggested=${name === suggested} onClick=${() => choose(name)}>
-							<kbd>${i + 1}</kbd> ${label} ${name === suggested ? html`<span class="reasons__suggested">fits <kbd>Enter</kbd></span>` : null} ${name === repeated ? html`<kbd>${again}</kbd>` : null}
+							<kbd>${i + 1}</kbd> ${label} ${name === suggested ? html`<span class="reasons__suggested">suggested <kbd>Enter</kbd></span>` : null} ${name === repeated ? html`<kbd>${again}</kbd>` : null}
 						</button>
 					</li>
 				`)}

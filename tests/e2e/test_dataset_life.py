@@ -101,7 +101,7 @@ def freeze_and_verify(page: Page) -> None:
     """A version that comes out the same when it is computed again."""
     page.goto("/datasets/passing through/versions")
     page.get_by_role("button", name="Freeze a version").first.click()
-    expect(page.locator(".bulk__outcome")).to_contain_text("groups enter")
+    expect(page.locator(".bulk__outcome")).to_contain_text("groups are included")
     usable(page)
     page.get_by_role("button", name="Freeze", exact=True).click()
     page.get_by_role("button", name="Done", exact=True).click()

@@ -44,7 +44,7 @@ GIVING = [
             tick("bob", ANNOTATORS, on=False),
             tick("bob", REVIEWERS),
             tick("dora", REVIEWERS),
-            tick("Leave out groups that wait in another open batch", DIALOG, on=False),
+            tick("Skip groups that are in another open batch", DIALOG, on=False),
             PRESS_GIVE,
         ],
         {
@@ -67,15 +67,13 @@ GIVING = [
             press("Assign…"),
             fill("Name", "Twice", DIALOG),
             fill("Annotators per group", "2", DIALOG),
-            fill("One gold group in so many", "4", DIALOG),
+            fill("One gold group in N", "4", DIALOG),
             choose("Gold groups are", "sample", DIALOG),
-            choose("People begin such a group with", "without_balls", DIALOG),
+            choose("Annotators start a gold group with", "without_balls", DIALOG),
             tick("bob", ANNOTATORS),
             tick("carl", ANNOTATORS),
-            tick(
-                "Where several people annotate, nobody sees what the others did", DIALOG, on=False
-            ),
-            tick("Leave out groups that wait in another open batch", DIALOG, on=False),
+            tick("Annotators do not see each other’s work", DIALOG, on=False),
+            tick("Skip groups that are in another open batch", DIALOG, on=False),
             PRESS_GIVE,
         ],
         {
@@ -102,7 +100,7 @@ BATCHES = [
             press("Reassign… Friday"),
             fill("Name", "Saturday", DIALOG),
             fill("Due", (DUE + timedelta(days=1)).isoformat(), DIALOG),
-            fill("One gold group in so many", "5", DIALOG),
+            fill("One gold group in N", "5", DIALOG),
             tick("carl", ANNOTATORS, on=False),
             tick("dora", ANNOTATORS),
             tick("bob", REVIEWERS, on=False),
@@ -124,7 +122,7 @@ BATCHES = [
         [
             press("Reassign… Saturday"),
             fill("Due", "", DIALOG),
-            fill("One gold group in so many", "", DIALOG),
+            fill("One gold group in N", "", DIALOG),
             press("Save", DIALOG),
         ],
         {
@@ -191,7 +189,7 @@ class TestBatches:
             handed = batch["annotators"] and batch["verdicts"] == 1
             words = [
                 f"{batch['settled']} of {batch['groups']} groups done",
-                f"{batch['handed_in']} handed in" if handed else "",
+                f"{batch['handed_in']} submitted" if handed else "",
                 f"{batch['waiting']} open",
             ]
             expect(item).to_contain_text(" · ".join(filter(None, words)))
@@ -210,7 +208,7 @@ class TestBatches:
         for mine in read(page, "/work")["items"]:
             left, name = mine["left"], mine["batch"]["name"]
             groups = f": {left} group{'' if left == 1 else 's'}" if left else ""
-            go_on = page.get_by_role("button", name=f"Go on{groups} of {name}", exact=True)
+            go_on = page.get_by_role("button", name=f"Continue{groups} of {name}", exact=True)
             expect(go_on).to_be_visible()
 
 
@@ -288,7 +286,7 @@ class TestPolicy:
 def value_text(value: Json, unit: str) -> str:
     """A threshold as the page has it."""
     if value is None:
-        return "not asked"
+        return "off"
     if isinstance(value, bool):
         text = "yes" if value else "no"
     else:

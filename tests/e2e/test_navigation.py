@@ -219,6 +219,6 @@ class TestTakingVerdictsBack:
         page.reload()
         screen.ready()
         screen.press("Control+Shift+z")
-        expect(page.locator(".bar")).to_contain_text("was judged since")
+        expect(page.locator(".bar")).to_contain_text("was reviewed since")
         assert state_of(page, queue[2]) == "rejected"
         withdraw_verdict(page, queue[2])

@@ -40,7 +40,7 @@ class TestWork:
         dialog.get_by_label("Limit to first N").fill("3")
         dialog.get_by_role("button", name="Assign", exact=True).click()
         tove.get_by_role("button", name="See the work").click()
-        go_on = tove.get_by_role("button", name="Go on: 3 groups of A few")
+        go_on = tove.get_by_role("button", name="Continue: 3 groups of A few")
         expect(go_on).to_be_focused()
         assert serious_in_both(tove) == []
         tove.keyboard.press("Enter")
@@ -51,7 +51,7 @@ class TestWork:
 
         ivo = open_page("/work", address=team)
         log_in(ivo, "ivo")
-        expect(ivo.get_by_role("button", name="Go on: 3 groups of A few")).to_be_focused()
+        expect(ivo.get_by_role("button", name="Continue: 3 groups of A few")).to_be_focused()
         ivo.keyboard.press("Enter")
         other = Screen(ivo)
         other.ready()
@@ -81,7 +81,7 @@ class TestWork:
         give_to(team_home, "quinto", "Late", "id:10")
         page = open_page("/work", address=team)
         log_in(page, "quinto")
-        go_on = page.get_by_role("button", name="Go on: 1 group of Late")
+        go_on = page.get_by_role("button", name="Continue: 1 group of Late")
         expect(go_on).to_be_visible()
         with holding(page, "**/api/v1/work") as asked:
             page.reload()
@@ -99,7 +99,7 @@ class TestWork:
         give_to(team_home, "quinn", "Slow", "id:11,12")
         page = open_page("/work", address=team)
         log_in(page, "quinn")
-        page.get_by_role("button", name="Go on: 2 groups of Slow").press("Enter")
+        page.get_by_role("button", name="Continue: 2 groups of Slow").press("Enter")
         screen = Screen(page)
         screen.ready()
         with holding(page, "**/verdict") as verdicts:
@@ -108,7 +108,7 @@ class TestWork:
             screen.ready()
             verdicts.arrive()
             screen.press("s")
-            expect(page.get_by_text("Nothing more waits for you in “Slow”")).to_be_visible()
+            expect(page.get_by_text("No more groups for you in “Slow”")).to_be_visible()
             assert screen.group == 12
         for group in (11, 12):
             until(page, lambda at=group: verdict(page, at).get("by") == "quinn")  # type: ignore[misc]
@@ -123,7 +123,7 @@ class TestWork:
         given = in_store(team_home, lambda store: make_batch(store, "sample", new, actor="local"))
         nora = open_page("/work", address=team)
         log_in(nora, "nora")
-        expect(nora.get_by_role("button", name="Go on: 2 groups of B")).to_be_focused()
+        expect(nora.get_by_role("button", name="Continue: 2 groups of B")).to_be_focused()
         nora.keyboard.press("Enter")
         Screen(nora).ready()
         nora.keyboard.press("Shift+F")
@@ -132,9 +132,9 @@ class TestWork:
         ralf = open_page(f"/review/6?q=batch%3A{given.id}", address=team)
         log_in(ralf, "ralf")
         Screen(ralf).ready()
-        expect(ralf.get_by_role("button", name="Hand back to nora…")).to_be_visible()
+        expect(ralf.get_by_role("button", name="Return to nora…")).to_be_visible()
         ralf.keyboard.press("Shift+U")
-        dialog = ralf.get_by_role("dialog", name="Hand back to nora")
+        dialog = ralf.get_by_role("dialog", name="Return to nora")
         expect(dialog.get_by_label("Why")).to_be_focused()
         assert serious_in_both(ralf) == []
         ralf.keyboard.type("The far goal line is missing")
@@ -145,7 +145,7 @@ class TestWork:
         bell = nora.get_by_role("button", name="Notifications")
         expect(bell).to_contain_text("2")
         nora.goto("/work")
-        back = nora.get_by_role("list", name="Handed back to you")
+        back = nora.get_by_role("list", name="Returned to you")
         expect(back).to_contain_text("by ralf: “The far goal line is missing”")
         assert serious_in_both(nora) == []
         back.get_by_role("link").press("Enter")
@@ -206,12 +206,12 @@ class TestWork:
         expect(page.locator(".compare__one")).to_have_count(2)
         page.keyboard.press("2")
         page.keyboard.press("Shift+U")
-        expect(page.get_by_label("Why, in a sentence")).to_be_focused()
+        expect(page.get_by_label("Reason")).to_be_focused()
         page.keyboard.type("Too far right")
         page.keyboard.press("Enter")
-        expect(page.get_by_text("Nothing waits")).to_be_visible()
-        rows = page.get_by_role("region", name="Own annotations").get_by_role("row")
-        expect(rows.filter(has_text="udo")).to_contain_text("handed back by lars")
+        expect(page.get_by_text("Nothing to decide")).to_be_visible()
+        rows = page.get_by_role("region", name="Independent annotations").get_by_role("row")
+        expect(rows.filter(has_text="udo")).to_contain_text("returned by lars")
         assert serious_in_both(page) == []
         rows.filter(has_text="ute").get_by_role("link").press("Enter")
         Screen(page).ready()
@@ -235,7 +235,7 @@ def give_to(home: Path, name: str, batch: str, q: str) -> None:
 
 def judge_alone(page: Page, batch: str, keys: list[str], *, unseen: dict[str, int]) -> int:
     """Judge the copy that somebody is given of a batch of one group; those of others are not there."""
-    page.get_by_role("button", name=f"Go on: 1 group of {batch}").press("Enter")
+    page.get_by_role("button", name=f"Continue: 1 group of {batch}").press("Enter")
     screen = Screen(page)
     screen.ready()
     copy = screen.group

@@ -20,7 +20,7 @@ import { FormDialog } from '../dialog.js';
 /** @import {DatasetJson} from '../../api/types.js' */
 
 const REASONS = /** @type {{[why: string]: string}} */ ({
-	annotated: 'the view has a ball already', the_same: 'this very ball is there already',
+	annotated: 'the view has a ball already', the_same: 'the view has this ball already',
 	below_score: 'the surest prediction is below the score', changed_meanwhile: 'the group was changed meanwhile',
 	not_a_ball: 'the box cannot be a ball of that image',
 });

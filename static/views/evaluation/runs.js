@@ -21,7 +21,7 @@ import { number } from './cell.js';
 const HEADLINES = [
 	{ name: 'ap_50', label: 'AP@0.5' }, { name: 'mae_m', label: 'MAE, m' }, { name: 'mae_percent', label: 'MAE, %' }, { name: 'p_2m', label: 'P 2 m' },
 ];
-const LIVE = [{ name: 'passing', label: 'as it is now: groups that pass' }, { name: 'accepted', label: 'as it is now: accepted groups' }, { name: 'all', label: 'as it is now: every group' }];
+const LIVE = [{ name: 'passing', label: 'current state: groups that pass' }, { name: 'accepted', label: 'current state: accepted groups' }, { name: 'all', label: 'current state: every group' }];
 
 /** What the form says, as the server wants it. @param {FormData} form */
 function bodyOf(form) {
@@ -95,7 +95,7 @@ export function Runs({ one, sets, runs, versions, shown, show, changed }) {
 			setState({ job: null, error: sentenceOf(problem) });
 		}
 	}
-	const versionOf = (/** @type {EvaluationRow} */ run) => (run.version === null ? 'as it was' : `version ${versions.find(({ id }) => id === run.version)?.name ?? run.version}`);
+	const versionOf = (/** @type {EvaluationRow} */ run) => (run.version === null ? 'not frozen' : `version ${versions.find(({ id }) => id === run.version)?.name ?? run.version}`);
 	return html`
 		<section class="card" aria-labelledby="new-run-title">
 			<h2 id="new-run-title">New run</h2>

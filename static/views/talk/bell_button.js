@@ -43,7 +43,7 @@ function Rings({ items, unread, close }) {
 						<span class="bell__kind" aria-hidden="true">${KINDS[ring.kind] ?? '·'}</span>
 						<span>${ring.read === null ? html`<span class="hidden-text">new: </span>` : null}${ring.sentence}<small>${ring.dataset ? `${ring.dataset} · ` : ''}<${When} at=${ring.at} /></small></span>
 					</a>
-				</li>`)}</ul>` : html`<p class="empty-note">Nothing yet: work that is given or handed back to you, mentions, replies, and jobs that ended are told here.</p>`}
+				</li>`)}</ul>` : html`<p class="empty-note">No notifications yet. They tell you of work assigned or returned to you, mentions, replies, and finished jobs.</p>`}
 			${unread ? html`<p><button class="button button--small" type="button" onClick=${() => seen(null)}>Mark all as read</button></p>` : null}
 		</div>
 	`;
