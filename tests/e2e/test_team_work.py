@@ -149,7 +149,7 @@ class TestWork:
         expect(back).to_contain_text("by ralf: “The far goal line is missing”")
         assert serious_in_both(nora) == []
         back.get_by_role("link").press("Enter")
-        expect(nora.get_by_text("ralf handed this back")).to_be_visible()
+        expect(nora.get_by_text("ralf returned this")).to_be_visible()
         Screen(nora).ready()
         nora.keyboard.press("Shift+F")
         until(nora, lambda: "/review/7" in nora.url)
@@ -216,7 +216,7 @@ class TestWork:
         rows.filter(has_text="ute").get_by_role("link").press("Enter")
         Screen(page).ready()
         accept = page.get_by_role("button", name="Accept A")
-        expect(accept).to_have_attribute("title", re.compile("ute has handed this in"))
+        expect(accept).to_have_attribute("title", re.compile("ute has submitted this"))
         page.keyboard.press("Shift+R")
         expect(page.get_by_role("dialog", name="Take over ute’s annotation")).to_be_visible()
         expect(page.get_by_role("button", name="Take over Enter")).to_be_focused()
