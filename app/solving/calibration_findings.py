@@ -127,8 +127,8 @@ def _not_annotated(
         if length > shortest:
             yield Finding(
                 "visible_not_annotated",
-                f"“{fit.marking}” should be visible over {length:.0f} px, and nobody has drawn "
-                "it. Draw it if you see it.",
+                f"“{fit.marking}” should be visible over {length:.0f} px and is not drawn. "
+                "Draw it if you see it.",
                 view,
                 fit.marking,
                 number=length,

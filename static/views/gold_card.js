@@ -82,7 +82,7 @@ export function GoldCard({ dataset }) {
 		<section class="card card--flush" aria-labelledby="gold-title">
 			<h2 id="gold-title"><${Term} word="gold-group">Gold groups<//></h2>
 			${error || refused ? html`<${FormError} error=${error ?? refused} />` : null}
-			<p class="gold__about">${value?.groups.length ? `${plural(value.groups.length, 'group')} with known truth.` : 'None yet.'} Review a group, then choose <em>Mark as gold group</em> in its palette (<kbd>Ctrl K</kbd>); or let <em>Assign…</em> use groups of a sample or a version. Batches mix them in; nobody is told which they are.</p>
+			<p class="gold__about">${value?.groups.length ? `${plural(value.groups.length, 'group')} with known truth.` : 'None yet.'} Review a group, then choose <em>Mark as gold group</em> in its palette (<kbd>Ctrl K</kbd>); or let <em>Assign…</em> use groups of a sample or a version. Batches mix them in without marking them.</p>
 			${value?.people.length ? html`
 				<div class="table__scroll" tabindex="0" role="region" aria-label="People and gold groups"><table class="table">
 					<thead><tr><th>Person</th><th data-numeric="true">groups</th><th data-numeric="true">lines, px</th><th data-numeric="true">ball, px</th><th data-numeric="true">ball, m</th><th data-numeric="true">correct verdicts</th><th>over time</th></tr></thead>

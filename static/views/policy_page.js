@@ -136,7 +136,7 @@ function ValueTable({ policy, fields }) {
 			<table class="table">
 				<tbody>${fields.map(({ name, label, unit }) => {
 					const value = policy.values[name];
-					return html`<tr key=${name}><th scope="row">${label}</th><td data-numeric="true">${value === null || value === undefined ? 'off' : `${valueText(value)} ${unit === 'share' ? '' : unit ?? ''}`}</td></tr>`;
+					return html`<tr key=${name}><th scope="row">${label}</th><td data-numeric="true">${value === null || value === undefined ? 'not set' : `${valueText(value)} ${unit === 'share' ? '' : unit ?? ''}`}</td></tr>`;
 				})}
 				</tbody>
 			</table>

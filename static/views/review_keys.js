@@ -270,7 +270,7 @@ const VIEW = [
 	{ keys: [','], label: 'The focused view one frame before, where the dataset has it', group: 'View', run: () => { stepInstant(-1); } },
 	{ keys: ['.'], label: 'The focused view one frame after', group: 'View', run: () => { stepInstant(1); } },
 	{ keys: ['t'], label: '3D point: pair average, or most likely point', group: 'View', run: otherEstimator },
-	{ keys: ['g'], label: 'Gates: what they ask and by how much', group: 'View', run: showGates },
+	{ keys: ['g'], label: 'Gates: thresholds and margins', group: 'View', run: showGates },
 	{
 		keys: ['Shift+l'], label: 'Main camera large, or all views equal', group: 'View',
 		run: () => { equalViews.value = !equalViews.value; },

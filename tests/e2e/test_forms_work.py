@@ -286,7 +286,7 @@ class TestPolicy:
 def value_text(value: Json, unit: str) -> str:
     """A threshold as the page has it."""
     if value is None:
-        return "off"
+        return "not set"
     if isinstance(value, bool):
         text = "yes" if value else "no"
     else:
