@@ -138,7 +138,7 @@ export function VerdictButtons({ group }) {
 			<div class="verdicts__buttons">
 				<button
 					class="button button--accept" type="button" data-needs="review" onClick=${accept}
-					aria-disabled=${unsolved || why !== ''} title=${why || (unsolved ? 'This group is not solved yet' : 'Accept and go on')}
+					aria-disabled=${unsolved || why !== ''} title=${why || (unsolved ? 'This group is not solved yet' : 'Accept and go to the next group')}
 				>Accept <kbd>A</kbd></button>
 				<button class="button button--reject" type="button" data-needs="review" aria-disabled=${why !== ''} title=${why || undefined} aria-expanded=${asking.value === 'reason'} onClick=${askReason}>Reject <kbd>X</kbd></button>
 				<button class="button" type="button" data-needs="review" aria-disabled=${why !== ''} title=${why || undefined} onClick=${defer}>Defer <kbd>S</kbd></button>

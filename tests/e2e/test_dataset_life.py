@@ -62,7 +62,7 @@ class TestLifeOfADataset:
         expect(delete).to_have_attribute("aria-disabled", "true")
         # What goes with it is read first: asked later, there is nothing any more to read of.
         expect(page.locator("dialog[open] .number-list")).to_contain_text("groups")
-        page.get_by_label("Type passing through to go on").fill("passing through")
+        page.get_by_label("Type passing through to confirm").fill("passing through")
         delete.click()
         expect(card).to_have_count(0)
 

@@ -62,7 +62,7 @@ class TestWork:
             ivo.goto(f"/review/{first}?batch={batch_in(ivo)}")
             other.ready()
             here = ivo.locator('[data-lease="others"]')
-            expect(here).to_contain_text("tove is here")
+            expect(here).to_contain_text("tove opened this")
         here.get_by_role("button", name="Take over").click()
         expect(here).to_be_hidden()
         lost = tove.locator('[data-lease="lost"]')
@@ -169,7 +169,7 @@ class TestWork:
         lotte.keyboard.press("Shift+D")
         dialog = lotte.get_by_role("dialog", name="Assign groups")
         dialog.get_by_label("Name").fill("Twice")
-        dialog.get_by_label("People who annotate each group").fill("2")
+        dialog.get_by_label("Annotators per group").fill("2")
         for name in ("uma", "ulf"):
             dialog.get_by_role("group", name="Annotators").get_by_label(name).check()
         dialog.get_by_role("button", name="Assign", exact=True).click()
