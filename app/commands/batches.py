@@ -14,7 +14,7 @@ from app.commands.shown_fields import BATCH
 from app.commands.terminal import print_rows, print_values
 from app.soccer.choices import GoldStart
 
-commands = typer.Typer(help="Groups that are given out to people.", no_args_is_help=True)
+commands = typer.Typer(help="Groups that are assigned to people.", no_args_is_help=True)
 
 Dataset = Annotated[str, typer.Argument(help="Name or id of the dataset.")]
 Number = Annotated[int, typer.Argument(help="Number of the batch.", min=1)]
@@ -44,23 +44,17 @@ def give(
     query: Annotated[
         str, typer.Option("--query", help="Which groups, and in which order; default: all.")
     ] = "",
-    size: Annotated[int | None, typer.Option(min=1, help="The first so many of them.")] = None,
+    size: Annotated[int | None, typer.Option(min=1, help="Limit to the first N of them.")] = None,
     annotator: Annotated[
         list[str] | None, typer.Option(help="Who annotates; may be given several times.")
     ] = None,
     reviewer: Annotated[
-        list[str] | None, typer.Option(help="Who reviews; nobody: whoever may.")
+        list[str] | None, typer.Option(help="Who reviews; default: every reviewer.")
     ] = None,
     due: Annotated[str | None, typer.Option(metavar="DATE", help="By when: 2026-12-24.")] = None,
-    verdicts: Annotated[
-        int, typer.Option(min=1, help="How many people judge each group by themselves.")
-    ] = 1,
-    seen: Annotated[
-        bool, typer.Option("--seen", help="Where several judge, they see what others say.")
-    ] = False,
-    gold_every: Annotated[
-        int | None, typer.Option(min=1, help="One of so many groups is a gold one.")
-    ] = None,
+    verdicts: Annotated[int, typer.Option(min=1, help="Annotators per group.")] = 1,
+    seen: Annotated[bool, typer.Option("--seen", help="Annotators see each other's work.")] = False,
+    gold_every: Annotated[int | None, typer.Option(min=1, help="One gold group in N.")] = None,
     again: Annotated[
         bool, typer.Option("--again", help="Also groups that wait in another open batch.")
     ] = False,
@@ -113,12 +107,14 @@ def show(batch: Number, json_: Json = False) -> None:
 def gold(
     dataset: Dataset,
     source: Annotated[
-        str, typer.Option("--from", help="Who knows the truth: sample, or version.")
+        str, typer.Option("--from", help="Source of the truth: sample, or version.")
     ] = "sample",
     version: Annotated[str | None, typer.Option(help="Name or id of the version.")] = None,
     query: Annotated[str, typer.Option("--query", help="Which groups; default: all.")] = "",
-    size: Annotated[int, typer.Option(min=1, max=1000, help="The first so many of them.")] = 1000,
-    start: Annotated[GoldStart, typer.Option(help="What people begin with.")] = "imported",
+    size: Annotated[
+        int, typer.Option(min=1, max=1000, help="Limit to the first N of them.")
+    ] = 1000,
+    start: Annotated[GoldStart, typer.Option(help="What annotators start with.")] = "imported",
     json_: Json = False,
 ) -> None:
     """Make gold groups of those whose truth is known; batches mix them in."""
@@ -145,9 +141,7 @@ def gold(
 @commands.command()
 def change(
     batch: Number,
-    gold_every: Annotated[
-        int | None, typer.Option(min=1, help="One of so many groups is a gold one.")
-    ] = None,
+    gold_every: Annotated[int | None, typer.Option(min=1, help="One gold group in N.")] = None,
     no_gold: Annotated[bool, typer.Option("--no-gold", help="No gold groups any more.")] = False,
     json_: Json = False,
 ) -> None:

@@ -25,7 +25,7 @@ commands = typer.Typer()
 
 
 BALLS, CAMERAS = "Predicted balls", "Predicted cameras"
-CAREFUL, TRUTH, RESULT = "Careful boxes", "The truth", "The result"
+CAREFUL, TRUTH, RESULT = "Reference boxes", "The truth", "The result"
 
 
 def _size(panel: str, text: str, *names: str) -> Any:
@@ -81,21 +81,21 @@ Careful = Annotated[
     str | None,
     typer.Option(
         rich_help_panel=CAREFUL,
-        help="Careful boxes, one a frame, which the dataset's are measured with: a file, folder or "
+        help="Reference boxes, one a frame, which the dataset's are measured with: a file, folder or "
         "zip, or the name of a set. Only the --careful options apply to them.",
     ),
 ]
 CarefulFormat = Annotated[
     AnyPredictionFormat,
-    typer.Option(rich_help_panel=CAREFUL, help="As --format, of the careful boxes."),
+    typer.Option(rich_help_panel=CAREFUL, help="As --format, of the reference boxes."),
 ]
 CarefulSize = Annotated[
     ImageSize | None,
-    _size(CAREFUL, "As --size, of the careful boxes."),
+    _size(CAREFUL, "As --size, of the reference boxes."),
 ]
 CarefulCategory = Annotated[
     int | None,
-    typer.Option(min=0, rich_help_panel=CAREFUL, help="As --category, of the careful boxes."),
+    typer.Option(min=0, rich_help_panel=CAREFUL, help="As --category, of the reference boxes."),
 ]
 Version = Annotated[
     str | None,

@@ -74,7 +74,7 @@ def import_(
         ),
     ] = None,
     dry_run: Annotated[
-        bool, typer.Option("--dry-run", help="Say what would happen, and keep nothing.")
+        bool, typer.Option("--dry-run", help="Dry run: report what would happen, change nothing.")
     ] = False,
     json_: Json = False,
 ) -> None:

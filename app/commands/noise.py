@@ -22,11 +22,15 @@ _FACTORS = "factors", "used"
 def noise(
     dataset: Dataset,
     apply: Annotated[
-        bool, typer.Option("--apply", help="Judge by them: the policy, and balls unlike others.")
+        bool,
+        typer.Option(
+            "--apply",
+            help="Use the estimates: in the policy, and for cameras and people that differ.",
+        ),
     ] = False,
     alike: Annotated[
         bool,
-        typer.Option("--alike", help="Take balls of all cameras and people to be alike again."),
+        typer.Option("--alike", help="Use one noise for all cameras and people again."),
     ] = False,
     json_: Json = False,
 ) -> None:
@@ -49,13 +53,13 @@ def noise(
         return
     _say(found)
     if policy is not None:
-        say("The dataset is judged by the estimates; `touchline solve` computes what that changes.")
+        say("The dataset uses the estimates; `touchline solve` computes what that changes.")
     elif alike:
-        say("All balls are taken to be alike; `touchline solve` computes what that changes.")
+        say("One noise is used for all balls; `touchline solve` computes what that changes.")
     elif found.values or found.is_new:
         changes = [f"{name} to {value:g}" for name, value in found.values.items()]
         changes += ["balls of cameras and people their own sigma"] if found.is_new else []
-        say(f"Run it again with --apply to judge by the estimates: {', '.join(changes)}.")
+        say(f"Run it again with --apply to use the estimates: {', '.join(changes)}.")
 
 
 def _say(found: Noise) -> None:

@@ -14,7 +14,6 @@ from app.commands.terminal import (
     complain,
     held_interrupts,
     print_json,
-    print_values,
     say,
 )
 
@@ -53,7 +52,12 @@ def solve(
                 complain(f"stopped; {report.solved} groups are kept, {left}")
                 raise typer.Exit(INTERRUPTED)
         count_yield(store, dataset, report, progress)
-    print_values(vars(report), json_)
+    if json_:
+        print_json(vars(report))
+        return
+    say(report.sentence if report.total else "nothing to solve: every group is up to date")
+    for key, problem in report.failed:
+        say(f"  {key}: {problem}")
 
 
 @commands.command()

@@ -35,7 +35,7 @@ def verdict(
         int | None, typer.Option(min=0, help="Judge nothing where another number would change.")
     ] = None,
     dry_run: Annotated[
-        bool, typer.Option("--dry-run", help="Say what would happen, and keep nothing.")
+        bool, typer.Option("--dry-run", help="Dry run: report what would happen, change nothing.")
     ] = False,
     json_: Json = False,
 ) -> None:

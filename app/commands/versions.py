@@ -53,7 +53,7 @@ def freeze(
     ] = None,
     groups: Annotated[
         VersionRule,
-        typer.Option(help="accepted by people, or whatever is passing and not rejected."),
+        typer.Option(help="accepted: accepted by people; passing: all passing, not rejected."),
     ] = "accepted",
     split: Annotated[
         SplitKind, typer.Option(help="How it is split into train and test.")

@@ -121,12 +121,15 @@ def _of_group(
 ) -> Iterator[Disagreement]:
     first, second = verdicts
     if first != second and first is not None and second is not None:
-        yield Disagreement("verdict", f"a {first} it, b {second} it")
+        yield Disagreement("verdict", f"annotation a: {first}, annotation b: {second}")
     ball = distance.ball
     if ball.a != ball.b:
-        yield Disagreement("ball_3d", f"only {'a' if ball.a else 'b'} has a 3D ball")
+        yield Disagreement("ball_3d", f"only annotation {'a' if ball.a else 'b'} yields a 3D ball")
     elif ball.distance_m is not None and ball.distance_m > limits.ball_m:
-        words = {True: ", which both uncertainties explain", False: ", more than sigma explains"}
+        words = {
+            True: ", which both uncertainties explain",
+            False: ", more than their uncertainties explain",
+        }
         explained = "" if ball.is_explained is None else words[ball.is_explained]
         text = f"the 3D balls are {ball.distance_m:.2f} m apart{explained}"
         yield Disagreement("ball_m", text, None, None, ball.distance_m, limits.ball_m)
@@ -134,33 +137,43 @@ def _of_group(
 
 def _of_view(view: ViewDistance, limits: AgreementLimits) -> Iterator[Disagreement]:
     if view.included[0] != view.included[1]:
-        yield Disagreement("view", f"only {'ba'[view.included[0]]} left it in", view.view)
+        yield Disagreement(
+            "view", f"only annotation {'ba'[view.included[0]]} uses the view", view.view
+        )
     ball = view.ball
     if not ball.is_same_state:
-        words = {"none": "not annotated", "out_of_view": "out of view", "several": "several"}
+        words = {
+            "none": "not annotated",
+            "out_of_view": "out of view",
+            "several": "drawn several times",
+        }
         first, second = (words.get(state, state) for state in (ball.a, ball.b))
-        yield Disagreement("ball", f"ball: a says {first}, b says {second}", view.view)
+        yield Disagreement(
+            "ball", f"the ball is {first} in annotation a, {second} in annotation b", view.view
+        )
     apart = ball.center_px
     if apart is not None and apart > limits.ball_px:
         text = f"the centres of the ball are {apart:.1f} px apart"
         yield Disagreement("ball_px", text, view.view, None, apart, limits.ball_px)
     wider = ball.diameter_px
     if wider is not None and abs(wider) > limits.diameter_px:
-        text = f"the ball of {'b' if wider > 0 else 'a'} is {abs(wider):.1f} px wider"
+        text = f"the ball of annotation {'b' if wider > 0 else 'a'} is {abs(wider):.1f} px wider"
         yield Disagreement("diameter_px", text, view.view, None, abs(wider), limits.diameter_px)
     yield from _of_lines(view, limits)
     jac = view.jac_least
     if jac is not None and jac < limits.jac:
-        text = f"one's camera meets the other's lines with a JaC of {jac:.2f}"
+        text = f"the camera of one annotation fits the lines of the other with JaC {jac:.2f}"
         yield Disagreement("jac", text, view.view, None, jac, limits.jac)
 
 
 def _of_lines(view: ViewDistance, limits: AgreementLimits) -> Iterator[Disagreement]:
     alone = [line for line in view.lines if line.only is not None]
     if len(alone) > limits.markings:
-        names = ", ".join(f"{line.marking} (only {line.only})" for line in alone)
+        names = ", ".join(f"{line.marking} (annotation {line.only})" for line in alone)
         count, limit = float(len(alone)), float(limits.markings)
-        yield Disagreement("markings", f"drawn once: {names}", view.view, None, count, limit)
+        yield Disagreement(
+            "markings", f"drawn by only one person: {names}", view.view, None, count, limit
+        )
     for line in view.lines:
         if line.largest_px is not None and line.largest_px > limits.line_px:
             text = f"{line.marking} lies up to {line.largest_px:.1f} px apart"

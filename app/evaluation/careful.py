@@ -1,4 +1,4 @@
-"""Careful boxes: the paper's table 1, a dataset's boxes against boxes drawn with care."""
+"""Reference boxes: the paper's table 1, a dataset's boxes against boxes drawn with care."""
 
 from __future__ import annotations
 
@@ -32,12 +32,12 @@ def boxes_table(
 ) -> Table:
     """IoU and size error of every kind of box, over the same frames for each.
 
-    A frame takes part when it has a careful box and all three boxes of the dataset. Where there
-    are detections, one more row measures the surest of each frame that overlaps the careful box.
+    A frame takes part when it has a reference box and all three boxes of the dataset. Where there
+    are detections, one more row measures the surest of each frame that overlaps the reference box.
 
     Args:
         frames: Of the dataset.
-        careful: The careful box by id of the frame.
+        careful: The reference box by id of the frame.
         detections: By id of the frame.
         resamples: For the intervals.
         truth: The kind of box whose overlap a run keeps of each frame (``box_iou``): its row
@@ -55,12 +55,12 @@ def boxes_table(
         ]
         rows.append(_row("detected", "Detected boxes, IoU > 0", found, resamples, len(careful)))
     note = (
-        f"{len(compared)} frames that have a careful box and a 3D ball, of {len(careful)} careful "
-        f"boxes. Size error is |d - d careful| in per cent of the careful box's diagonal. "
+        f"{len(compared)} frames that have a reference box and a 3D ball, of {len(careful)} reference "
+        f"boxes. Size error is |d - d reference| in per cent of the reference box's diagonal. "
         f"The row of the run's true box opens its frames; the figure of boxes has every frame of "
         f"every row."
     )
-    return Table("boxes", "Boxes against careful boxes", COLUMNS, tuple(rows), note)
+    return Table("boxes", "Boxes against reference boxes", COLUMNS, tuple(rows), note)
 
 
 def boxes_figure(
@@ -70,7 +70,7 @@ def boxes_figure(
 
     Args:
         frames: Of the dataset.
-        careful: The careful box by id of the frame.
+        careful: The reference box by id of the frame.
         distances: Camera to ball, metres, by id of the frame; frames without one are left out.
     """
     compared = sorted(
@@ -80,8 +80,8 @@ def boxes_figure(
     )
     note = f"{len(compared)} frames; a point opens its frame."
     measures = (
-        ("Overlap with the careful box", Axis("IoU", low=0.0, high=1.0), iou),
-        ("Size against the careful box", Axis("Size error", "%", low=0.0), size_error_percent),
+        ("Overlap with the reference box", Axis("IoU", low=0.0, high=1.0), iou),
+        ("Size against the reference box", Axis("Size error", "%", low=0.0), size_error_percent),
     )
     panels = tuple(
         Panel(
@@ -92,7 +92,7 @@ def boxes_figure(
         )
         for title, axis, measure in measures
     )
-    return Figure("box_overlap", "Boxes against careful boxes", panels, note)
+    return Figure("box_overlap", "Boxes against reference boxes", panels, note)
 
 
 def _points(

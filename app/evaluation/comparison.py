@@ -80,7 +80,7 @@ class FrameComparison:
 def differing_pins(first: Mapping[str, Any], second: Mapping[str, Any]) -> tuple[str, ...]:
     """Pins in which two runs differ that should be measured alike."""
     names = [name for name in _MEASURES if first.get(name) != second.get(name)]
-    # Where one has no careful boxes, no two numbers come of different ones.
+    # Where one has no reference boxes, no two numbers come of different ones.
     drawn = {pins["careful"]["digest"] for pins in (first, second) if pins.get("careful")}
     return (*names, *(["careful"] if len(drawn) > 1 else []))
 

@@ -21,7 +21,7 @@ def iou(a: Box, b: Box) -> float:
 
 
 def size_error_percent(box: Box, careful: Box) -> float:
-    """|d - d_careful| in per cent of the careful box's diagonal, d = (width + height) / 2.
+    """|d - d_careful| in per cent of the reference box's diagonal, d = (width + height) / 2.
 
     Example:
         >>> size_error_percent(Box(0, 0, 6, 8), Box(0, 0, 3, 4))

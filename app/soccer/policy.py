@@ -53,26 +53,24 @@ class CalibrationPolicy:
         2.0, CALIBRATION, "Scale of the robust loss", "px at 960x540", 0.2, 20.0
     )
     """Scale of the soft-L1 loss at 960 x 540; grows with the diagonal."""
-    distortion_mean: float = _threshold(
-        0.025, CALIBRATION, "Distortion that is expected", "", -0.3, 0.3
-    )
+    distortion_mean: float = _threshold(0.025, CALIBRATION, "Expected distortion", "", -0.3, 0.3)
     """Mean of the prior on kappa, the displacement at the image's corner as a share of half the
     diagonal: broadcast lenses show pincushion."""
     distortion_sigma: float = _threshold(
-        0.03, CALIBRATION, "Its standard deviation", "", 0.001, 0.5
+        0.03, CALIBRATION, "Standard deviation of the distortion", "", 0.001, 0.5
     )
     """Standard deviation of that prior."""
     check_labels: bool = _threshold(True, CALIBRATION, "Leave out markings found mislabelled")
     """Leave out markings that are found mislabelled."""
     share_position: bool = _threshold(
-        False, CALIBRATION, "Use the position that the match shares", later=True, told=False
+        False, CALIBRATION, "Use the shared position of a match", later=True, told=False
     )
     """Where the main camera stands is known from the match's other pictures, where that was
     accepted. Not in the ``repr``, which keys calibrations: they are keyed by the position itself."""
     source: Literal["lines", "paint"] = _threshold(
         "lines",
         CALIBRATION,
-        "What cameras are found from",
+        "Source of cameras",
         choices=("lines", "paint"),
         later=True,
         told=False,
@@ -94,7 +92,7 @@ class CalibrationPolicy:
     line_share: float | None = _threshold(
         None,
         CALIBRATION,
-        "Of its variance, what a marking shares",
+        "Share of its variance common to a marking",
         "share",
         0.0,
         0.95,
@@ -139,7 +137,7 @@ class Policy:
     min_baseline_m: float = _threshold(1.0, "baseline", "Smallest baseline", "m", 0.0, 50.0)
     ball_diameter_m: float = _threshold(0.226, BOXES, "Diameter of the ball", "m", 0.2, 0.25)
     point: Literal["mean", "best"] = _threshold(
-        "mean", BOXES, "3D ball that is exported", choices=("mean", "best"), later=True
+        "mean", BOXES, "Exported 3D point", choices=("mean", "best"), later=True
     )
     """``mean`` of the valid pairs, as in the paper, or ``best``: the most likely point over all
     views. Boxes, errors and exports follow it; the gates judge the mean."""

@@ -54,8 +54,8 @@ def _wrong_labels(
             continue
         if suspect.suggested is None:
             sentence = (
-                f"“{suspect.marking}” contradicts all other lines and fits no other marking. Drop "
-                "it, or draw it anew."
+                f"“{suspect.marking}” contradicts all other lines and fits no other marking. Delete "
+                "it, or draw it again."
             )
             fix = Fix("drop_marking", view, suspect.marking)
         else:
@@ -104,7 +104,7 @@ def _bad_points(
         yield Finding(
             "bad_point",
             f"Point {index + 1} of “{marking}” lies {worst:.1f} px off the line on which its other "
-            "points lie. Drop it, or move it onto the paint.",
+            "points lie. Delete it, or move it onto the paint.",
             view,
             marking,
             number=worst,
@@ -127,8 +127,8 @@ def _not_annotated(
         if length > shortest:
             yield Finding(
                 "visible_not_annotated",
-                f"“{fit.marking}” should be visible over {length:.0f} px, and nobody has drawn "
-                "it. Draw it if you see it.",
+                f"“{fit.marking}” should be visible over {length:.0f} px and is not drawn. "
+                "Draw it if you see it.",
                 view,
                 fit.marking,
                 number=length,
@@ -181,7 +181,7 @@ def _picture_geometry(
     yield Finding(
         "picture_geometry",
         f"The lines fit far better when {found}. The camera is found as if it were not, so its "
-        "place is doubtful. Solve it so, import the picture as it was taken, or leave the view "
+        "place is doubtful. Use this geometry, import the picture as it was taken, or leave the view "
         "out.",
         view,
         number=number,

@@ -204,7 +204,7 @@ def _views_contradict(item: Contradiction, group: Group) -> Finding:
     found = item.chi_square
     one = "The two views do" if len(found.views) == 2 else "The views do"
     sentences = [
-        f"{one} not show one ball: chance alone makes residuals as large as these in "
+        f"{one} not show one ball: consistent views have residuals as large as these in only "
         f"{chance(found.p_value)}."
     ]
     if item.view is not None:

@@ -7,11 +7,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from math import isnan
+from math import floor, isnan, log10
 
 from app.soccer.policy import Policy
 from app.soccer.solution import GATES, Ball3D, Calibration, ChiSquare, Gate, Pair, margin_of
+from app.solving.contradiction import LOW_P_VALUE
 from app.solving.judgement import MIN_VIEWS, Judgement
+
+UNLIKELY_P_VALUE = 0.05
+"""Below: consistent views have residuals as large as these in fewer than one of twenty groups."""
 
 
 @dataclass(frozen=True)
@@ -145,9 +149,13 @@ def _worst(
     fallen = [item for item in measured if item[1].failed == name]
     shown = fallen if blamed else [item for item in measured if item[1].failed is None] or measured
     value, view = min(shown, key=lambda item: item[0])
-    sentence = f"{'worst ' if len(shown) > 1 else ''}{_beside(value, threshold)} · {view.letter}"
+    sentence = f"{view.letter}: {_beside(value, threshold)}"
+    if value == threshold and view.failed == name:
+        sentence += f", must be above {threshold:.2f}"
+    elif len(shown) > 1:
+        sentence += " (lowest)"
     if fallen and not blamed:
-        sentence += f"; {_letters([view for _, view in fallen])} below, not used"
+        sentence += f"; {_letters([view for _, view in fallen])} too low, not used"
     key = view.key if blamed else None
     return _gate(name, not blamed, value, threshold, sentence, view=key)
 
@@ -161,10 +169,9 @@ _FALLEN_AT = {
 
 
 def _beside(value: float, limit: float) -> str:
-    """A value in as many digits as it takes to tell it from its limit; the limit itself is said."""
-    if value == limit:
-        return f"exactly {value:.2f}"
-    return f"{value:.2f}" if f"{value:.2f}" != f"{limit:.2f}" else f"{value:.4f}"
+    """A value in as many digits as it takes to tell it from its limit."""
+    same = value != limit and f"{value:.2f}" == f"{limit:.2f}"
+    return f"{value:.4f}" if same else f"{value:.2f}"
 
 
 def _two_views(group: _Group) -> Gate:
@@ -289,10 +296,38 @@ def _chi_square(group: _Group, found: ChiSquare | None, policy: Policy) -> Gate:
     if active and not all(
         item.is_known or (item.is_bare and policy.given_sigma_px) for item in cameras
     ):
-        sentence = "not judged: nobody says how exact a camera is"
+        sentence = "not judged: a camera has no known uncertainty"
         return Gate("chi_square", passed, None, threshold, None, sentence, active=active)
-    sentence = f"by chance in {chance(found.p_value)}, χ² {found.value:.1f}"
+    sentence = f"{consistency(found.p_value)} ({_probability(found.p_value)})"
     return _gate("chi_square", passed, found.p_value, threshold, sentence, active=active)
+
+
+def consistency(p_value: float) -> str:
+    """How well the residuals agree with their uncertainty, in a word.
+
+    Args:
+        p_value: Of their chi-square test.
+
+    Example:
+        >>> consistency(0.72), consistency(0.01), consistency(0.0004)
+        ('normal', 'unlikely', 'contradictory')
+    """
+    if p_value < LOW_P_VALUE:
+        return "contradictory"
+    return "unlikely" if p_value < UNLIKELY_P_VALUE else "normal"
+
+
+def _probability(p_value: float) -> str:
+    """A p-value in two digits.
+
+    Example:
+        >>> _probability(0.72), _probability(0.00083), _probability(1e-12)
+        ('p = 0.72', 'p = 0.00083', 'p < 0.000001')
+    """
+    if p_value < 1e-6:
+        return "p < 0.000001"
+    digits = max(2, 1 - floor(log10(p_value)))
+    return f"p = {p_value:.{digits}f}"
 
 
 def chance(p_value: float) -> str:

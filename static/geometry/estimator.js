@@ -36,7 +36,7 @@ export function withOtherBall(group, solution) {
  * @param {SolutionJson | null} solution @param {'exported' | 'other'} which
  */
 export function ballName(solution, which) {
-	return (solution?.point === 'best') !== (which === 'other') ? 'most likely point' : 'mean of pairs';
+	return (solution?.point === 'best') !== (which === 'other') ? 'most likely point' : 'pair average';
 }
 
 /**

@@ -130,7 +130,7 @@ export function undo() {
 		undoSaved();
 		return;
 	}
-	announce(`${staging.value.steps[staging.value.at - 1].label}: taken back.`);
+	announce(`${staging.value.steps[staging.value.at - 1].label}: undone.`);
 	keep(stepBack(staging.value));
 }
 
@@ -140,7 +140,7 @@ export function redo() {
 		return;
 	}
 	keep(stepForward(staging.value));
-	announce(`${staging.value.steps[staging.value.at - 1].label}: done again.`);
+	announce(`${staging.value.steps[staging.value.at - 1].label}: redone.`);
 }
 
 /** Forget everything staged for this view. */
@@ -150,7 +150,7 @@ export function discardStaged() {
 	keep(begin(at.lines));
 	held.value = null;
 	choice.value = null;
-	announce('Staged changes dropped.');
+	announce('Staged changes discarded.');
 }
 
 /** Save everything staged as one edit. @returns {boolean} whether there was anything */

@@ -120,7 +120,7 @@ function same(a, b) {
 
 /** Make my edits again on top of theirs. */
 export function keepMine() {
-	resolve((field) => !same(field.mine, field.theirs), 'Yours counts.');
+	resolve((field) => !same(field.mine, field.theirs), 'Your version is kept.');
 }
 
 /** Make again what they did not touch; where both changed the same, theirs stays. */
@@ -130,7 +130,7 @@ export function mergeBoth() {
 
 /** Drop my edits and go on with theirs. */
 export function takeTheirs() {
-	resolve(() => false, 'Your edit was dropped.');
+	resolve(() => false, 'Your edit was discarded.');
 }
 
 /** @param {(field: Field) => boolean} wanted @param {string} said */

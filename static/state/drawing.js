@@ -8,8 +8,8 @@ import { expectedDiameter, newBall, placeBall } from './ball_edits.js';
 import { chosenPlace, dropCross, setCross } from './drawing_cross.js';
 import { applyEdit } from './edits.js';
 import { group, solution, submit } from './group.js';
-import { announce } from './notice.js';
-import { drawing, focused, focusView, pointerPlace, selected } from './workspace.js';
+import { announce, complain } from './notice.js';
+import { drawing, focused, focusView, isSmall, pointerPlace, selected } from './workspace.js';
 
 /** @import {GroupDocument, PointJson, ViewJson} from '../api/types.js' */
 /** @import {ScreenPoint, Viewport} from '../geometry/viewport.js' */
@@ -24,10 +24,17 @@ function targetView() {
 	return group.value?.views.find((view) => view.letter === letter);
 }
 
+/** Say that drawing needs room, where there is too little. */
+function hasNoRoom() {
+	const small = isSmall();
+	if (small) complain('Drawing needs a wider screen: open this group on a computer.');
+	return small;
+}
+
 /** Begin to draw; the marking of the selected point is gone on with, else one chooses. @param {string} [letter] */
 export function startDrawing(letter) {
 	const view = letter ? group.value?.views.find((one) => one.letter === letter) : targetView();
-	if (!view) return;
+	if (!view || hasNoRoom()) return;
 	focused.value = view.letter;
 	const object = selected.value;
 	const goesOn = object?.kind === 'point' && object.view === view.key;
@@ -37,6 +44,7 @@ export function startDrawing(letter) {
 
 /** Draw the ball of a view. @param {ViewJson} view @param {PointJson} [at] where it may be, if more is known than the solution says */
 export function startBall(view, at) {
+	if (hasNoRoom()) return;
 	focused.value = view.letter;
 	drawing.value = { view: view.key, what: 'ball', marking: '' };
 	setCross(view, at ?? likelyPlace(view));
@@ -56,6 +64,7 @@ export function placeExpected(view) {
 
 /** Draw a marking of a view. @param {ViewJson} view @param {string} marking */
 export function startMarking(view, marking) {
+	if (hasNoRoom()) return;
 	focused.value = view.letter;
 	selected.value = null;
 	drawing.value = { view: view.key, what: 'line', marking };

@@ -228,7 +228,7 @@ function delivered(item, answer) {
 		if (item.edit) keepStation(item.group, item.station);
 	});
 	if (item.edit) announce(`${describe(answer, item.edit)}, saved.`);
-	else if (item.method === 'POST') announce(item.path.includes('/undo') ? 'Undone.' : 'Done again.');
+	else if (item.method === 'POST') announce(item.path.includes('/undo') ? 'Undone.' : 'Redone.');
 }
 
 /** @param {Item} item @param {GroupDocument} answer */

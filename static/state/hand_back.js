@@ -38,8 +38,8 @@ export const frozen = computed(() => {
 	if (one === null || one.group !== groupDocument.value?.id) return '';
 	if (one.settled !== null) return 'This annotation was adjudicated already; it can no longer be changed.';
 	const mine = !isTeam || one.person === myName.value;
-	if (one.handed_in !== null) return mine ? '' : `${one.person} has handed this in; hand it back, or take it over.`;
-	return mine ? '' : `${one.person} judges this annotation.`;
+	if (one.handed_in !== null) return mine ? '' : `${one.person} has submitted this; return it, or take it over.`;
+	return mine ? '' : `${one.person} reviews this annotation.`;
 });
 
 /** Whether it can be taken over into the group that it is of. */
@@ -58,19 +58,19 @@ export function askHandBack() {
 	if (isReady.value && one) {
 		question.value = {
 			kind: 'back', person: one.person,
-			says: `${one.person} can change this annotation again, is told why, and hands it in anew. Where others annotated the group, too, nothing is decided until then.`,
+			says: `${one.person} sees the reason, can change this annotation, and submits it again. If others annotated the group too, nothing is decided until then.`,
 			send: async (reason) => {
 				take.value = await postTakeBack(one.group, reason);
-				announce(`${one.person} has it back.`);
+				announce(`Returned to ${one.person}.`);
 			},
 		};
 	} else if (held?.handedInBy) {
 		const person = held.handedInBy;
 		question.value = {
-			kind: 'back', person, says: `${person} is told why and gets this group next; you get the one that waits for you next.`,
+			kind: 'back', person, says: `${person} sees the reason and gets this group next; you go to your next group.`,
 			send: async (reason) => {
 				await postHandBack(held.batch, held.group, reason);
-				announce(`Handed back to ${person}.`);
+				announce(`Returned to ${person}.`);
 				await nextOfBatch();
 				// Who stays would have open what the annotator gets next.
 				if (currentId() === held.group) navigate('/work');
@@ -85,11 +85,11 @@ export function askTakeOver() {
 	if (!canTakeOver.value || !one) return;
 	question.value = {
 		kind: 'over', person: one.person,
-		says: `What ${one.person} changed here, and their verdict${one.verdict ? ` (${one.verdict})` : ''}, go into the group under their name. This annotation can then no longer be changed; where others annotated the group, too, theirs are set aside. Undo in the group takes the change back.`,
+		says: `What ${one.person} changed here, and their verdict${one.verdict ? ` (${one.verdict})` : ''}, go into the group under their name. This annotation can then no longer be changed; annotations of others are set aside. Undo in the group reverts the change.`,
 		send: async () => {
 			const { id } = await postAdoption(one.group);
 			navigate(reviewAddress(id));
-			inform(`${one.person}’s annotation is in the group now. Undo (Ctrl Z) takes the change back.`);
+			inform(`${one.person}’s annotation is in the group now. Undo (Ctrl Z) reverts the change.`);
 		},
 	};
 }

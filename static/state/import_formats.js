@@ -5,7 +5,7 @@
 /** @typedef {{name: string, label: string, note: string, options: FormatOption[], lines?: boolean}} ImportFormat   `lines`: static cameras, whose lines are files of their own */
 
 /** @type {FormatOption} */
-const CALIBRATION = { name: 'calibration', label: 'Where a view has a given camera and lines', hint: 'which of them counts', kind: 'calibration' };
+const CALIBRATION = { name: 'calibration', label: 'Where a view has a given camera and lines', hint: 'which of them is used', kind: 'calibration' };
 /** @type {FormatOption} */
 const SIZE = { name: 'size', label: 'Size of the images', hint: 'width x height, for example 960x540; empty: the usual one', kind: 'size' };
 /** @type {FormatOption[]} */

@@ -141,7 +141,7 @@ export async function nextOfBatch(stillWanted = () => true) {
 		if (!(error instanceof ApiError)) throw error;
 		// Without the server the batch is walked as it is known.
 		if (error.status === 0) await goNext(stillWanted);
-		else complain(`The next group cannot be had: ${error.message}`);
+		else complain(`The next group is not available: ${error.message}`);
 	} finally {
 		isMoving.value = false;
 	}
@@ -158,8 +158,8 @@ function goTo(answer, group) {
 /** @param {BatchJson} one */
 function sayDone(one) {
 	const left = one.groups - one.settled;
-	const more = left > 0 ? ' Others have the rest open, or it waits for somebody else.' : '';
-	inform(`Nothing more waits for you in “${one.name}”.${more}`, { label: 'My work', run: () => navigate('/work') });
+	const more = left > 0 ? ' Others have the rest open, or it waits for other people.' : '';
+	inform(`No more groups for you in “${one.name}”.${more}`, { label: 'My work', run: () => navigate('/work') });
 }
 
 /** Begin or go on with a batch. @param {number} id @returns {Promise<boolean>} whether there is a group for me */
@@ -191,7 +191,7 @@ export async function handInAndNext() {
 	settle();
 	await arrived(held.group);
 	if (outbox.value.some((item) => item.group === held.group)) {
-		announce('First choose whose edit counts.');
+		announce('First choose which version to keep.');
 		return;
 	}
 	try {
@@ -199,7 +199,7 @@ export async function handInAndNext() {
 		announce('Handed in.');
 	} catch (error) {
 		if (!(error instanceof ApiError)) throw error;
-		complain(`This group was not handed in: ${error.message}`);
+		complain(`This group was not submitted: ${error.message}`);
 		return;
 	}
 	await nextOfBatch();

@@ -43,7 +43,7 @@ export function welcome(session) {
 	const before = me.value;
 	if (JSON.stringify(before) === JSON.stringify(session)) return;
 	me.value = session;
-	if (before?.name && rightsOf(before) !== rightsOf(session)) inform(`Your rights were changed: ${rightsOf(session)}. What you have not sent yet stays here.`);
+	if (before?.name && rightsOf(before) !== rightsOf(session)) inform(`Your role was changed: ${rightsOf(session)}. Unsent changes stay in this browser.`);
 }
 
 /** @param {SessionJson} session */

@@ -67,7 +67,7 @@ function missingBalls(shown, solved) {
 		const place = solved.views.find((one) => one.view === view.key)?.expected?.place;
 		// Where there is no 3D ball yet, another view's ball may bring it.
 		if (solved.ball ? !(place && inPicture(view, place)) : solved.passes) return [];
-		const why = NEEDS_A_PAIR.has(solved.first_failing?.gate ?? '') ? ` With it ${view.letter} may make the pair that is missing.` : '';
+		const why = NEEDS_A_PAIR.has(solved.first_failing?.gate ?? '') ? ` With it ${view.letter} may form the missing pair.` : '';
 		return [{
 			view: view.key, caption: '',
 			...(place ? { label: 'Place it there', run: placeExpected } : { label: 'Draw it', guide: { ball: true } }),

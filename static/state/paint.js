@@ -107,7 +107,7 @@ function stage({ lines: next, moved, left }, only) {
 	}
 	stageLines(next, only ? `${only} onto the paint` : 'Points onto the paint');
 	const median = [...moved].sort((a, b) => a - b)[moved.length >> 1];
-	announce(`${plural(moved.length, 'point')} moved onto the paint by ${fixed(median, 1)} px in the middle${stayed}.`);
+	announce(`${plural(moved.length, 'point')} moved onto the paint, median move ${fixed(median, 1)} px${stayed}.`);
 }
 
 /** Where a point that is dragged lies on the paint of its marking; where there is none, where it is. */

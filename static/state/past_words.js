@@ -7,7 +7,7 @@ import { REASONS } from './reasons.js';
 /** @import {LogEntryJson} from '../api/past.js' */
 
 const MOST_NAMES = 3;
-const TOLD = { said: 'Commented', edited: 'Changed a comment', deleted: 'Deleted a comment', resolved: 'Resolved a thread', reopened: 'Opened a thread again' };
+const TOLD = { said: 'Commented', edited: 'Changed a comment', deleted: 'Deleted a comment', resolved: 'Resolved a thread', reopened: 'Reopened a thread' };
 const PLAIN = /** @type {Record<string, string>} */ ({
 	import: 'Imported', camera: 'A camera was imported', pitch: 'Set the size of the pitch', position: 'Set where cameras stand', paint: 'Read the paint of its pictures',
 });
@@ -35,9 +35,9 @@ function editWords(edit, letterOf) {
 		case 'set_balls': return `${edit.balls?.length ? 'placed the ball' : 'removed the ball'}${where}`;
 		case 'include_view': return edit.included ? `used view ${letterOf(edit.view)}` : `left view ${letterOf(edit.view)} out${edit.reason ? `: ${reasonWords(edit.reason)}` : ''}`;
 		case 'set_calibration': return `chose the ${edit.calibration} calibration${where}`;
-		case 'set_picture': return `said what was done to the picture${where}`;
+		case 'set_picture': return `set how the picture was changed${where}`;
 		case 'set_pitch': return `set the pitch to ${edit.length} × ${edit.width} m`;
-		case 'set_noise': return 'said how noisy the balls of its cameras and people are';
+		case 'set_noise': return 'set the noise of its cameras and people';
 		case 'set_station_camera': return 'set the camera of a static camera';
 		default: return words(String(edit.edit ?? 'changed it')).toLowerCase();
 	}
@@ -51,14 +51,14 @@ function reasonWords(reason) {
 /** @param {any} body */
 function verdictWords({ state, reason, note, override }) {
 	const why = reason ? ` because of ${reasonWords(reason)}` : override ? ` although ${words(override).toLowerCase()} fails` : '';
-	return `${state === 'unreviewed' ? 'Took the verdict back' : capital(state)}${why}${note ? `: “${note.replaceAll('\n', ' · ')}”` : ''}`;
+	return `${state === 'unreviewed' ? 'Withdrew the verdict' : capital(state)}${why}${note ? `: “${note.replaceAll('\n', ' · ')}”` : ''}`;
 }
 
 /** What became of somebody's own annotation. @param {string} kind @param {any} body */
 function ownWords(kind, { did, person, reason, of = [] }) {
-	if (did === 'handed back') return `Handed back to ${person}${reason ? `: “${reason}”` : ''}`;
-	if (kind === 'take') return `Took over ${person}’s own annotation`;
-	return did === 'agreed' ? `${of.join(' and ')} agree: ${person}’s annotation counts` : `Decided for ${person}’s annotation`;
+	if (did === 'handed back') return `Returned to ${person}${reason ? `: “${reason}”` : ''}`;
+	if (kind === 'take') return `Took over ${person}’s independent annotation`;
+	return did === 'agreed' ? `${of.join(' and ')} agree: ${person}’s annotation is used` : `Decided for ${person}’s annotation`;
 }
 
 /** @param {LogEntryJson} entry @param {(view: string) => string} letterOf letter of a view's key @returns {string} */
@@ -69,8 +69,8 @@ export function sentenceOfEntry({ kind, body }, letterOf) {
 	if (body?.person && (kind === 'take' || kind === 'agreement' || kind === 'work')) return ownWords(kind, body);
 	if (!body?.edit || PLAIN[kind]) return PLAIN[kind] ?? capital(words(kind));
 	const said = editWords(body.edit, letterOf);
-	if (plain === 'undo') return `Took back: ${said}`;
-	return plain === 'redo' ? `Did again: ${said}` : capital(said);
+	if (plain === 'undo') return `Undid: ${said}`;
+	return plain === 'redo' ? `Redid: ${said}` : capital(said);
 }
 
 /** Kinds of entries that change what is drawn. */

@@ -79,7 +79,7 @@ async function ask(state, abort) {
 /** Why there is no proposal for a view. @param {ViewJson} view */
 function whyNone(view) {
 	if (!waitsForLines(view, groupDocument.value?.solution ?? null)) return `View ${view.letter} has a camera already.`;
-	const looked = `Nothing was proposed for view ${view.letter} yet: Statistics has the button that looks.`;
+	const looked = `Nothing was proposed for view ${view.letter} yet: start the search under Statistics.`;
 	return view.station.shared ? `${looked} Of a static camera the first view with a picture has the proposal, maybe in another group.` : looked;
 }
 

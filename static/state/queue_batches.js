@@ -35,13 +35,13 @@ export async function takeBatchBack(action) {
 		const { restored, kept } = await undoVerdicts(action.batch);
 		forget(action);
 		if (restored > 0) tookBack(action);
-		const text = `${count(restored)} ${restored === 1 ? 'verdict is' : 'verdicts are'} taken back.${stayed(kept, 'judged since')}`;
+		const text = `${count(restored)} ${restored === 1 ? 'verdict is' : 'verdicts are'} undone.${stayed(kept, 'reviewed since')}`;
 		inform(text, restored > 0 ? { label: 'Redo', run: () => giveBatchAgain(action) } : undefined);
 	} catch (error) {
 		if (!(error instanceof ApiError)) throw error;
 		// Somebody else may have taken it back, or it is gone with its dataset.
 		if (error.status === 409 || error.status === 404) forget(action);
-		complain(`Not taken back: ${error.message}`);
+		complain(`Not undone: ${error.message}`);
 	}
 	await readAgain();
 }
@@ -51,10 +51,10 @@ export async function giveBatchAgain(action) {
 	try {
 		const { batch, changed, kept, refused } = await redoVerdicts(action.batch);
 		const failing = refused.reduce((sum, { groups }) => sum + groups, 0);
-		const rest = stayed(kept, 'judged or edited since') + stayed(failing, 'not fit for it any more');
+		const rest = stayed(kept, 'reviewed or edited since') + stayed(failing, 'no longer eligible');
 		if (batch === null) {
 			forgetUndone(action);
-			inform(`No verdict was given again.${rest}`);
+			inform(`No verdict was redone.${rest}`);
 		} else {
 			/** @type {BatchDone} */
 			const again = { kind: 'batch', batch, text: action.text.replace(/^[\d,]+ groups?/, plural(changed, 'group')) };
@@ -68,7 +68,7 @@ export async function giveBatchAgain(action) {
 	} catch (error) {
 		if (!(error instanceof ApiError)) throw error;
 		if (error.status === 409 || error.status === 404) forgetUndone(action);
-		complain(`Not given again: ${error.message}`);
+		complain(`Not redone: ${error.message}`);
 	}
 	await readAgain();
 }

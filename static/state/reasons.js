@@ -6,7 +6,7 @@
 /** In the order of their digits. */
 export const REASONS = [
 	{ name: 'bad_field_lines', label: 'Bad field lines' },
-	{ name: 'sides_confused', label: 'Sides confused' },
+	{ name: 'sides_confused', label: 'Sides swapped' },
 	{ name: 'not_same_instant', label: 'Not the same instant' },
 	{ name: 'ball_not_visible', label: 'Ball not visible' },
 	{ name: 'bad_calibration', label: 'Bad calibration' },

@@ -26,14 +26,14 @@ export async function revertSelected() {
 		if (groupDocument.value?.id === at.id) revert(object, items);
 	} catch (error) {
 		if (!(error instanceof ApiError)) throw error;
-		complain(`Cannot be reverted: ${error.message}`);
+		complain(`Not reset: ${error.message}`);
 	}
 }
 
 /** @param {Selection} object @param {Entry[]} entries */
 function revert(object, entries) {
 	const edit = originalOf(object, entries);
-	if (edit === null) announce('Nobody has edited this in the group.');
+	if (edit === null) announce('Nothing to reset: nobody has edited this.');
 	else if (edit === 'several') complain('The dataset brought several balls here: undo brings them back.');
 	else if (group.value) {
 		selected.value = object.kind === 'ball' ? object : null;

@@ -10,7 +10,7 @@ import { complain } from './notice.js';
 /** @import {Action, Role} from '../api/people.js' */
 
 const DEEDS = /** @type {Record<Action, string>} */ ({
-	account: 'This', read: 'Looking at this', annotate: 'Editing', review: 'Judging or exporting',
+	account: 'This', read: 'Looking at this', annotate: 'Editing', review: 'Reviewing or exporting',
 	lead: 'This', administer: 'This',
 });
 

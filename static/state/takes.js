@@ -32,7 +32,7 @@ async function told(ask) {
 export async function annotateOwn() {
 	const group = groupDocument.value;
 	if (!group) return;
-	if (isCopy(group)) { announce('This is your own annotation already.'); return; }
+	if (isCopy(group)) { announce('This is already your independent annotation.'); return; }
 	const take = await told(() => postTake(group.id));
 	if (take) navigate(reviewAddress(take.group));
 }

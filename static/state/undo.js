@@ -30,18 +30,18 @@ export const undoable = computed(() => {
 	const action = next.value;
 	if (action === null) return null;
 	if (action === 'here') return 'Undo the last edit of this group';
-	if (action.kind === 'batch') return `Take back: ${action.text}`;
+	if (action.kind === 'batch') return `Undo: ${action.text}`;
 	if (action.kind === 'edit') return `Go back to group ${action.number} and undo its last edit`;
-	return `Take back the verdict on group ${action.number}`;
+	return `Undo the verdict on group ${action.number}`;
 });
 const canRedoHere = computed(() => Boolean(groupDocument.value?.can_redo) || ownStation.value !== null);
 /** What redo would do again, in words; null when there is nothing. */
 export const redoable = computed(() => {
 	const action = undone.value.at(-1);
-	if (!action) return canRedoHere.value ? 'Make the undone edit of this group again' : null;
-	if (action.kind === 'batch') return `Give again: ${action.text}`;
-	if (action.kind === 'edit') return `Make the undone edit of group ${action.number} again`;
-	return `Give the verdict on group ${action.number} again`;
+	if (!action) return canRedoHere.value ? 'Redo the undone edit of this group' : null;
+	if (action.kind === 'batch') return `Redo: ${action.text}`;
+	if (action.kind === 'edit') return `Redo the undone edit of group ${action.number}`;
+	return `Redo the verdict on group ${action.number}`;
 });
 
 /** One after the other: the next one speaks about the group to which the last one led. */

@@ -115,7 +115,7 @@ function decide(state, reason, note) {
 		return;
 	}
 	if (conflict.value) {
-		announce('First choose whose edit counts.');
+		announce('First choose which version to keep.');
 		return;
 	}
 	asking.value = null;
@@ -163,12 +163,12 @@ export async function takeVerdictBack(action) {
 	if (!(await returnTo(action.group)) || !group.value) return;
 	const { state, reason } = group.value.verdict;
 	if (state !== action.given.state || reason !== action.given.reason) {
-		complain(`Group ${action.number} was judged again since; that verdict stays.`);
+		complain(`Group ${action.number} was reviewed again since; the new verdict stays.`);
 		return;
 	}
 	submitVerdict(action.before);
 	tookBack(action);
-	announce(`The verdict on group ${action.number} was taken back.`);
+	announce(`The verdict on group ${action.number} was undone.`);
 }
 
 /** Give a verdict again that was taken back, on its group. @param {VerdictDone} action */
@@ -177,7 +177,7 @@ export async function giveVerdictAgain(action) {
 	const { state, reason } = group.value.verdict;
 	if (state !== action.before.state || reason !== action.before.reason) {
 		forgetUndone(action);
-		complain(`Group ${action.number} was judged since; that verdict stays.`);
+		complain(`Group ${action.number} was reviewed since; the new verdict stays.`);
 		return;
 	}
 	didAgain();

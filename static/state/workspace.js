@@ -76,6 +76,11 @@ export function cycleGain() {
 	gain.value = GAINS[(GAINS.indexOf(gain.value) + 1) % GAINS.length];
 }
 
+/** Whether the window is as small as a phone's: there groups are looked at and judged, not drawn in. As in `css/phone.css`. */
+export function isSmall() {
+	return globalThis.matchMedia?.('(max-width: 640px), (max-height: 480px)').matches ?? false;
+}
+
 /** Look at the other 3D ball. */
 export function cycleEstimator() {
 	estimator.value = estimator.value === 'other' ? 'exported' : 'other';

@@ -48,10 +48,10 @@ function PasswordForm({ changed }) {
 			<h2 id="account-password">Password</h2>
 			<form class="form" onSubmit=${send}>
 				<input class="hidden-text" name="username" autocomplete="username" value=${me.value?.name ?? ''} readonly tabindex="-1" aria-hidden="true" />
-				<div class="form__row"><label for="password-old">Present password</label><input class="field" id="password-old" name="old" type="password" required maxlength="200" autocomplete="current-password" /></div>
-				<div class="form__row"><label for="password-new">New password</label><input class="field" id="password-new" name="new" type="password" required minlength="10" maxlength="200" autocomplete="new-password" /><small>At least 10 letters. Every other session of yours ends.</small></div>
+				<div class="form__row"><label for="password-old">Current password</label><input class="field" id="password-old" name="old" type="password" required maxlength="200" autocomplete="current-password" /></div>
+				<div class="form__row"><label for="password-new">New password</label><input class="field" id="password-new" name="new" type="password" required minlength="10" maxlength="200" autocomplete="new-password" /><small>At least 10 letters. All your other sessions end.</small></div>
 				<${FormError} error=${error} />
-				<p class="buttons"><button class="button" type="submit" aria-disabled=${busy}>Change the password</button><span role="status">${done ? 'It is changed.' : ''}</span></p>
+				<p class="buttons"><button class="button" type="submit" aria-disabled=${busy}>Change password</button><span role="status">${done ? 'Password changed.' : ''}</span></p>
 			</form>
 		</section>
 	`;
@@ -75,12 +75,12 @@ export function AccountPage() {
 			${sessions && ways ? html`
 				<div class="account">
 					<section class="card card--flush" aria-labelledby="account-sessions">
-						<h2 id="account-sessions">Where ${me.value?.name} (${me.value?.role}) is logged in</h2>
+						<h2 id="account-sessions">Sessions of ${me.value?.name} (${me.value?.role})</h2>
 						<table class="table">
 							<thead><tr><th>Browser</th><th>Since</th><th>Used</th><td></td></tr></thead>
 							<tbody>${sessions.map((one) => html`<${SessionRow} key=${one.id} one=${one} end=${end} />`)}</tbody>
 						</table>
-						${sessions.length > 1 ? html`<p class="buttons"><button class="button" type="button" onClick=${() => end(null)}>End all others</button></p>` : null}
+						${sessions.length > 1 ? html`<p class="buttons"><button class="button" type="button" onClick=${() => end(null)}>End all other sessions</button></p>` : null}
 					</section>
 					<${SecondFactorCard} changed=${read} again=${factors} />
 					<div class="account__ways">

@@ -23,13 +23,13 @@ import { FormDialog } from './dialog.js';
 const STATES = [
 	{ state: 'accepted', verb: 'Accept', note: 'they may enter a version' },
 	{ state: 'rejected', verb: 'Reject', note: 'they stay out, with a reason' },
-	{ state: 'deferred', verb: 'Defer', note: 'somebody comes back to them' },
-	{ state: 'unreviewed', verb: 'Withdraw', note: 'as if nobody had decided' },
+	{ state: 'deferred', verb: 'Defer', note: 'to be reviewed later' },
+	{ state: 'unreviewed', verb: 'Withdraw', note: 'back to unreviewed' },
 ];
 
 /** Why a group is left alone. */
 const REFUSALS = /** @type {{[reason: string]: string}} */ ({
-	unsolved: 'nobody has solved them yet',
+	unsolved: 'they are not solved yet',
 	needs_note: 'they fail a gate, and accepting that needs a note',
 	no_picture: 'no view of them has a picture, and accepting that needs a note',
 });

@@ -23,9 +23,9 @@ function choicesOf({ view, solved }) {
 	const rank = (/** @type {string} */ name) => (view.lines[name] ? 2 : seen.has(name) ? 0 : 1);
 	const markings = NAMES.toSorted((a, b) => rank(a) - rank(b)).map((name) => ({
 		marking: name, name, plain: plainMarking(name),
-		note: view.lines[name] ? `${view.lines[name].length} drawn` : seen.has(name) ? 'in sight, not drawn' : '',
+		note: view.lines[name] ? `${view.lines[name].length} drawn` : seen.has(name) ? 'visible, not drawn' : '',
 	}));
-	const ball = { marking: null, name: 'Ball', plain: '', note: view.balls.length ? 'again' : 'missing' };
+	const ball = { marking: null, name: 'Ball', plain: '', note: view.balls.length ? 'draw again' : 'not drawn' };
 	return view.balls.length ? [...markings, ball] : [ball, ...markings];
 }
 
@@ -58,7 +58,7 @@ export function ClassChooser({ picture }) {
 			<label class="hidden-text" for=${`draw-${letter}`}>What to draw in view ${letter}</label>
 			<input
 				id=${`draw-${letter}`} class="field chooser__field" ref=${field} value=${text} autocomplete="off" spellcheck=${false}
-				placeholder="Draw what?" role="combobox" aria-expanded="true" aria-controls=${`draw-list-${letter}`}
+				placeholder="Ball or marking" role="combobox" aria-expanded="true" aria-controls=${`draw-list-${letter}`}
 				aria-activedescendant=${found[active] ? `draw-${letter}-${active}` : undefined}
 				onInput=${withValue((typed) => { setText(typed); setAt(0); })}
 				onBlur=${(/** @type {FocusEvent} */ event) => {

@@ -33,7 +33,7 @@ function DatasetCard({ one, ask }) {
 				</div>
 				<nav class="dataset-card__links" aria-label=${`Pages of ${one.name}`}>
 					${DATASET_PAGES.map((page) => html`<a key=${page.name} href=${pageAddress(one.name, page.name)}>${page.label}</a>`)}
-					${isTeam && whyNot('lead', one.name) === '' ? html`<a href=${pageAddress(one.name, 'statistics')}>Who works here</a>` : null}
+					${isTeam && whyNot('lead', one.name) === '' ? html`<a href=${pageAddress(one.name, 'statistics')}>Members</a>` : null}
 				</nav>
 			</section>
 		</li>
@@ -44,7 +44,7 @@ function NoDatasets() {
 	if (isTeam && whyNot('lead')) {
 		return html`
 			<section class="card empty">
-				<h2>No dataset that you may see</h2>
+				<h2>No dataset that you can see</h2>
 				<p>A lead of a dataset, or an admin, gives you a role in it.</p>
 			</section>
 		`;

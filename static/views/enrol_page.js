@@ -13,7 +13,7 @@ export function EnrolPage() {
 	return html`
 		<main class="login">
 			<div class="factor__page">
-				<h1>Hello ${me.value?.name}: everybody needs a second factor here</h1>
+				<h1>Hello ${me.value?.name}: this server requires a second factor</h1>
 				<${SecondFactorCard} />
 				<${PasskeysCard} />
 				<p><button class="button" type="button" onClick=${logOut}>Log out</button></p>

@@ -31,7 +31,7 @@ function Choice({ legend, name, options }) {
 /** @param {DatasetJson} one */
 function groupChoices(one) {
 	return [
-		{ name: 'accepted', label: `Accepted groups · ${count(one.accepted)}`, note: 'what people let pass' },
+		{ name: 'accepted', label: `Accepted groups · ${count(one.accepted)}`, note: 'accepted by people' },
 		{ name: 'all', label: `All groups · ${count(one.groups)}`, note: 'with the verdict as a column where there is room' },
 	];
 }
@@ -103,7 +103,7 @@ export function ExportDialog({ one, version = null, onClose }) {
 							: html`<${Choice} legend="Groups" name="groups" options=${groupChoices(one)} />`}
 						<${Choice} legend="Ball boxes" name="boxes" options=${BOXES} />
 						<label class="form__check"><input type="checkbox" name="images" />Copy the frames into the zip</label>
-						<label class="form__check"><input type="checkbox" name="views" />COCO and YOLO: balls that no other view confirms, too</label>
+						<label class="form__check"><input type="checkbox" name="views" />COCO and YOLO: include balls that no other view confirms</label>
 					</div>
 				</div>
 				${state.job ? html`<${JobProgress} job=${state.job} />` : null}

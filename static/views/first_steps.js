@@ -15,7 +15,7 @@ export function FirstSteps({ dataset }) {
 	if (dataset !== SAMPLE || !offerFirstSteps.value) return null;
 	return html`
 		<section class="card first-steps" aria-label="First steps">
-			<p><strong>New here?</strong> Learn it on eight made-up groups: you decide, and are told at once whether it was right.</p>
+			<p><strong>New here?</strong> Learn it on eight made-up groups: you decide, and see at once whether it was right.</p>
 			<p class="buttons">
 				<button class="button button--primary" type="button" aria-disabled=${making.value !== null} onClick=${() => startPractice()}>Practice with eight groups (5 minutes)</button>
 				<button class="button" type="button" onClick=${() => openHelpAt('guide')}>Read the guide</button>

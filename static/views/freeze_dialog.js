@@ -25,12 +25,12 @@ function freeName(taken) {
 }
 
 const GROUPS = /** @type {{name: FreezeRequest['groups'], label: string, note: string}[]} */ ([
-	{ name: 'accepted', label: 'Accepted', note: 'by people; against a gate only with a reason' },
-	{ name: 'passing', label: 'Passing', note: 'whatever the policy passes and nobody refused' },
+	{ name: 'accepted', label: 'Accepted', note: 'by people; groups that fail a gate need a note' },
+	{ name: 'passing', label: 'Passing', note: 'all passing, not rejected' },
 ]);
 const SPLITS = /** @type {{kind: SplitRequest['kind'], label: string, note: string}[]} */ ([
 	{ kind: 'given', label: 'As given', note: 'the split of the source' },
-	{ kind: 'match', label: 'By match', note: 'drawn with a seed; no match is on both sides' },
+	{ kind: 'match', label: 'By match', note: 'random by seed; each match is on one side' },
 	{ kind: 'camera', label: 'By camera', note: 'some static cameras are for testing' },
 ]);
 
@@ -66,7 +66,7 @@ function Plan({ plan }) {
 	const left = Object.entries(plan.left_out);
 	return html`
 		<div class="bulk__outcome" role="status">
-			<p><strong>${count(plan.groups)}</strong> ${plan.groups === 1 ? 'group enters' : 'groups enter'}.</p>
+			<p><strong>${count(plan.groups)}</strong> ${plan.groups === 1 ? 'group is' : 'groups are'} included.</p>
 			${plan.unsolved ? html`<p data-grade="warn">${count(plan.unsolved)} ${plan.unsolved === 1 ? 'is' : 'are'} not solved yet.</p>` : null}
 			${left.length ? html`<ul>${left.map(([why, n]) => html`<li key=${why}>${count(n)} ${n === 1 ? 'stays' : 'stay'} out: ${words(why).replace(': ', ', ')}</li>`)}</ul>` : null}
 		</div>
@@ -92,7 +92,7 @@ function FreezeFields({ ask, change }) {
 		<div class="form__row">
 			<label for="freeze-licence">Licence</label>
 			<textarea class="field" id="freeze-licence" rows="3" value=${ask.licence} onInput=${withValue((licence) => change({ licence }))}></textarea>
-			<small>Left empty: the terms of the sources.</small>
+			<small>Empty: the licences of the sources.</small>
 		</div>
 	`;
 }
@@ -106,7 +106,7 @@ export function FreezeDialog({ one, taken, onClose, onFrozen }) {
 	const { job } = state;
 	const busy = job !== null && (job.state === 'running' || job.state === 'waiting');
 	const done = job?.state === 'done';
-	const why = busy ? 'Under way' : done ? '' : !name ? 'A version needs a name' : plan.error ? sentenceOf(plan.error) : plan.value?.groups === 0 ? 'No group would enter' : '';
+	const why = busy ? 'Under way' : done ? '' : !name ? 'A version needs a name' : plan.error ? sentenceOf(plan.error) : plan.value?.groups === 0 ? 'No group would be included' : '';
 	async function send() {
 		if (done) { onClose(); return; }
 		if (why) return;

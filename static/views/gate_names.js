@@ -10,7 +10,7 @@ export const GATE_TITLES = /** @type {Record<string, string>} */ ({
 	calibratable: 'Too few views have a camera',
 	jac: 'Field lines do not fit',
 	agreement: 'The paint does not agree with the cameras',
-	two_views: 'Fewer than two views are left',
+	two_views: 'Fewer than two views are usable',
 	ball: 'The ball is drawn in fewer than two views',
 	baseline: 'The cameras stand too close together',
 	reprojection: 'The views do not agree on one ball',
@@ -26,13 +26,13 @@ export function gateLabel(gate, policy) {
 		calibratable: 'Cameras found',
 		jac: `JaC ${policy.jac_gamma_percent} % > ${policy.min_jac}`,
 		agreement: threshold === null ? 'Agreement with the paint' : `Agreement with the paint ≥ ${threshold}`,
-		two_views: 'At least 2 views left',
+		two_views: 'At least 2 usable views',
 		ball: 'Ball in ≥ 2 views',
 		baseline: `Baseline ≥ ${policy.min_baseline_m} m`,
 		reprojection: `Reprojection ≤ ${policy.tau_percent} %`,
 		parallax: threshold === null ? 'Parallax' : `Parallax ≥ ${threshold}°`,
 		sigma: threshold === null ? 'σ' : `σ ≤ ${threshold} m`,
-		chi_square: threshold === null ? 'Residuals by chance' : `Residuals by chance ≥ ${sharePercent(threshold)}`,
+		chi_square: threshold === null ? 'Consistency' : `Consistency p ≥ ${threshold}`,
 	});
 	return labels[gate.name] ?? gate.name;
 }
@@ -43,6 +43,6 @@ export function gateMargin(gate) {
 	if (margin === null || !active) return '';
 	const size = sharePercent(margin);
 	// A gate may ask for more than its threshold.
-	if (size === '0.0 %') return passed ? 'exactly as much as is asked' : 'exactly at the threshold, which is not enough';
+	if (size === '0.0 %') return passed ? 'equals the threshold' : 'equals the threshold; must be above it';
 	return margin < 0 ? `misses by ${size}` : `margin ${size.startsWith('over') ? '' : '+'}${size}`;
 }

@@ -32,7 +32,7 @@ function follows(group, gate, before) {
 
 /** @param {GroupDocument} group @param {GateJson} gate @param {GateJson[]} before the gates above it */
 function stateOf(group, gate, before) {
-	if (!gate.active) return { state: 'off', glyph: '·', word: 'not asked' };
+	if (!gate.active) return { state: 'off', glyph: '·', word: 'not required' };
 	if (gate.value === null) return { state: 'off', glyph: '·', word: 'not judged' };
 	if (gate.passed) return { state: 'passed', glyph: '✓', word: 'passed' };
 	if (follows(group, gate, before)) return { state: 'follows', glyph: '↳', word: 'fails because of the gate above' };

@@ -17,9 +17,9 @@ import { Term } from './term.js';
 /** @import {GoldGroupJson, GoldResultJson, MiddleJson, PersonResultsJson} from '../api/takes.js' */
 
 /** What annotators of a gold group may begin with. */
-export const STARTS = [['imported', 'what its dataset brought'], ['without_balls', 'its lines, without balls'], ['bare', 'its pictures alone']];
+export const STARTS = [['imported', 'the imported annotations'], ['without_balls', 'lines without balls'], ['bare', 'pictures only']];
 /** Where the truth of a group is from. */
-const FROM = { verdict: 'what it held when it was marked', sample: 'with what it was drawn', version: 'what a version holds' };
+const FROM = { verdict: 'its annotations when it was marked', sample: 'the values it was generated from', version: 'a frozen version' };
 const WIDE = 160, HIGH = 28;
 
 /** A median with its interval; few numbers have none. @param {MiddleJson} one @param {number} digits */
@@ -66,7 +66,7 @@ function GoldRow({ one, change, drop }) {
 			</select></td>
 			<td>${FROM[one.source]}</td>
 			<td>${one.marked_by}</td>
-			<td><button class="button button--small" type="button" onClick=${drop}>No gold group</button></td>
+			<td><button class="button button--small" type="button" onClick=${drop}>Unmark</button></td>
 		</tr>`;
 }
 
@@ -82,16 +82,16 @@ export function GoldCard({ dataset }) {
 		<section class="card card--flush" aria-labelledby="gold-title">
 			<h2 id="gold-title"><${Term} word="gold-group">Gold groups<//></h2>
 			${error || refused ? html`<${FormError} error=${error ?? refused} />` : null}
-			<p class="gold__about">${value?.groups.length ? `${plural(value.groups.length, 'group')} whose truth is known.` : 'There is none yet.'} Judge a group, then <em>Gold group: its truth is known</em> in its palette (<kbd>Ctrl K</kbd>); or let <em>Give out…</em> take those of a sample or a version. Batches mix them in; nobody is told which they are.</p>
+			<p class="gold__about">${value?.groups.length ? `${plural(value.groups.length, 'group')} with known truth.` : 'None yet.'} Review a group, then choose <em>Mark as gold group</em> in its palette (<kbd>Ctrl K</kbd>); or let <em>Assign…</em> use groups of a sample or a version. Batches mix them in without marking them.</p>
 			${value?.people.length ? html`
 				<div class="table__scroll" tabindex="0" role="region" aria-label="People and gold groups"><table class="table">
-					<thead><tr><th>Person</th><th data-numeric="true">groups</th><th data-numeric="true">lines, px</th><th data-numeric="true">ball, px</th><th data-numeric="true">ball, m</th><th data-numeric="true">verdicts as true</th><th>over time</th></tr></thead>
+					<thead><tr><th>Person</th><th data-numeric="true">groups</th><th data-numeric="true">lines, px</th><th data-numeric="true">ball, px</th><th data-numeric="true">ball, m</th><th data-numeric="true">correct verdicts</th><th>over time</th></tr></thead>
 					<tbody>${value.people.map((one) => html`<${Person} key=${one.person} one=${one} />`)}</tbody>
 				</table></div>
 				<p class="gold__about">Medians of the distance from the truth, with an interval of 95 %; fewer than six groups have none.</p>` : null}
 			${value?.groups.length ? html`
 				<div class="table__scroll" tabindex="0" role="region" aria-label="Gold groups"><table class="table">
-					<thead><tr><th>Group</th><th>Annotators begin with</th><th>The truth is</th><th>Marked by</th><th><span class="hidden-text">Change</span></th></tr></thead>
+					<thead><tr><th>Group</th><th>Annotators begin with</th><th>Truth</th><th>Marked by</th><th><span class="hidden-text">Change</span></th></tr></thead>
 					<tbody>${value.groups.map((one) => html`<${GoldRow} key=${one.group} one=${one} change=${(/** @type {string} */ start) => told(patchGold(one.group, start))} drop=${() => told(deleteGold(one.group))} />`)}</tbody>
 				</table></div>` : null}
 		</section>

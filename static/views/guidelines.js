@@ -23,7 +23,7 @@ function Past({ found, group }) {
 	const judged = state !== 'unreviewed' && at ? versionAt(versions, at) : number;
 	if (versions.length < 2) return null;
 	return html`
-		${judged !== number ? html`<p class="guidelines__past" role="status">${judged === null ? 'There were no guidelines' : `Version ${judged} was in force`} when ${by ?? 'somebody'} judged this group.</p>` : null}
+		${judged !== number ? html`<p class="guidelines__past" role="status">${judged === null ? 'There were no guidelines' : `Version ${judged} was in force`} when ${by ?? 'a reviewer'} reviewed this group.</p>` : null}
 		<details open=${judged !== number}><summary>Versions, and what each changed</summary><${GuidelinesVersions} found=${found} may=${false} inForce=${judged} /></details>
 	`;
 }
@@ -34,7 +34,7 @@ function Body({ group }) {
 	const { value, error } = useResource((signal) => getGuidelines(dataset, signal), [dataset]);
 	if (error) return html`<p role="alert">${sentenceOf(error)}</p>`;
 	if (!value) return html`<p aria-busy="true">Loading…</p>`;
-	if (value.number === 0) return html`<p>Nobody has written guidelines for this dataset. Leads do that under <em>Statistics</em>.</p>`;
+	if (value.number === 0) return html`<p>This dataset has no guidelines yet. Leads write them under <em>Statistics</em>.</p>`;
 	return html`
 		<${GuidelinesText} dataset=${dataset} text=${value.text} />
 		<${Past} found=${value} group=${group} />

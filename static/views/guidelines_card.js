@@ -66,10 +66,10 @@ export function GuidelinesCard({ dataset }) {
 			${error ? html`<${Trouble} title="The guidelines cannot be shown" error=${error} retry=${reload} />` : null}
 			${found && editing ? html`<${Editor} one=${dataset} found=${found} close=${() => { setEditing(false); reload(); }} />` : null}
 			${found && !editing ? html`
-				<p>${found.number === 0 ? 'What annotators of this dataset should know: nobody has written it yet.' : html`${plural(found.versions.length, 'version')}, the last by ${found.versions[0].written_by}.`} In a group <kbd>Shift G</kbd> shows them.</p>
+				<p>${found.number === 0 ? 'No guidelines yet. They tell annotators how to annotate this dataset.' : html`${plural(found.versions.length, 'version')}, the last by ${found.versions[0].written_by}.`} In a group <kbd>Shift G</kbd> shows them.</p>
 				${found.number > 0 ? html`<details><summary>Read them</summary><${GuidelinesText} dataset=${dataset.id} text=${found.text} /></details>` : null}
 				${found.versions.length > 1 ? html`<details><summary>Versions, and what each changed</summary><${GuidelinesVersions} found=${found} may=${may} changed=${reload} /></details>` : null}
-				${may ? html`<p><button class="button" type="button" onClick=${() => setEditing(true)}>${found.number === 0 ? 'Write guidelines' : 'Change them'}</button></p>` : null}` : null}
+				${may ? html`<p><button class="button" type="button" onClick=${() => setEditing(true)}>${found.number === 0 ? 'Write guidelines' : 'Edit guidelines'}</button></p>` : null}` : null}
 		</section>
 	`;
 }

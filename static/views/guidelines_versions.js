@@ -70,13 +70,13 @@ export function GuidelinesVersions({ found, may, inForce = null, changed }) {
 				<thead><tr><th>version</th><th>written</th><th>by</th><th><span class="hidden-text">what to do</span></th></tr></thead>
 				<tbody>${versions.map(({ number, written, written_by: by }, i) => html`
 					<tr key=${number} data-shown=${shown?.number === number}>
-						<th scope="row">${number}${i === 0 ? html` <small>in force</small>` : null}${number === inForce && i > 0 ? html` <small>when it was judged</small>` : null}</th>
+						<th scope="row">${number}${i === 0 ? html` <small>in force</small>` : null}${number === inForce && i > 0 ? html` <small>when it was reviewed</small>` : null}</th>
 						<td><${When} at=${written} /></td><td>${by}</td>
 						<td class="guidelines__deeds">
 							<button class="button button--small" type="button" aria-pressed=${shown?.number === number && shown.against === null} onClick=${() => turn(number, null)}>Read<span class="hidden-text"> version ${number}</span></button>
 							${i < versions.length - 1 ? html`<button class="button button--small" type="button" aria-pressed=${shown?.number === number && shown.against === versions[i + 1].number} onClick=${() => turn(number, versions[i + 1].number)}>What it changed<span class="hidden-text"> in version ${number}</span></button>` : null}
 							${i > 0 ? html`<button class="button button--small" type="button" aria-pressed=${shown?.number === newest.number && shown.against === number} onClick=${() => turn(newest.number, number)}>Changed since<span class="hidden-text"> version ${number}</span></button>` : null}
-							${may && i > 0 ? html`<button class="button button--small" type="button" title=${`Its text becomes version ${newest.number + 1}; every version stays`} onClick=${() => attempt(takeBack(number))}>Take back<span class="hidden-text"> version ${number}</span></button>` : null}
+							${may && i > 0 ? html`<button class="button button--small" type="button" title=${`Its text becomes version ${newest.number + 1}; every version stays`} onClick=${() => attempt(takeBack(number))}>Restore<span class="hidden-text"> version ${number}</span></button>` : null}
 						</td>
 					</tr>`)}</tbody>
 			</table>

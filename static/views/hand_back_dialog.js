@@ -23,13 +23,13 @@ export function HandBackDialog() {
 	}
 	return html`
 		<${FormDialog}
-			title=${back ? `Hand back to ${asked.person}` : `Take over ${asked.person}’s annotation`} onClose=${close} onSubmit=${send}
-			buttons=${html`<button class="button button--primary" type="submit" autofocus=${!back} aria-disabled=${busy}>${back ? 'Hand back' : 'Take over'} <kbd>Enter</kbd></button>`}
+			title=${back ? `Return to ${asked.person}` : `Take over ${asked.person}’s annotation`} onClose=${close} onSubmit=${send}
+			buttons=${html`<button class="button button--primary" type="submit" autofocus=${!back} aria-disabled=${busy}>${back ? 'Return' : 'Take over'} <kbd>Enter</kbd></button>`}
 		>
 			<p>${asked.says}</p>
 			${back ? html`
 				<div class="form__row">
-					<label for="hand-back-reason">Why, in a sentence</label>
+					<label for="hand-back-reason">Reason</label>
 					<input class="field" id="hand-back-reason" name="reason" required maxlength=${MAX_REASON} autocomplete="off" placeholder="The far goal line is missing in view B." />
 				</div>` : null}
 			${error ? html`<${FormError} error=${error} />` : null}

@@ -22,10 +22,10 @@ export function IdentityCard({ ways, changed }) {
 		<section class="card" aria-labelledby="account-identity">
 			<h2 id="account-identity">${provider ?? 'Single sign-on'}</h2>
 			${identity ? html`
-				<p class="identity__come">You come in as <strong class="identity__shown">${identity.shown}</strong>, linked <${When} at=${identity.created} />${identity.used ? html`, used <${When} at=${identity.used} />` : null}.</p>
-				${provider ? null : html`<p class="note">This server knows no provider any more: it logs nobody in.</p>`}
+				<p class="identity__come">You log in as <strong class="identity__shown">${identity.shown}</strong>, linked <${When} at=${identity.created} />${identity.used ? html`, used <${When} at=${identity.used} />` : null}.</p>
+				${provider ? null : html`<p class="note">Single sign-on is no longer set up on this server.</p>`}
 				${password ? html`<${OneField} key="unlink" id="identity-unlink" ...${proof()} button="Unlink it" name="password" type="password" complete="current-password" error=${error} send=${(/** @type {string} */ said) => act(deleteIdentity(said || null))} />`
-					: html`<p class="note">It is your only way in. An admin can send you a link with which you choose a password.</p>`}` : null}
+					: html`<p class="note">It is your only way to log in. An admin can send you a link to choose a password.</p>`}` : null}
 			${!identity && provider ? html`
 				<${OneField} key="link" id="identity-link" ...${proof()} button=${`Link your account of ${provider}`} name="password" type="password" complete="current-password" error=${error} send=${(/** @type {string} */ said) => act(beginLink(said || null).then(({ address }) => location.assign(address)))}>
 					<p>Once it is linked you log in with ${provider}, without a password of this server.</p>

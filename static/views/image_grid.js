@@ -44,7 +44,7 @@ export function ReviewMain({ pictures, children }) {
 	const [ref, size] = useSize();
 	const screen = size.width > 0 && pictures.length > 0 ? screenOf(pictures, size) : null;
 	const side = screen?.side ?? 'below';
-	const strip = screen && { [side === 'below' ? '--strip-height' : '--strip-width']: `${screen.strip}px` };
+	const strip = { '--views': shownOf(pictures).length, ...(screen && { [side === 'below' ? '--strip-height' : '--strip-width']: `${screen.strip}px` }) };
 	return html`
 		<main ref=${ref} class="review__main" data-collapsed=${stripCollapsed.value} data-side=${side} style=${strip}>${children}</main>
 	`;

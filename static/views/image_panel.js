@@ -14,7 +14,7 @@ import { draft } from '../state/group.js';
 import { mend } from '../state/mends.js';
 import { panPanel, viewportOf, zoomPanel } from '../state/viewports.js';
 import {
-	boxes, drawing, editing, focused, focusView, gain, otherInstant, overlaysHidden, pointerPlace, projections,
+	boxes, drawing, editing, focused, focusView, gain, isSmall, otherInstant, overlaysHidden, pointerPlace, projections,
 	selected, toggleMaximised,
 } from '../state/workspace.js';
 import { attachPointer } from '../tools/pointer.js';
@@ -100,7 +100,7 @@ export function ImagePanel({ picture, area, sizes }) {
 			view: () => latestProps.current.view,
 			viewport: () => latestProps.current.viewport,
 			selected: () => selected.value,
-			enabled: () => !overlaysHidden.value && !latestProps.current.elsewhere,
+			enabled: () => !overlaysHidden.value && !latestProps.current.elsewhere && !isSmall(),
 			draws: () => {
 				const present = drawing.value;
 				return present?.view === latestProps.current.view.key && present.what !== 'ask' ? present.what : null;

@@ -38,7 +38,7 @@ function OptionField({ option, change }) {
 			<div class="form__row">
 				<label for=${id}>${option.label}</label>
 				<select class="field" id=${id} onChange=${withValue(change)}>
-					<option value="given">the given camera counts</option><option value="lines">the lines count</option>
+					<option value="given">the given camera</option><option value="lines">the lines</option>
 				</select>
 			</div>
 		`;
@@ -54,7 +54,7 @@ function OptionField({ option, change }) {
 
 /** Lines of static cameras are files of their own. @param {{source: ImportSource | null, change: (lines: ImportSource | undefined) => void}} props */
 function LinesField({ source, change }) {
-	const label = 'Line files of the cameras, where there are any';
+	const label = 'Line files of the cameras (optional)';
 	if (source && 'folder' in source) {
 		return html`
 			<div class="form__row">
@@ -155,7 +155,7 @@ export function ImportPage() {
 							<label for="import-dataset">Dataset</label>
 							<input class="field" id="import-dataset" list="known-datasets" maxlength="100" autocomplete="off" value=${dataset} onInput=${withValue(setDataset)} />
 							<datalist id="known-datasets">${(datasets.value ?? []).map((one) => html`<option key=${one.id} value=${one.name}></option>`)}</datalist>
-							<small>A new name makes a new dataset. An import into an existing one brings what its files have changed; what people edited stays.</small>
+							<small>A new name makes a new dataset. An import into an existing one updates what has changed in its files; edits of people stay.</small>
 						</div>
 						<${FormatChoice} format=${format} choose=${setFormat} />
 						<${SourceChoice} onSource=${setSource} guess=${(/** @type {string} */ guessed) => { if (IMPORT_FORMATS.some((one) => one.name === guessed)) setFormat(guessed); }} />
@@ -164,14 +164,14 @@ export function ImportPage() {
 							<${LinesField} source=${source} change=${(/** @type {ImportSource | undefined} */ lines) => setOptions({ ...options, lines })} />` : null}
 						<${PolicyField} kept=${kept} change=${setPolicy} />
 						<p class="buttons">
-							<button data-needs="lead" data-of="" class="button button--primary" type="submit" aria-disabled=${why !== ''} title=${why}>Try it out</button>
+							<button data-needs="lead" data-of="" class="button button--primary" type="submit" aria-disabled=${why !== ''} title=${why}>Dry run</button>
 							<button data-needs="lead" data-of="" class="button" type="button" aria-disabled=${why !== ''} title=${why} onClick=${() => start(false)}>Import</button>
 						</p>
 						${error ? html`<p class="form__error" role="alert">${error}</p>` : null}
 					</form>
 				</section>
 				${job ? html`<${Outcome} job=${job} dry=${dry} dataset=${imported} />` : html`
-					<section class="card empty"><h2>Nothing is changed before you say so</h2><p>Trying it out reads the files and reports what an import would do: what is new, what changed, and every record that cannot be read, with its file and place.</p></section>`}
+					<section class="card empty"><h2>Start with a dry run</h2><p>A dry run saves nothing. It reads the files and reports what an import would do: what is new, what changed, and every record that cannot be read, with its file and place.</p></section>`}
 			</div>
 		<//>
 	`;

@@ -86,7 +86,7 @@ function JobCard({ job }) {
 		<li>
 			<section class="card" aria-label=${`Job ${job.id}: ${job.title}`}>
 				<${JobProgress} job=${job} />
-				<p class="note">${job.kind}${job.dataset ? html` · <a class="link" href=${pageAddress(job.dataset, 'queue')}>${job.dataset}</a>` : null}${` · ${job.actor} · ${job.started ? 'begun' : 'asked for'} `}<${When} at=${job.started ?? job.created} />${job.ended ? html`${' · ended '}<${When} at=${job.ended} />` : null}</p>
+				<p class="note">${job.kind}${job.dataset ? html` · <a class="link" href=${pageAddress(job.dataset, 'queue')}>${job.dataset}</a>` : null}${` · ${job.actor} · ${job.started ? 'started' : 'requested'} `}<${When} at=${job.started ?? job.created} />${job.ended ? html`${' · ended '}<${When} at=${job.ended} />` : null}</p>
 				${partOf(job)}
 				${job.problem?.hint ? html`<p>${job.problem.hint}</p>` : null}
 			</section>
@@ -112,7 +112,7 @@ export function JobsPage() {
 		<${PageFrame} current="jobs" title="Jobs" where=${html`<strong>Jobs</strong>`}>
 			${error ? html`<${Trouble} title="The jobs cannot be shown" error=${error} retry=${retry} />` : null}
 			${!jobs && !error ? html`<${Loading} what="jobs" />` : null}
-			${jobs?.length === 0 ? html`<section class="card empty"><h2>Nothing has been done yet</h2><p>Imports, solving, freezing, exports and evaluations show up here.</p><p><a class="button" href="/import">Import a dataset</a></p></section>` : null}
+			${jobs?.length === 0 ? html`<section class="card empty"><h2>No jobs yet</h2><p>Imports, solving, freezing, exports and evaluations show up here.</p><p><a class="button" href="/import">Import a dataset</a></p></section>` : null}
 			${open.length ? html`<${JobList} title="Under way" jobs=${open} />` : null}
 			${over.length ? html`<${JobList} title="Finished" jobs=${over} />` : null}
 			${next ? html`<p><button class="button" type="button" onClick=${more}>Older jobs</button></p>` : null}

@@ -29,7 +29,7 @@ function Ways({ meant, token }) {
 	const said = meant.name === null ? { name } : {};
 	return html`
 		${meant.name === null ? html`<div class="form"><div class="form__row"><label for="join-name">Name</label><input class="field" id="join-name" name="name" required maxlength="40" autocomplete="username" autocapitalize="none" spellcheck=${false} value=${name} onInput=${withValue(setName)} /><small>Small letters and digits; history and verdicts will name you so.</small></div></div>` : null}
-		${provider ? html`<${SignOnButton} primary=${!password} begin=${() => beginSignOn({ link: token, ...said })}>Come in with ${provider}<//>` : null}
+		${provider ? html`<${SignOnButton} primary=${!password} begin=${() => beginSignOn({ link: token, ...said })}>Continue with ${provider}<//>` : null}
 		${provider && password ? html`<p class="login__or">or choose a password of this server</p>` : null}
 		${password ? html`<${JoinForm} meant=${meant} token=${token} said=${said} />` : null}
 	`;

@@ -14,34 +14,34 @@ import { batch, canHandIn, handInAndNext, isMoving, lease, nextOfBatch, others, 
 export function Presence() {
 	const now = useNow(20_000);
 	if (others.value.length === 0 || lease.value?.state !== 'mine') return null;
-	return html`<span class="pill" role="status">${others.value.map(({ person, since }) => `${person} is here, came ${ago(Date.parse(since), now)}`).join(', ')}</span>`;
+	return html`<span class="pill" role="status">${others.value.map(({ person, since }) => `${person} opened this ${ago(Date.parse(since), now)}`).join(', ')}</span>`;
 }
 
 /** Who handed something back, when and why. @param {{back: import('../api/takes.js').HandedBackJson}} props */
 export function HandedBack({ back }) {
 	const now = useNow(20_000);
-	return html`<strong>${back.by}</strong> handed this back ${ago(Date.parse(back.at), now)}${back.reason ? html`: “${back.reason}”` : '.'}`;
+	return html`<strong>${back.by}</strong> returned this ${ago(Date.parse(back.at), now)}${back.reason ? html`: “${back.reason}”` : '.'}`;
 }
 
 /** The button of who annotates: done, and on; of who reviews: back to them. */
 export function HandIn() {
 	if (canHandBack.value && !isCopy(groupDocument.value)) {
-		return html`<button class="button" type="button" title="Give this group back to who handed it in, and say why (Shift U)" onClick=${askHandBack}>Hand back to ${lease.value?.handedInBy}… <kbd>⇧U</kbd></button>`;
+		return html`<button class="button" type="button" title="Return this group to its annotator, with a reason (Shift U)" onClick=${askHandBack}>Return to ${lease.value?.handedInBy}… <kbd>⇧U</kbd></button>`;
 	}
 	if (!canHandIn.value) return null;
-	return html`<button class="button button--primary" type="button" aria-disabled=${isMoving.value} title="Hand this group in, so that a reviewer gets it (Shift F)" onClick=${handInAndNext}>Done and next <kbd>⇧F</kbd></button>`;
+	return html`<button class="button button--primary" type="button" aria-disabled=${isMoving.value} title="Submit this group for review (Shift F)" onClick=${handInAndNext}>Submit and next <kbd>⇧F</kbd></button>`;
 }
 
 /** Below the header: this group is somebody else's. It blocks nothing. */
 export function LeaseBar() {
 	const now = useNow(20_000);
 	const held = lease.value;
-	if (held?.state === 'mine' && held.back) return html`<div class="bar" data-tone="info" role="status"><p><${HandedBack} back=${held.back} /> Hand it in again when it is mended.</p></div>`;
+	if (held?.state === 'mine' && held.back) return html`<div class="bar" data-tone="info" role="status"><p><${HandedBack} back=${held.back} /> Submit it again when it is fixed.</p></div>`;
 	if (!held || held.state === 'mine') return null;
 	const [other] = others.value;
 	const since = other ? `${ago(Date.parse(other.since), now)}` : '';
-	const text = held.state === 'lost' ? `${other ? `${other.person} has taken this group over, ${since}` : held.sentence}. Nothing of yours is lost: what you changed is saved, and what you change now is checked against theirs.`
-		: held.state === 'others' ? `${other ? `${other.person} is here, came ${since}` : held.sentence}. You can look; take it over to work on it.`
+	const text = held.state === 'lost' ? `${other ? `${other.person} has taken this group over, ${since}` : held.sentence}. Your changes are saved; new changes are checked against theirs.`
+		: held.state === 'others' ? `${other ? `${other.person} opened this ${since}` : held.sentence}. You can view it; take it over to edit it.`
 			: `${held.sentence}.`;
 	return html`
 		<div class="bar" data-tone="info" role="status" data-lease=${held.state}>

@@ -16,7 +16,7 @@ import { openHelpAt } from '../state/workspace.js';
 
 /** Glyphs beside the colours. */
 export const MARKS = { open: '○', mended: '○', right: '✓', almost: '≈', wrong: '✗' };
-export const WORDS = { open: 'not judged yet', mended: 'mended', right: 'right', almost: 'nearly right', wrong: 'look again' };
+export const WORDS = { open: 'not answered yet', mended: 'fixed', right: 'right', almost: 'nearly right', wrong: 'look again' };
 
 /** @param {{lesson: LessonJson, of?: string}} props */
 function Feedback({ lesson, of = '' }) {
@@ -78,7 +78,7 @@ export function LessonCard({ group }) {
 				${hinted === group.id ? html`<p class="lesson__hint" role="status"><strong>Hint:</strong> ${lesson.hint}</p>`
 					: html`<button class="link-button" type="button" onClick=${() => setHinted(group.id)}>Show a hint <kbd>Shift H</kbd></button>`}`}
 			${judged.length === lessons.length ? html`
-				<p class="lesson__end"><strong>All ${lessons.length} are judged: ${right} right.</strong>${' '}<button class="link-button" type="button" onClick=${() => openHelpAt('practice')}>See the results</button></p>` : null}
+				<p class="lesson__end"><strong>All ${lessons.length} are answered: ${right} right.</strong>${' '}<button class="link-button" type="button" onClick=${() => openHelpAt('practice')}>See the results</button></p>` : null}
 		</section>
 	`;
 }

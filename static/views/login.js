@@ -108,7 +108,7 @@ export function LoginPage() {
 				<p class="login__brand">Touchline</p>
 				<h1 id="login-title">Log in</h1>
 				<${LoginForm} />
-				<p class="note">${ways.value.password ? 'No account, or no password?' : 'No account here?'} Whoever runs this server can send you a link.</p>
+				<p class="note">${ways.value.password ? 'No account, or no password?' : 'No account here?'} An admin of this server can send you a link.</p>
 			</section>
 		</main>
 	`;
@@ -125,7 +125,7 @@ export function LoginAgain() {
 	return html`
 		<dialog class="dialog" ref=${dialog} aria-labelledby="login-again" onCancel=${(/** @type {Event} */ event) => event.preventDefault()}>
 			<header class="dialog__header"><h2 id="login-again">Your session has ended</h2></header>
-			<p>Log in to go on where you are. ${waiting ? `${plural(waiting, 'change')} of yours ${waiting === 1 ? 'waits' : 'wait'} and will be saved then.` : 'Nothing is lost.'}</p>
+			<p>Log in to continue here. ${waiting ? `${plural(waiting, 'change')} of yours ${waiting === 1 ? 'waits' : 'wait'} and will be saved then.` : 'Nothing is lost.'}</p>
 			<${LoginForm} name=${me.value?.name ?? ''} />
 		</dialog>
 	`;

@@ -20,7 +20,7 @@ const ROLES_HERE = /** @type {const} */ (['none', 'viewer', 'annotator', 'review
 function MemberRow({ one, give }) {
 	const mine = one.name === myName.value;
 	const admin = one.everywhere === 'admin';
-	const why = mine ? 'Nobody changes their own rights' : admin ? 'An admin may do everything in every dataset' : undefined;
+	const why = mine ? 'You cannot change your own role' : admin ? 'An admin may do everything in every dataset' : undefined;
 	return html`
 		<tr>
 			<th scope="row">${one.name}${mine ? ' (you)' : ''}</th>
@@ -44,7 +44,7 @@ export function MembersCard({ dataset }) {
 	if (!may) return null;
 	return html`
 		<section class="card card--flush" aria-labelledby="members-title">
-			<h2 id="members-title">Who works in ${dataset}</h2>
+			<h2 id="members-title">Members of ${dataset}</h2>
 			${people.error ? html`<${FormError} error=${people.error} />` : null}
 			${error ? html`<${FormError} error=${error} />` : null}
 			<div class="table__scroll"><table class="table">

@@ -32,7 +32,7 @@ export function MendBox({ group, solution }) {
 			<p class="mend__row">
 				${offered ? html`<button data-needs="annotate" class="button button--fix" type="button" onClick=${mendNow}>${offered.label} <kbd>Enter</kbd></button>` : null}
 				${offered && count > 1 ? html`
-					<button class="mend__more" type="button" title="Show another way to mend it (Shift+Enter)" onClick=${() => turnMend(1)}>
+					<button class="mend__more" type="button" title="Show another fix (Shift+Enter)" onClick=${() => turnMend(1)}>
 						${mendIndex.value + 1} of ${count}${isSearching.value ? ' or more' : ''} <kbd>Shift Enter</kbd>
 					</button>` : null}
 			</p>
@@ -40,8 +40,8 @@ export function MendBox({ group, solution }) {
 				<p class="mend__hint">To compare players and clock: <kbd>H</kbd> hides what is drawn on the pictures, <kbd>1</kbd> <kbd>1</kbd> and <kbd>2</kbd> show one alone, <kbd>0</kbd> all.</p>` : null}
 			${reason ? html`
 				<p class="mend__reject">
-					${offered ? 'If that is not it: ' : 'Nothing here mends it: '}
-					<button data-needs="review" class="mend__more" type="button" onClick=${askReason}>reject, ${reason.label.toLowerCase()} <kbd>X</kbd> <kbd>Enter</kbd></button>
+					${offered ? 'Not the cause? ' : 'Cannot be fixed here. '}
+					<button data-needs="review" class="mend__more" type="button" onClick=${askReason}>Reject: ${reason.label.toLowerCase()} <kbd>X</kbd> <kbd>Enter</kbd></button>
 				</p>` : null}
 		</div>
 	`;

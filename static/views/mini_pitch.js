@@ -151,7 +151,7 @@ function Drawing({ group, solution }) {
 /** @param {{solution: SolutionJson}} props */
 function Numbers({ solution }) {
 	const { ball } = solution;
-	if (!ball) return html`<p class="mini-pitch__none">No valid pair: no 3D ball.</p>`;
+	if (!ball) return html`<p class="mini-pitch__none">No 3D ball: no pair is valid.</p>`;
 	const [x, y] = ball.point;
 	return html`
 		<dl class="mini-pitch__numbers">
@@ -171,10 +171,10 @@ function Estimator({ solution }) {
 	const exported = ballName(saved, 'exported');
 	const { name, state } = ballTold(solution, estimator.value, saved, isPreview.value);
 	return html`
-		<span class="card__aside"><button
+		<span class="card__aside">3D point: <button
 			class="link-button" type="button" aria-pressed=${other} onClick=${cycleEstimator}
-			title=${`The ${exported} is exported, as the policy says. The mean of the valid pairs is the paper’s; the most likely point fits all views at once (T)`}
-		>${name}</button>, <span class="mini-pitch__state">${state}</span></span>
+			title=${`The ${exported} is exported, as the policy says. The pair average is the mean of the points of all valid pairs, as in the paper; the most likely point fits all views at once (T)`}
+		>${name}</button> <span class="mini-pitch__state">(${state})</span></span>
 	`;
 }
 

@@ -35,12 +35,12 @@ function unlike(factors) {
 	const own = factors.filter(({ camera, person, ratio }) => ratio !== 1 && (camera === null || person === null));
 	const names = own.map(({ camera, person, ratio }) => `${camera === null ? person : `camera ${camera}`} (${ratio.toFixed(2)} times)`);
 	if (names.length) return names.join(', ');
-	return factors.some(({ ratio }) => ratio !== 1) ? 'some cameras and people together' : '';
+	return factors.some(({ ratio }) => ratio !== 1) ? 'some combinations of camera and person' : '';
 }
 
 /** @param {number | null} value @returns {string} what the policy says */
 function shownPresent(value) {
-	return value === null ? 'each image by itself' : value.toFixed(2);
+	return value === null ? 'estimated per image' : value.toFixed(2);
 }
 
 /** @param {{item: AdviceJson}} props */
@@ -71,8 +71,8 @@ function Own({ noise }) {
 	if (!stations.length && !people.length && !used.length) return null;
 	const [now, shown] = [unlike(used), unlike(factors)];
 	return html`
-		<p class="note">${now ? `Sigma uses the own noise of ${now}.` : 'Sigma takes all balls to be as noisy as the dataset’s.'}
-			${noise.is_new ? (shown ? ` The estimates show ${shown} unlike the dataset.` : ' The estimates show no difference any more.') : ''}</p>`;
+		<p class="note">${now ? `Sigma uses separate noise for ${now}.` : 'Sigma uses the same noise for all balls.'}
+			${noise.is_new ? (shown ? ` The estimates differ from the dataset for ${shown}.` : ' The estimates show no differences.') : ''}</p>`;
 }
 
 /** @param {{lines: NonNullable<NoiseJson['lines']>}} props */
@@ -95,7 +95,7 @@ export function NoiseCard({ dataset, version = '', children }) {
 	const noise = found.value;
 	return html`
 		<section class="card card--flush" aria-labelledby="noise-title">
-			<h2 id="noise-title">Noise of the clicks${noise ? html` <span class="card__aside">from ${count(noise.groups)} of ${count(noise.solved)} solved groups</span>` : null}</h2>
+			<h2 id="noise-title">Annotation noise${noise ? html` <span class="card__aside">from ${count(noise.groups)} of ${count(noise.solved)} solved groups</span>` : null}</h2>
 			${found.error ? html`<${Trouble} title="The noise cannot be shown" error=${found.error} retry=${found.reload} />` : null}
 			${noise ? html`
 				<table class="table noise">

@@ -24,7 +24,7 @@ function wordsFor(picture, object) {
 	}
 	if (object.kind === 'prediction') {
 		const mark = picture.predictions?.marks.find(({ id }) => id === object.prediction);
-		return { name: `Predicted by ${mark?.name}`, point: mark?.sure ? '' : 'less sure', number: mark ? scoreText(mark) : '', title: 'Y accepts it' };
+		return { name: `Predicted by ${mark?.name}`, point: mark?.sure ? '' : 'below threshold', number: mark ? scoreText(mark) : '', title: 'Y accepts it' };
 	}
 	const found = picture.markings.find(({ marking }) => marking === object.marking);
 	const distance = found?.points[object.index]?.distance ?? null;

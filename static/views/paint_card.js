@@ -34,7 +34,7 @@ function Numbers({ items }) {
 		['views with lines', sum(({ views }) => views)], ['read', sum(({ read }) => read)], ['on their paint', sum(({ painted }) => painted)],
 		['too little paint', sum((one) => one.no_paint)], ['paint elsewhere', sum((one) => one.paint_disagrees)],
 		['to be read again', items.some(({ old }) => old === null) ? null : sum(({ old }) => old ?? 0)],
-		['picture lost', sum((one) => one.no_frame)], ['without picture', sum((one) => one.without_picture)],
+		['picture missing', sum((one) => one.no_frame)], ['without picture', sum((one) => one.without_picture)],
 	];
 	return html`<dl class="number-list paint-card__numbers">${numbers.map(([name, n]) => html`<div key=${name}><dt>${name}</dt><dd>${n === null ? '?' : count(Number(n))}</dd></div>`)}</dl>`;
 }
@@ -84,7 +84,7 @@ export function PaintCard({ dataset }) {
 						busy=${busy} act=${() => send(() => readDatasetPaint(dataset.id, null))} kind=${left ? 'button--primary' : ''}
 						title=${left ? `${count(left)} pictures to read; those that fit are only compared` : 'Every picture is compared with what was read of it'}
 					>${isRead ? 'Read again' : 'Read the pictures'}<//>
-					${isRead ? html`<${JobButton} busy=${busy} act=${() => send(() => takeDatasetPaintBack(dataset.id))} title="All groups get what they had before">Take the last reading back<//>` : null}
+					${isRead ? html`<${JobButton} busy=${busy} act=${() => send(() => takeDatasetPaintBack(dataset.id))} title="Restores the previous cameras of all groups">Undo the last reading<//>` : null}
 				</p>` : html`
 				<p class="paint-card__actions">The policy finds cameras from the lines alone; the paint of ${plural(pictures, 'picture')} could place them more exactly. <a class="link" href=${pageAddress(dataset.name, 'policy')}>Choose the policy <em>touchline</em></a>, then read the pictures here.</p>`}
 			${job ? html`<div class="paint-card__actions"><${JobProgress} job=${job} /></div>` : null}

@@ -137,7 +137,7 @@ export function Palette() {
 				})}
 			/>
 			<${Choices} items=${items} active=${items[at]?.id ?? ''} choose=${choose} />
-			${items.length === 0 ? html`<p class="empty-note" role="status">Nothing is called that.</p>` : null}
+			${items.length === 0 ? html`<p class="empty-note" role="status">No result.</p>` : null}
 		</dialog>
 	`;
 }

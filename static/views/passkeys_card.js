@@ -27,7 +27,7 @@ function usePasskeys(changed) {
 	useEffect(() => { read(); }, []);
 	return {
 		items, codes, leaving, error, busy, setLeaving,
-		unavailable: unavailable ?? (passkeysWork() ? null : 'This browser knows no passkeys.'),
+		unavailable: unavailable ?? (passkeysWork() ? null : 'This browser does not support passkeys.'),
 		/** @param {string} name @param {string} password */
 		make: (name, password) => act(makePasskey(name, password || null), (done) => { setCodes(done.codes); read(); changed(); if (!done.codes.length) askWhoIsThere(); }),
 		/** @param {PasskeyJson} one @param {string} password */
@@ -46,7 +46,7 @@ function Table({ items, leave }) {
 					<th scope="row">${one.name}</th>
 					<td><${When} at=${one.created} /></td>
 					<td>${one.used ? html`<${When} at=${one.used} />` : 'never'}</td>
-					<td><span class="table__actions"><button class="button button--small" type="button" aria-label=${`Take away ${one.name}`} onClick=${() => leave(one)}>Take away</button></span></td>
+					<td><span class="table__actions"><button class="button button--small" type="button" aria-label=${`Remove ${one.name}`} onClick=${() => leave(one)}>Remove</button></span></td>
 				</tr>`)}
 			</tbody>
 		</table>
@@ -74,13 +74,13 @@ export function PasskeysCard({ changed = () => {} }) {
 	return html`
 		<section class="card card--flush" aria-labelledby="account-passkeys">
 			<h2 id="account-passkeys">Passkeys</h2>
-			<p class="note passkeys__note">A passkey stays in a device of yours: your finger, face or PIN there takes the place of password and code.</p>
+			<p class="note passkeys__note">A passkey stays in a device of yours: your finger, face or PIN there replaces password and code.</p>
 			${items.length ? html`<${Table} items=${items} leave=${setLeaving} />` : null}
 			<div class="passkeys__form">
 				${codes.length ? html`<${Codes} codes=${codes} close=${close} />` : null}
 				${leaving ? html`
-					<${OneField} key=${leaving.id} id="passkey-remove" ...${proof()} button=${`Take away ${leaving.name}`} name="password" type="password" complete="current-password" error=${error} send=${(/** @type {string} */ password) => remove(leaving, password)}
-						beside=${html`<button class="button" type="button" onClick=${() => setLeaving(null)}>Keep it</button>`}
+					<${OneField} key=${leaving.id} id="passkey-remove" ...${proof()} button=${`Remove ${leaving.name}`} name="password" type="password" complete="current-password" error=${error} send=${(/** @type {string} */ password) => remove(leaving, password)}
+						beside=${html`<button class="button" type="button" onClick=${() => setLeaving(null)}>Cancel</button>`}
 					>
 						<p>${leaving.name} will no longer log you in. Delete it in the device, too.</p>
 					<//>` : null}

@@ -25,10 +25,10 @@ import { When } from './when.js';
 /** @import {TokenJson} from '../api/tokens.js' */
 
 const ROLES = /** @type {{name: Role, note: string}[]} */ ([
-	{ name: 'none', note: 'sees no dataset but those where they have a role' },
-	{ name: 'viewer', note: 'looks at everything' },
+	{ name: 'none', note: 'sees only datasets in which they have a role' },
+	{ name: 'viewer', note: 'views groups and numbers' },
 	{ name: 'annotator', note: 'changes lines, balls and cameras' },
-	{ name: 'reviewer', note: 'judges groups, makes exports' },
+	{ name: 'reviewer', note: 'reviews groups, makes exports' },
 	{ name: 'lead', note: 'thresholds, versions, imports, evaluations' },
 	{ name: 'admin', note: 'people, deleting datasets' },
 ]);
@@ -69,7 +69,7 @@ function FactorRule({ act }) {
 	return html`
 		<p class="people__rule"><label class="form__check">
 			<input type="checkbox" checked=${asked ?? on} onChange=${withTick(ask)} />
-			<span>Everybody needs a second factor: who has none makes one before anything else</span>
+			<span>Require a second factor: people without one set it up at their next login</span>
 		</label></p>
 	`;
 }
@@ -98,8 +98,8 @@ function InviteCard({ invite, error }) {
 			<h2 id="people-invite">Invite somebody</h2>
 			<form class="form" onSubmit=${send}>
 				<div class="form__columns">
-					<div class="form__row"><label for="people-name">Name</label><input class="field" id="people-name" name="name" required maxlength="40" autocomplete="off" autocapitalize="none" spellcheck=${false} /><small>Small letters and digits; it stays in the history for good.</small></div>
-					<div class="form__row"><label for="people-role">Role</label><select class="field" id="people-role" name="role">${ROLES.map(({ name, note }) => html`<option key=${name} value=${name} selected=${name === 'reviewer'}>${name}: ${note}</option>`)}</select><small>Each may what those above it may.</small></div>
+					<div class="form__row"><label for="people-name">Name</label><input class="field" id="people-name" name="name" required maxlength="40" autocomplete="off" autocapitalize="none" spellcheck=${false} /><small>Small letters and digits; the history keeps it permanently.</small></div>
+					<div class="form__row"><label for="people-role">Role</label><select class="field" id="people-role" name="role">${ROLES.map(({ name, note }) => html`<option key=${name} value=${name} selected=${name === 'reviewer'}>${name}: ${note}</option>`)}</select><small>Each role includes the rights of those above it.</small></div>
 				</div>
 				<${FormError} error=${error} />
 				<p><button class="button button--primary" type="submit">Make a link</button></p>
@@ -111,7 +111,7 @@ function InviteCard({ invite, error }) {
 /** @param {{one: UserJson, change: (change: {role?: Role, disabled?: boolean}) => void, link: () => void, tokens: () => void, factor: () => void, unlink: () => void}} props */
 function PersonRow({ one, change, link, tokens, factor, unlink }) {
 	const mine = one.name === myName.value;
-	const why = mine ? 'Nobody changes their own rights' : undefined;
+	const why = mine ? 'You cannot change your own role' : undefined;
 	return html`
 		<tr>
 			<th scope="row">${one.name}${mine ? ' (you)' : ''}<small>invited by ${one.created_by}</small>${one.datasets.length ? html`<small>${one.datasets.map(({ dataset, role }) => `${role} in ${dataset}`).join(', ')}</small>` : null}</th>
@@ -125,7 +125,7 @@ function PersonRow({ one, change, link, tokens, factor, unlink }) {
 			<td><span class="table__actions">
 				${one.tokens ? html`<button class="button button--small" type="button" aria-label=${`Tokens of ${one.name}`} onClick=${tokens}>${plural(one.tokens, 'token')}</button>` : null}
 				${one.second_factor && !mine ? html`<button class="button button--small" type="button" aria-label=${`Second factor off for ${one.name}`} title="For somebody who has lost it" onClick=${factor}>Second factor off</button>` : null}
-				${one.sign_on && !mine ? html`<button class="button button--small" type="button" aria-label=${`Unlink ${one.name}`} title="Their account of the provider then no longer logs them in" onClick=${unlink}>Unlink</button>` : null}
+				${one.sign_on && !mine ? html`<button class="button button--small" type="button" aria-label=${`Unlink ${one.name}`} title="They can then no longer log in with their account of the provider" onClick=${unlink}>Unlink</button>` : null}
 				${one.disabled || mine ? null : html`<button class="button button--small" type="button" aria-label=${`New link for ${one.name}`} onClick=${link}>New link</button>`}
 				<button class="button button--small ${one.disabled ? '' : 'button--danger'}" type="button" disabled=${mine} title=${why} aria-label=${`${one.disabled ? 'Enable' : 'Disable'} ${one.name}`} onClick=${() => change({ disabled: !one.disabled })}>${one.disabled ? 'Enable' : 'Disable'}</button>
 			</span></td>
@@ -162,7 +162,7 @@ function InOneDataset() {
 				<select class="field" id="people-dataset" value=${chosen} onChange=${withValue(setName)}>
 					${all.map((one) => html`<option key=${one.id} value=${one.name}>${one.name}</option>`)}
 				</select>
-				<small>A role here takes the place of the one in all datasets. Leads of a dataset give roles in it, too.</small>
+				<small>A role here replaces the one in all datasets. Leads of a dataset can also assign roles in it.</small>
 			</div></div>
 		</section>
 		<${MembersCard} key=${chosen} dataset=${chosen} />
@@ -173,15 +173,15 @@ function InOneDataset() {
 function LocalWork({ people, adoptedBy, give }) {
 	return html`
 		<section class="card" aria-labelledby="people-local">
-			<h2 id="people-local">Work from before there were accounts</h2>
-			${adoptedBy ? html`<p>It is shown as ${adoptedBy}'s. The log keeps the name local.</p>` : html`
+			<h2 id="people-local">Work from before accounts</h2>
+			${adoptedBy ? html`<p>It is assigned to ${adoptedBy}. The log keeps the name local.</p>` : html`
 				<form class="form" onSubmit=${withForm((said) => give(Number(said.get('person'))))}>
 					<div class="form__row">
-						<label for="people-adopter">Show what local did until now as the work of</label>
+						<label for="people-adopter">Assign the earlier work of “local” to</label>
 						<select class="field" id="people-adopter" name="person">${people.map((one) => html`<option key=${one.id} value=${one.id}>${one.name}</option>`)}</select>
 						<small>This can be done once. The log keeps the name local.</small>
 					</div>
-					<p><button class="button" type="submit">Show it as theirs</button></p>
+					<p><button class="button" type="submit">Assign earlier work</button></p>
 				</form>`}
 		</section>
 	`;

@@ -26,7 +26,7 @@ function pictureWords(picture) {
 	const said = [];
 	if (Math.abs(wide) >= LEAST_PERCENT) said.push(`pixels ${fixed(Math.abs(wide), 1)} % ${wide > 0 ? 'wide' : 'narrow'}`);
 	if (Math.max(Math.abs(right), Math.abs(down)) >= LEAST_SHIFT) said.push(`axis ${fixed(right, 3)} right, ${fixed(down, 3)} down`);
-	return said.join(', ') || 'changed, its lines say how';
+	return said.join(', ') || 'changed, estimated from its lines';
 }
 
 /** @param {{one: MatchPictureJson, shown: PictureEstimateJson | undefined, busy: boolean, onSet: (picture: PictureJson | null) => void}} props */
@@ -38,7 +38,7 @@ function MatchPicture({ one, shown, busy, onSet }) {
 		<tr>
 			<${MatchHead} name=${name} aside=${aside} />
 			<td>${one.mixed ? 'several kinds' : pictureWords(one.picture)}</td>
-			<td>${shown ? shown.sentence : '–'}${shown?.estimate && !proposed ? html`<small>nothing that is certain</small>` : null}</td>
+			<td>${shown ? shown.sentence : '–'}${shown?.estimate && !proposed ? html`<small>not certain enough</small>` : null}</td>
 			<td><span class="table__actions">
 				${isNew ? html`
 					<${MatchButton}
@@ -65,7 +65,7 @@ export function Pictures({ dataset }) {
 		<span class="card__aside"><${JobButton} busy=${busy} act=${() => ask(() => estimateMatchPictures(dataset))} kind="button--small" title="Look at up to thirty frames of each match together">Estimate<//></span>`;
 	return html`
 		<${MatchCard}
-			id="pictures" title=${title} columns=${['in use', 'lines show']} card=${card} refused=${refused}
+			id="pictures" title=${title} columns=${['in use', 'estimated from lines']} card=${card} refused=${refused}
 			job=${job?.kind === 'pictures' && job.state === 'done' ? null : job}
 			rows=${value.items.map((one) => html`
 				<${MatchPicture}

@@ -49,7 +49,7 @@ export function Pitches({ dataset }) {
 	return html`
 		<${MatchCard}
 			id="pitches" title=${html`Pitch sizes${proposals ? html` · ${count(proposals)} proposed` : null}`}
-			columns=${['in use', 'lines show']} card=${card} job=${job} refused=${refused}
+			columns=${['in use', 'estimated from lines']} card=${card} job=${job} refused=${refused}
 			rows=${value.items.map((one) => html`
 				<${MatchPitch} key=${one.match} one=${one} busy=${busy} onSet=${(/** @type {PitchSizeJson} */ size) => send(() => setPitch(dataset, one.match, size, value.etag))} />`)}
 		/>

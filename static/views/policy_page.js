@@ -98,7 +98,7 @@ function NoiseOf({ one, policy, busy, send }) {
 				${changesOf(noise) ? html`<p class="note">The button sets ${changesOf(noise)}.</p>` : null}
 				<p class="buttons">
 					${isNews(noise) ? html`<${JobButton} busy=${busy} act=${() => act(() => acceptNoise(one.id))}>Use the estimates and solve<//>` : null}
-					${noise.used?.length ? html`<${JobButton} busy=${busy} act=${() => act(() => takeNoiseBack(one.id))}>Take all balls to be alike<//>` : null}
+					${noise.used?.length ? html`<${JobButton} busy=${busy} act=${() => act(() => takeNoiseBack(one.id))}>Use one noise for all balls<//>` : null}
 				</p>`)}
 		<//>
 	`;
@@ -136,7 +136,7 @@ function ValueTable({ policy, fields }) {
 			<table class="table">
 				<tbody>${fields.map(({ name, label, unit }) => {
 					const value = policy.values[name];
-					return html`<tr key=${name}><th scope="row">${label}</th><td data-numeric="true">${value === null || value === undefined ? 'not asked' : `${valueText(value)} ${unit === 'share' ? '' : unit ?? ''}`}</td></tr>`;
+					return html`<tr key=${name}><th scope="row">${label}</th><td data-numeric="true">${value === null || value === undefined ? 'not set' : `${valueText(value)} ${unit === 'share' ? '' : unit ?? ''}`}</td></tr>`;
 				})}
 				</tbody>
 			</table>

@@ -26,7 +26,7 @@ function MatchPosition({ one, used, busy, onShare, onBack }) {
 				${used && one.current !== true ? html`
 					<${MatchButton} name=${name} busy=${busy} act=${onShare} kind="button--primary" title="Solve the groups of this match with it">${one.current === null ? 'Share' : 'Share again'}<//>` : null}
 				${one.current === null ? null : html`
-					<${MatchButton} name=${name} busy=${busy} act=${onBack} title="Back to what it was before it was shared last">Take back<//>`}
+					<${MatchButton} name=${name} busy=${busy} act=${onBack} title="Restore the position before the last sharing">Take back<//>`}
 			</span></td>
 		</tr>`;
 }
@@ -47,7 +47,7 @@ export function Positions({ dataset }) {
 					onShare=${() => send(() => sharePositions(dataset, one.match))}
 					onBack=${() => send(() => takePositionsBack(dataset, one.match))}
 				/>`)}
-			note=${value.used ? null : html`<p>The policy does not use them: it says so under <em>Use the position that the match shares</em>.</p>`}
+			note=${value.used ? null : html`<p>The policy does not use them: switch on <em>Use the shared position of a match</em>.</p>`}
 		/>
 	`;
 }

@@ -23,13 +23,13 @@ function Brackets() {
 function Choice({ predicted: { sets, set } }) {
 	return html`
 		<div class="predictions__choice">
-			${sets.length < 2 ? html`<span class="predictions__set" title=${sets[0]}>${sets[0] ?? 'No set any more'}</span>` : html`
+			${sets.length < 2 ? html`<span class="predictions__set" title=${sets[0]}>${sets[0] ?? 'Set deleted'}</span>` : html`
 				<select class="field" aria-label="Set of predictions" value=${set || EVERY_SET} onChange=${withValue((chosen) => { shownSet.value = chosen; })}>
 					<option value=${EVERY_SET}>All ${sets.length} sets</option>
 					${sets.map((name) => html`<option key=${name} value=${name}>${name}</option>`)}
 				</select>`}
-			<label class="predictions__least" title="Less sure predictions are dotted and taken only one by one">
-				sure from
+			<label class="predictions__least" title="Predictions with a score below this threshold are dotted and accepted one by one">
+				threshold
 				<input
 					class="field" type="number" min="0" max="1" step="0.05" value=${leastScore.value}
 					onChange=${withValue((text) => { leastScore.value = Math.min(1, Math.max(0, Number(text) || 0)); })}
@@ -70,7 +70,7 @@ function Row({ view, own: { marks, fewer, origin }, sets }) {
 			<button class="row-button" type="button" title=${`Show ${view.label}`} aria-label=${`Show the prediction in view ${view.letter}`} onClick=${show}><${Letter} letter=${view.letter} /></button>
 			${origin ? html`<span class="predictions__accepted">${origin}</span>`
 				: mark ? html`<${Offered} view=${view} mark=${mark} sets=${sets} />`
-					: html`<span class="predictions__none">${others ? `${others} less sure` : 'nothing predicted'}</span>`}
+					: html`<span class="predictions__none">${others ? `: ${others} below threshold` : 'nothing predicted'}</span>`}
 		</li>
 	`;
 }
@@ -83,7 +83,7 @@ export function PredictionCard({ group }) {
 	const why = ready ? '' : 'Every view with a sure prediction has a ball already';
 	return html`
 		<section class="card predictions" aria-label="Predictions">
-			<h2 title="Corner brackets: predicted, dotted where less sure. A solid box is a person's, a dashed one fits the 3D ball."><${Brackets} /> Predictions</h2>
+			<h2 title="Corner brackets: predicted, dotted below the threshold. A solid box is a person's, a dashed one fits the 3D ball."><${Brackets} /> Predictions</h2>
 			<${Choice} predicted=${found} />
 			<ul class="predictions__views">
 				${group.views.map((view) => html`<${Row} key=${view.key} view=${view} own=${found.views.get(view.key) ?? { marks: [], fewer: 0, origin: null }} sets=${found.set === '' ? found.sets.length : 1} />`)}

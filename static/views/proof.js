@@ -6,5 +6,5 @@ import { me } from '../state/me.js';
 /** How a field for the password is described, and whether it may stay empty. */
 export function proof() {
 	const optional = me.value?.way === 'sign_on';
-	return { label: optional ? 'Your password, or nothing within ten minutes of logging in' : 'Your password', optional };
+	return { label: optional ? 'Your password (not needed within ten minutes of logging in)' : 'Your password', optional };
 }

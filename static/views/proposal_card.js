@@ -19,7 +19,7 @@ export function ProposalScores({ item }) {
 		supported === null ? null : html`<${Term} word="supported">supported<//> ${sharePercent(supported)}`,
 		explained === null ? null : html`<${Term} word="explained">explained<//> ${sharePercent(explained)}`,
 		error === null ? null : html`${fixed(error, 2)} px off`,
-		lead === null ? null : html`next best ${fixed(lead, 2)} behind`,
+		lead === null ? null : html`runner-up scores ${fixed(lead, 2)} less`,
 	].filter((part) => part !== null);
 	return html`<span class="proposals__scores">${parts.map((part, i) => html`<span key=${i}>${part}</span>`)}</span>`;
 }
@@ -45,7 +45,7 @@ function Row({ picture: { view }, item }) {
 export function ProposalCard({ pictures }) {
 	return html`
 		<section class="card proposals" aria-label="Proposed lines">
-			<h2 title="Violet and dashed: proposed from the paint. They count for nothing until a person accepts them."><${Term} word="proposal">Proposed lines<//></h2>
+			<h2 title="Violet and dashed: proposed from the paint. They are not used until a person accepts them."><${Term} word="proposal">Proposed lines<//></h2>
 			<ul class="proposals__views">
 				${pictures.map((picture) => (picture.proposal ? html`<${Row} key=${picture.view.key} picture=${picture} item=${picture.proposal.item} />` : null))}
 			</ul>

@@ -64,7 +64,7 @@ export function Proposals({ dataset, name }) {
 		setProblem('');
 		try {
 			const { forgotten } = await forgetProposals(dataset);
-			announce(`${plural(forgotten, 'proposal')} forgotten; lines that were accepted stay.`);
+			announce(`${plural(forgotten, 'proposal')} deleted; lines that were accepted stay.`);
 			card.current?.querySelector('h2')?.focus();
 			reload();
 		} catch (failed) {
@@ -74,14 +74,14 @@ export function Proposals({ dataset, name }) {
 	return html`
 		<section class="card card--flush statistics__matches proposals-card" aria-labelledby="proposals-title" ref=${card}>
 			<h2 id="proposals-title" tabindex="-1"><${Term} word="proposal">Proposed lines<//></h2>
-			<p>Views without a camera: without lines, or with lines that do not determine one. Their paint may show where the camera stands. What is found counts for nothing until a person accepts it, under review or in the calibration editor.</p>
+			<p>Views without a camera: without lines, or with lines that do not determine one. Their paint may show where the camera stands. Proposals are not used until a person accepts them, in review or in the calibration editor.</p>
 			<table class="table">
 				<thead><tr><th>match</th><th data-numeric="true">no camera</th><th data-numeric="true">proposed</th><th data-numeric="true">unsure</th><th data-numeric="true">nothing</th><th data-numeric="true">accepted</th></tr></thead>
 				<tbody>${items.map((one) => html`<${MatchProposals} key=${one.match} one=${one} dataset=${name} />`)}</tbody>
 			</table>
 			<p class="table__actions">
-				<button data-needs="lead" class="button button--primary" type="button" aria-disabled=${why !== ''} title=${why || 'Those that were looked at before are only compared'} onClick=${() => { if (!why) send(() => proposeForDataset(dataset)); }}>Propose lines for ${plural(views, 'view')}</button>
-				<button data-needs="lead" class="button" type="button" aria-disabled=${busy || !looked} title=${busy ? 'Under way' : looked ? 'Lines that were accepted stay' : 'Nothing was proposed yet'} onClick=${forget}>Forget all proposals</button>
+				<button data-needs="lead" class="button button--primary" type="button" aria-disabled=${why !== ''} title=${why || 'Views that have not changed since the last search are skipped'} onClick=${() => { if (!why) send(() => proposeForDataset(dataset)); }}>Propose lines for ${plural(views, 'view')}</button>
+				<button data-needs="lead" class="button" type="button" aria-disabled=${busy || !looked} title=${busy ? 'Under way' : looked ? 'Lines that were accepted stay' : 'There are no proposals yet'} onClick=${forget}>Delete all proposals</button>
 			</p>
 			${job ? html`<${JobProgress} job=${job} /><${Outcome} job=${job} />` : null}
 			${refused || problem ? html`<p class="form__error" role="alert">${refused || problem}</p>` : null}

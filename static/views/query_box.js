@@ -17,7 +17,7 @@ const NOTHING = { from: 0, to: 0, offers: [] };
 /** @param {{offers: Offer[], active: number, choose: (offer: Offer) => void}} props */
 function Offers({ offers, active, choose }) {
 	return html`
-		<ul class="query-box__offers" id="query-offers" role="listbox" aria-label="What may stand here">
+		<ul class="query-box__offers" id="query-offers" role="listbox" aria-label="Suggestions">
 			${offers.map((offer, index) => html`
 				<li
 					key=${offer.text} id=${`query-offer-${index}`} role="option" aria-selected=${index === active}

@@ -62,7 +62,7 @@ export function QueueEmpty({ q }) {
 	return html`
 		<section class="card empty">
 			<h2>${q ? 'No group matches this query' : 'This dataset has no groups'}</h2>
-			${q ? html`<p>Take a word away, or start again.</p><p><a class="button" href=${queueAddress(name, '')}>Show all groups</a></p>`
+			${q ? html`<p>Remove a filter, or show all groups.</p><p><a class="button" href=${queueAddress(name, '')}>Show all groups</a></p>`
 				: html`<p>Nothing was imported into it yet.</p><p><a class="button button--primary" href=${`/import?dataset=${encodeURIComponent(name)}`}>Import</a></p>`}
 		</section>
 	`;

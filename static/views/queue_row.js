@@ -47,7 +47,7 @@ const CAME_TO = { agreed: 'agree', open: 'differ', decided: 'differed' };
 function OwnAnnotations({ row }) {
 	if (!row.takes) return null;
 	const text = row.came_to ? `${row.takes} ${CAME_TO[row.came_to]}` : row.takes === 1 ? '1 annotation' : `${row.takes} annotations`;
-	const title = `${row.takes === 1 ? 'One person has' : `${row.takes} people have`} handed in an annotation of their own${row.came_to === 'open' ? '; they differ, and somebody has to decide' : ''}`;
+	const title = `${row.takes === 1 ? 'One person has' : `${row.takes} people have`} submitted an independent annotation${row.came_to === 'open' ? '; they differ and need a decision' : ''}`;
 	if (row.came_to !== 'open') return html`<span class="own-annotations" title=${title}>${text}</span>`;
 	return html`<a class="own-annotations" data-state="open" href=${`/adjudicate/${row.id}`} tabindex="-1" title=${title}>${text}</a>`;
 }

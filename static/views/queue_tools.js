@@ -107,17 +107,17 @@ export function QueueTools({ dataset, q, onQuery }) {
 	const [giving, setGiving] = useState(false);
 	const { total, loaded, error } = queue.value;
 	const ticked = countOf(ticks.value, total);
-	const reason = !loaded || error ? 'The query has no answer yet' : total === 0 ? 'No group matches' : '';
+	const reason = !loaded || error ? 'The query is still running' : total === 0 ? 'No group matches' : '';
 	const open = () => { if (!reason) setDeciding(true); };
 	const give = () => { if (!reason) setGiving(true); };
 	const [keys] = useState(() => ({ run: open, give }));
 	keys.run = open;
 	keys.give = give;
 	const [bindings] = useState(() => [
-		{ keys: ['b'], label: 'Decide what is ticked, or all that match', group: 'Queue', run: () => keys.run() },
-		{ keys: ['Shift+d'], label: 'Give out what is ticked, or all that match, as a batch', group: 'Queue', needs: /** @type {const} */ ('lead'), run: () => keys.give() },
-		{ keys: ['Ctrl+z'], label: 'Take back the last verdict, of one group or of many', group: 'Queue', run: undo },
-		{ keys: ['Ctrl+Shift+z', 'Ctrl+y'], label: 'Give the verdict again that was taken back last', group: 'Queue', run: redo },
+		{ keys: ['b'], label: 'Set a verdict on the ticked groups, or on all that match', group: 'Queue', run: () => keys.run() },
+		{ keys: ['Shift+d'], label: 'Assign the ticked groups, or all that match, as a batch', group: 'Queue', needs: /** @type {const} */ ('lead'), run: () => keys.give() },
+		{ keys: ['Ctrl+z'], label: 'Undo the last verdict, of one group or of many', group: 'Queue', run: undo },
+		{ keys: ['Ctrl+Shift+z', 'Ctrl+y'], label: 'Redo the verdict that was undone last', group: 'Queue', run: redo },
 	]);
 	useKeys(bindings);
 	return html`
@@ -129,7 +129,7 @@ export function QueueTools({ dataset, q, onQuery }) {
 			<${UndoButton} />
 			<${RedoButton} />
 			<${Ticked} ticked=${ticked} />
-			${whyNot('lead', dataset.name) ? null : html`<button class="button" type="button" aria-disabled=${reason !== ''} title=${reason || 'Make a batch of these groups for people to work on (Shift D)'} onClick=${give}>Give out…</button>`}
+			${whyNot('lead', dataset.name) ? null : html`<button class="button" type="button" aria-disabled=${reason !== ''} title=${reason || 'Make a batch of these groups for people to work on (Shift D)'} onClick=${give}>Assign…</button>`}
 			<button data-needs="review" class=${ticked > 0 ? 'button button--primary' : 'button'} type="button" aria-disabled=${reason !== ''} title=${reason} onClick=${open}>
 				${reason ? 'Decide…' : ticked > 0 ? `Decide ${count(ticked)} ticked…` : `Decide all ${count(total)}…`}
 			</button>

@@ -83,7 +83,7 @@ function zoomToBall() {
 	const center = (ball && ballCenter(ball)) ?? (place && { x: place[0], y: place[1] });
 	const stage = document.querySelector(`.image-panel[data-view="${focused.value}"] .image-panel__stage`);
 	if (!center || !stage) {
-		announce(`Nobody has drawn a ball in view ${focused.value}, and the other views do not say where it is.`);
+		announce(`View ${focused.value} has no ball, and the other views do not locate it.`);
 		return;
 	}
 	const { width, height } = stage.getBoundingClientRect();
@@ -217,9 +217,9 @@ const VERDICT = [
 const NAVIGATE = [
 	{ keys: ['f'], label: 'Next group', group: 'Navigate', run: () => { goNext(); } },
 	{ keys: ['d'], label: 'Previous group', group: 'Navigate', run: () => { goPrevious(); } },
-	{ keys: ['Shift+f'], label: 'Done and next: hand the group in, in a batch that you annotate', group: 'Navigate', needs: 'annotate', when: () => canHandIn.value, run: () => { handInAndNext(); } },
-	{ keys: ['Shift+u'], label: 'Hand the group back to who handed it in, and say why', group: 'Verdict', needs: 'review', when: () => canHandBack.value, run: askHandBack },
-	{ keys: ['Shift+r'], label: 'Take somebody’s own annotation over into the group', group: 'Verdict', needs: 'lead', when: () => canTakeOver.value, run: askTakeOver },
+	{ keys: ['Shift+f'], label: 'Submit the group and go to the next, in a batch that you annotate', group: 'Navigate', needs: 'annotate', when: () => canHandIn.value, run: () => { handInAndNext(); } },
+	{ keys: ['Shift+u'], label: 'Return the group to its annotator, with a reason', group: 'Verdict', needs: 'review', when: () => canHandBack.value, run: askHandBack },
+	{ keys: ['Shift+r'], label: 'Take over an independent annotation into the group', group: 'Verdict', needs: 'lead', when: () => canTakeOver.value, run: askTakeOver },
 	{ keys: ['v'], label: 'Ten groups on', group: 'Navigate', run: () => { goBy(1, FAR); } },
 	{ keys: ['c'], label: 'Ten groups back', group: 'Navigate', run: () => { goBy(-1, FAR); } },
 	{ keys: ['r'], label: 'Next flagged group', group: 'Navigate', run: () => { goFlagged(1); } },
@@ -256,21 +256,21 @@ const VIEW = [
 		run: () => { boxes.value = !boxes.value; say('Ball boxes', boxes.value); },
 	},
 	{
-		keys: ['w'], label: 'Residual whiskers × 1, 5, 20', group: 'View',
-		run: () => { cycleGain(); announce(`Whiskers times ${gain.value}.`); },
+		keys: ['w'], label: 'Error lines × 1, 5, 20', group: 'View',
+		run: () => { cycleGain(); announce(`Error lines × ${gain.value}.`); },
 	},
 	{
-		keys: ['Shift+w'], label: 'Whiskers to the paint in the pictures, or to the clicks', group: 'View',
+		keys: ['Shift+w'], label: 'Error lines to the paint in the pictures, or to the annotated points', group: 'View',
 		run: () => {
 			paintWhiskers.value = !paintWhiskers.value;
-			announce(paintWhiskers.value ? 'Whiskers lead to the paint.' : 'Whiskers lead to the clicks.');
+			announce(paintWhiskers.value ? 'Error lines lead to the paint.' : 'Error lines lead to the annotated points.');
 		},
 	},
 	{ keys: ['Shift+t'], label: 'History of the group: who changed what, with pictures', group: 'View', run: openHistory },
 	{ keys: [','], label: 'The focused view one frame before, where the dataset has it', group: 'View', run: () => { stepInstant(-1); } },
 	{ keys: ['.'], label: 'The focused view one frame after', group: 'View', run: () => { stepInstant(1); } },
-	{ keys: ['t'], label: '3D ball: mean of pairs, or most likely point', group: 'View', run: otherEstimator },
-	{ keys: ['g'], label: 'Gates: what they ask and by how much', group: 'View', run: showGates },
+	{ keys: ['t'], label: '3D point: pair average, or most likely point', group: 'View', run: otherEstimator },
+	{ keys: ['g'], label: 'Gates: thresholds and margins', group: 'View', run: showGates },
 	{
 		keys: ['Shift+l'], label: 'Main camera large, or all views equal', group: 'View',
 		run: () => { equalViews.value = !equalViews.value; },
@@ -292,11 +292,11 @@ const EDIT = [
 		keys: [], label: 'Put a point on the line there', group: 'Edit', shown: 'Alt click', run: () => {},
 	},
 	{
-		keys: ['Enter'], label: 'Do what the card on the right offers', group: 'Edit', needs: 'annotate', once: true,
+		keys: ['Enter'], label: 'Apply the fix that the card on the right offers', group: 'Edit', needs: 'annotate', once: true,
 		when: () => !editing.value && (mend.value !== null || isHeld.value), run: mendNow,
 	},
 	{
-		keys: ['Shift+Enter'], label: 'Show another way to mend the group', group: 'Edit',
+		keys: ['Shift+Enter'], label: 'Show another fix', group: 'Edit',
 		when: () => mend.value !== null && mends.value.length > 1, run: () => turnMend(1),
 	},
 	{
@@ -305,7 +305,7 @@ const EDIT = [
 		when: () => !editing.value,
 		run: () => { editing.value = true; },
 	},
-	{ keys: ['Escape'], label: 'Leave, or give back what is held', group: 'Edit', typing: true, run: escape },
+	{ keys: ['Escape'], label: 'Leave, or cancel the drag', group: 'Edit', typing: true, run: escape },
 	{
 		keys: [], label: 'Move by 1 px; Shift 5 px; Alt 0.1 px', group: 'Edit', shown: '← ↑ → ↓',
 		run: () => {},
@@ -325,14 +325,14 @@ const EDIT = [
 		keys: ['o'], label: 'Ball out of view, or not', group: 'Edit', needs: 'annotate',
 		run: () => changeBall(toggleOutOfView, ''),
 	},
-	{ keys: ['y'], label: 'Take the predicted ball, else place it where the other views see it', group: 'Edit', needs: 'annotate', run: takeBall },
+	{ keys: ['y'], label: 'Accept the predicted ball, else place it where the other views see it', group: 'Edit', needs: 'annotate', run: takeBall },
 	{ keys: ['Shift+y'], label: 'Accept predictions in every view without a ball', group: 'Edit', needs: 'annotate', run: acceptAll },
 	{ keys: ['Shift+p'], label: 'Accept the lines that are proposed for the view', group: 'Edit', needs: 'annotate', run: acceptProposed },
-	{ keys: ['u'], label: 'Give the selected object back what it was', group: 'Edit', needs: 'annotate', run: () => { revertSelected(); } },
+	{ keys: ['u'], label: 'Reset object', group: 'Edit', needs: 'annotate', run: () => { revertSelected(); } },
 	{ keys: ['m'], label: 'Swap left and right, in the view that a finding names', group: 'Edit', needs: 'annotate', run: swap },
 	{ keys: ['Shift+g'], label: 'Guidelines of the dataset', group: 'View', run: () => { guidelinesShown.value = !guidelinesShown.value; } },
-	{ keys: ['Shift+o'], label: 'Annotate the group on your own, on a copy', group: 'Edit', needs: 'annotate', run: annotateOwn },
-	{ keys: ['Shift+k'], label: 'Gold group: its truth is known', group: 'Edit', needs: 'lead', run: markGold },
+	{ keys: ['Shift+o'], label: 'Start an independent annotation, on a copy', group: 'Edit', needs: 'annotate', run: annotateOwn },
+	{ keys: ['Shift+k'], label: 'Mark as gold group', group: 'Edit', needs: 'lead', run: markGold },
 	{ keys: ['Ctrl+z'], label: 'Undo', group: 'Edit', run: undo },
 	{ keys: ['Ctrl+Shift+z', 'Ctrl+y'], label: 'Redo', group: 'Edit', run: redo },
 ];

@@ -2,7 +2,7 @@
 /** The review screen: one group, every number beside its pixels. */
 
 import { html } from 'htm/preact';
-import { useEffect, useMemo } from 'preact/hooks';
+import { useEffect, useMemo, useRef } from 'preact/hooks';
 
 import { useKeys } from '../lib/hooks.js';
 import { lazy } from '../lib/lazy.js';
@@ -71,6 +71,7 @@ function Workspace() {
 	return html`
 		<${ReviewMain} pictures=${pictures}>
 			${sceneShown.value ? html`<${Scene3D} group=${shown} solution=${found} />` : html`<${ImageGrid} pictures=${pictures} />`}
+			<p class="small-note">Look, comment and decide here. To draw or move points and balls, open the group on a wider screen.</p>
 			<${BottomStrip} group=${shown} solution=${solved} pictures=${pictures} />
 		<//>
 		<${Rail} group=${shown} solution=${solved} pictures=${pictures} live=${live} />
@@ -79,12 +80,15 @@ function Workspace() {
 }
 
 export function ReviewPage() {
+	const root = useRef(/** @type {HTMLDivElement | null} */ (null));
 	useKeys(REVIEW_KEYS);
+	// On a small screen the page scrolls: the next group begins at its pictures.
+	useEffect(() => root.current?.scrollTo(0, 0), [group.value?.id]);
 	useEffect(() => {
 		document.title = group.value ? `${group.value.label} · Touchline` : 'Touchline';
 	}, [group.value?.label]);
 	return html`
-		<div class="review">
+		<div class="review" ref=${root}>
 			<${ReviewHeader} />
 			<div class="bars">${isCopy(groupDocument.value) ? html`<${TakeBar} />` : null}<${NoticeBar} /><${LeaseBar} />${conflict.value ? html`<${ConflictBar} />` : null}</div>
 			<${Workspace} />

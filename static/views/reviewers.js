@@ -21,7 +21,7 @@ function People({ dataset, open }) {
 	return html`
 		<h2>Reviewers of ${dataset.name}</h2>
 		${people.error ? html`<p class="form__error" role="alert">${sentenceOf(people.error)}</p>` : null}
-		${people.value && items.length === 0 ? html`<p class="empty-note">Nobody has decided anything yet.</p>` : null}
+		${people.value && items.length === 0 ? html`<p class="empty-note">No verdicts yet.</p>` : null}
 		${items.length > 0 ? html`
 			<table class="table">
 				<thead><tr>
@@ -60,16 +60,16 @@ function Batches({ dataset }) {
 	if (items.length === 0) return null;
 	return html`
 		<section class="batches">
-			<h2>Decided for many at once</h2>
+			<h2>Bulk verdicts</h2>
 			<ul>
 				${items.map((batch) => html`
 					<li key=${batch.id}>
 						<span>
 							${batchText(batch.changed, batch.state)}
-							<small>${batch.actor} · ${ago(Date.parse(batch.at), now)}${batch.undone ? ` · taken back by ${batch.undone_by}` : ''}${batch.redone ? ' · given again' : ''}</small>
+							<small>${batch.actor} · ${ago(Date.parse(batch.at), now)}${batch.undone ? ` · undone by ${batch.undone_by}` : ''}${batch.redone ? ' · redone' : ''}</small>
 						</span>
 						${batch.undone ? null : html`<button data-needs="review" class="button" type="button" onClick=${() => undo(batch)}>Undo</button>`}
-						${batch.undone && !batch.redone ? html`<button data-needs="review" class="button" type="button" title="Give these verdicts again; groups judged or edited since stay as they are" onClick=${() => redo(batch)}>Redo</button>` : null}
+						${batch.undone && !batch.redone ? html`<button data-needs="review" class="button" type="button" title="Redo these verdicts; groups reviewed or edited since stay as they are" onClick=${() => redo(batch)}>Redo</button>` : null}
 					</li>`)}
 			</ul>
 		</section>

@@ -42,9 +42,9 @@ function Scan({ made, error, confirm }) {
 export function Codes({ codes, close }) {
 	return html`
 		<div role="status">
-			<p>From now on a second factor is asked for after your password. If you lose it, each of these codes takes its place once. They are not shown again: print them, or keep them with your passwords.</p>
+			<p>From now on the login asks for a second factor after your password. If you lose it, each of these codes replaces it once. They are not shown again: print them, or store them with your passwords.</p>
 			<ul class="factor__codes">${codes.map((code) => html`<li key=${code}><code>${code}</code></li>`)}</ul>
-			<p><button class="button button--primary" type="button" onClick=${close}>I have kept them</button></p>
+			<p><button class="button button--primary" type="button" onClick=${close}>I have saved them</button></p>
 		</div>
 	`;
 }
@@ -69,8 +69,8 @@ function useFactor(again = 0) {
 /** What there is, and how it goes. @param {{state: SecondFactorJson, error: ApiError | null, remove: (password: string) => void}} props */
 function Remove({ state, error, remove }) {
 	const told = html`<p>A code is asked for after your password. ${state.codes_left} of 10 recovery codes are left.</p>`;
-	if (state.required) return html`${told}<p class="note">Everybody needs one here. Has the device changed? An admin takes it away, then you make another one.</p>`;
-	return html`<${OneField} key="remove" id="factor-remove" ...${proof()} button="Take it away" name="password" type="password" complete="current-password" error=${error} send=${remove}>${told}<//>`;
+	if (state.required) return html`${told}<p class="note">This server requires one. If you have lost the device, an admin can remove it; then you set up another one.</p>`;
+	return html`<${OneField} key="remove" id="factor-remove" ...${proof()} button="Remove it" name="password" type="password" complete="current-password" error=${error} send=${remove}>${told}<//>`;
 }
 
 /** @param {{changed?: () => void, again?: number}} props */
@@ -85,7 +85,7 @@ export function SecondFactorCard({ changed = () => {}, again = 0 }) {
 			${state && !made && !codes && !state.authenticator ? html`
 				<${OneField} key="begin" id="factor-begin" ...${proof()} button="Begin" name="password" type="password" complete="current-password" error=${error} send=${begin}>
 					${state.on ? html`<p>Your passkeys are asked for after your password; ${state.codes_left} of 10 recovery codes are left.</p>` : null}
-					<p>With an authenticator (an app on your phone) a password alone, in wrong hands, opens nothing.</p>
+					<p>With an authenticator (an app on your phone), a stolen password alone gives no access.</p>
 				<//>` : null}
 			${state && !made && !codes && state.authenticator ? html`<${Remove} state=${state} error=${error} remove=${remove} />` : null}
 		</section>

@@ -16,12 +16,12 @@ import { OneField } from './second_factor.js';
 
 /** What the provider says where it does not let somebody through (RFC 6749, section 4.1.2.1). */
 const SAYS = /** @type {{[error: string]: {detail: string, hint: string}}} */ ({
-	access_denied: { detail: 'the provider did not let you through, or you have cancelled', hint: 'Log in again; whoever looks after the provider can say who may use Touchline.' },
+	access_denied: { detail: 'the provider did not let you through, or you have cancelled', hint: 'Log in again; the administrator of the provider decides who may use Touchline.' },
 	login_required: { detail: 'you are not logged in at the provider', hint: 'Log in again.' },
-	temporarily_unavailable: { detail: 'the provider has no time at the moment', hint: 'Try again in a while.' },
+	temporarily_unavailable: { detail: 'the provider is busy', hint: 'Try again in a while.' },
 	server_error: { detail: 'something went wrong at the provider', hint: 'Try again in a while.' },
 });
-const OTHERWISE = { detail: 'the provider refuses what this server asks of it', hint: 'Whoever runs this server has to look at its settings.' };
+const OTHERWISE = { detail: 'the provider refused the request of this server', hint: 'The operator of this server has to check its settings.' };
 
 /** What the address says, which it then forgets. @returns {SignOnAnswer | ApiError | null} */
 function readAddress() {
@@ -72,7 +72,7 @@ export function SignOnPage() {
 				<h1 id="sign-on-title">${asked ? 'One more step' : error ? 'You are not logged in' : 'Logging in…'}</h1>
 				${asked ? html`<${OneField} id="sign-on-factor" label="Code of your second factor" button="Log in" name="factor" complete="one-time-code" error=${error} send=${again} />` : null}
 				${error && !asked ? html`<${FormError} error=${error} /><p><a class="button button--primary" href=${me.value ? '/account' : '/groups'}>${me.value ? 'Back to your account' : 'Back to the login'}</a></p>` : null}
-				${!error ? html`<p role="status">Asking whether the provider vouches for you.</p>` : null}
+				${!error ? html`<p role="status">Checking your login with the provider.</p>` : null}
 			</section>
 		</main>
 	`;

@@ -98,14 +98,14 @@ function StatisticsOf({ one }) {
 		${found.error ? html`<${Trouble} title=${found.error.status === 400 ? 'The query cannot be read' : 'The statistics cannot be shown'} error=${found.error} retry=${found.reload} />` : null}
 		${found.value ? html`
 			<${Body} found=${found.value} dataset=${one.name} q=${q} />
-			<h2 class="statistics__whole">Of the whole dataset</h2>
+			<h2 class="statistics__whole">Whole dataset</h2>
 			<${MembersCard} dataset=${one.name} />
 			<${GuidelinesCard} dataset=${one} />
 			<${GoldCard} dataset=${one} />
 			<${NoiseCard} dataset=${one.id}>
 				${(/** @type {NoiseJson} */ noise) => (noise.advice.length === 0 ? null : html`
-					<p class="note">Uncertainties are right where the policy says what this dataset shows.
-						${isNews(noise) ? html` It does not: <a class="link" href=${pageAddress(one.name, 'policy')}>judge by the estimates</a> on the page Policy.` : ' It does.'}</p>`)}
+					<p class="note">
+						${isNews(noise) ? html`The policy’s noise does not match this data: <a class="link" href=${pageAddress(one.name, 'policy')}>use the estimates</a> on the page Policy.` : 'The policy’s noise matches this data.'}</p>`)}
 			<//>
 			<${Pitches} dataset=${one.id} />
 			<${Pictures} dataset=${one.id} />

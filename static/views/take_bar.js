@@ -39,15 +39,15 @@ function Bar({ group }) {
 	}
 	if (error || !take) return null;
 	const mine = !isTeam || take.person === myName.value;
-	const whose = mine ? 'your own annotation' : `${take.person}’s annotation`;
-	const state = take.settled ? 'It was adjudicated.' : take.handed_in ? 'It is handed in and can no longer be changed.' : mine ? 'Only you and the leads see it.' : 'It is not handed in yet.';
+	const whose = mine ? 'your independent annotation' : `${take.person}’s annotation`;
+	const state = take.settled ? 'It was adjudicated.' : take.handed_in ? 'It is submitted and can no longer be changed.' : mine ? 'Only you and the leads see it.' : 'It is not submitted yet.';
 	return html`
 		<div class="bar take-bar" data-tone=${take.handed_back ? 'info' : undefined} role="status">
 			<p><strong>${take.title}</strong>, ${whose}. ${take.handed_back ? html`<${HandedBack} back=${take.handed_back} />` : state}</p>
-			${canHandBack.value ? html`<button class="button" type="button" onClick=${askHandBack}>Hand back… <kbd>⇧U</kbd></button>` : null}
+			${canHandBack.value ? html`<button class="button" type="button" onClick=${askHandBack}>Return… <kbd>⇧U</kbd></button>` : null}
 			${canTakeOver.value ? html`<button class="button" type="button" onClick=${askTakeOver}>Take over… <kbd>⇧R</kbd></button>` : null}
 			${take.of && take.settled ? html`<a class="button" href=${`/review/${take.of}`}>Open the group</a>` : null}
-			${mine && !take.handed_in && take.batch === null ? html`<button class="button button--primary" type="button" disabled=${busy} onClick=${handIn}>Hand in</button>` : null}
+			${mine && !take.handed_in && take.batch === null ? html`<button class="button button--primary" type="button" disabled=${busy} onClick=${handIn}>Submit</button>` : null}
 		</div>
 	`;
 }

@@ -65,7 +65,7 @@ function Slider({ field, value, id, change }) {
 }
 
 /** What a choice is called, where it is a word of the policy's. */
-const CHOICES = /** @type {{[name: string]: string}} */ ({ mean: 'mean of pairs', best: 'most likely point', lines: 'annotated lines', paint: 'paint in the picture' });
+const CHOICES = /** @type {{[name: string]: string}} */ ({ mean: 'pair average', best: 'most likely point', lines: 'annotated lines', paint: 'paint in the picture' });
 
 /** @param {{field: PolicyField, id: string, value: Value, change: (value: Value) => void}} props */
 function Choice({ field, id, value, change }) {
@@ -100,7 +100,7 @@ export function Threshold({ field, value, present, switched, change, idle }) {
 			${field.optional ? html`
 				<label class="threshold__switch">
 					<input type="checkbox" checked=${value !== null} onChange=${withTick((ticked) => change(ticked ? switched : null))} />
-					<span class="hidden-text">${field.label} is asked</span>
+					<span class="hidden-text">Use the threshold “${field.label}”</span>
 				</label>` : null}
 			${field.choices.length
 				? html`<${Choice} field=${field} id=${id} value=${value} change=${change} />`

@@ -21,7 +21,7 @@ function switchedOn(field, shipped) {
  */
 export function ThresholdForm({ fields, shipped, present, values, change, idle = '' }) {
 	const source = values['calibration.source'] ?? present['calibration.source'];
-	const unread = source === 'paint' ? '' : 'no effect: cameras are found from lines';
+	const unread = source === 'paint' ? '' : 'Needs policy "touchline"';
 	/** @param {PolicyField} field */
 	const one = (field) => html`
 		<${Threshold}

@@ -19,12 +19,12 @@ import { TokenTable } from './token_table.js';
 /** @import {Action} from '../api/people.js' */
 
 const SCOPES = /** @type {{name: Scope, action: Action, note: string}[]} */ ([
-	{ name: 'read', action: 'read', note: 'look, which the others may, too' },
+	{ name: 'read', action: 'read', note: 'read only; included in all others' },
 	{ name: 'annotate', action: 'annotate', note: 'lines, balls and cameras' },
 	{ name: 'review', action: 'review', note: 'verdicts' },
 	{ name: 'export', action: 'export', note: 'make exports' },
 	{ name: 'lead', action: 'lead', note: 'import, freeze, evaluate, thresholds' },
-	{ name: 'admin', action: 'administer', note: 'look at people, end tokens, delete datasets' },
+	{ name: 'admin', action: 'administer', note: 'list people, end tokens, delete datasets' },
 ]);
 const DAYS = [7, 30, 90, 365];
 
@@ -49,9 +49,9 @@ function TokenForm({ make, error }) {
 			<div class="form__columns">
 				<div class="form__row"><label for="token-name">What it is for</label><input class="field" id="token-name" name="name" required maxlength="40" autocomplete="off" placeholder="nightly copy" /><small>The log has it beside your name.</small></div>
 				<div class="form__row"><label for="token-dataset">Dataset</label><select class="field" id="token-dataset" name="dataset"><option value="">all datasets</option>${(datasets.value ?? []).map(({ name }) => html`<option key=${name} value=${name}>${name}</option>`)}</select></div>
-				<div class="form__row"><label for="token-days">Good for</label><select class="field" id="token-days" name="days">${DAYS.map((days) => html`<option key=${days} value=${days} defaultSelected=${days === 90}>${days} days</option>`)}</select></div>
+				<div class="form__row"><label for="token-days">Valid for</label><select class="field" id="token-days" name="days">${DAYS.map((days) => html`<option key=${days} value=${days} defaultSelected=${days === 90}>${days} days</option>`)}</select></div>
 			</div>
-			<fieldset class="tokens__scopes"><legend>It may</legend>${SCOPES.map((one) => html`<${ScopeCheck} key=${one.name} one=${one} />`)}</fieldset>
+			<fieldset class="tokens__scopes"><legend>Scopes</legend>${SCOPES.map((one) => html`<${ScopeCheck} key=${one.name} one=${one} />`)}</fieldset>
 			<${FormError} error=${error} />
 			<p><button class="button button--primary" type="submit">Make a token</button></p>
 		</form>
@@ -81,7 +81,7 @@ export function TokenCard() {
 	return html`
 		<section class="card card--flush" aria-labelledby="account-tokens">
 			<h2 id="account-tokens">Tokens</h2>
-			<p class="note tokens__note">With a token a script, or the command line, does some of what you may, in your name. Whoever has it may, too: keep it in a file that you alone can read.</p>
+			<p class="note tokens__note">With a token a script, or the command line, acts in your name within the scopes of the token. Anyone who has the token can do the same: keep it in a file that only you can read.</p>
 			${made ? html`
 				<div class="tokens__made" role="status">
 					<p>This is ${made.token.name}. It is not shown again.</p>

@@ -11,5 +11,5 @@ export const VALUE_OF_REVIEW = 'First the groups whose margin is smallest, on ei
 export function ValueOfReview({ q }) {
 	const sort = valueOf(q, 'sort');
 	if (sort !== 'value' && sort !== 'value-desc') return null;
-	return html`<p class="queue-tools__order" id="order-explained"><strong>Value of review${sort === 'value' ? '' : ', turned round'}:</strong> ${VALUE_OF_REVIEW}${sort === 'value' ? '' : ' Here they come last.'}</p>`;
+	return html`<p class="queue-tools__order" id="order-explained"><strong>Value of review${sort === 'value' ? '' : ', reversed'}:</strong> ${VALUE_OF_REVIEW}${sort === 'value' ? '' : ' Here they come last.'}</p>`;
 }

@@ -56,7 +56,7 @@ function ReasonList({ title, choose, again, keys, suggested = null }) {
 				${REASONS.map(({ name, label }, i) => html`
 					<li key=${name}>
 						<button type="button" data-last=${name === repeated} data-suggested=${name === suggested} onClick=${() => choose(name)}>
-							<kbd>${i + 1}</kbd> ${label} ${name === suggested ? html`<span class="reasons__suggested">fits <kbd>Enter</kbd></span>` : null} ${name === repeated ? html`<kbd>${again}</kbd>` : null}
+							<kbd>${i + 1}</kbd> ${label} ${name === suggested ? html`<span class="reasons__suggested">suggested <kbd>Enter</kbd></span>` : null} ${name === repeated ? html`<kbd>${again}</kbd>` : null}
 						</button>
 					</li>
 				`)}
@@ -138,7 +138,7 @@ export function VerdictButtons({ group }) {
 			<div class="verdicts__buttons">
 				<button
 					class="button button--accept" type="button" data-needs="review" onClick=${accept}
-					aria-disabled=${unsolved || why !== ''} title=${why || (unsolved ? 'This group is not solved yet' : 'Accept and go on')}
+					aria-disabled=${unsolved || why !== ''} title=${why || (unsolved ? 'This group is not solved yet' : 'Accept and go to the next group')}
 				>Accept <kbd>A</kbd></button>
 				<button class="button button--reject" type="button" data-needs="review" aria-disabled=${why !== ''} title=${why || undefined} aria-expanded=${asking.value === 'reason'} onClick=${askReason}>Reject <kbd>X</kbd></button>
 				<button class="button" type="button" data-needs="review" aria-disabled=${why !== ''} title=${why || undefined} onClick=${defer}>Defer <kbd>S</kbd></button>

@@ -24,7 +24,7 @@ const ODD = new Set(['view_disagrees', 'views_contradict', 'sides_swapped', 'not
 /** What a gate asks, before what it got. @param {GroupDocument} group @param {SolutionJson} solution @param {string} name */
 function asked(group, solution, name) {
 	const gate = solution.gates.find((one) => one.name === name);
-	return gate ? `${gateLabel(gate, group.policy)}: ` : '';
+	return gate ? `${gateLabel(gate, group.policy)} — ` : '';
 }
 
 /**
@@ -36,7 +36,7 @@ function asked(group, solution, name) {
 function headline(group, solution, offered) {
 	if (!solution && offered?.title) return { tone: 'unseen', over: 'Not solved', title: offered.title, text: offered.sentence };
 	if (!solution) {
-		return { tone: 'unseen', over: 'Not solved', title: 'No numbers yet', text: 'Solve the dataset, or edit this group: it is solved with every edit.' };
+		return { tone: 'unseen', over: 'Not solved', title: 'No numbers yet', text: 'Solve the dataset, or edit this group: each edit solves it.' };
 	}
 	const used = solution.ball?.views.length ?? 0;
 	const all = group.views.length;
@@ -87,7 +87,7 @@ function unused(group, solution) {
 	const sentences = group.views.flatMap((view) => {
 		const markings = solution.views.find((one) => one.view === view.key)?.calibration.markings ?? [];
 		const names = markings.filter(({ marking, used, outcome }) => view.lines[marking] && (!used || outcome !== 'tp')).map(({ marking }) => `“${marking}”`);
-		return names.length ? [`${names.join(' and ')} of ${view.letter} ${names.length > 1 ? 'do' : 'does'} not fit, which fails no gate: its row under Lines leads to the point.`] : [];
+		return names.length ? [`${names.join(' and ')} of ${view.letter} ${names.length > 1 ? 'do' : 'does'} not fit (does not block; see Lines).`] : [];
 	});
 	return sentences.join(' ');
 }

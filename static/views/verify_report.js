@@ -43,7 +43,7 @@ function Kept({ found }) {
 export function VerifyReport({ job, found }) {
 	const over = job === null || isOver(job);
 	const told = job !== null && job.state !== 'done';
-	if (!told && !found) return html`<p class="note verify">Nobody has verified this version yet. Verify computes every group again from the frozen annotations and compares all numbers.</p>`;
+	if (!told && !found) return html`<p class="note verify">This version is not verified yet. Verify computes every group again from the frozen annotations and compares all numbers.</p>`;
 	return html`
 		<div class="verify">
 			${told ? html`<${JobProgress} job=${job} />` : null}

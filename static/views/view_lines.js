@@ -70,7 +70,7 @@ export function ViewLines({ group, pictures }) {
 	return html`
 		<section class="card" aria-label=${`Lines of view ${picture.view.letter}`}>
 			<h2><${Letter} letter=${picture.view.letter} /> Lines${jac === null ? '' : ` · JaC ${jac.toFixed(2)}`}
-				<span class="card__aside">px${known.length ? ' · left out' : ''}</span></h2>
+				<span class="card__aside">error${known.length ? ' · error if unused' : ''}</span></h2>
 			${drawn.length ? html`
 				<ul class="view-lines" data-influence=${known.length > 0}>
 					${drawn.map((marking) => html`
@@ -79,7 +79,7 @@ export function ViewLines({ group, pictures }) {
 							one=${known.find((one) => one.marking === marking.marking)}
 						/>`)}
 				</ul>` : html`<p class="empty-note">No lines are drawn in this view. N draws one.</p>`}
-			${missing > 0 ? html`<p class="view-lines__missing">${missing} in sight and not drawn: ${picture.markings.filter(({ points }) => points.length === 0).map(({ marking }) => marking).join(', ')}.</p>` : null}
+			${missing > 0 ? html`<p class="view-lines__missing">${missing} visible, not drawn: ${picture.markings.filter(({ points }) => points.length === 0).map(({ marking }) => marking).join(', ')}.</p>` : null}
 		</section>
 	`;
 }

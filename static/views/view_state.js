@@ -52,7 +52,7 @@ export function gradeOfView(picture) {
 	const error = errorOf(picture).px;
 	if (error !== null && error > tau) return { grade: 'bad', sentence: given };
 	// What is wrong is not to be seen in this view: it has nobody to agree with.
-	if (apart !== null || (solved.ball && !solved.included)) return { grade: 'warn', sentence: 'no pair' };
+	if (apart !== null || (solved.ball && !solved.included)) return { grade: 'warn', sentence: 'not usable: no matching view' };
 	return { grade: 'ok', sentence: given };
 }
 

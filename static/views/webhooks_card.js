@@ -26,15 +26,15 @@ const SOON_MS = 2000, WATCH_MS = 30_000;
 /** What each kind of message tells. */
 const TELLS = /** @type {Record<string, string>} */ ({
 	'group.changed': 'lines, balls or cameras changed',
-	'group.commented': 'somebody commented, without the words',
+	'group.commented': 'a comment was written (text not included)',
 	'group.judged': 'accepted, rejected, deferred',
 	'dataset.changed': 'imports, thresholds, static cameras, pitches',
-	'batch.given_out': 'a batch was made',
-	'batch.handed_on': 'a batch has other people',
-	'batch.done': 'the last group of a batch is settled',
-	'batch.stalled': 'nobody works on a batch any more, or its day is over',
-	'group.disputed': 'annotations differ, somebody has to decide',
-	'group.handed_back': 'somebody has work back, without the reason',
+	'batch.given_out': 'a batch was assigned',
+	'batch.handed_on': 'a batch was reassigned',
+	'batch.done': 'the last group of a batch is done',
+	'batch.stalled': 'a batch has no activity, or its due date has passed',
+	'group.disputed': 'annotations differ and need a decision',
+	'group.handed_back': 'work was returned (reason not included)',
 	'version.frozen': 'a version was frozen',
 	'job.done': 'an import, export or other job ended',
 	'job.failed': 'a job failed',
@@ -60,10 +60,10 @@ function NewWebhook({ found, make }) {
 			<div class="form__row">
 				<label for="webhook-url">Address</label>
 				<input class="field" id="webhook-url" name="url" type="url" required placeholder=${found.allowed[0]} autocomplete="off" spellcheck=${false} />
-				<small>The operator of this server lets it begin with ${found.allowed.join(' or ')}</small>
+				<small>The operator of this server allows addresses that begin with ${found.allowed.join(' or ')}</small>
 			</div>
 			<fieldset class="form__row webhooks__kinds">
-				<legend class="form__label">Tell it of</legend>
+				<legend class="form__label">Events</legend>
 				${found.kinds.map((kind) => html`<label key=${kind} class="form__check"><input type="checkbox" name="kinds" value=${kind} /><span>${kind}<small>${TELLS[kind]}</small></span></label>`)}
 			</fieldset>
 			<p><button class="button" type="submit">Add the webhook</button></p>
@@ -74,7 +74,7 @@ function NewWebhook({ found, make }) {
 /** @param {{one: DeliveryJson, again: () => void}} props */
 function DeliveryRow({ one, again }) {
 	const [open, setOpen] = useState(false);
-	const told = one.state === 'delivered' ? 'arrived' : one.state === 'failed' ? 'given up' : one.attempts ? 'will be tried again' : 'waits';
+	const told = one.state === 'delivered' ? 'delivered' : one.state === 'failed' ? 'failed' : one.attempts ? 'will be retried' : 'waiting';
 	return html`
 		<tr>
 			<th scope="row">${one.kind}<small><${When} at=${one.created} /></small></th>
@@ -105,7 +105,7 @@ function Deliveries({ dataset, one, act }) {
 /** @param {{dataset: number, one: WebhookJson, act: (doing: Promise<any>, then?: (done: any) => void) => Promise<boolean>, show: (url: string, secret: string) => void}} props */
 function WebhookItem({ dataset, one, act, show }) {
 	const [open, setOpen] = useState(false);
-	const counts = [one.waiting ? `${one.waiting} waiting` : '', `${one.delivered} arrived`, one.failed ? `${one.failed} given up` : ''].filter(Boolean).join(', ');
+	const counts = [one.waiting ? `${one.waiting} waiting` : '', `${one.delivered} delivered`, one.failed ? `${one.failed} failed` : ''].filter(Boolean).join(', ');
 	const renew = () => act(renewWebhookSecret(dataset, one.id), (done) => show(one.url, done.secret));
 	return html`
 		<li class="webhooks__item">

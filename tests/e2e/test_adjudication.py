@@ -16,7 +16,7 @@ from tests.e2e.test_access import serious_in_both
 
 def test_one_of_two_is_taken_by_keyboard(home: Path, open_page: Callable[..., Page]) -> None:
     page = open_page("/datasets/sample/agreement")
-    expect(page.get_by_text("Nothing waits")).to_be_visible()
+    expect(page.get_by_text("Nothing to decide")).to_be_visible()
     group = passing(page, 1)
     store = Store.open(Settings(home=home))
     try:
@@ -41,7 +41,7 @@ def test_one_of_two_is_taken_by_keyboard(home: Path, open_page: Callable[..., Pa
     expect(page.locator('.compare__one[data-chosen="true"]')).to_contain_text("ada")
     page.keyboard.press("Enter")
     until(page, lambda: page.url.endswith("/datasets/sample/agreement"))
-    expect(page.get_by_text("Nothing waits")).to_be_visible()
+    expect(page.get_by_text("Nothing to decide")).to_be_visible()
     groups = page.get_by_role("region", name="Groups, the worst first", exact=True)
     expect(groups).to_contain_text("ada’s, by local")
     withdraw_verdict(page, group)
@@ -50,6 +50,6 @@ def test_one_of_two_is_taken_by_keyboard(home: Path, open_page: Callable[..., Pa
     before = page.request.get(agreement).json()["limits"]
     page.get_by_label("ball centre, px").fill("4.5")
     page.get_by_role("button", name="Save limits").click()
-    expect(page.get_by_text("They count for what is handed in from now on")).to_be_visible()
+    expect(page.get_by_text("They apply to annotations submitted from now on")).to_be_visible()
     assert page.request.get(agreement).json()["limits"] == {**before, "ball_px": 4.5}
     assert page.request.put(f"{agreement}/limits", data=before).ok

@@ -59,7 +59,7 @@ def test_agreement_is_told_of_views_and_finds_groups_and_may_be_asked_for(
     step = page.locator(".funnel").get_by_role("row", name="Agreement with the paint ≥ 1")
     expect(page.locator(".yield__difference")).to_be_visible()
     expect(step).to_have_count(0)
-    page.get_by_label("Smallest agreement with the paint is asked").check()
+    page.get_by_label("Use the threshold “Smallest agreement with the paint”").check()
     # Asked for as it is first offered: another number goes in once that is answered.
     first = page.locator(".funnel").get_by_role("row", name="Agreement with the paint ≥")
     expect(first).to_contain_text(re.compile(r"\d"))
@@ -82,7 +82,7 @@ def test_the_pictures_of_a_match_are_read_and_taken_back_by_keyboard(
     expect(row.get_by_role("button")).to_have_count(0)
     expect(card.get_by_role("heading")).to_be_focused()
     assert serious(page) == []
-    back = card.get_by_role("button", name="Take the last reading back")
+    back = card.get_by_role("button", name="Undo the last reading")
     expect(back).to_have_attribute("aria-disabled", "false")
     back.press("Enter")
     expect(row).to_contain_text("The paint of none")

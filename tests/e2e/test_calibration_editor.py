@@ -415,7 +415,7 @@ class TestStation:
         dialog.get_by_role("button", name="Propose").click()
         row = dialog.locator(f'tr[data-camera="{editor.key}"]')
         expect(row).to_be_visible()
-        expect(dialog).to_contain_text("Rays pass each other")
+        expect(dialog).to_contain_text("Camera pair")
         assert serious(page) == []
         # Somebody leaves a view out: that proposal is not saved any more, and a new one can be had.
         other = f"{film}/api/v1/groups/{timeline['id'][1]}"
@@ -437,7 +437,7 @@ class TestStation:
         until(page, lambda: page.request.get(station).json()["can_undo"])
 
         page.get_by_role("button", name="Adjust all static cameras").click()
-        dialog.get_by_role("button", name="Take it back").click()
+        dialog.get_by_role("button", name="Undo the adjustment").click()
         expect(dialog).to_be_hidden()
         expect(page.locator(".station-card__work")).to_be_visible()
         # While the groups are solved anew, their state changes.

@@ -62,7 +62,7 @@ class TestLifeOfADataset:
         expect(delete).to_have_attribute("aria-disabled", "true")
         # What goes with it is read first: asked later, there is nothing any more to read of.
         expect(page.locator("dialog[open] .number-list")).to_contain_text("groups")
-        page.get_by_label("Type passing through to go on").fill("passing through")
+        page.get_by_label("Type passing through to confirm").fill("passing through")
         delete.click()
         expect(card).to_have_count(0)
 
@@ -72,7 +72,7 @@ def bring_in(page: Page, labels: Path) -> None:
     page.get_by_label("Dataset", exact=True).fill("passing through")
     page.set_input_files("#import-file", labels)
     expect(page.get_by_text("is uploaded")).to_be_visible()
-    page.get_by_role("button", name="Try it out").click()
+    page.get_by_role("button", name="Dry run").click()
     expect(page.get_by_role("region", name="What would happen")).to_be_visible()
     usable(page)
     page.get_by_role("button", name="Import", exact=True).click()
@@ -101,7 +101,7 @@ def freeze_and_verify(page: Page) -> None:
     """A version that comes out the same when it is computed again."""
     page.goto("/datasets/passing through/versions")
     page.get_by_role("button", name="Freeze a version").first.click()
-    expect(page.locator(".bulk__outcome")).to_contain_text("groups enter")
+    expect(page.locator(".bulk__outcome")).to_contain_text("groups are included")
     usable(page)
     page.get_by_role("button", name="Freeze", exact=True).click()
     page.get_by_role("button", name="Done", exact=True).click()

@@ -104,7 +104,7 @@ PEOPLE = [
     ),
     Row(
         "asks a second factor of everybody",
-        [tick("Everybody needs a second factor: who has none makes one before anything else")],
+        [tick("Require a second factor: people without one set it up at their next login")],
         {"PUT /team": {"require_second_factor": True}},
         {".people__rule:has(input:checked)": "Everybody needs a second factor"},
     ),
@@ -112,7 +112,7 @@ PEOPLE = [
         "asks it of nobody any more",
         [
             tick(
-                "Everybody needs a second factor: who has none makes one before anything else",
+                "Require a second factor: people without one set it up at their next login",
                 on=False,
             )
         ],
@@ -132,11 +132,11 @@ PEOPLE = [
     Row(
         "shows earlier work as somebody's",
         [
-            choose("Show what local did until now as the work of", "dora"),
-            press("Show it as theirs"),
+            choose("Assign the earlier work of “local” to", "dora"),
+            press("Assign earlier work"),
         ],
         {"POST /users/{dora}/adoption": None},
-        {"section[aria-labelledby=people-local]": "It is shown as dora's."},
+        {"section[aria-labelledby=people-local]": "It is assigned to dora."},
     ),
 ]
 
@@ -224,8 +224,8 @@ ACCOUNT = [
         [
             fill("What it is for", "robot"),
             choose("Dataset", "sample", TOKENS),
-            choose("Good for", "365", TOKENS),
-            tick("read: look, which the others may, too", on=False),
+            choose("Valid for", "365", TOKENS),
+            tick("read: read only; included in all others", on=False),
             tick("annotate: lines, balls and cameras"),
             tick("review: verdicts"),
             tick("lead: import, freeze, evaluate, thresholds"),
@@ -261,19 +261,19 @@ ACCOUNT = [
     ),
     Row(
         "ends all other sessions",
-        [press("End all others")],
+        [press("End all other sessions")],
         {"DELETE /sessions": None},
         hides=f"{SESSIONS} tr:has-text('Chrome 141')",
     ),
     Row(
         "takes another password",
         [
-            fill("Present password", SECRET),
+            fill("Current password", SECRET),
             fill("New password", "four words that differ"),
-            press("Change the password"),
+            press("Change password"),
         ],
         {"PUT /session/password": {"old": SECRET, "new": "four words that differ"}},
-        {"section[aria-labelledby=account-password]": "It is changed."},
+        {"section[aria-labelledby=account-password]": "Password changed."},
     ),
 ]
 
@@ -286,7 +286,7 @@ class TestAccount:
             crew.log_in("tess", agent)
         page = open_as(open_page, crew.log_in("tess"), "/account")
         expect(page.locator(f"{SESSIONS} tbody tr")).to_have_count(3)
-        expect(page.locator(f"{SESSIONS} h2")).to_have_text("Where tess (lead) is logged in")
+        expect(page.locator(f"{SESSIONS} h2")).to_have_text("Sessions of tess (lead)")
         open_ones = read(page, "/sessions")["items"]
         firefox = next(one for one in open_ones if one["browser"] == FIREFOX)
         chrome = next(one for one in open_ones if one["browser"] == CHROME)
@@ -318,7 +318,10 @@ class TestAccount:
             expect(line.get_by_role("cell").nth(3)).to_contain_text(str(day.year))
 
 
-TRUTH = {"sample": "with what it was drawn", "verdict": "what it held when it was marked"}
+TRUTH = {
+    "sample": "the values it was generated from",
+    "verdict": "its annotations when it was marked",
+}
 GOLD = "section[aria-labelledby=gold-title]"
 MEMBERS = [
     Row(
@@ -349,11 +352,11 @@ MEMBERS = [
             )
         ],
         {"PATCH /groups/4/gold": {"start": "bare"}},
-        {f"{GOLD} tr:has(a[href='/review/4'])": "with what it was drawn"},
+        {f"{GOLD} tr:has(a[href='/review/4'])": "the values it was generated from"},
     ),
     Row(
         "takes its mark away",
-        [press("No gold group", f"{GOLD} tr:has(a[href='/review/3'])")],
+        [press("Unmark", f"{GOLD} tr:has(a[href='/review/3'])")],
         {"DELETE /groups/3/gold": None},
         hides=f"{GOLD} a[href='/review/3']",
     ),
@@ -369,7 +372,7 @@ class TestMembers:
         sent(dora, "PUT", "/groups/3/gold", {"start": "imported"})
         sent(dora, "POST", "/datasets/1/gold", {"source": "sample", "start": "without_balls"})
         page = open_as(open_page, dora, "/datasets/sample/statistics")
-        card = page.get_by_role("region", name="Who works in sample")
+        card = page.get_by_role("region", name="Members of sample")
         expect(card.get_by_label("Role of bob here")).to_be_visible()
         for one in read(page, "/datasets/sample/members")["items"]:
             role = card.get_by_label(f"Role of {one['name']} here", exact=True)

@@ -48,7 +48,7 @@ EXPORTS = [
             lambda page: page.locator(DIALOG).get_by_role("radio", name="All groups").check(),
             lambda page: page.locator(DIALOG).get_by_role("radio", name="Annotated boxes").check(),
             tick("Copy the frames into the zip", DIALOG),
-            tick("COCO and YOLO: balls that no other view confirms, too", DIALOG),
+            tick("COCO and YOLO: include balls that no other view confirms", DIALOG),
             press("Export", DIALOG),
         ],
         {

@@ -24,27 +24,27 @@ GIVEN: dict[str, Any] = {
 GIVEN |= {"verdicts": 1, "blind": True, "gold_every": None}
 ANNOTATORS = f"{DIALOG} fieldset:has(legend:text('Annotators'))"
 REVIEWERS = f"{DIALOG} fieldset:has(legend:text('Reviewers'))"
-PRESS_GIVE = press("Give out", DIALOG)
+PRESS_GIVE = press("Assign", DIALOG)
 GIVING = [
     Row(
         "gives all groups out",
-        [press("Give out…"), fill("Name", " Everything ", DIALOG), PRESS_GIVE],
+        [press("Assign…"), fill("Name", " Everything ", DIALOG), PRESS_GIVE],
         {"POST /datasets/1/batches": {**GIVEN, "name": "Everything", "q": ""}},
         hides=DIALOG,
     ),
     Row(
         "gives a few to some people until a day",
         [
-            press("Give out…"),
+            press("Assign…"),
             fill("Name", "Friday", DIALOG),
-            fill("The first so many", "3", DIALOG),
+            fill("Limit to first N", "3", DIALOG),
             fill("Due", DUE.isoformat(), DIALOG),
             tick("carl", ANNOTATORS),
             tick("bob", ANNOTATORS),
             tick("bob", ANNOTATORS, on=False),
             tick("bob", REVIEWERS),
             tick("dora", REVIEWERS),
-            tick("Leave out groups that wait in another open batch", DIALOG, on=False),
+            tick("Skip groups that are in another open batch", DIALOG, on=False),
             PRESS_GIVE,
         ],
         {
@@ -64,18 +64,16 @@ GIVING = [
     Row(
         "mixes gold groups in and lets two annotate who see each other",
         [
-            press("Give out…"),
+            press("Assign…"),
             fill("Name", "Twice", DIALOG),
-            fill("People who annotate each group on their own", "2", DIALOG),
-            fill("One gold group in so many", "4", DIALOG),
+            fill("Annotators per group", "2", DIALOG),
+            fill("One gold group in N", "4", DIALOG),
             choose("Gold groups are", "sample", DIALOG),
-            choose("People begin such a group with", "without_balls", DIALOG),
+            choose("Annotators start a gold group with", "without_balls", DIALOG),
             tick("bob", ANNOTATORS),
             tick("carl", ANNOTATORS),
-            tick(
-                "Where several people annotate, nobody sees what the others did", DIALOG, on=False
-            ),
-            tick("Leave out groups that wait in another open batch", DIALOG, on=False),
+            tick("Annotators do not see each other’s work", DIALOG, on=False),
+            tick("Skip groups that are in another open batch", DIALOG, on=False),
             PRESS_GIVE,
         ],
         {
@@ -99,10 +97,10 @@ BATCHES = [
     Row(
         "gives a batch on",
         [
-            press("Give on… Friday"),
+            press("Reassign… Friday"),
             fill("Name", "Saturday", DIALOG),
             fill("Due", (DUE + timedelta(days=1)).isoformat(), DIALOG),
-            fill("One gold group in so many", "5", DIALOG),
+            fill("One gold group in N", "5", DIALOG),
             tick("carl", ANNOTATORS, on=False),
             tick("dora", ANNOTATORS),
             tick("bob", REVIEWERS, on=False),
@@ -122,9 +120,9 @@ BATCHES = [
     Row(
         "takes its day and its gold groups away",
         [
-            press("Give on… Saturday"),
+            press("Reassign… Saturday"),
             fill("Due", "", DIALOG),
-            fill("One gold group in so many", "", DIALOG),
+            fill("One gold group in N", "", DIALOG),
             press("Save", DIALOG),
         ],
         {
@@ -191,7 +189,7 @@ class TestBatches:
             handed = batch["annotators"] and batch["verdicts"] == 1
             words = [
                 f"{batch['settled']} of {batch['groups']} groups done",
-                f"{batch['handed_in']} handed in" if handed else "",
+                f"{batch['handed_in']} submitted" if handed else "",
                 f"{batch['waiting']} open",
             ]
             expect(item).to_contain_text(" · ".join(filter(None, words)))
@@ -210,7 +208,7 @@ class TestBatches:
         for mine in read(page, "/work")["items"]:
             left, name = mine["left"], mine["batch"]["name"]
             groups = f": {left} group{'' if left == 1 else 's'}" if left else ""
-            go_on = page.get_by_role("button", name=f"Go on{groups} of {name}", exact=True)
+            go_on = page.get_by_role("button", name=f"Continue{groups} of {name}", exact=True)
             expect(go_on).to_be_visible()
 
 
@@ -288,7 +286,7 @@ class TestPolicy:
 def value_text(value: Json, unit: str) -> str:
     """A threshold as the page has it."""
     if value is None:
-        return "not asked"
+        return "not set"
     if isinstance(value, bool):
         text = "yes" if value else "no"
     else:

@@ -40,7 +40,7 @@ class TestFound:
         open_help(page)
         page.get_by_role("tab", name="Keys").focus()
         for name, words in (
-            ("Legend", "Line that nobody drew"),
+            ("Legend", "Visible line, not drawn"),
             ("Glossary", "Jaccard index"),
             ("Guide", "The loop"),
             ("Practice", "Eight made-up groups"),
@@ -237,13 +237,13 @@ class TestPractice:
         page.keyboard.press("x")
         page.keyboard.press("1")
         expect(card).to_contain_text("Lesson 3 of 8")
-        expect(card).to_contain_text("Look again: it could have been mended")
+        expect(card).to_contain_text("Look again: it could have been fixed")
         expect(card).to_contain_text("Best:")
         # Mended by a key: told before the verdict, too.
         page.wait_for_selector('.image-panel[data-view="B"] .image-panel__stage[data-ready="true"]')
         page.keyboard.press("2")
         page.keyboard.press("m")
-        expect(card).to_contain_text("Right: the fault is mended.")
+        expect(card).to_contain_text("Right: the fault is fixed.")
         page.keyboard.press("?")
         page.get_by_role("tab", name="Practice").click()
         expect(page.get_by_role("tabpanel")).to_contain_text("1 of 8 right")

@@ -374,9 +374,9 @@ class TestStates:
         gates = {gate["name"]: gate["sentence"] for gate in state["solution"]["gates"]}
         assert "left out by a person" in gates["two_views"]
         one.open()
-        expect(one.card.locator("h1")).to_have_text("Fewer than two views are left")
+        expect(one.card.locator("h1")).to_have_text("Fewer than two views are usable")
         expect(one.card).to_contain_text("left out by a person")
-        expect(one.card.get_by_role("button", name="Use it again")).to_be_visible()
+        expect(one.card.get_by_role("button", name="Include it again")).to_be_visible()
         one.screen.press("Enter")
         one.screen.saved()
         expect(one.card).to_have_attribute("data-tone", "ok")

@@ -200,7 +200,7 @@ class TestTakingVerdictsBack:
         stands(page, queue, 3)
         screen.ready()
         screen.press("Control+z")
-        expect(page.locator(".bar")).to_contain_text("was judged again since")
+        expect(page.locator(".bar")).to_contain_text("was reviewed again since")
         assert state_of(page, queue[2]) == "rejected"
         withdraw_verdict(page, queue[2])
 
@@ -219,6 +219,6 @@ class TestTakingVerdictsBack:
         page.reload()
         screen.ready()
         screen.press("Control+Shift+z")
-        expect(page.locator(".bar")).to_contain_text("was judged since")
+        expect(page.locator(".bar")).to_contain_text("was reviewed since")
         assert state_of(page, queue[2]) == "rejected"
         withdraw_verdict(page, queue[2])

@@ -312,7 +312,7 @@ class TestNoise:
         page.goto("/datasets/sample/policy")
         card = page.get_by_label("Noise of the clicks")
         expect(card).to_contain_text("sets “Of its diameter” to 0.08 (now 0.04)")
-        expect(card).to_contain_text("show camera cam2 (1.80 times) unlike the dataset")
+        expect(card).to_contain_text("differ from the dataset for camera cam2 (1.80 times)")
         button = card.get_by_role("button", name="Use the estimates and solve")
         button.click()
         expect(button).to_have_attribute("aria-disabled", "true")

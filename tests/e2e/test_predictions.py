@@ -201,7 +201,7 @@ class TestEvaluationPage:
         expect(dialog).to_contain_text("the view has a ball already")
         page.get_by_label("Groups, as a query of the queue").fill(f"number:{number}")
         page.locator("#accept-score").fill("0.9")
-        expect(dialog).to_contain_text("the surest prediction is below the score")
+        expect(dialog).to_contain_text("the best prediction is below the score")
         page.locator("#accept-score").fill("0.8")
         page.keyboard.press("Tab")
         page.get_by_role("button", name="Accept 1", exact=True).click()

@@ -160,7 +160,7 @@ class TestBulkVerdicts:
         expect(page.locator(".bar")).to_contain_text("3 groups deferred")
         expect(page.locator(".pill[data-status=deferred]")).to_have_count(3)
         page.locator(".bar").get_by_role("button", name="Undo").click()
-        expect(page.locator(".bar")).to_contain_text("3 verdicts are taken back")
+        expect(page.locator(".bar")).to_contain_text("3 verdicts are undone")
         expect(page.locator(".pill[data-status=deferred]")).to_have_count(0)
         until(page, lambda: statuses(page) == before)
 
@@ -362,7 +362,7 @@ class TestTicks:
         page.reload()
         expect(page.locator(".pill[data-status=deferred]")).to_have_count(2)
         page.keyboard.press("Control+z")
-        expect(page.locator(".bar")).to_contain_text("2 verdicts are taken back")
+        expect(page.locator(".bar")).to_contain_text("2 verdicts are undone")
         expect(page.locator(".pill[data-status=deferred]")).to_have_count(0)
         until(page, lambda: statuses(page) == before)
 
@@ -415,7 +415,7 @@ class TestTicks:
         page.get_by_role("button", name="Reviewers").click()
         entry = page.locator(".batches li").filter(has_text=f"{SEASON - 1:,} groups deferred")
         entry.get_by_role("button", name="Undo").click()
-        expect(entry).to_contain_text("taken back by local")
+        expect(entry).to_contain_text("undone by local")
         expect(page.locator(".pill[data-status=deferred]")).to_have_count(0)
 
 

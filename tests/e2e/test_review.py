@@ -252,7 +252,7 @@ class TestLooking:
         screen = review(0)
         solution = screen.document()["solution"]
         which = screen.page.locator(".mini-pitch button")
-        expect(which).to_have_text("mean of pairs")
+        expect(which).to_have_text("pair average")
         mean = screen.pitch("sigma"), screen.number("A", "error")
         screen.press("t")
         expect(which).to_have_text("most likely point")
@@ -267,7 +267,7 @@ class TestLooking:
         # The gates stay with the mean, which is exported.
         assert screen.document()["solution"]["ball"] == solution["ball"]
         which.click()
-        expect(which).to_have_text("mean of pairs")
+        expect(which).to_have_text("pair average")
         assert (screen.pitch("sigma"), screen.number("A", "error")) == mean
 
     def test_g_tells_by_how_much_each_gate_is_met(self, review: Callable[..., Screen]) -> None:

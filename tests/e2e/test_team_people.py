@@ -79,7 +79,7 @@ class TestPeople:
         Screen(mia).ready()
         noa = open_page("/groups", address=team)
         log_in(noa, "noa")
-        bell = noa.get_by_role("button", name="Bell")
+        bell = noa.get_by_role("button", name="Notifications")
         expect(bell).to_contain_text("nothing new")
         hears(noa)
         hears(mia)
@@ -174,11 +174,11 @@ class TestPeople:
             expect(bar).to_contain_text("needs the role reviewer")
             assert verdict(page, 3)["state"] is None
         page.evaluate("() => dispatchEvent(new Event('focus'))")
-        expect(page.get_by_text("Your rights were changed: viewer in ")).to_be_visible()
+        expect(page.get_by_text("Your role was changed: viewer in ")).to_be_visible()
         expect(accept).to_have_attribute("aria-disabled", "true")
         expect(accept).to_have_attribute("title", re.compile("needs the role reviewer"))
         page.keyboard.press("x")
-        expect(page.get_by_text("Judging or exporting needs the role reviewer")).to_be_visible()
+        expect(page.get_by_text("Reviewing or exporting needs the role reviewer")).to_be_visible()
         assert serious_in_both(page) == []
 
         in_store(team_home, lambda store: give(store, "vera", Role.REVIEWER))
@@ -209,7 +209,7 @@ class TestPeople:
         page.get_by_role("button", name="Read version 1").click()
         expect(page.locator(".guidelines__shown")).to_contain_text("Draw tight boxes.")
         assert serious_in_both(page) == []
-        page.get_by_role("button", name="Take back version 1").click()
+        page.get_by_role("button", name="Restore version 1").click()
         expect(page.get_by_text("3 versions, the last by gwen")).to_be_visible()
         now = in_store(team_home, lambda store: read_guidelines(store, "sample"))
         assert (now.number, now.text) == (3, "Draw tight boxes.")

@@ -69,7 +69,7 @@ class TestSessions:
         code.fill(totp.now())
         page.get_by_role("button", name="Confirm").click()
         expect(page.locator(".factor__codes li")).to_have_count(10)
-        page.get_by_role("button", name="I have kept them").click()
+        page.get_by_role("button", name="I have saved them").click()
         log_out(page)
         log_in(page, "tina")
         expect(page.get_by_label("Code of your second factor")).to_be_focused()
@@ -94,7 +94,7 @@ class TestSessions:
         page.get_by_role("button", name="Make a passkey").click()
         expect(page.locator(".factor__codes li")).to_have_count(10)
         assert serious_in_both(page) == []
-        page.get_by_role("button", name="I have kept them").click()
+        page.get_by_role("button", name="I have saved them").click()
 
         log_out(page)
         log_in(page, "paula")
@@ -104,12 +104,12 @@ class TestSessions:
         expect(page.get_by_role("link", name="paula")).to_be_visible()
 
         page.goto(page.url.rpartition("/")[0] + "/account")
-        page.get_by_role("button", name="Take away laptop").click()
+        page.get_by_role("button", name="Remove laptop").click()
         page.locator("#passkey-remove").fill(SECRET)
         assert serious_in_both(page) == []
         page.locator("#passkey-remove").press("Enter")
         expect(page.get_by_role("rowheader", name="laptop")).to_be_hidden()
-        expect(page.get_by_role("button", name="Take away laptop")).to_be_hidden()
+        expect(page.get_by_role("button", name="Remove laptop")).to_be_hidden()
         assert not in_store(team_home, lambda store: find_person(store, "paula")).second_factor
 
     def test_somebody_comes_by_the_provider_and_goes_on_where_they_were(
@@ -121,7 +121,7 @@ class TestSessions:
         _, link = in_store(team_home, lambda store: invite(store, "pia", Role.LEAD, actor="local"))
         provider.who = {"sub": "s-pia", "email": "pia@club.example"}
         page = open_page(f"/join#{link.token}", address=here)
-        page.get_by_role("button", name="Come in with Club").click()
+        page.get_by_role("button", name="Continue with Club").click()
         expect(page.get_by_role("link", name="pia")).to_be_visible()
 
         page.goto(f"{here}/account")
@@ -134,7 +134,7 @@ class TestSessions:
         code.fill(totp.now())
         page.get_by_role("button", name="Confirm").click()
         expect(page.locator(".factor__codes li")).to_have_count(10)
-        page.get_by_role("button", name="I have kept them").click()
+        page.get_by_role("button", name="I have saved them").click()
         log_out(page)
         page.goto(f"{here}/jobs?state=failed")
         # A key that comes before goes to the field that the page gives the focus.

@@ -33,14 +33,14 @@ class TestWork:
         join(team_home, "ivo", Role.REVIEWER)
         tove = open_page("/groups", address=team)
         log_in(tove, "tove")
-        expect(tove.get_by_role("button", name="Give out…")).to_be_enabled()
+        expect(tove.get_by_role("button", name="Assign…")).to_be_enabled()
         tove.keyboard.press("Shift+D")
-        dialog = tove.get_by_role("dialog", name="Give out groups")
+        dialog = tove.get_by_role("dialog", name="Assign groups")
         dialog.get_by_label("Name").fill("A few")
-        dialog.get_by_label("The first so many").fill("3")
-        dialog.get_by_role("button", name="Give out", exact=True).click()
+        dialog.get_by_label("Limit to first N").fill("3")
+        dialog.get_by_role("button", name="Assign", exact=True).click()
         tove.get_by_role("button", name="See the work").click()
-        go_on = tove.get_by_role("button", name="Go on: 3 groups of A few")
+        go_on = tove.get_by_role("button", name="Continue: 3 groups of A few")
         expect(go_on).to_be_focused()
         assert serious_in_both(tove) == []
         tove.keyboard.press("Enter")
@@ -51,7 +51,7 @@ class TestWork:
 
         ivo = open_page("/work", address=team)
         log_in(ivo, "ivo")
-        expect(ivo.get_by_role("button", name="Go on: 3 groups of A few")).to_be_focused()
+        expect(ivo.get_by_role("button", name="Continue: 3 groups of A few")).to_be_focused()
         ivo.keyboard.press("Enter")
         other = Screen(ivo)
         other.ready()
@@ -62,7 +62,7 @@ class TestWork:
             ivo.goto(f"/review/{first}?batch={batch_in(ivo)}")
             other.ready()
             here = ivo.locator('[data-lease="others"]')
-            expect(here).to_contain_text("tove is here")
+            expect(here).to_contain_text("tove opened this")
         here.get_by_role("button", name="Take over").click()
         expect(here).to_be_hidden()
         lost = tove.locator('[data-lease="lost"]')
@@ -81,7 +81,7 @@ class TestWork:
         give_to(team_home, "quinto", "Late", "id:10")
         page = open_page("/work", address=team)
         log_in(page, "quinto")
-        go_on = page.get_by_role("button", name="Go on: 1 group of Late")
+        go_on = page.get_by_role("button", name="Continue: 1 group of Late")
         expect(go_on).to_be_visible()
         with holding(page, "**/api/v1/work") as asked:
             page.reload()
@@ -99,7 +99,7 @@ class TestWork:
         give_to(team_home, "quinn", "Slow", "id:11,12")
         page = open_page("/work", address=team)
         log_in(page, "quinn")
-        page.get_by_role("button", name="Go on: 2 groups of Slow").press("Enter")
+        page.get_by_role("button", name="Continue: 2 groups of Slow").press("Enter")
         screen = Screen(page)
         screen.ready()
         with holding(page, "**/verdict") as verdicts:
@@ -108,7 +108,7 @@ class TestWork:
             screen.ready()
             verdicts.arrive()
             screen.press("s")
-            expect(page.get_by_text("Nothing more waits for you in “Slow”")).to_be_visible()
+            expect(page.get_by_text("No more groups for you in “Slow”")).to_be_visible()
             assert screen.group == 12
         for group in (11, 12):
             until(page, lambda at=group: verdict(page, at).get("by") == "quinn")  # type: ignore[misc]
@@ -123,7 +123,7 @@ class TestWork:
         given = in_store(team_home, lambda store: make_batch(store, "sample", new, actor="local"))
         nora = open_page("/work", address=team)
         log_in(nora, "nora")
-        expect(nora.get_by_role("button", name="Go on: 2 groups of B")).to_be_focused()
+        expect(nora.get_by_role("button", name="Continue: 2 groups of B")).to_be_focused()
         nora.keyboard.press("Enter")
         Screen(nora).ready()
         nora.keyboard.press("Shift+F")
@@ -132,9 +132,9 @@ class TestWork:
         ralf = open_page(f"/review/6?q=batch%3A{given.id}", address=team)
         log_in(ralf, "ralf")
         Screen(ralf).ready()
-        expect(ralf.get_by_role("button", name="Hand back to nora…")).to_be_visible()
+        expect(ralf.get_by_role("button", name="Return to nora…")).to_be_visible()
         ralf.keyboard.press("Shift+U")
-        dialog = ralf.get_by_role("dialog", name="Hand back to nora")
+        dialog = ralf.get_by_role("dialog", name="Return to nora")
         expect(dialog.get_by_label("Why")).to_be_focused()
         assert serious_in_both(ralf) == []
         ralf.keyboard.type("The far goal line is missing")
@@ -142,14 +142,14 @@ class TestWork:
         expect(dialog).to_be_hidden()
         until(ralf, lambda: ralf.url.endswith("/work"))
 
-        bell = nora.get_by_role("button", name="Bell")
+        bell = nora.get_by_role("button", name="Notifications")
         expect(bell).to_contain_text("2")
         nora.goto("/work")
-        back = nora.get_by_role("list", name="Handed back to you")
+        back = nora.get_by_role("list", name="Returned to you")
         expect(back).to_contain_text("by ralf: “The far goal line is missing”")
         assert serious_in_both(nora) == []
         back.get_by_role("link").press("Enter")
-        expect(nora.get_by_text("ralf handed this back")).to_be_visible()
+        expect(nora.get_by_text("ralf returned this")).to_be_visible()
         Screen(nora).ready()
         nora.keyboard.press("Shift+F")
         until(nora, lambda: "/review/7" in nora.url)
@@ -165,14 +165,14 @@ class TestWork:
         log_in(lotte, "lotte")
         for name in ("uma", "ulf"):
             join(team_home, name, Role.REVIEWER)
-        expect(lotte.get_by_role("button", name="Give out…")).to_be_enabled()
+        expect(lotte.get_by_role("button", name="Assign…")).to_be_enabled()
         lotte.keyboard.press("Shift+D")
-        dialog = lotte.get_by_role("dialog", name="Give out groups")
+        dialog = lotte.get_by_role("dialog", name="Assign groups")
         dialog.get_by_label("Name").fill("Twice")
-        dialog.get_by_label("People who annotate each group").fill("2")
+        dialog.get_by_label("Annotators per group").fill("2")
         for name in ("uma", "ulf"):
             dialog.get_by_role("group", name="Annotators").get_by_label(name).check()
-        dialog.get_by_role("button", name="Give out", exact=True).click()
+        dialog.get_by_role("button", name="Assign", exact=True).click()
         expect(lotte.get_by_role("button", name="See the work")).to_be_visible()
 
         copies: dict[str, int] = {}
@@ -206,17 +206,17 @@ class TestWork:
         expect(page.locator(".compare__one")).to_have_count(2)
         page.keyboard.press("2")
         page.keyboard.press("Shift+U")
-        expect(page.get_by_label("Why, in a sentence")).to_be_focused()
+        expect(page.get_by_label("Reason")).to_be_focused()
         page.keyboard.type("Too far right")
         page.keyboard.press("Enter")
-        expect(page.get_by_text("Nothing waits")).to_be_visible()
-        rows = page.get_by_role("region", name="Own annotations").get_by_role("row")
-        expect(rows.filter(has_text="udo")).to_contain_text("handed back by lars")
+        expect(page.get_by_text("Nothing to decide")).to_be_visible()
+        rows = page.get_by_role("region", name="Independent annotations").get_by_role("row")
+        expect(rows.filter(has_text="udo")).to_contain_text("returned by lars")
         assert serious_in_both(page) == []
         rows.filter(has_text="ute").get_by_role("link").press("Enter")
         Screen(page).ready()
         accept = page.get_by_role("button", name="Accept A")
-        expect(accept).to_have_attribute("title", re.compile("ute has handed this in"))
+        expect(accept).to_have_attribute("title", re.compile("ute has submitted this"))
         page.keyboard.press("Shift+R")
         expect(page.get_by_role("dialog", name="Take over ute’s annotation")).to_be_visible()
         expect(page.get_by_role("button", name="Take over Enter")).to_be_focused()
@@ -235,7 +235,7 @@ def give_to(home: Path, name: str, batch: str, q: str) -> None:
 
 def judge_alone(page: Page, batch: str, keys: list[str], *, unseen: dict[str, int]) -> int:
     """Judge the copy that somebody is given of a batch of one group; those of others are not there."""
-    page.get_by_role("button", name=f"Go on: 1 group of {batch}").press("Enter")
+    page.get_by_role("button", name=f"Continue: 1 group of {batch}").press("Enter")
     screen = Screen(page)
     screen.ready()
     copy = screen.group

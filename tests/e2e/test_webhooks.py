@@ -28,7 +28,7 @@ def test_a_lead_sees_that_nobody_takes_the_messages(
     card.get_by_role("button", name="Done").click()
     card.get_by_role("button", name="Try").click()
     expect(card.get_by_text("it could not be reached")).to_be_visible()
-    expect(card.get_by_text("will be tried again")).to_be_visible()
+    expect(card.get_by_text("will be retried")).to_be_visible()
     card.get_by_role("button", name="Turn off").click()
     expect(card.get_by_text("somebody turned it off")).to_be_visible()
     page.reload()

@@ -9,15 +9,15 @@ describe('sentenceOfEntry', () => {
 	it('names lines that were drawn and removed', () => {
 		const edit = { edit: 'set_lines', view: 'x', lines: { 'Middle line': [[1, 2]], 'Circle left': null } };
 		assert.equal(said('edit', { edit }), 'Drew “Middle line” and removed “Circle left” in B');
-		assert.equal(said('undo', { edit }), 'Took back: drew “Middle line” and removed “Circle left” in B');
+		assert.equal(said('undo', { edit }), 'Undid: drew “Middle line” and removed “Circle left” in B');
 	});
 	it('says what was decided, and why', () => {
 		assert.equal(said('verdict', { state: 'rejected', reason: 'bad_field_lines', note: 'no', override: null }), 'Rejected because of bad field lines: “no”');
 	});
-	it('says whose own annotation was taken over, and how that was decided', () => {
-		assert.equal(said('take', { did: 'adopted', take: 1, person: 'anna' }), 'Took over anna’s own annotation');
-		assert.equal(said('agreement', { did: 'agreed', person: 'anna', of: ['anna', 'bo'] }), 'anna and bo agree: anna’s annotation counts');
-		assert.equal(said('work', { did: 'handed back', person: 'bo', reason: 'the far line' }), 'Handed back to bo: “the far line”');
+	it('says whose independent annotation was taken over, and how that was decided', () => {
+		assert.equal(said('take', { did: 'adopted', take: 1, person: 'anna' }), 'Took over anna’s independent annotation');
+		assert.equal(said('agreement', { did: 'agreed', person: 'anna', of: ['anna', 'bo'] }), 'anna and bo agree: anna’s annotation is used');
+		assert.equal(said('work', { did: 'handed back', person: 'bo', reason: 'the far line' }), 'Returned to bo: “the far line”');
 		assert.equal(said('agreement', { did: 'decided', person: 'bo', of: ['anna', 'bo'] }), 'Decided for bo’s annotation');
 	});
 	it('says nothing of the words of a comment', () => {

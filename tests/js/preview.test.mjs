@@ -90,14 +90,14 @@ describe('previewBall', () => {
 		const next = previewBall(group, exported);
 		assert.equal(next.point, 'mean');
 		assert.equal(next.mean_ball, null);
-		assert.deepEqual(ballTold(next, 'exported', exported, true), { name: 'mean of pairs', state: 'until saved' });
+		assert.deepEqual(ballTold(next, 'exported', exported, true), { name: 'pair average', state: 'until saved' });
 		assert.deepEqual(ballTold(exported, 'exported', exported, false), { name: 'most likely point', state: 'exported' });
 	});
 
 	it('stays what is exported where that is the mean of pairs', () => {
 		const group = { policy, views: [viewOf('a', mainCamera), viewOf('b', goalCamera)] };
 		const next = previewBall(group, solution);
-		assert.deepEqual(ballTold(next, 'exported', solution, true), { name: 'mean of pairs', state: 'exported' });
-		assert.deepEqual(ballTold(next, 'other', solution, true), { name: 'mean of pairs', state: 'until saved' });
+		assert.deepEqual(ballTold(next, 'exported', solution, true), { name: 'pair average', state: 'exported' });
+		assert.deepEqual(ballTold(next, 'other', solution, true), { name: 'pair average', state: 'until saved' });
 	});
 });

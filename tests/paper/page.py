@@ -51,7 +51,7 @@ Workshops 2025 (arXiv 2504.10106).
 **What this is.** {study.groups} synthetic groups (seed {SEED}) with noisy clicks, loose ball boxes and planted
 faults go through the real pipeline: calibration from lines, triangulation, gates, optimised boxes,
 and then the real evaluation. {counts["groups"]} groups pass the policy `paper`; {counts["with_3d_ball"]} of their {counts["frames"]} frames have a 3D ball. The
-truth is known exactly, so the tight box of the true ball takes the place of a careful manual box.
+truth is known exactly, so the tight box of the true ball takes the place of a manual reference box.
 
 **What this is not.** There is no detector here. What stands for YOLO is a **simulated detector**:
 true boxes with seeded noise (missed {simulated.MISSED:.0%}, {simulated.FALSE_ALARMS:g} false alarms a frame, size noise {simulated.SIZE_NOISE:.0%}, centre noise
@@ -71,7 +71,7 @@ def _boxes(study: Study) -> Iterator[str]:
     assert table is not None
     yield from (
         "",
-        "## Boxes against careful boxes (the paper's table 1)",
+        "## Boxes against reference boxes (the paper's table 1)",
         "",
         "| boxes | IoU, paper | IoU, here | size error, paper | size error, here | n |",
         "|---|---|---|---|---|---|",
@@ -197,7 +197,7 @@ def _end() -> Iterator[str]:
     yield from """
 ## What is missing for a true reproduction
 
-The paper's own numbers need SoccerNet-v3 frames and labels, the authors' careful boxes of a tenth
+The paper's own numbers need SoccerNet-v3 frames and labels, the authors' reference boxes of a tenth
 of the training images, and YOLO weights trained on them; none of these come with Touchline. With
 them, the same tables come from `touchline evaluate` on a frozen version:
 

@@ -65,7 +65,7 @@ def get_take(group: Id, store: AppStore) -> takes.TakeView:
     responses=responses(403, 404),
 )
 def hand_in(group: Id, services: AppServices, actor: Actor, asked: AskedUnder) -> Response:
-    """Say that one's own annotation is done; a verdict on it does the same."""
+    """Say that an independent annotation is done; a verdict on it does the same."""
     store, reply = services.store, Reply(asked, _take_answer)
     take = takes.get_take_of(store, group)
     handed = takes.hand_in(store, take.id, actor=actor, keep=reply.keep)

@@ -49,7 +49,7 @@ def put_verdict(
     change = partial(set_verdict, services.store, group, *said, if_match=if_match, actor=actor)
 
     def hand_in(state: GroupState) -> None:
-        """A verdict on one's own annotation of a group, and on nothing else, hands that in."""
+        """A verdict on an independent annotation of a group, and on nothing else, hands that in."""
         if state.is_copy:
             after_hand_in(services.store, group, services.paint)
 

@@ -32,7 +32,7 @@ class EvaluationBody(BaseModel):
     name: Annotated[str, Field(max_length=MAX_NAME)] = ""
     predictions: SetId | None = Field(default=None, description="Boxes, cameras or both.")
     careful: SetId | None = Field(
-        default=None, description="Careful boxes, for the table of boxes (the paper's table 1)."
+        default=None, description="Reference boxes, for the table of boxes (the paper's table 1)."
     )
     version: VersionId | None = Field(
         default=None,
@@ -54,7 +54,7 @@ class EvaluationBody(BaseModel):
     @model_validator(mode="after")
     def _something(self) -> EvaluationBody:
         if self.predictions is None and self.careful is None:
-            raise ValueError("give predictions, careful boxes, or both")
+            raise ValueError("give predictions, reference boxes, or both")
         return self
 
     def value(self, version: int | None) -> EvaluationRequest:
@@ -223,7 +223,7 @@ class ComparisonDocument(Document):
     first: EvaluationRow
     second: EvaluationRow
     same_truth: bool = Field(
-        description="Same frames, policy, solver, options and careful boxes: the numbers can be "
+        description="Same frames, policy, solver, options and reference boxes: the numbers can be "
         "compared."
     )
     differs: list[str] = Field(

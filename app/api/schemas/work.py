@@ -191,7 +191,7 @@ class TeamBatchDocument(Document):
     """A batch and who has done what of it."""
 
     batch: WorkBatchDocument
-    gold_every: int | None = Field(description="One of so many groups is a gold one.")
+    gold_every: int | None = Field(description="One gold group in N.")
     here: list[PresenceDocument]
     stalled: datetime | None = Field(
         description="Since when nobody does anything, where that is as long as the operator's setting "

@@ -13,8 +13,8 @@ def require_open(session: Session, dataset_id: int, group_id: int) -> None:
     take = take_of_copy(session, group_id) if dataset_id > COPIES else None
     if take is not None and take.handed_in is not None:
         raise ConflictError(
-            "this annotation was handed in, and can no longer be changed",
-            hint="Take your verdict back to go on, or ask a lead.",
+            "this annotation is submitted and can no longer be changed",
+            hint="Withdraw your verdict to continue, or ask a lead.",
         )
 
 

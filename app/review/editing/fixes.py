@@ -234,7 +234,10 @@ _ACTIONS = {
         0, "ball {number} was the one in play in {letter}", "Keep ball {number}", edit=_pick_ball
     ),
     "free_picture": _Action(
-        1, "the picture of {letter} was stretched or cropped", "Solve it so", edit=_free_picture
+        1,
+        "the picture of {letter} was stretched or cropped",
+        "Use this geometry",
+        edit=_free_picture,
     ),
     "move_point": _Action(
         1,
@@ -251,19 +254,19 @@ _ACTIONS = {
     ),
     "draw_marking": _Action(2, label="Draw it"),
     READ_PAINT: _Action(1, label="Read its paint"),
-    "include_view": _Action(2, "{letter} was used again", "Use it again", edit=_include),
+    "include_view": _Action(2, "{letter} was included again", "Include it again", edit=_include),
     "drop_point": _Action(
         3,
-        "point {number} of {marking} in {letter} was dropped",
-        "Drop the point",
+        "point {number} of {marking} in {letter} was deleted",
+        "Delete the point",
         "point {number} of {marking}",
         _drop_point,
     ),
     "drop_marking": _Action(
         4,
-        "{marking} in {letter} was dropped",
-        "Drop the line",
-        "{marking}: fits nothing",
+        "{marking} in {letter} was deleted",
+        "Delete the line",
+        "{marking}: fits no line",
         _drop_marking,
     ),
     "exclude_view": _Action(5, "{letter} was left out", "Leave it out", edit=_include),

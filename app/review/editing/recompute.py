@@ -57,6 +57,18 @@ class SolveReport:
     passed: int = 0
     failed: list[tuple[str, str]] = field(default_factory=list)
 
+    @property
+    def sentence(self) -> str:
+        """How many groups pass, how many do not, and how many could not be solved.
+
+        Example:
+            >>> SolveReport(total=61, solved=60, passed=52, failed=[("7", "boom")]).sentence
+            '52 pass, 8 do not; 1 error'
+        """
+        errors = len(self.failed)
+        rest = self.solved - self.passed
+        return f"{self.passed} pass, {rest} do not; {errors} error{'' if errors == 1 else 's'}"
+
 
 @dataclass(frozen=True)
 class Task:

@@ -1,4 +1,4 @@
-"""Careful boxes of a set of predictions: one a frame, which the dataset's are measured with."""
+"""Reference boxes of a set of predictions: one a frame, which the dataset's are measured with."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ LISTED = 5
 
 
 def careful_boxes(session: Session, careful: PredictionSet) -> dict[int, Box]:
-    """The careful box of each view, by its id.
+    """The reference box of each view, by its id.
 
     Raises:
         InputError: A frame has several; nobody can tell which one would be the truth.
@@ -25,7 +25,7 @@ def careful_boxes(session: Session, careful: PredictionSet) -> dict[int, Box]:
         names = [_frame_name(row) for row in rows if row.id in several]
         more = f" and {len(names) - LISTED} more" if len(names) > LISTED else ""
         raise InputError(
-            f'frames of the careful boxes "{careful.name}" have more than one box: '
+            f'frames of the reference boxes "{careful.name}" have more than one box: '
             f"{', '.join(names[:LISTED])}{more}",
             hint="Keep the one box of each frame that is the ball.",
             pointer="/careful",

@@ -80,7 +80,7 @@ def evaluate_sources(
     actor: str,
     progress: TellProgress | None = None,
 ) -> EvaluatedSources:
-    """Read predictions and careful boxes into sets, and evaluate them.
+    """Read predictions and reference boxes into sets, and evaluate them.
 
     Args:
         store: The database.

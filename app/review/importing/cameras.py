@@ -51,7 +51,7 @@ def ingest_cameras(
         cameras: By name, as ``datasets.camera_json.read_cameras`` reads them.
         source: Where they come from, for the log.
         actor: Who imports.
-        dry_run: Say what would happen, and keep nothing.
+        dry_run: Dry run: report what would happen, change nothing.
 
     Returns:
         ``changed`` and ``unchanged`` count cameras; ``problems`` name those that fit nothing.

@@ -98,7 +98,7 @@ def carry_in(
         source: Where it comes from, for the log.
         actor: Who imports.
         progress: Called with the number of groups done.
-        dry_run: Say what would happen, and keep nothing.
+        dry_run: Dry run: report what would happen, change nothing.
     """
     result = IngestReport()
     with opened_tree(path, report, limits) as tree:

@@ -57,7 +57,7 @@ def import_apart(
         dataset: Name.
         source: What to read, and how.
         actor: Who imports.
-        dry_run: Say what would happen, and keep nothing.
+        dry_run: Dry run: report what would happen, change nothing.
         progress: Called with the number of groups done; what it raises ends the import.
         stop: Called every now and then; what it raises ends the import.
         policy: Of a dataset that is made; None: as its first pictures suggest.

@@ -97,7 +97,7 @@ def ingest(
         source: Where they come from, for the log.
         actor: Who imports.
         progress: Called after each batch.
-        dry_run: Say what would happen, and keep nothing.
+        dry_run: Dry run: report what would happen, change nothing.
         policy: Of a dataset that is made; None: as its first pictures suggest.
         told: What the files hold; hears what of a group is left out, beyond its ``GroupLimits``.
     """

@@ -168,7 +168,7 @@ def import_source(
         settings: Caps on what is read.
         progress: Called with the number of groups done.
         actor: Who imports.
-        dry_run: Say what would happen, and keep nothing.
+        dry_run: Dry run: report what would happen, change nothing.
         policy: Of a dataset that is made; None: as its first pictures suggest. A dataset that a
             ``touchline`` file makes has the policy of the file.
     """

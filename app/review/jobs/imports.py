@@ -98,7 +98,7 @@ def request_import(
         row = find_dataset(session, request.dataset)
     if row is None:
         require_name(request.dataset, "a dataset", pointer="/dataset")
-    would = "Look at" if request.dry_run else "Import"
+    would = "Dry run of" if request.dry_run else "Import"
     return jobs.submit(
         KIND,
         f"{would} {source.name} ({request.format}) for {request.dataset}",
@@ -126,7 +126,7 @@ def import_work(
 
     def work(progress: JobProgress) -> Json:
         source = source_of(settings, request)
-        sentence = f"{'Looking at' if request.dry_run else 'Importing'} {source.name}."
+        sentence = f"{'Reading' if request.dry_run else 'Importing'} {source.name}."
         progress(0, None, sentence)
         if not request.dry_run and "upload" in request.source:
             # Frames are read where they are, so the file must stay from the first group on.

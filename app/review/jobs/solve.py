@@ -170,6 +170,7 @@ def solve_work(store: Store, dataset_id: int, pool: Pool = nullcontext) -> Work:
         with pool() if large else nullcontext() as executor:
             report = solve_fully(store, dataset_id, executor, counting(progress, "groups solved"))
         count_yield(store, dataset_id, report, progress)
+        progress(report.total, report.total, report.sentence)
         return {"policy": found.policy.name, **_report(report)}
 
     return work

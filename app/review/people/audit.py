@@ -209,7 +209,7 @@ def _edit(row: AuditRow, body: Mapping[str, Any]) -> str:
         what = "use" if said.get("included") else "leaving out"
     else:
         what = name.removeprefix("set_").replace("_", " ")
-    verb = {"undo": "took back: ", "redo": "did again: "}.get(row.kind.removeprefix("station_"), "")
+    verb = {"undo": "undid: ", "redo": "redid: "}.get(row.kind.removeprefix("station_"), "")
     return f"{verb}{what}{view}{names}"
 
 
@@ -223,16 +223,14 @@ def _verdict(_row: AuditRow, body: Mapping[str, Any]) -> str:
 
 
 def _bulk(row: AuditRow, body: Mapping[str, Any]) -> str:
-    verb = (
-        "took back verdicts on" if row.kind.endswith("undo") else f"{body.get('state', 'judged')}"
-    )
+    verb = "undid verdicts on" if row.kind.endswith("undo") else f"{body.get('state', 'changed')}"
     count = body.get("changed", body.get("groups"))
     return f"{verb} {count if isinstance(count, int) else 'many'} groups at once"
 
 
 def _comment(_row: AuditRow, body: Mapping[str, Any]) -> str:
     did = {"said": "commented", "edited": "changed a comment", "deleted": "deleted a comment"}
-    did |= {"resolved": "resolved a thread", "reopened": "opened a thread again"}
+    did |= {"resolved": "resolved a thread", "reopened": "reopened a thread"}
     said = did.get(str(body.get("did")), "commented")
     return f"{said}: {body['text']}" if body.get("text") else said
 
@@ -249,7 +247,7 @@ def _person(_row: AuditRow, body: Mapping[str, Any]) -> str:
 
 
 def _job(_row: AuditRow, body: Mapping[str, Any]) -> str:
-    return f"asked for: {body.get('title')}"
+    return f"requested: {body.get('title')}"
 
 
 def _deed(_row: AuditRow, body: Mapping[str, Any]) -> str:
@@ -257,13 +255,13 @@ def _deed(_row: AuditRow, body: Mapping[str, Any]) -> str:
     return f"{body.get('did')}: {', '.join(more)}" if more else str(body.get("did"))
 
 
-_BATCH_DEEDS = {"made": "gave out", "changed": "changed", "closed": "closed", "deleted": "deleted"}
+_BATCH_DEEDS = {"made": "assigned", "changed": "changed", "closed": "closed", "deleted": "deleted"}
 
 
 _STARTS = {
-    "imported": "what its dataset brought",
-    "without_balls": "its lines, without balls",
-    "bare": "its pictures alone",
+    "imported": "the imported annotations",
+    "without_balls": "lines without balls",
+    "bare": "pictures only",
 }
 
 
@@ -272,12 +270,12 @@ def _own(row: AuditRow, body: Mapping[str, Any]) -> str | None:
     did, person, group = (body.get(name) for name in ("did", "person", "group"))
     why = f": {body['reason']}" if body.get("reason") else ""
     said = {
-        ("take", "adopted"): f"took over {person}’s own annotation",
-        ("take", "handed back"): f"handed back to {person}{why}",
-        ("work", "handed back"): f"handed back to {person}{why}",
-        ("work", "handed in"): f"handed in group {group} of batch {body.get('batch')}",
-        ("work", "taken back"): f"took group {group} of batch {body.get('batch')} back",
-        ("agreement", "agreed"): f"annotations agree, {person}’s was taken over",
+        ("take", "adopted"): f"took over {person}’s independent annotation",
+        ("take", "handed back"): f"returned to {person}{why}",
+        ("work", "handed back"): f"returned to {person}{why}",
+        ("work", "handed in"): f"submitted group {group} of batch {body.get('batch')}",
+        ("work", "taken back"): f"reopened group {group} of batch {body.get('batch')}",
+        ("agreement", "agreed"): f"annotations agree, {person}’s is used",
         ("agreement", "decided"): f"decided for {person}’s annotation",
         ("agreement", "limits"): "set the limits of agreement",
         ("gold", "marked"): f"marked group {group} as gold",
@@ -285,7 +283,7 @@ def _own(row: AuditRow, body: Mapping[str, Any]) -> str | None:
             "gold",
             "changed",
         ): f"lets annotators of gold group {group} begin with {_STARTS.get(str(body.get('start')))}",
-        ("gold", "unmarked"): f"group {group} is gold no longer",
+        ("gold", "unmarked"): f"unmarked gold group {group}",
     }
     if row.kind == "work" and did in _BATCH_DEEDS and "name" in body:
         return f"{_BATCH_DEEDS[did]} the batch “{body['name']}”"

@@ -101,7 +101,7 @@ def give_role(
             raise NotFoundError.person(person_id)
         if person.name == person_of(actor):
             raise ForbiddenError(
-                "nobody changes their own rights", hint="An admin, or another lead, can."
+                "you cannot change your own role", hint="An admin, or another lead, can."
             )
         if person.role == Role.ADMIN:
             raise ConflictError(f"{person.name} is an admin and may do everything in every dataset")

@@ -166,7 +166,7 @@ def change_person(
         person = _read(session, person_id)
         if person.name == actor:
             raise ForbiddenError(
-                "nobody changes their own rights", hint="Another admin of this server can."
+                "you cannot change your own role", hint="Another admin of this server can."
             )
         wanted = person.role if role is None else role
         off = person.disabled if disabled is None else disabled

@@ -336,22 +336,22 @@ def _advised(name: str, found: tuple[float, float, float], policy: Policy) -> Ad
 def _notices(advice: Sequence[Advice]) -> Iterator[str]:
     if not advice:
         yield (
-            "Too few views that agree about a ball to tell how noisy its clicks are: the policy's "
-            "sigma is used as it is."
+            "Too few views agree on a ball to estimate the noise of its annotation: the sigma of the "
+            "policy is used."
         )
     loose = [item for item in advice if item.present is None]
     if loose:
         known = " and ".join(f"{item.estimate:g}{item.short_unit}" for item in loose)
         yield (
-            "The noise of lines is weighed image by image. All images together know it better: "
-            f"sigma and shared part are {known}."
+            "The policy estimates the noise of lines per image. All images together estimate it "
+            f"better: sigma and shared part are {known}."
         )
     for item in advice:
         if item.present is not None and not item.agrees:
             word = "small" if item.present < item.low else "large"
             yield (
-                f"{item.label}: the policy says {item.present:g}{item.short_unit}, this dataset "
+                f"{item.label}: the policy has {item.present:g}{item.short_unit}, this dataset shows "
                 f"{item.estimate:g}{item.short_unit} ({item.low:g} to {item.high:g}). "
                 "Uncertainties are too "
-                f"{word} until the policy says so too."
+                f"{word} until the policy uses this value."
             )

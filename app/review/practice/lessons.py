@@ -88,12 +88,12 @@ def _accepted(truth: SceneTruth, group: Group, words: _Told) -> Feedback:
             return words.say(RIGHT, "")
         return words.say(WRONG, "The group was sound, and an edit has spoilt it.")
     if kind not in _REASONS and _is_mended(truth, group):
-        return words.say(RIGHT, "You mended it.")
+        return words.say(RIGHT, "You fixed it.")
     if kind != "tiny_baseline" and _is_left_out(truth, group):
         if kind == "not_synchronous":
             return words.say(RIGHT, "You left that view out, and the others agree.")
         return words.say(
-            ALMOST, "Leaving the view out works, but it could be mended, and it is lost now."
+            ALMOST, "Leaving the view out works, but it could be fixed, and it is lost now."
         )
     return words.say(WRONG, "The group was accepted with its fault.")
 
@@ -103,7 +103,7 @@ def _rejected(truth: SceneTruth, reason: str | None, words: _Told) -> Feedback:
     if kind == CLEAN:
         return words.say(WRONG, "A good group was lost.")
     if kind not in _REASONS:
-        return words.say(WRONG, "It could have been mended, and a good group was lost.")
+        return words.say(WRONG, "It could have been fixed, and a good group was lost.")
     if reason == _REASONS[kind]:
         return words.say(RIGHT, "The reason is the right one, too.")
     return words.say(ALMOST, "It is right to reject this group, but another reason fits better.")
@@ -119,7 +119,7 @@ class _Told:
     @property
     def done(self) -> str:
         """What was wrong, and that it no longer is."""
-        return f"the fault is mended. {self.fault}"
+        return f"the fault is fixed. {self.fault}"
 
     @property
     def fault(self) -> str:

@@ -34,7 +34,7 @@ WORDS = {
     ),
     "wrong_label": LessonWords(
         question="The field lines of one view do not fit. Find out why before you decide.",
-        hint="Compare the names: click a red line to read which marking it is said to be. Is that "
+        hint="Compare the names: click a red line to read its marking. Is that "
         "the line that you see?",
         fault="In view {view} the line called “{marking}” is really “{true_marking}”.",
         best="Press Enter: it gives the line its right name, as the card says. Then press A.",
@@ -49,7 +49,7 @@ WORDS = {
     ),
     "bad_point": LessonWords(
         question="One click of an annotator went astray. Find it.",
-        hint="Follow the whiskers: they lead from the line to each annotated point, and one is "
+        hint="Follow the error lines: they lead from the line to each annotated point, and one is "
         "much longer than the others.",
         fault="In view {view} a point of “{marking}” lies {amount:.0f} px beside its line.",
         best="Press Enter to do what the card offers, Shift Enter for another way (or drag the "
@@ -76,7 +76,7 @@ WORDS = {
         "Look at the players.",
         hint="Compare how the players stand around the ball in each view. Is it the same moment?",
         fault="View {view} shows another moment: the ball had moved {amount:.1f} m.",
-        best="No edit can mend that. Press X, then Enter for “Not the same instant”; where two other "
+        best="No edit can fix that. Press X, then Enter for “Not the same instant”; where two other "
         "views agree you may leave view {view} out with Shift X instead, and accept the rest.",
     ),
     "tiny_baseline": LessonWords(
@@ -85,7 +85,7 @@ WORDS = {
         "from one place say nothing about depth.",
         fault="Both cameras stand at one place: view {view} is only {amount:.1f} m beside the "
         "main camera.",
-        best="No edit can mend that. Press X, then Enter for “Duplicate view”.",
+        best="No edit can fix that. Press X, then Enter for “Duplicate view”.",
     ),
 }
 """By the kind of the lesson."""

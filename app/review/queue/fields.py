@@ -77,7 +77,7 @@ def _flag(name: str, meaning: str) -> QueryField:
 
 _ASKED = (
     QueryField("status", "choice", "verdict", values=STATUSES, also=("state",)),
-    QueryField("finding", "choice", "what was noticed", values=(*WHETHER, *FINDING_KINDS)),
+    QueryField("finding", "choice", "kind of finding", values=(*WHETHER, *FINDING_KINDS)),
     QueryField(
         "gate", "choice", "first failing gate; none: it passes", values=("none", "unsolved", *GATES),
         also=("first_failing",),
@@ -100,22 +100,21 @@ _ASKED = (
     _text("key", "key of the group, all of it"),
     _text("override", "gate that an acceptance overrides"),
     QueryField(
-        "comments", "choice", "what people say to each other about it",
+        "comments", "choice", "comments on it",
         values=(*WHETHER, "open", "resolved"),
     ),
     _text("mentions", "whom an open comment mentions, by name"),
     QueryField(
         "annotations", "choice",
-        "what people's own annotations of it came to; waiting: they differ, and somebody has to "
-        "decide (reviewers)",
+        "result of its independent annotations; waiting: they differ and need a decision (reviewers)",
         values=(*WHETHER, "agreed", "waiting", "decided"),
     ),
     QueryField(
-        "takes", "number", "how many people handed in an annotation of their own (reviewers)",
+        "takes", "number", "how many independent annotations were submitted (reviewers)",
         values=("none",),
     ),
     QueryField("id", "ids", "groups one by one: id:12,15,19"),
-    QueryField("batch", "ids", "work that was given out: batch:3, in its order where no other is asked for"),
+    QueryField("batch", "ids", "assigned work: batch:3, in its order unless another is given"),
     _number("jac", "min_jac", "smallest JaC of the views at the policy's tolerance, 0 to 1", "", "jac05"),
     _number(
         "agreement", "agreement",

@@ -147,7 +147,7 @@ def _require_ready(take: Take) -> None:
     if take.kind == GOLD:
         raise ConflictError("this is an annotation of a gold group, whose truth is known")
     if take.handed_in is None:
-        raise ConflictError(f"{take.person} has not handed this in yet")
+        raise ConflictError(f"{take.person} has not submitted this yet")
     if take.settled is not None:
         raise ConflictError("this annotation was adjudicated already")
 

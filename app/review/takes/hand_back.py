@@ -44,7 +44,7 @@ def hand_back_take(
     with store.write() as session:
         take = read_take(session, take_id)
         if take.settled is None and take.handed_in is None:
-            raise ConflictError(f"{take.person} has not handed this in yet")
+            raise ConflictError(f"{take.person} has not submitted this yet")
         reopen_take(session, take)
         copy = take.copy_id
         note_hand_back(session, KIND, copy, take.person, said, actor=actor, batch=take.batch_id)
@@ -86,7 +86,7 @@ def note_hand_back(
     why = f": {reason}" if reason else ""
     walk = "" if batch is None else f"?q=batch%3A{batch}"
     tell(
-        session, person, RingKind.RETURNED, f"{person_of(actor)} handed {group.group.label or group.group.key} back to you{why}",
+        session, person, RingKind.RETURNED, f"{person_of(actor)} returned {group.group.label or group.group.key} to you{why}",
         actor=actor, address=f"/review/{group_id}{walk}", dataset_id=group.dataset_id, group_id=group_id,
     )  # fmt: skip
 

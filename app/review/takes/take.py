@@ -171,7 +171,7 @@ def begin(
 
 
 def hand_in(store: Store, take_id: int, *, actor: str, keep: Keep[TakeView] = keep_nothing) -> Take:
-    """Say that one's own annotation is done; from then on it stays as it is.
+    """Say that an independent annotation is done; from then on it stays as it is.
 
     ``keep`` keeps the answer in the transaction.
 
@@ -182,7 +182,7 @@ def hand_in(store: Store, take_id: int, *, actor: str, keep: Keep[TakeView] = ke
     with store.write() as session:
         take = read_take(session, take_id)
         if person_of(actor) != take.person:
-            raise ForbiddenError(f"{take.person} hands this in, nobody else")
+            raise ForbiddenError(f"only {take.person} can submit this")
         if take.handed_in is None:
             update_take(session, take_id, handed_in=now())
         handed = read_take(session, take_id)

@@ -324,6 +324,6 @@ def _need_own(
     for comment in thread.comments:
         if comment.id == comment_id and comment.text is not None:
             if not is_of(comment.actor, person_of(actor)):
-                raise ForbiddenError("nobody changes what others have said", hint="Reply to it.")
+                raise ForbiddenError("only its author can change a comment", hint="Reply to it.")
             return comment
     raise NotFoundError(f"thread {thread_id} has no comment {comment_id}")

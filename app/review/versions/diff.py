@@ -177,7 +177,7 @@ def _passages(there: dict[str, Any], elsewhere: dict[str, Any], absent: str) -> 
 
 
 def _word(value: Any) -> str:
-    return "not asked" if value is None else str(value)
+    return "not set" if value is None else str(value)
 
 
 def _change(before: Any, after: Any) -> ChangedGroup:

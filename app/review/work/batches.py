@@ -70,7 +70,7 @@ class NewBatch:
     Attributes:
         query: Which groups, as in the queue; with the order in which they are given out.
         size: So many of them, the first ones; None: all.
-        skip_given: Leave out groups that wait in another open batch.
+        skip_given: Skip groups that are in another open batch.
         verdicts, blind, gold_every: As ``BatchModel`` has them.
     """
 
@@ -409,7 +409,7 @@ def _tell(session: Session, batch: Batch, people: Iterable[str], actor: str) -> 
     """Tell people that work was given to them."""
     by = person_of(actor)
     due = "" if batch.due is None else f", due {batch.due}"
-    said = f"{by} gave you work: {batch.name}, {batch.groups} groups of {batch.dataset}{due}"
+    said = f"{by} assigned you work: {batch.name}, {batch.groups} groups of {batch.dataset}{due}"
     for name in dict.fromkeys(people):
         tell(
             session, name, RingKind.ASSIGNED, said,

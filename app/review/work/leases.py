@@ -198,7 +198,7 @@ class Leases:
             others = row.handed_in is not None and row.handed_in_by != worker.name
             if row.settled is not None or others:
                 by = row.handed_in_by or "somebody"
-                raise ConflictError(f"{by} has handed this group in", hint="Go on with the next.")
+                raise ConflictError(f"{by} has submitted this group", hint="Go on with the next.")
             hand_in(session, batch_id, group, at=self._now() if done else None, by=worker.name)
             did = "handed in" if done else "taken back"
             body = {"batch": batch.id, "dataset": batch.dataset_id, "did": did, "group": group}
@@ -231,7 +231,7 @@ class Leases:
             if row.settled is not None:
                 raise ConflictError("this group was judged", hint="Take the verdict back first.")
             if row.handed_in is None:
-                raise ConflictError("nobody has handed this group in")
+                raise ConflictError("this group is not submitted")
             person = row.handed_in_by
             hand_in(session, batch_id, group, at=None, by=person, returned=True)
             note_hand_back(session, WORK, group, person, said, actor=actor, batch=batch_id)

@@ -122,6 +122,6 @@ def hand_in_own(
         hand_in(store, take.id, actor=actor, keep=keep)
         take_over_handed_in(store, batch, take.person)
     elif take.verdict is not None:
-        raise ConflictError("you have judged this group", hint="Take your verdict back.")
+        raise ConflictError("you have reviewed this group", hint="Take your verdict back.")
     else:
         reopen(store, take.id, keep=keep)

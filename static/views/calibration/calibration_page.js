@@ -149,6 +149,7 @@ export function CalibrationPage() {
 				<${SaveState} />
 			<//>
 			<div class="bars"><${NoticeBar} /><${ConflictBar} /></div>
+			<p class="small-note">The calibration editor needs a wider screen. ${wanted === null ? null : html`<a class="button" href=${reviewAddress(wanted)}>Back to the review</a>`}</p>
 			${group && at ? html`<${Workspace} group=${group} at=${at} />` : html`<main class="review__empty" aria-busy="true"><p>Loading…</p></main>`}
 		</div>
 	`;

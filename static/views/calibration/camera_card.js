@@ -23,7 +23,7 @@ async function choose(view, source) {
 	if (!present || view.station.calibration === source) return;
 	try {
 		takeOver(await chooseCalibration(present, view, source));
-		announce(source === 'given' ? 'The given calibration counts.' : 'The lines count.');
+		announce(source === 'given' ? 'The given calibration is used.' : 'The lines are used.');
 		if (view.station.shared) watchSolving(present.dataset.name);
 	} catch (error) {
 		if (!(error instanceof ApiError)) throw error;
@@ -42,7 +42,7 @@ function SourceChoice({ view }) {
 		{ source: 'given', label: 'Given camera' }, { source: 'lines', label: 'From lines' },
 	]);
 	return html`
-		<div class="segments" role="group" aria-label="Which calibration counts">
+		<div class="segments" role="group" aria-label="Calibration in use">
 			${sources.map(({ source, label }) => html`
 				<button
 					key=${source} class="button" type="button" aria-pressed=${calibration === source} aria-disabled=${off !== null}
@@ -82,7 +82,7 @@ export function CameraCard({ picture, solution }) {
 	const odd = oddities(solution, view.key, calibration);
 	return html`
 		<section class="card strip-card camera-card" aria-label="Camera">
-			<h2>Camera<span class="card__aside" data-grade=${odd.length ? 'warn' : 'ok'}>${odd.length ? '! look at this' : '✓ plausible'}</span></h2>
+			<h2>Camera <span class="card__aside" data-grade=${odd.length ? 'warn' : 'ok'}>${odd.length ? 'uncertain' : '✓ plausible'}</span></h2>
 			<div class="editor__scroll" tabindex="0" role="group" aria-label="Camera in numbers">
 				<${SourceChoice} view=${view} />
 				<${PictureChoice} view=${view} />

@@ -34,8 +34,8 @@ function shapesOf(length, width) {
 
 /** @param {Grade | undefined} grade @param {number} points */
 function words(grade, points) {
-	if (points === 0) return grade ? 'in sight, not annotated' : 'not annotated';
-	const state = { ok: 'fits', warn: 'fits badly', bad: 'does not fit', unseen: 'not in sight' }[grade ?? 'unseen'];
+	if (points === 0) return grade ? 'visible, not drawn' : 'outside this view';
+	const state = { ok: 'fits', warn: 'fits badly', bad: 'does not fit', unseen: 'outside this view' }[grade ?? 'unseen'];
 	return `${points} points, ${state}`;
 }
 

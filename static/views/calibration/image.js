@@ -45,7 +45,7 @@ function ProposalChip({ item }) {
 	const found = item.outcome === 'proposed';
 	return html`
 		<div class="paint-chip proposal-chip" role="status" data-outcome=${item.outcome}>
-			<p>${found ? `${plural(Object.keys(item.lines).length, 'marking')} proposed. ${item.sentence}` : `Looked at before: ${item.outcome}. ${item.sentence}`}</p>
+			<p>${found ? `${plural(Object.keys(item.lines).length, 'marking')} proposed. ${item.sentence}` : `Searched before: ${item.outcome}. ${item.sentence}`}</p>
 			<${ProposalScores} item=${item} />
 		</div>
 	`;

@@ -78,7 +78,7 @@ function arrow(name, x, y) {
 /** @type {Binding[]} */
 export const EDITOR_KEYS = [
 	{ keys: ['n'], label: 'Draw: set points on the marking', group: 'Edit', run: toggleDrawing },
-	{ keys: ['i'], label: 'Insert a point after the one in hand', group: 'Edit', run: insertPoint },
+	{ keys: ['i'], label: 'Insert a point after the selected one', group: 'Edit', run: insertPoint },
 	{ keys: ['r'], label: 'Relabel the marking', group: 'Edit', run: toggleRelabelling },
 	{ keys: ['m'], label: 'Swap sides', group: 'Edit', run: swapAllSides },
 	{ keys: ['k'], label: 'Move all points onto the paint', group: 'Edit', run: () => { snapToPaint(); } },
@@ -101,10 +101,10 @@ export const EDITOR_KEYS = [
 	{ keys: ['h'], label: 'Hide or show everything drawn', group: 'View', run: () => { overlaysHidden.value = !overlaysHidden.value; } },
 	{ keys: ['p'], label: 'Projected lines', group: 'View', run: () => { projections.value = !projections.value; } },
 	{ keys: ['e'], label: 'Paint that the picture shows', group: 'View', run: togglePaint },
-	{ keys: ['w'], label: 'Residual whiskers × 1, 5, 20', group: 'View', run: () => { cycleGain(); announce(`Whiskers times ${gain.value}.`); } },
+	{ keys: ['w'], label: 'Error lines × 1, 5, 20', group: 'View', run: () => { cycleGain(); announce(`Error lines × ${gain.value}.`); } },
 	{ keys: ['Ctrl+s', 'Ctrl+Enter'], label: 'Save everything staged as one edit', group: 'Save', typing: true, run: save },
 	{ keys: ['Ctrl+z'], label: 'Undo: staged edits first', group: 'Save', run: undo },
 	{ keys: ['Ctrl+Shift+z', 'Ctrl+y'], label: 'Redo', group: 'Save', run: redo },
-	{ keys: ['Ctrl+Delete', 'Ctrl+Backspace'], label: 'Drop everything staged', group: 'Save', run: discardStaged },
-	{ keys: ['Escape'], label: 'Leave; at last back to the review', group: 'Save', typing: true, run: escape },
+	{ keys: ['Ctrl+Delete', 'Ctrl+Backspace'], label: 'Discard everything staged', group: 'Save', run: discardStaged },
+	{ keys: ['Escape'], label: 'Leave, then back to the review', group: 'Save', typing: true, run: escape },
 ];

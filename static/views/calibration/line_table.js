@@ -39,7 +39,7 @@ function influenceOf(influence) {
 	const gained = after - before;
 	const text = Math.abs(gained) < WORTH ? '±0' : `${gained > 0 ? '+' : '−'}${Math.abs(gained).toFixed(2)}`;
 	const far = influence.largest_px_without;
-	const own = far === null ? '' : `; a camera that never saw it puts it ${pixels(far)} px off`;
+	const own = far === null ? '' : `; it is then ${pixels(far)} px off`;
 	const title = `Without it: JaC 0.5 % ${before.toFixed(2)} → ${after.toFixed(2)}${own}`;
 	return { text, grade: gained > WORTH ? 'warn' : 'unseen', title };
 }

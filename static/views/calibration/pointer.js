@@ -104,7 +104,7 @@ function pointDrag(before, marking, index, label, offset) {
 		},
 		cancel() {
 			held.value = null;
-			announce('Given back.');
+			announce('Drag cancelled.');
 		},
 	};
 }

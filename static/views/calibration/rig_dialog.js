@@ -19,8 +19,8 @@ import { JobProgress } from '../job_progress.js';
 /** @import {Accepted, RigProposal} from '../../api/rig.js' */
 
 const CHOICES = /** @type {{name: Accepted, label: string, note: string}[]} */ ([
-	{ name: 'cameras', label: 'The adjusted cameras', note: 'balls move; undo takes it back' },
-	{ name: 'sigma', label: 'Only how far the cameras in use may be off', note: 'no ball moves, its uncertainty becomes right' },
+	{ name: 'cameras', label: 'The adjusted cameras', note: 'balls move; can be undone' },
+	{ name: 'sigma', label: 'Only the uncertainty of the cameras in use', note: 'no ball moves; uncertainties are corrected' },
 ]);
 
 /** @param {number | null} before @param {number | null} after */
@@ -43,7 +43,7 @@ function Proposal({ proposal }) {
 					</tr>`)}</tbody>
 			</table>
 			<table class="table">
-				<thead><tr><th>Rays pass each other</th><th data-numeric="true">Instants</th><th data-numeric="true">Gap</th><th data-numeric="true">Held out</th></tr></thead>
+				<thead><tr><th>Camera pair</th><th data-numeric="true">Instants</th><th data-numeric="true">Gap</th><th data-numeric="true">Held out</th></tr></thead>
 				<tbody>${proposal.pairs.map((pair) => html`
 					<tr key=${`${pair.a} ${pair.b}`}>
 						<th scope="row">${pair.a} and ${pair.b}</th>
@@ -89,7 +89,7 @@ export function RigDialog({ dataset, station, onClose }) {
 				return;
 			}
 			if (!over.result.accepted) { setProposal(over.result); return; }
-			announce(what === 'cameras' ? 'The adjusted cameras count.' : 'The cameras stay, their uncertainty is known.');
+			announce(what === 'cameras' ? 'The adjusted cameras are used.' : 'The cameras stay; their uncertainty is saved.');
 			watchSolving(dataset.name);
 			onClose();
 		});
@@ -97,7 +97,7 @@ export function RigDialog({ dataset, station, onClose }) {
 	async function takeBack() {
 		await attempt(async () => {
 			const { taken_back: cameras } = await deleteRig(dataset.id);
-			announce(`${count(cameras)} cameras are what they were.`);
+			announce(`${count(cameras)} cameras are restored.`);
 			watchSolving(dataset.name);
 			onClose();
 		});
@@ -106,10 +106,10 @@ export function RigDialog({ dataset, station, onClose }) {
 		<${FormDialog}
 			wide=${true} title="Adjust static cameras together" onClose=${onClose} onSubmit=${send}
 			buttons=${html`
-				${adjusted ? html`<button class="button" type="button" onClick=${takeBack}>Take it back</button>` : null}
+				${adjusted ? html`<button class="button" type="button" onClick=${takeBack}>Undo the adjustment</button>` : null}
 				<button class="button button--primary" type="submit" aria-disabled=${busy} title=${busy ? 'Under way' : ''}>${proposal ? 'Save' : 'Propose'}</button>`}
 		>
-			<p>Balls that several cameras show at once tell how the cameras stand to each other; field lines and the cameras in use hold them in their place. Nothing is saved before you have seen what changes.</p>
+			<p>Balls that several cameras show at once align the cameras with each other; field lines and the cameras in use keep them in place. You see what changes before anything is saved.</p>
 			${proposal ? html`
 				<${Proposal} proposal=${proposal} />
 				<fieldset class="choice choice--row">

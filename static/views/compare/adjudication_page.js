@@ -38,19 +38,19 @@ async function goOn(dataset, after) {
 function DecisionCard({ found, chosen, third, busy, decide, flipThird, back }) {
 	const taken = chosen === null ? null : found.takes[chosen];
 	const of = found.group.dataset.name;
-	const say = taken === null ? 'Look at both, and take one of them: 1, 2 …' : third
-		? `${taken.person}’s goes into the group, and you go on from it`
-		: taken.verdict ? `${taken.person}’s goes into the group, with your verdict: ${words(taken.verdict)}` : `${taken.person}’s goes into the group; they gave no verdict, so it waits for one`;
+	const say = taken === null ? 'Compare both, then choose one: 1, 2 …' : third
+		? `${taken.person}’s annotation goes into the group, and you continue from it`
+		: taken.verdict ? `${taken.person}’s annotation goes into the group, with your verdict: ${words(taken.verdict)}` : `${taken.person}’s annotation goes into the group; it has no verdict yet and waits for one`;
 	return html`
 		<section class="card compare__card" aria-labelledby="compare-decide">
 			<h2 id="compare-decide">Decide</h2>
 			${found.refused ? html`<p role="alert" data-grade="warn">${found.refused.replace(/^./, (first) => first.toUpperCase())}.</p>` : html`
-				${found.own ? html`<p class="compare__own">You annotated this group yourself. Nobody else may judge here, so you decide; the history says so.</p>` : null}
+				${found.own ? html`<p class="compare__own">You annotated this group yourself. No other reviewer is available, so you may decide; the history records it.</p>` : null}
 				<p class="compare__say" role="status">${say}${say.endsWith('…') ? '' : '.'}</p>
 				<p class="compare__links">
-					<button class="button" type="button" data-needs="review" data-of=${of} aria-pressed=${third} onClick=${flipThird}>A third one, from it <kbd>${found.takes.length + 1}</kbd></button>
-					${isTeam ? html`<button class="button" type="button" data-needs="review" data-of=${of} disabled=${taken === null} title=${taken === null ? 'Take one of them first' : 'Its person changes it and hands it in again'} onClick=${back}>Hand it back… <kbd>⇧U</kbd></button>` : null}
-					<button class="button button--primary" type="button" data-needs="review" data-of=${of} disabled=${taken === null || busy} title=${taken === null ? 'Take one of them first' : ''} onClick=${decide}>Decide <kbd>Enter</kbd></button>
+					<button class="button" type="button" data-needs="review" data-of=${of} aria-pressed=${third} onClick=${flipThird}>Continue from it <kbd>${found.takes.length + 1}</kbd></button>
+					${isTeam ? html`<button class="button" type="button" data-needs="review" data-of=${of} disabled=${taken === null} title=${taken === null ? 'Choose one first' : 'Its annotator changes it and submits it again'} onClick=${back}>Return… <kbd>⇧U</kbd></button>` : null}
+					<button class="button button--primary" type="button" data-needs="review" data-of=${of} disabled=${taken === null || busy} title=${taken === null ? 'Choose one first' : ''} onClick=${decide}>Decide <kbd>Enter</kbd></button>
 				</p>`}
 			<p class="compare__verdicts">${found.takes.map(({ id, person, verdict }) => html`<span key=${id}>${person}: <strong>${words(verdict ?? 'no verdict')}</strong></span>`)}</p>
 		</section>
@@ -67,7 +67,7 @@ function Adjudication({ found }) {
 	const choose = useCallback((/** @type {number} */ place) => {
 		if (place >= takes.length) return;
 		setChosen(place);
-		announce(`${takes[place].person}’s is taken. Enter decides.`);
+		announce(`${takes[place].person}’s annotation is chosen. Enter decides.`);
 	}, [takes]);
 	const decide = useCallback(async () => {
 		if (chosen === null || refused || busy) return;
@@ -78,7 +78,7 @@ function Adjudication({ found }) {
 			else await goOn(group.dataset.name, group.id);
 		} catch (error) {
 			if (!(error instanceof ApiError)) throw error;
-			complain(`Nothing was decided: ${sentenceOf(error)}`);
+			complain(`Not decided: ${sentenceOf(error)}`);
 		} finally {
 			setBusy(false);
 		}
@@ -90,10 +90,10 @@ function Adjudication({ found }) {
 		const mine = take.person === myName.value;
 		question.value = {
 			kind: 'back', person: mine ? 'yourself' : take.person,
-			says: `${mine ? 'You' : take.person} can change it again and hands it in anew. The group waits for no decision until then; it is compared again, and settles itself where all agree.`,
+			says: `${mine ? 'You' : take.person} can change it and submit it again. Until then the group needs no decision; it is then compared again, and settled automatically if all agree.`,
 			send: async (reason) => {
 				await postAdjudicatedBack(group.id, take.id, reason);
-				announce(`Handed back to ${take.person}.`);
+				announce(`Returned to ${take.person}.`);
 				await goOn(group.dataset.name, group.id);
 			},
 		};
@@ -101,12 +101,12 @@ function Adjudication({ found }) {
 	// The key after the last annotation's.
 	const keys = useMemo(() => /** @type {Binding[]} */ ([
 		...takes.map((_, place) => ({
-			keys: [String(place + 1)], label: 'Take that annotation', group: 'Decide', shown: place === 0 ? `1 … ${takes.length}` : 'hidden',
+			keys: [String(place + 1)], label: 'Choose that annotation', group: 'Decide', shown: place === 0 ? `1 … ${takes.length}` : 'hidden',
 			needs: /** @type {const} */ ('review'), run: () => choose(place),
 		})),
-		{ keys: [String(takes.length + 1)], label: 'A third one, that begins from the one taken', group: 'Decide', needs: 'review', run: flipThird },
+		{ keys: [String(takes.length + 1)], label: 'Continue from the chosen annotation', group: 'Decide', needs: 'review', run: flipThird },
 		{ keys: ['Enter'], label: 'Decide', group: 'Decide', needs: 'review', run: decide },
-		{ keys: ['Shift+u'], label: 'Hand the one taken back to its person, and say why', group: 'Decide', needs: 'review', run: back },
+		{ keys: ['Shift+u'], label: 'Return the chosen one to its annotator, with a reason', group: 'Decide', needs: 'review', run: back },
 		{ keys: ['Escape'], label: 'Back to the list', group: 'Decide', run: () => navigate(agreementAddress(group.dataset.name)) },
 	]), [takes, choose, decide, flipThird, back, group]);
 	useKeys(keys);

@@ -38,11 +38,11 @@ const spread = (one, digits) => (one.count === 0 ? '–' : `${fixed(one.median, 
 function WaitingCard({ dataset }) {
 	const found = useResource((signal) => getWaiting(dataset, signal), [dataset]);
 	const items = found.value?.items ?? [];
-	if (found.error) return html`<${Trouble} title="What waits cannot be shown" error=${found.error} retry=${found.reload} />`;
+	if (found.error) return html`<${Trouble} title="The list cannot be shown" error=${found.error} retry=${found.reload} />`;
 	return html`
 		<section class="card card--flush" aria-labelledby="agreement-waiting">
 			<h2 id="agreement-waiting">To decide<span class="card__aside">${found.value ? plural(items.length, 'group') : ''}</span></h2>
-			${found.value && items.length === 0 ? html`<p class="agreement__text">Nothing waits. Groups come here when people annotated them independently and differ by more than the limits.</p>` : null}
+			${found.value && items.length === 0 ? html`<p class="agreement__text">Nothing to decide. Groups appear here when their independent annotations differ by more than the limits.</p>` : null}
 			${items.length > 0 ? html`
 				<p class="agreement__text"><a class="button button--primary" href=${`/adjudicate/${items[0].group}`}>Decide the worst one</a></p>
 				<div class="table__scroll" tabindex="0" role="region" aria-label="Groups that wait for a decision">
@@ -76,7 +76,7 @@ function PeopleCard({ found, dataset, batch }) {
 	return html`
 		<section class="card card--flush" aria-labelledby="agreement-people">
 			<h2 id="agreement-people">Agreement<span class="card__aside">median · 95th percentile, of JaC the 5th</span></h2>
-			<p class="agreement__text">Settled by themselves because all agree: ${found.agreed}; decided: ${found.decided}; waiting for a decision: ${found.open}. Krippendorff’s α of the verdicts: ${coefficient(found.alpha)}.</p>
+			<p class="agreement__text">Settled automatically, because all agree: ${found.agreed}; decided: ${found.decided}; waiting for a decision: ${found.open}. Krippendorff’s α of the verdicts: ${coefficient(found.alpha)}.</p>
 			<div class="table__scroll" tabindex="0" role="region" aria-label="Agreement by pair of people">
 				<table class="table">
 					<thead><tr><th>people</th><th data-numeric="true">groups</th><th data-numeric="true">κ of verdicts</th><th data-numeric="true">lines, px</th><th data-numeric="true">ball, px</th><th data-numeric="true">3D ball, m</th><th data-numeric="true">JaC</th><th data-numeric="true">cameras, m</th></tr></thead>
@@ -92,7 +92,7 @@ function PeopleCard({ found, dataset, batch }) {
 }
 
 const LIMITS = /** @type {{name: keyof LimitsJson, label: string, step: string}[]} */ ([
-	{ name: 'line_px', label: 'lines, px', step: '0.5' }, { name: 'markings', label: 'markings drawn once', step: '1' },
+	{ name: 'line_px', label: 'lines, px', step: '0.5' }, { name: 'markings', label: 'markings drawn by only one person', step: '1' },
 	{ name: 'ball_px', label: 'ball centre, px', step: '0.5' }, { name: 'diameter_px', label: 'ball diameter, px', step: '0.5' },
 	{ name: 'ball_m', label: '3D ball, m', step: '0.05' }, { name: 'jac', label: 'least JaC', step: '0.05' },
 ]);
@@ -106,7 +106,7 @@ function LimitsCard({ limits, dataset, saved }) {
 		event.preventDefault();
 		try {
 			await putLimits(dataset, edited);
-			setSaid('Saved. They count for what is handed in from now on.');
+			setSaid('Saved. They apply to annotations submitted from now on.');
 			saved();
 		} catch (error) {
 			if (!(error instanceof ApiError)) throw error;
@@ -116,7 +116,7 @@ function LimitsCard({ limits, dataset, saved }) {
 	return html`
 		<section class="card" aria-labelledby="agreement-limits">
 			<h2 id="agreement-limits">Limits</h2>
-			<p>Annotations agree when they have the same verdict and differ by no more than this. What agrees settles itself: the first one handed in is taken over.</p>
+			<p>Annotations agree when they have the same verdict and differ by no more than this. A group whose annotations agree is settled automatically: the first one submitted is used.</p>
 			<form class="agreement__limits" onSubmit=${save}>
 				${LIMITS.map(({ name, label, step }) => html`
 					<label key=${name}><span>${label}</span><input class="field"
@@ -137,7 +137,7 @@ function GroupRow({ one }) {
 	return html`
 		<tr>
 			<th scope="row"><a href=${link}>${one.number}</a></th><td>${said}</td>
-			<td>${one.state}${one.taken ? html`<small>${one.taken}’s${one.state === 'decided' ? `, by ${one.decided_by}` : ''}${one.outcome === 'start' ? ', gone on from' : ''}</small>` : null}</td>
+			<td>${one.state}${one.taken ? html`<small>${one.taken}’s${one.state === 'decided' ? `, by ${one.decided_by}` : ''}${one.outcome === 'start' ? ', continued from' : ''}</small>` : null}</td>
 			<td data-numeric="true">${one.disagreements}</td><td data-numeric="true">${spread(one.spreads.line_px, 1)}</td>
 			<td data-numeric="true">${spread(one.spreads.ball_px, 1)}</td><td data-numeric="true">${fixed(one.spreads.ball_m.median, 2)}</td><td data-numeric="true">${spread(one.spreads.jac, 2)}</td>
 		</tr>
@@ -151,11 +151,11 @@ function GroupsCard({ found }) {
 			<h2 id="agreement-groups">Groups, the worst first<span class="card__aside">${plural(found.groups.length, 'group')}</span></h2>
 			<div class="table__scroll" tabindex="0" role="region" aria-label="Groups, the worst first">
 				<table class="table">
-					<thead><tr><th>group</th><th>verdicts</th><th>came to</th><th data-numeric="true">differences</th><th data-numeric="true">lines, px</th><th data-numeric="true">ball, px</th><th data-numeric="true">3D ball, m</th><th data-numeric="true">JaC</th></tr></thead>
+					<thead><tr><th>group</th><th>verdicts</th><th>result</th><th data-numeric="true">differences</th><th data-numeric="true">lines, px</th><th data-numeric="true">ball, px</th><th data-numeric="true">3D ball, m</th><th data-numeric="true">JaC</th></tr></thead>
 					<tbody>${found.groups.slice(0, MOST_ROWS).map((one) => html`<${GroupRow} key=${`${one.group} ${one.batch}`} one=${one} />`)}</tbody>
 				</table>
 			</div>
-			${found.groups.length > MOST_ROWS ? html`<p class="agreement__text">The file has all of them.</p>` : null}
+			${found.groups.length > MOST_ROWS ? html`<p class="agreement__text">The CSV file has all of them.</p>` : null}
 		</section>
 	`;
 }
@@ -163,8 +163,8 @@ function GroupsCard({ found }) {
 /** @param {TakeJson} one */
 function stateOf({ handed_in: handed, settled, handed_back: back }) {
 	if (settled) return html`over <small><${When} at=${settled} /></small>`;
-	if (handed) return html`<strong>handed in</strong> <small><${When} at=${handed} /></small>`;
-	return back ? html`handed back by ${back.by}${back.reason ? html`<small>“${back.reason}”</small>` : null}` : 'being made';
+	if (handed) return html`<strong>submitted</strong> <small><${When} at=${handed} /></small>`;
+	return back ? html`returned by ${back.by}${back.reason ? html`<small>“${back.reason}”</small>` : null}` : 'in progress';
 }
 
 /** Everybody's own annotations, those that a lead can do something about first. @param {{dataset: string, batch: number | null}} props */
@@ -178,9 +178,9 @@ function TakesCard({ dataset, batch }) {
 	const sorted = items.toSorted((a, b) => rank(a) - rank(b) || b.id - a.id);
 	return html`
 		<section class="card card--flush" aria-labelledby="agreement-takes">
-			<h2 id="agreement-takes">Own annotations<span class="card__aside">${plural(items.length, 'annotation')}</span></h2>
-			<p class="agreement__text">Open one to take it over into its group, or to hand it back to its person.</p>
-			<div class="table__scroll agreement__takes" tabindex="0" role="region" aria-label="Own annotations">
+			<h2 id="agreement-takes">Independent annotations<span class="card__aside">${plural(items.length, 'annotation')}</span></h2>
+			<p class="agreement__text">Open one to take it over into its group, or to return it to its annotator.</p>
+			<div class="table__scroll agreement__takes" tabindex="0" role="region" aria-label="Independent annotations">
 				<table class="table">
 					<thead><tr><th>group</th><th>person</th><th>verdict</th><th>state</th></tr></thead>
 					<tbody>${sorted.slice(0, MOST_ROWS).map((one) => html`
@@ -200,7 +200,7 @@ function BatchChoice({ dataset, batch, choose }) {
 	return html`
 		<p class="agreement__choice"><label for="agreement-batch">Results of</label>
 			<select class="field" id="agreement-batch" value=${batch ?? ''} onChange=${withValue((text) => choose(text === '' ? null : Number(text)))}>
-				<option value="">all batches, and what belongs to none</option>
+				<option value="">all batches, and no batch</option>
 				${several.map(({ id, name, state }) => html`<option key=${id} value=${id}>${name}${state === 'closed' ? ' (closed)' : ''}</option>`)}
 				<option value="0">no batch</option>
 			</select></p>
@@ -215,7 +215,7 @@ function LeadCards({ dataset }) {
 	if (!found.value) return html`<${Loading} what="the agreement" />`;
 	return html`
 		<${BatchChoice} dataset=${dataset} batch=${batch} choose=${setBatch} />
-		${found.value.groups.length > 0 ? html`<${PeopleCard} found=${found.value} dataset=${dataset} batch=${batch} /><${GroupsCard} found=${found.value} />` : html`<p class="agreement__choice">Nothing was compared yet${batch === null ? '' : ' here'}. Give groups out to several people (<em>Give out…</em> in the queue, <em>People who annotate each group on their own</em>), or press <kbd>Shift O</kbd> in a group.</p>`}
+		${found.value.groups.length > 0 ? html`<${PeopleCard} found=${found.value} dataset=${dataset} batch=${batch} /><${GroupsCard} found=${found.value} />` : html`<p class="agreement__choice">Nothing is compared yet${batch === null ? '' : ' here'}. Assign groups to several annotators (<em>Assign…</em> in the queue, <em>Annotators per group</em>), or press <kbd>Shift O</kbd> in a group.</p>`}
 		<${TakesCard} dataset=${dataset} batch=${batch} />
 		<${LimitsCard} key=${dataset} limits=${found.value.limits} dataset=${dataset} saved=${found.reload} />
 	`;

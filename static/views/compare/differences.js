@@ -3,16 +3,16 @@
 
 import { html } from 'htm/preact';
 
-import { fixed, pixels, words } from '../../lib/format.js';
+import { capital, fixed, pixels, words } from '../../lib/format.js';
 import { numbers, pair, pointed, pointOut } from '../../state/compare.js';
 import { Letter } from '../letter.js';
 
 /** @import {ViewDistanceJson} from '../../api/agreement.js' */
 /** @import {GroupDocument} from '../../api/types.js' */
 
-/** The two by the numbers that people see. @param {string} sentence @param {[string, string]} names */
+/** A sentence about annotations a and b, with the names that people see. @param {string} sentence @param {[string, string]} names */
 function withNames(sentence, [a, b]) {
-	return sentence.replace(/\ba\b/g, a).replace(/\bb\b/g, b);
+	return capital(sentence.replace(/\bannotation ([ab])\b/g, (_, which) => `annotation ${which === 'a' ? a : b}`));
 }
 
 /** @param {{group: GroupDocument, names: [string, string]}} props */
@@ -23,7 +23,7 @@ export function DifferenceList({ group, names }) {
 		<section class="card compare__card" aria-labelledby="compare-differences">
 			<h2 id="compare-differences">Differences beyond the limits<span class="card__aside">${found.length || 'none'}</span></h2>
 			<div class="compare__scroll" tabindex="0" role="group" aria-label="Differences, the worst first">
-				${found.length === 0 ? html`<p>Both say the same within the limits: they agree.</p>` : html`
+				${found.length === 0 ? html`<p>All differences are within the limits.</p>` : html`
 					<ol class="compare__list">
 						${found.map((one, i) => html`
 							<li key=${`${one.kind} ${one.view} ${one.marking} ${i}`}>
@@ -55,7 +55,7 @@ export function NumberCard({ names, limits, letter }) {
 	const view = numbers.value;
 	const ball = pair.value?.distance.ball ?? null;
 	if (!view) return null;
-	const explained = ball?.explained === null || !ball ? '' : ball.explained ? ' · both σ explain it' : ' · more than both σ explain';
+	const explained = ball?.explained === null || !ball ? '' : ball.explained ? ' · within their σ' : ' · beyond their σ';
 	return html`
 		<section class="card compare__card" aria-labelledby="compare-numbers">
 			<h2 id="compare-numbers">In numbers<span class="card__aside">view <${Letter} letter=${letter} /></span></h2>
@@ -69,7 +69,7 @@ export function NumberCard({ names, limits, letter }) {
 					${ball?.sigmas_m.some((one) => one !== null) ? html`<${Row} label="their σ" value=${ball.sigmas_m.map((one) => fixed(one, 2, ' m')).join(' and ')} />` : null}
 					${view.lines.map((line) => html`<${Row}
 						key=${line.marking} label=${line.marking}
-						value=${line.only ? `only ${withNames(line.only, names)}` : `${pixels(line.mean_px)} px, at most ${pixels(line.largest_px)}`}
+						value=${line.only ? `only annotation ${names[line.only === 'a' ? 0 : 1]}` : `${pixels(line.mean_px)} px, at most ${pixels(line.largest_px)}`}
 						grade=${line.only ? 'warn' : gradeOf(line.largest_px, limits.line_px)} />`)}
 				</tbody></table>
 			</div>

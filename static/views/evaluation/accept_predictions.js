@@ -20,8 +20,8 @@ import { FormDialog } from '../dialog.js';
 /** @import {DatasetJson} from '../../api/types.js' */
 
 const REASONS = /** @type {{[why: string]: string}} */ ({
-	annotated: 'the view has a ball already', the_same: 'this very ball is there already',
-	below_score: 'the surest prediction is below the score', changed_meanwhile: 'the group was changed meanwhile',
+	annotated: 'the view has a ball already', the_same: 'the view has this ball already',
+	below_score: 'the best prediction is below the score', changed_meanwhile: 'the group was changed meanwhile',
 	not_a_ball: 'the box cannot be a ball of that image',
 });
 const EXAMPLES = 4;
@@ -82,7 +82,7 @@ export function AcceptPredictions({ one, set, onClose }) {
 			title=${`Accept balls of ${set.name}`} onClose=${onClose} onSubmit=${send}
 			buttons=${html`<button class="button button--primary" type="submit" aria-disabled=${why !== ''} title=${why}>${state.busy || (would ? `Accept ${count(would)}` : 'Accept')}</button>`}
 		>
-			<p>The surest prediction of each view becomes its annotation, as an edit that can be undone.</p>
+			<p>The prediction with the highest score of each view becomes its annotation, as an edit that can be undone.</p>
 			<div class="form__row"><label for="accept-q">Groups, as a query of the queue</label><input class="field mono" id="accept-q" placeholder="every group; gate:ball for those without enough balls" value=${typed.q} autocomplete="off" spellcheck=${false} onInput=${withValue((text) => setTyped({ ...typed, q: text }))} /></div>
 			<div class="form__row"><label for="accept-score">Smallest score</label><input class="field" id="accept-score" type="number" min="0" max="1" step="0.05" defaultValue=${String(typed.min_score)} onInput=${withValue((text) => setTyped({ ...typed, min_score: Number(text) }))} /></div>
 			<label class="form__check"><input type="checkbox" checked=${typed.replace} onChange=${withTick((replace) => setTyped({ ...typed, replace }))} />Also where the view has another ball</label>

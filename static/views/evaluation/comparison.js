@@ -17,7 +17,7 @@ import { Cell, number } from './cell.js';
 /** @import {ComparisonJson, EvaluationJson} from '../../api/evaluations.js' */
 
 const FIELDS = [
-	{ name: 'error_m', label: 'error of the ball’s place, m' }, { name: 'iou', label: 'IoU of the surest box' }, { name: 'hit_iou', label: 'IoU of the hit' },
+	{ name: 'error_m', label: 'error of the ball’s place, m' }, { name: 'iou', label: 'IoU of the box with the highest score' }, { name: 'hit_iou', label: 'IoU of the hit' },
 	{ name: 'predicted_error_m', label: 'error with predicted cameras, m' }, { name: 'predicted_jac', label: 'JaC of predicted cameras' },
 ];
 

@@ -43,7 +43,7 @@ function EvaluationOf({ one }) {
 				${asked ? html`<${RunDetails} key=${asked} id=${asked} runs=${runs} versions=${versions} changed=${() => changed(null)} />` : html`
 					<section class="card empty">
 						<h2>Nothing is evaluated yet</h2>
-						<p>Upload what a detector or a calibrator said, then run it against a frozen version. Predictions never enter a solve before a person accepts them.</p>
+						<p>Upload the predictions of a detector or a calibrator, then evaluate them against a frozen version. Predictions never enter a solve before a person accepts them.</p>
 					</section>`}
 			</div>
 		</div>

@@ -96,7 +96,7 @@ function UploadDialog({ one, onClose, onAdded }) {
 			</fieldset>
 			<${UploadField} id="prediction-boxes" label="Ball boxes" onUploaded=${took('boxes')} />
 			<details>
-				<summary class="evaluation__pins">Where the file alone does not say enough</summary>
+				<summary class="evaluation__pins">More about the file</summary>
 				<div class="form">
 					${format === 'coco' ? html`<${UploadField} id="prediction-images" label="COCO images" hint="the document whose image numbers the results use" accept=".json" onUploaded=${took('images')} />` : null}
 					<div class="form__row"><label for="prediction-category">Class of the ball</label><input class="field" id="prediction-category" name="category" type="number" min="0" step="1" placeholder="the only one" /></div>
@@ -104,7 +104,7 @@ function UploadDialog({ one, onClose, onAdded }) {
 					<div class="form__row"><label for="prediction-cameras-size">Image size of the cameras</label><input class="field" id="prediction-cameras-size" name="cameras_size" autocomplete="off" maxlength="20" placeholder="as annotated, or 960x540" /></div>
 				</div>
 			</details>
-			<${UploadField} id="prediction-cameras" label="Predicted cameras, where there are any" hint="a zip of SoccerNet camera JSON" onUploaded=${took('cameras')} />
+			<${UploadField} id="prediction-cameras" label="Predicted cameras (optional)" hint="a zip of SoccerNet camera JSON" onUploaded=${took('cameras')} />
 			<div class="form__row">
 				<label for="prediction-name">Name</label>
 				<input class="field" id="prediction-name" maxlength="100" autocomplete="off" value=${name} onInput=${withValue(setName)} />

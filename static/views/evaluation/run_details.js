@@ -24,7 +24,7 @@ import { TableCard } from './table_card.js';
 const COUNTS = [
 	['groups', 'groups'], ['matches', 'matches'], ['frames', 'frames'], ['judged', 'frames judged'], ['balls', 'with a ball'],
 	['with_3d_ball', 'with a 3D ball'], ['without_ball', 'without a ball'], ['detections', 'detections'], ['frames_with_detections', 'frames with detections'],
-	['detections_not_judged', 'detections not judged'], ['predicted_cameras', 'predicted cameras'], ['careful_boxes', 'careful boxes'],
+	['detections_not_judged', 'detections not judged'], ['predicted_cameras', 'predicted cameras'], ['careful_boxes', 'reference boxes'],
 	['unknown_predictions_frames', 'unknown frames'], ['accepted_predictions', 'balls accepted from predictions'], ['gone', 'frames deleted since'],
 ];
 /** Those that say nothing when they are zero. */
@@ -48,7 +48,7 @@ function pinText(value) {
 function Pins({ run }) {
 	return html`
 		<details>
-			<summary class="evaluation__pins">What makes it repeatable</summary>
+			<summary class="evaluation__pins">Reproducibility details</summary>
 			<dl class="facts">${Object.entries(run.pins).map(([name, value]) => html`<dt key=${name}>${words(name)}</dt><dd class="mono">${pinText(value)}</dd>`)}</dl>
 		</details>
 	`;

@@ -21,7 +21,7 @@ import { number } from './cell.js';
 const HEADLINES = [
 	{ name: 'ap_50', label: 'AP@0.5' }, { name: 'mae_m', label: 'MAE, m' }, { name: 'mae_percent', label: 'MAE, %' }, { name: 'p_2m', label: 'P 2 m' },
 ];
-const LIVE = [{ name: 'passing', label: 'as it is now: groups that pass' }, { name: 'accepted', label: 'as it is now: accepted groups' }, { name: 'all', label: 'as it is now: every group' }];
+const LIVE = [{ name: 'passing', label: 'current state: groups that pass' }, { name: 'accepted', label: 'current state: accepted groups' }, { name: 'all', label: 'current state: every group' }];
 
 /** What the form says, as the server wants it. @param {FormData} form */
 function bodyOf(form) {
@@ -40,7 +40,7 @@ function RunForm({ sets, versions, why, send }) {
 	const choices = sets.map(({ id, name }) => html`<option key=${id} value=${String(id)}>${name}</option>`);
 	return html`
 		<form class="form run-form" onSubmit=${withForm((said) => { if (!why) send(said); })}>
-			<div class="form__row"><label for="run-predictions">Predictions</label><select class="field" id="run-predictions" name="predictions">${choices}<option value="">none: careful boxes alone</option></select></div>
+			<div class="form__row"><label for="run-predictions">Predictions</label><select class="field" id="run-predictions" name="predictions">${choices}<option value="">none: reference boxes alone</option></select></div>
 			<div class="form__row"><label for="run-against">Against</label><select class="field" id="run-against" name="against">
 				${versions.map(({ id, name }) => html`<option key=${id} value=${String(id)}>version ${name}</option>`)}
 				${LIVE.map(({ name, label }) => html`<option key=${name} value=${name}>${label}</option>`)}
@@ -51,7 +51,7 @@ function RunForm({ sets, versions, why, send }) {
 					<div class="form__row"><label for="run-name">Name</label><input class="field" id="run-name" name="name" maxlength="100" autocomplete="off" /></div>
 					<div class="form__row"><label for="run-split">Split</label><input class="field" id="run-split" name="split" maxlength="50" autocomplete="off" placeholder="all" /></div>
 					<div class="form__row"><label for="run-boxes">True box</label><select class="field" id="run-boxes" name="boxes"><option value="optimized">optimised</option><option value="annotated">annotated</option><option value="exact">exact</option></select></div>
-					<div class="form__row"><label for="run-careful">Careful boxes, for table 1</label><select class="field" id="run-careful" name="careful"><option value="">none</option>${choices}</select></div>
+					<div class="form__row"><label for="run-careful">Reference boxes, for table 1</label><select class="field" id="run-careful" name="careful"><option value="">none</option>${choices}</select></div>
 					<div class="form__row"><label for="run-score">Smallest score for localisation</label><input class="field" id="run-score" name="min_score" type="number" min="0" max="1" step="0.05" defaultValue="0" /></div>
 				</div>
 			</details>
@@ -95,7 +95,7 @@ export function Runs({ one, sets, runs, versions, shown, show, changed }) {
 			setState({ job: null, error: sentenceOf(problem) });
 		}
 	}
-	const versionOf = (/** @type {EvaluationRow} */ run) => (run.version === null ? 'as it was' : `version ${versions.find(({ id }) => id === run.version)?.name ?? run.version}`);
+	const versionOf = (/** @type {EvaluationRow} */ run) => (run.version === null ? 'not frozen' : `version ${versions.find(({ id }) => id === run.version)?.name ?? run.version}`);
 	return html`
 		<section class="card" aria-labelledby="new-run-title">
 			<h2 id="new-run-title">New run</h2>

@@ -91,6 +91,6 @@ export function Keys({ bindings }) {
 					<dl>${members.map((binding) => html`<${KeyRow} key=${idOf(binding)} binding=${binding} chosen=${chosen} onChoose=${setChosen} />`)}</dl>
 				</section>`)}
 		</div>
-		<p class="help__note">Click a key to choose another. The wheel zooms about the pointer, dragging the picture pans, a double click shows one view alone. Drag a line point or the ball to move it; select the ball to resize its box by the corners. Corner brackets with a score are predictions: they count for nothing until you accept them.</p>
+		<p class="help__note">Click a key to choose another. The wheel zooms about the pointer, dragging the picture pans, a double click shows one view alone. Drag a line point or the ball to move it; select the ball to resize its box by the corners. Corner brackets with a score are predictions: they are not used until you accept them.</p>
 	`;
 }

@@ -21,7 +21,7 @@ function Sample({ row }) {
 
 export function Legend() {
 	return html`
-		<p class="note">These pictures are drawn by what draws the real ones. Nothing is told by colour alone: look at dash, shape and place.</p>
+		<p class="note">These pictures are drawn by what draws the real ones. No meaning rests on colour alone: look at dash, shape and place.</p>
 		<div class="legend">
 			${LEGEND.map(({ title, rows }) => html`
 				<section key=${title}>

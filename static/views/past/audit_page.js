@@ -17,7 +17,7 @@ import { When } from '../when.js';
 
 const FAMILIES = [
 	{ name: 'edit', label: 'edits' }, { name: 'verdict', label: 'verdicts' }, { name: 'comment', label: 'comments' }, { name: 'policy', label: 'policies' },
-	{ name: 'version', label: 'versions' }, { name: 'import', label: 'imports' }, { name: 'people', label: 'people, rights, tokens, logins' }, { name: 'job', label: 'jobs' }, { name: 'work', label: 'work, own annotations, gold groups' }, { name: 'other', label: 'other' },
+	{ name: 'version', label: 'versions' }, { name: 'import', label: 'imports' }, { name: 'people', label: 'people, rights, tokens, logins' }, { name: 'job', label: 'jobs' }, { name: 'work', label: 'work, independent annotations, gold groups' }, { name: 'other', label: 'other' },
 ];
 /** Pages of what belongs to no dataset. */
 const PLACES = /** @type {Record<string, string>} */ ({ people: 'People', job: 'Jobs' });
@@ -114,7 +114,7 @@ export function AuditPage() {
 				<h2 id="audit-title">Who did what
 					<span class="card__aside buttons"><a class="button button--small" href=${auditFile(filter, 'csv')} download>CSV</a><a class="button button--small" href=${auditFile(filter, 'jsonl')} download>JSON Lines</a></span></h2>
 				<${Filters} key=${key} />
-				${param('group') ? html`<p>Of group ${param('group')} alone. <a class="link" href="/audit">Show all</a></p>` : null}
+				${param('group') ? html`<p>Only group ${param('group')}. <a class="link" href="/audit">Show all</a></p>` : null}
 			</section>
 			${error ? html`<${Trouble} title="The audit cannot be shown" error=${error} retry=${retry} />` : null}
 			${!found && !error ? html`<${Loading} what="the log" />` : null}
@@ -124,7 +124,7 @@ export function AuditPage() {
 						<thead><tr><th>When</th><th>Who</th><th>What</th><th>About</th></tr></thead>
 						<tbody>${found.items.map((one) => html`<${Row} key=${one.id} one=${one} />`)}</tbody>
 					</table></div>
-					${found.items.length ? null : html`<p class="empty-note audit__none">Nothing fits${found.next ? ' so far' : ''}.</p>`}
+					${found.items.length ? null : html`<p class="empty-note audit__none">No entry matches${found.next ? ' so far' : ''}.</p>`}
 					${found.next ? html`<p class="audit__more"><button class="button" type="button" aria-disabled=${waiting} onClick=${() => { if (!waiting) more(); }}>Show more</button></p>` : null}
 				</section>` : null}
 		<//>

@@ -79,9 +79,9 @@ export function BeforeAfter({ group, entry }) {
 					<p><${Letter} letter=${view.letter} /> <span class="past__key">${view.key}</span></p>
 					<div class="past__pair">
 						${view.before ? html`<${Side} view=${view} state=${view.before} other=${view.after} tone="before" title="Before" />` : null}
-						<${Side} view=${view} state=${view.after} other=${view.before} tone="after" title=${view.before ? 'After' : 'As it came'} />
+						<${Side} view=${view} state=${view.after} other=${view.before} tone="after" title=${view.before ? 'After' : 'As imported'} />
 					</div>
-				</div>`) : html`<p class="past__none">Nothing that is drawn was changed.</p>`}
+				</div>`) : html`<p class="past__none">Nothing drawn was changed.</p>`}
 		</div>
 	`;
 }

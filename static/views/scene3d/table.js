@@ -43,8 +43,8 @@ export function SceneTable({ scene }) {
 					</tr>
 				</thead>
 				<tbody>
-					${best ? html`<${Row} name="best" what="Best point ◆" point=${best.point} rest=${ballText(best)} />` : null}
-					${ball ? html`<${Row} name="mean" what="Mean of pairs ●" point=${ball.point} rest=${ballText(ball)} />` : null}
+					${best ? html`<${Row} name="best" what="Most likely point ◆" point=${best.point} rest=${ballText(best)} />` : null}
+					${ball ? html`<${Row} name="mean" what="Pair average ●" point=${ball.point} rest=${ballText(ball)} />` : null}
 					${pairs.map(({ letters, point, valid }) => html`
 						<${Row} key=${letters} name=${`pair ${letters}`} what=${`Pair ${letters} ${valid ? '○' : '×'}`} point=${point} rest=${valid ? '' : 'left out'} />`)}
 					${stands.map((stand) => html`

@@ -36,14 +36,14 @@ function Rings({ items, unread, close }) {
 	}
 	return html`
 		<div class="bell__panel" onKeyDown=${key}>
-			<h2>What you are told</h2>
+			<h2>Notifications</h2>
 			${items.length ? html`<ul class="bell__list" ref=${list}>${items.map((ring, i) => html`
 				<li key=${ring.id} data-unread=${ring.read === null}>
 					<a href=${ring.address} autofocus=${i === 0} onClick=${() => { if (ring.read === null) seen([ring.id]); close(); }}>
 						<span class="bell__kind" aria-hidden="true">${KINDS[ring.kind] ?? '·'}</span>
 						<span>${ring.read === null ? html`<span class="hidden-text">new: </span>` : null}${ring.sentence}<small>${ring.dataset ? `${ring.dataset} · ` : ''}<${When} at=${ring.at} /></small></span>
 					</a>
-				</li>`)}</ul>` : html`<p class="empty-note">Nothing yet: work that is given or handed back to you, mentions, replies, and jobs that ended are told here.</p>`}
+				</li>`)}</ul>` : html`<p class="empty-note">No notifications yet. They tell you of work assigned or returned to you, mentions, replies, and finished jobs.</p>`}
 			${unread ? html`<p><button class="button button--small" type="button" onClick=${() => seen(null)}>Mark all as read</button></p>` : null}
 		</div>
 	`;
@@ -52,6 +52,6 @@ function Rings({ items, unread, close }) {
 export function BellButton() {
 	if (!isTeam || !myName.value) return null;
 	const { items, unread } = bell.value ?? { items: [], unread: 0 };
-	const label = html`<svg viewBox="0 0 16 16" aria-hidden="true"><path d="M3 12h10l-1.5-2V7a3.5 3.5 0 0 0-7 0v3zM6.5 14h3" /></svg><span class="hidden-text">Bell: </span>${unread ? html`<span class="bell__count">${unread > 99 ? '99+' : unread}</span><span class="hidden-text"> new</span>` : html`<span class="hidden-text">nothing new</span>`}`;
-	return html`<span class="bell"><${Popover} id=${ID} label=${label} title="What you are told (Shift B)">${(/** @type {() => void} */ close) => html`<${Rings} items=${items} unread=${unread} close=${close} />`}<//></span>`;
+	const label = html`<svg viewBox="0 0 16 16" aria-hidden="true"><path d="M3 12h10l-1.5-2V7a3.5 3.5 0 0 0-7 0v3zM6.5 14h3" /></svg><span class="hidden-text">Notifications: </span>${unread ? html`<span class="bell__count">${unread > 99 ? '99+' : unread}</span><span class="hidden-text"> new</span>` : html`<span class="hidden-text">nothing new</span>`}`;
+	return html`<span class="bell"><${Popover} id=${ID} label=${label} title="Notifications (Shift B)">${(/** @type {() => void} */ close) => html`<${Rings} items=${items} unread=${unread} close=${close} />`}<//></span>`;
 }

@@ -53,7 +53,7 @@ function Comment({ group, thread, one }) {
 					<button class="link-button" type="button" data-needs="annotate" onClick=${() => act(group, deleteComment(group, thread, one.id))}>Delete<span class="hidden-text"> your comment</span></button>
 				</span>` : null}
 			</p>
-			${one.text === null ? html`<p class="talk__gone">Deleted by its writer.</p>` : html`<p class="talk__text">${partsOf(one.text, one.mentions).map((part) => (part.mention ? html`<mark>${part.text}</mark>` : part.text))}</p>`}
+			${one.text === null ? html`<p class="talk__gone">Deleted by its author.</p>` : html`<p class="talk__text">${partsOf(one.text, one.mentions).map((part) => (part.mention ? html`<mark>${part.text}</mark>` : part.text))}</p>`}
 		</li>
 	`;
 }

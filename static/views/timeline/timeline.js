@@ -132,8 +132,8 @@ export function Timeline() {
 			<div class="timeline__tools" role="toolbar" aria-label="Timeline">
 				<button class="button" type="button" aria-pressed=${playing.value} onClick=${togglePlaying}>${playing.value ? 'Stop' : 'Play'} <kbd>Space</kbd></button>
 				<button class="button" type="button" onClick=${goToWorst}>Worst <kbd>J</kbd></button>
-				<button class="button" type="button" aria-label="Shorter stretch" title="Shorter stretch (wheel)" onClick=${() => zoomSpan(0.5)}>+</button>
-				<button class="button" type="button" aria-label="Longer stretch" title="Longer stretch (wheel)" onClick=${() => zoomSpan(2)}>−</button>
+				<button class="button" type="button" aria-label="Zoom in" title="Zoom in (wheel)" onClick=${() => zoomSpan(0.5)}>+</button>
+				<button class="button" type="button" aria-label="Zoom out" title="Zoom out (wheel)" onClick=${() => zoomSpan(2)}>−</button>
 				<span class="timeline__key"><span aria-hidden="true">- -</span> limit ${pixels(limit)} px</span>
 			</div>
 			${all && all.id.length > 0 ? html`<${Curve} all=${all} limit=${limit} />` : html`<p class="empty-note" role="status">${trouble.value || 'Loading the frames…'}</p>`}

@@ -43,14 +43,14 @@ function GoldFields({ dataset }) {
 	const [some, setSome] = useState(false);
 	const versions = useResource(async (signal) => (some ? getVersions(dataset.id, signal) : null), [dataset.id, some]);
 	return html`
-		<div class="form__row"><label for="batch-gold">One gold group in so many</label><input class="field" id="batch-gold" name="gold" type="number" min="1" max="1000" placeholder="none" onInput=${withValue((text) => setSome(text !== ''))} /></div>
+		<div class="form__row"><label for="batch-gold">One gold group in N</label><input class="field" id="batch-gold" name="gold" type="number" min="1" max="1000" placeholder="none" onInput=${withValue((text) => setSome(text !== ''))} /></div>
 		${some ? html`
 			<div class="form__row"><label for="batch-truth">Gold groups are</label><select class="field" id="batch-truth" name="truth">
-				<option value="">those that leads marked</option>
+				<option value="">marked by leads</option>
 				<option value="sample">also those of a sample: true cameras and ball</option>
-				${versions.value?.items.map(({ name }) => html`<option key=${name} value=${`v:${name}`}>also those of ${name} upon which people agreed</option>`)}
+				${versions.value?.items.map(({ name }) => html`<option key=${name} value=${`v:${name}`}>also those of ${name} on which people agreed</option>`)}
 			</select></div>
-			<div class="form__row"><label for="batch-start">People begin such a group with</label><select class="field" id="batch-start" name="start">
+			<div class="form__row"><label for="batch-start">Annotators start a gold group with</label><select class="field" id="batch-start" name="start">
 				${STARTS.map(([name, words]) => html`<option key=${name} value=${name}>${words}</option>`)}
 			</select></div>` : null}
 	`;
@@ -73,24 +73,24 @@ export function BatchDialog({ dataset, q, total, ticked, onClose }) {
 		})), (made) => {
 			clearTicks();
 			onClose();
-			inform(`“${made.name}” was given out: ${plural(made.groups, 'group')}.`, { label: 'See the work', run: () => navigate('/work') });
+			inform(`“${made.name}” is assigned: ${plural(made.groups, 'group')}.`, { label: 'See the work', run: () => navigate('/work') });
 		});
 	}
 	return html`
 		<${FormDialog}
-			title="Give out groups" onClose=${onClose} onSubmit=${send}
-			buttons=${html`<button class="button button--primary" type="submit" aria-disabled=${busy}>Give out</button>`}
+			title="Assign groups" onClose=${onClose} onSubmit=${send}
+			buttons=${html`<button class="button button--primary" type="submit" aria-disabled=${busy}>Assign</button>`}
 		>
-			<p>${ticked ? html`${count(ticked.count)} ticked groups` : q ? html`${plural(total, 'group')} that match <code>${q}</code>` : html`All ${plural(total, 'group')} of ${dataset.name}`}, in the order of the list. What comes to match later is not part of it.</p>
+			<p>${ticked ? html`${count(ticked.count)} ticked groups` : q ? html`${plural(total, 'group')} that match <code>${q}</code>` : html`All ${plural(total, 'group')} of ${dataset.name}`}, in the order of the list. Groups that match later are not added.</p>
 			<div class="form__row"><label for="batch-name">Name</label><input class="field" id="batch-name" name="name" required maxlength="80" autocomplete="off" /></div>
 			<div class="form__columns batch-dialog__fields">
-			<div class="form__row"><label for="batch-size">The first so many</label><input class="field" id="batch-size" name="size" type="number" min="1" max="10000" placeholder=${`all ${count(matching)}`} /></div>
+			<div class="form__row"><label for="batch-size">Limit to first N</label><input class="field" id="batch-size" name="size" type="number" min="1" max="10000" placeholder=${`all ${count(matching)}`} /></div>
 			<div class="form__row"><label for="batch-due">Due</label><input class="field" id="batch-due" name="due" type="date" /></div>
-			<div class="form__row"><label for="batch-verdicts">People who annotate each group on their own</label><input class="field" id="batch-verdicts" name="verdicts" type="number" min="1" max="5" placeholder="1" /></div>
+			<div class="form__row"><label for="batch-verdicts">Annotators per group</label><input class="field" id="batch-verdicts" name="verdicts" type="number" min="1" max="5" placeholder="1" /></div>
 			<${GoldFields} dataset=${dataset} />
 			</div>
-			<label class="form__check"><input type="checkbox" name="blind" defaultChecked /> Where several people annotate, nobody sees what the others did</label>
-			<label class="form__check"><input type="checkbox" name="skip" defaultChecked /> Leave out groups that wait in another open batch</label>
+			<label class="form__check"><input type="checkbox" name="blind" defaultChecked /> Annotators do not see each other’s work</label>
+			<label class="form__check"><input type="checkbox" name="skip" defaultChecked /> Skip groups that are in another open batch</label>
 			<${PeopleChoice} dataset=${dataset.name} chosen=${people} choose=${setPeople} />
 			${error ? html`<${FormError} error=${error} />` : null}
 		<//>

@@ -24,12 +24,12 @@ export function GiveOnDialog({ one, onClose, onDone }) {
 		annotators: people.annotator, reviewers: people.reviewer, gold_every: Number(form.get('gold')) || null,
 	}), () => { onClose(); onDone(); });
 	return html`
-		<${FormDialog} title=${`Give on: ${batch.name}`} onClose=${onClose} onSubmit=${send} buttons=${html`<button class="button button--primary" type="submit">Save</button>`}>
-			<p>What was handed in or judged stays; whoever has a group open keeps it until they leave.</p>
+		<${FormDialog} title=${`Reassign: ${batch.name}`} onClose=${onClose} onSubmit=${send} buttons=${html`<button class="button button--primary" type="submit">Save</button>`}>
+			<p>Submitted and reviewed groups stay; a person who has a group open keeps it until they leave.</p>
 			<div class="form__row"><label for="give-name">Name</label><input class="field" id="give-name" name="name" required maxlength="80" autocomplete="off" defaultValue=${batch.name} /></div>
 			<div class="form__columns">
 			<div class="form__row"><label for="give-due">Due</label><input class="field" id="give-due" name="due" type="date" defaultValue=${batch.due ?? ''} /></div>
-			<div class="form__row"><label for="give-gold">One gold group in so many</label><input class="field" id="give-gold" name="gold" type="number" min="1" max="1000" placeholder="none" defaultValue=${goldEvery ?? ''} /></div>
+			<div class="form__row"><label for="give-gold">One gold group in N</label><input class="field" id="give-gold" name="gold" type="number" min="1" max="1000" placeholder="none" defaultValue=${goldEvery ?? ''} /></div>
 			</div>
 			<${PeopleChoice} dataset=${batch.dataset} chosen=${people} choose=${setPeople} />
 			${error ? html`<${FormError} error=${error} />` : null}

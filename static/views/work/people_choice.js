@@ -14,14 +14,14 @@ import { isTeam } from '../../state/me.js';
 /** @typedef {Record<Part, string[]>} Chosen */
 
 const PARTS = /** @type {{part: Part, title: string, note: string, roles: Role[]}[]} */ ([
-	{ part: 'annotator', title: 'Annotators', note: 'Nobody: reviewers get every group at once.', roles: ['annotator', 'reviewer', 'lead', 'admin'] },
-	{ part: 'reviewer', title: 'Reviewers', note: 'Nobody: whoever may review here.', roles: ['reviewer', 'lead', 'admin'] },
+	{ part: 'annotator', title: 'Annotators', note: 'None: groups go directly to the reviewers.', roles: ['annotator', 'reviewer', 'lead', 'admin'] },
+	{ part: 'reviewer', title: 'Reviewers', note: 'None: every reviewer of this dataset.', roles: ['reviewer', 'lead', 'admin'] },
 ]);
 
 /** @param {{dataset: string, chosen: Chosen, choose: (chosen: Chosen) => void}} props `dataset`: its name */
 export function PeopleChoice({ dataset, chosen, choose }) {
 	const people = useResource(async (signal) => (isTeam && !signal.aborted ? getMembers(dataset) : { items: /** @type {MemberJson[]} */ ([]) }), [dataset]);
-	if (!isTeam) return html`<p class="note">Nobody has an account on this server: the batch is yours.</p>`;
+	if (!isTeam) return html`<p class="note">This server has no accounts: the batch is yours.</p>`;
 	/** @param {Part} part @param {string} name @param {boolean} on */
 	function turn(part, name, on) {
 		choose({ ...chosen, [part]: on ? [...chosen[part], name] : chosen[part].filter((one) => one !== name) });

@@ -27,8 +27,8 @@ function Paces({ people, name }) {
 	if (people.length === 0) return null;
 	return html`
 		<div class="table__scroll"><table class="table">
-			<caption class="hidden-text">Who has done what of ${name}</caption>
-			<thead><tr><th>Name</th><th>Handed in</th><th>Judged</th><th title="The time between what they did; pauses of more than ten minutes are left out">Minutes</th><th>Minutes a group</th><th>Groups an hour</th></tr></thead>
+			<caption class="hidden-text">Progress of each person in ${name}</caption>
+			<thead><tr><th>Name</th><th>Submitted</th><th>Reviewed</th><th title="Time between actions; pauses of more than ten minutes do not count">Minutes</th><th>Minutes a group</th><th>Groups an hour</th></tr></thead>
 			<tbody>${people.map((one) => html`
 				<tr key=${one.name}><th scope="row">${one.name}</th><td>${one.handed_in}</td><td>${one.judged}</td><td>${fixed(one.minutes, 0)}</td><td>${fixed(one.minutes_a_group, 1)}</td><td>${fixed(one.groups_an_hour, 0)}</td></tr>`)}
 			</tbody>
@@ -40,18 +40,18 @@ function Paces({ people, name }) {
 function TeamBatch({ one, act, give }) {
 	const { batch, gold_every: goldEvery, here, stalled, people } = one;
 	const open = batch.state === 'open';
-	const several = batch.verdicts > 1 ? html` · ${batch.verdicts} people annotate each group: <a class="link" href=${pageAddress(batch.dataset, 'agreement')}>how far they agree</a>` : null;
-	const given = [batch.annotators.length ? `annotate: ${batch.annotators.join(', ')}` : '', `review: ${batch.reviewers.join(', ') || 'whoever may'}`].filter(Boolean).join(' · ');
+	const several = batch.verdicts > 1 ? html` · ${batch.verdicts} people annotate each group: <a class="link" href=${pageAddress(batch.dataset, 'agreement')}>agreement</a>` : null;
+	const given = [batch.annotators.length ? `annotate: ${batch.annotators.join(', ')}` : '', `review: ${batch.reviewers.join(', ') || 'all reviewers'}`].filter(Boolean).join(' · ');
 	return html`
 		<li class="work__item">
 			<div class="work__head">
 				<div>
 					<h3><a class="link" href=${queueAddress(batch.dataset, `batch:${batch.id}`)}>${batch.name}</a>${open ? null : html` <span class="pill">closed</span>`}${stalled ? html` <span class="pill" data-status="rejected">stalled</span>` : null}</h3>
 					<${Progress} batch=${batch} />
-					<p class="note">${given}${several}${goldEvery ? ` · one gold group in ${goldEvery}` : ''}${here.length ? ` · here now: ${here.map(({ person }) => person).join(', ')}` : ''}${stalled ? html` · nobody since <${When} at=${stalled} />` : null}<${Due} due=${batch.due} /></p>
+					<p class="note">${given}${several}${goldEvery ? ` · one gold group in ${goldEvery}` : ''}${here.length ? ` · active now: ${here.map(({ person }) => person).join(', ')}` : ''}${stalled ? html` · no activity since <${When} at=${stalled} />` : null}<${Due} due=${batch.due} /></p>
 				</div>
 				<span class="table__actions">
-					<button class=${stalled ? 'button button--small button--primary' : 'button button--small'} type="button" onClick=${() => give(one)}>Give on…<span class="hidden-text"> ${batch.name}</span></button>
+					<button class=${stalled ? 'button button--small button--primary' : 'button button--small'} type="button" onClick=${() => give(one)}>Reassign…<span class="hidden-text"> ${batch.name}</span></button>
 					<button class="button button--small" type="button" onClick=${() => act(patchBatch(batch.id, { state: open ? 'closed' : 'open' }))}>${open ? 'Close' : 'Open again'}<span class="hidden-text"> ${batch.name}</span></button>
 					<${ConfirmButton} label="Delete" question="Really delete?" what=${batch.name} small=${true} run=${() => act(deleteBatch(batch.id))} />
 				</span>
@@ -76,7 +76,7 @@ export function TeamCard({ dataset, changed }) {
 	return html`
 		<section class="card" aria-labelledby="team-title">
 			<h2 id="team-title"><${Term} word="batch">Batches<//> of ${dataset.name}</h2>
-			<p class="note">${items.length ? plural(items.length, 'batch').replace('batchs', 'batches') : 'None yet'}. Filter or tick groups in the <a class="link" href=${queueAddress(dataset.name, '')}>queue</a> and press “Give out…” to make one.</p>
+			<p class="note">${items.length ? plural(items.length, 'batch').replace('batchs', 'batches') : 'None yet'}. Filter or tick groups in the <a class="link" href=${queueAddress(dataset.name, '')}>queue</a> and press “Assign…” to make one.</p>
 			${error ? html`<${FormError} error=${error} />` : null}
 			<ul class="work__list">${items.map((one) => html`<${TeamBatch} key=${one.batch.id} one=${one} act=${act} give=${setGiving} />`)}</ul>
 			${giving ? html`<${GiveOnDialog} one=${giving} onClose=${() => setGiving(null)} onDone=${renew} />` : null}

@@ -29,7 +29,7 @@ function MyBatch({ one: { batch, parts, left, handed_back: back }, first }) {
 	// Who is at something else already stays there; where another one becomes the first, nobody is taken to it.
 	useEffect(() => { if (first && document.activeElement === document.body) button.current?.focus(); }, []);
 	const go = () => attempt(goOn(batch.id), (some) => {
-		if (!some) inform(`Nothing waits for you in “${batch.name}” now: others have the rest open, or it waits for somebody else.`);
+		if (!some) inform(`No group of “${batch.name}” is available to you now: others have the rest open, or it waits for other people.`);
 	});
 	return html`
 		<li class="work__item">
@@ -38,11 +38,11 @@ function MyBatch({ one: { batch, parts, left, handed_back: back }, first }) {
 					<h3>${batch.name}</h3>
 					<${Progress} batch=${batch} />
 					<p class="note">${batch.dataset} · you ${parts.map((part) => (part === 'annotator' ? 'annotate' : 'review')).join(' and ')}${batch.verdicts > 1 && parts.includes('reviewer') ? html` · <a class="link" href=${pageAddress(batch.dataset, 'agreement')}>decide where annotations differ</a>` : null}<${Due} due=${batch.due} /></p>
-					${back.length ? html`<ul class="work__back" aria-label="Handed back to you">${back.map((one) => html`
-						<li key=${one.group}><a href=${reviewAddress(one.group, `batch:${batch.id}`)}>${one.title}</a> was handed back by ${one.by}${one.reason ? html`: “${one.reason}”` : ''} <small><${When} at=${one.at} /></small></li>`)}</ul>` : null}
+					${back.length ? html`<ul class="work__back" aria-label="Returned to you">${back.map((one) => html`
+						<li key=${one.group}><a href=${reviewAddress(one.group, `batch:${batch.id}`)}>${one.title}</a> was returned by ${one.by}${one.reason ? html`: “${one.reason}”` : ''} <small><${When} at=${one.at} /></small></li>`)}</ul>` : null}
 					${error ? html`<${FormError} error=${error} />` : null}
 				</div>
-				<button ref=${button} class=${first ? 'button button--primary' : 'button'} type="button" data-needs="annotate" onClick=${go}>${left ? `Go on: ${plural(left, 'group')}` : 'Go on'}<span class="hidden-text"> of ${batch.name}</span></button>
+				<button ref=${button} class=${first ? 'button button--primary' : 'button'} type="button" data-needs="annotate" onClick=${go}>${left ? `Continue: ${plural(left, 'group')}` : 'Continue'}<span class="hidden-text"> of ${batch.name}</span></button>
 			</div>
 		</li>
 	`;
@@ -53,8 +53,8 @@ function Mine({ items }) {
 	const first = items.findIndex(({ left }) => left > 0);
 	return html`
 		<section class="card" aria-labelledby="mine-title">
-			<h2 id="mine-title">Mine</h2>
-			${items.length ? null : html`<p>${isTeam ? 'Nobody has given you a batch. A lead can; or review from the queue.' : 'A batch is a part of a dataset that you set yourself to do, or give to others on a server of a team.'}</p>`}
+			<h2 id="mine-title">My batches</h2>
+			${items.length ? null : html`<p>${isTeam ? 'No batch is assigned to you. A lead can assign one; or review groups from the queue.' : 'A batch is a set of groups to work through. Make one with Assign… in the queue.'}</p>`}
 			<ul class="work__list">${items.map((one, index) => html`<${MyBatch} key=${one.batch.id} one=${one} first=${index === first} />`)}</ul>
 		</section>
 	`;

@@ -56,7 +56,7 @@ class TestWhatIsUnlike:
         assert unlike[0].startswith("Sigma of a ball of camera b: ")
         assert re.search(r"\nSigma of a point on a line: .* share \d+ % of its variance\n", out)
         assert told[-1].startswith(
-            "Run it again with --apply to judge by the estimates: click_sigma_px to "
+            "Run it again with --apply to use the estimates: click_sigma_px to "
         )
         assert told[-1].endswith("balls of cameras and people their own sigma.")
 
@@ -73,7 +73,7 @@ class TestWhatIsUnlike:
         assert {one["camera"] for one in again["used"]} == {None, "a", "b"}
         assert again["used"] == again["factors"] == body["factors"]
         out = touchline("noise", "--dataset", "noisy", "--alike")[1]
-        assert "All balls are taken to be alike; `touchline solve`" in out
+        assert "One noise is used for all balls; `touchline solve`" in out
         assert json.loads(touchline("noise", "--dataset", "noisy", "--json")[1])["used"] == []
 
     def test_to_apply_and_to_take_back_at_once_is_refused(self, home: Path, touchline: Run) -> None:

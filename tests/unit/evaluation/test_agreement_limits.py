@@ -63,21 +63,21 @@ class TestLimits:
                 "diameter_px",
                 5.0,
                 5.1,
-                "the ball of b is 5.1 px wider",
+                "the ball of annotation b is 5.1 px wider",
             ),
             (
                 lambda px: balls(diameter_px=-px),
                 "diameter_px",
                 5.0,
                 5.1,
-                "the ball of a is 5.1 px wider",
+                "the ball of annotation a is 5.1 px wider",
             ),
             (
                 lambda jac: replace(ALIKE, jac=(0.9, jac)),
                 "jac",
                 0.7,
                 0.69,
-                "one's camera meets the other's lines with a JaC of 0.69",
+                "the camera of one annotation fits the lines of the other with JaC 0.69",
             ),
         ],
     )
@@ -93,7 +93,7 @@ class TestLimits:
         [
             (None, ""),
             (0.05, ", which both uncertainties explain"),
-            (0.04, ", more than sigma explains"),
+            (0.04, ", more than their uncertainties explain"),
         ],
     )
     def test_of_the_3d_balls(self, p_value: float | None, why: str) -> None:
@@ -106,7 +106,10 @@ class TestLimits:
         one, two = LineDistance(MIDDLE, "a"), LineDistance(GOAL, "b")
         assert told(replace(ALIKE, lines=(one,))) == []
         (found,) = told(replace(ALIKE, lines=(one, two)))
-        assert found.sentence == f"drawn once: {MIDDLE} (only a), {GOAL} (only b)"
+        assert (
+            found.sentence
+            == f"drawn by only one person: {MIDDLE} (annotation a), {GOAL} (annotation b)"
+        )
         assert (found.kind, found.value, found.limit) == ("markings", 2.0, 1.0)
 
 
@@ -114,28 +117,40 @@ class TestStates:
     @pytest.mark.parametrize(("included", "who"), [((True, False), "a"), ((False, True), "b")])
     def test_who_left_a_view_in(self, included: tuple[bool, bool], who: str) -> None:
         (found,) = told(replace(ALIKE, included=included))
-        assert (found.kind, found.sentence) == ("view", f"only {who} left it in")
+        assert (found.kind, found.sentence) == ("view", f"only annotation {who} uses the view")
 
     @pytest.mark.parametrize(
         ("states", "said"),
         [
-            (("seen", "occluded"), "a says seen, b says occluded"),
-            (("none", "out_of_view"), "a says not annotated, b says out of view"),
-            (("several", "seen"), "a says several, b says seen"),
+            (("seen", "occluded"), "the ball is seen in annotation a, occluded in annotation b"),
+            (
+                ("none", "out_of_view"),
+                "the ball is not annotated in annotation a, out of view in annotation b",
+            ),
+            (
+                ("several", "seen"),
+                "the ball is drawn several times in annotation a, seen in annotation b",
+            ),
         ],
     )
     def test_what_each_says_of_the_ball(self, states: tuple[str, str], said: str) -> None:
         (found,) = told(replace(ALIKE, ball=BallDistance(*states)))
-        assert (found.kind, found.sentence) == ("ball", f"ball: {said}")
+        assert (found.kind, found.sentence) == ("ball", said)
 
     @pytest.mark.parametrize(("there", "who"), [((True, False), "a"), ((False, True), "b")])
     def test_who_has_a_3d_ball(self, there: tuple[bool, bool], who: str) -> None:
         (found,) = told(ball=Ball3DDistance(*there))
-        assert (found.kind, found.sentence) == ("ball_3d", f"only {who} has a 3D ball")
+        assert (found.kind, found.sentence) == (
+            "ball_3d",
+            f"only annotation {who} yields a 3D ball",
+        )
 
     def test_verdicts_differ_where_both_are_given(self) -> None:
         (found,) = told(verdicts=("accepted", "rejected"))
-        assert (found.kind, found.sentence) == ("verdict", "a accepted it, b rejected it")
+        assert (found.kind, found.sentence) == (
+            "verdict",
+            "annotation a: accepted, annotation b: rejected",
+        )
         assert told(verdicts=("accepted", None)) == told(verdicts=("deferred", "deferred")) == []
 
 

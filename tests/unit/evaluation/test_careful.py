@@ -1,4 +1,4 @@
-"""Careful boxes: the words, counts and directions of the table, the axes of its figure."""
+"""Reference boxes: the words, counts and directions of the table, the axes of its figure."""
 
 from __future__ import annotations
 
@@ -100,7 +100,7 @@ class TestBoxesTable:
         told = {row.name: [(cell.count, cell.of) for cell in row.cells] for row in table.rows}
         assert told.pop("detected") == [(1, 4), (1, 4)]
         assert set(map(tuple, told.values())) == {((2, 4), (2, 4))}
-        assert table.note.startswith("2 frames that ") and " of 4 careful boxes." in table.note
+        assert table.note.startswith("2 frames that ") and " of 4 reference boxes." in table.note
 
     def test_the_surest_of_those_that_overlap_is_measured(self, make_frame) -> None:
         frame = replace(make_frame(1), group_id=5)

@@ -93,32 +93,37 @@ class TestCalibratable:
 class TestJac:
     def test_says_the_worst_of_the_views_that_are_left(self):
         views = [seen("A", 1.0), seen("B", 0.875), seen("C", **LOW)]
-        sentence = "worst 0.88 · B; C below, not used"
+        sentence = "B: 0.88 (lowest); C too low, not used"
         assert gates(views)["jac"] == Gate("jac", True, 0.875, 0.75, 0.125 / 0.75, sentence)
 
     def test_names_all_views_below(self):
         found = gates([seen("A"), seen("B", **LOW), seen("C", **LOW)])["jac"]
-        assert found.sentence == "0.88 · A; B, C below, not used"
+        assert found.sentence == "A: 0.88; B, C too low, not used"
 
     def test_says_the_worst_of_the_fallen_when_they_are_to_blame(self):
         views = [seen("A", 0.25), seen("B", 0.5, failed="jac"), seen("C", 0.375, failed="jac")]
         found = gates(views, ("jac", "two_views"))["jac"]
-        assert found == Gate("jac", False, 0.375, 0.75, -0.5, "worst 0.38 · C", "c")
+        assert found == Gate("jac", False, 0.375, 0.75, -0.5, "C: 0.38 (lowest)", "c")
 
     def test_where_all_fell_and_another_gate_is_to_blame_the_fallen_speak(self):
         found = gates([seen("A", **LOW), seen("B", **NO_CAMERA)], ("calibratable",))["jac"]
         assert (found.passed, found.sentence, found.view) == (
             True,
-            "0.50 · A; A below, not used",
+            "A: 0.50; A too low, not used",
             None,
         )
 
     @pytest.mark.parametrize(
         ("jac", "said"),
-        [(0.75, "exactly 0.75"), (0.7512, "0.7512"), (0.7488, "0.7488"), (0.7612, "0.76")],
+        [(0.7512, "0.7512"), (0.7488, "0.7488"), (0.7612, "0.76")],
     )
     def test_says_as_many_digits_as_it_takes(self, jac: float, said: str):
-        assert gates([seen("A", jac)])["jac"].sentence == f"{said} · A"
+        assert gates([seen("A", jac)])["jac"].sentence == f"A: {said}"
+
+    def test_a_value_at_the_threshold_says_that_it_must_be_above(self):
+        views = [seen("A", 1.0), seen("B", 0.75, failed="jac")]
+        found = gates(views, ("jac", "two_views"))["jac"]
+        assert found.sentence == "B: 0.75, must be above 0.75"
 
     def test_given_cameras_without_lines_are_not_measured(self):
         sentence = "not measured, the cameras were given"
@@ -150,13 +155,13 @@ class TestAgreement:
         found = gates(views, policy=self.POLICY)["agreement"]
         assert (found.passed, found.value, found.view) == (True, 0.6, None)
         assert found.margin == pytest.approx(0.5)
-        assert found.sentence == "worst 0.60 · B"
+        assert found.sentence == "B: 0.60 (lowest)"
 
     def test_names_the_one_to_blame(self):
         views = [self.painted("A", 0.9), self.painted("B", 0.2, failed="agreement")]
         found = gates(views, ("agreement", "two_views"), policy=self.POLICY)
         assert (found["agreement"].passed, found["agreement"].view) == (False, "b")
-        assert found["agreement"].sentence == "0.20 · B"
+        assert found["agreement"].sentence == "B: 0.20"
         assert "B not counted (paint does not agree)" in found["two_views"].sentence
 
     def test_one_below_that_is_not_needed_is_said(self):
@@ -166,7 +171,7 @@ class TestAgreement:
             self.painted("C", 0.1, failed="agreement"),
         ]
         found = gates(views, policy=self.POLICY)["agreement"]
-        assert found.sentence == "worst 0.80 · B; C below, not used"
+        assert found.sentence == "B: 0.80 (lowest); C too low, not used"
 
     def test_where_no_paint_was_read_it_is_not_judged(self):
         found = gates([seen("A"), given("B")], policy=self.POLICY)["agreement"]
@@ -316,10 +321,23 @@ class TestChiSquare:
     FOUND = ChiSquare(11.62, 3, 0.0088, ("a", "b", "c"))
     POLICY = replace(PAPER, min_p_value=0.002)
 
-    def test_says_how_often_chance_does_as_much(self):
-        found = gates([], policy=self.POLICY, chi_square=self.FOUND)["chi_square"]
-        assert (found.passed, found.value, found.threshold) == (True, 0.0088, 0.002)
-        assert found.sentence == "by chance in 1 of 110 groups, χ² 11.6"
+    @pytest.mark.parametrize(
+        ("p_value", "said"),
+        [
+            (0.72, "normal (p = 0.72)"),
+            (0.05, "normal (p = 0.050)"),
+            (0.049, "unlikely (p = 0.049)"),
+            (0.0088, "unlikely (p = 0.0088)"),
+            (0.002, "unlikely (p = 0.0020)"),
+            (0.00083, "contradictory (p = 0.00083)"),
+            (1e-12, "contradictory (p < 0.000001)"),
+        ],
+    )
+    def test_says_how_consistent_the_views_are(self, p_value: float, said: str):
+        one = replace(self.FOUND, p_value=p_value)
+        found = gates([], policy=self.POLICY, chi_square=one)["chi_square"]
+        assert (found.passed, found.value, found.threshold) == (True, p_value, 0.002)
+        assert found.sentence == said
 
     def test_fails_where_the_verdict_says_so(self):
         one = ChiSquare(20.0, 1, 7.7e-6, ("a", "b"))

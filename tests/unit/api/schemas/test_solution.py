@@ -121,7 +121,7 @@ class TestSolutionDocument:
         document = SolutionDocument.of(replace(solution, findings=(found,)), group).findings[0]
         edit = {"edit": "set_lines", "view": view.key, "lines": {marking: None}}
         assert [offer.model_dump() for offer in document.offers] == [
-            {"label": "Drop the line", "edit": edit, "caption": f"{marking}: fits nothing"}
+            {"label": "Delete the line", "edit": edit, "caption": f"{marking}: fits no line"}
         ]
         assert edit_from_json(edit).apply(group).view(view.key).station.lines.keys() == (
             view.station.lines.keys() - {marking}

@@ -76,11 +76,11 @@ class TestOffers:
             (Fix("relabel", "a", MARKING, to="Side line top"), "Relabel as Side line top"),
             (Fix("swap_sides", "a"), "Swap left and right"),
             (Fix("pick_ball", "a", index=0), "Keep ball 1"),
-            (Fix("drop_point", "a", MARKING, index=0), "Drop the point"),
-            (Fix("drop_marking", "a", MARKING), "Drop the line"),
-            (Fix("include_view", "a"), "Use it again"),
+            (Fix("drop_point", "a", MARKING, index=0), "Delete the point"),
+            (Fix("drop_marking", "a", MARKING), "Delete the line"),
+            (Fix("include_view", "a"), "Include it again"),
             (Fix("exclude_view", "a"), "Leave it out"),
-            (Fix("free_picture", "a"), "Solve it so"),
+            (Fix("free_picture", "a"), "Use this geometry"),
         ],
     )
     def test_say_what_the_button_does(self, fix, label):
@@ -93,7 +93,7 @@ class TestOffers:
             (Fix("relabel", "a", MARKING, to="Side line top"), f"{MARKING} → Side line top"),
             (Fix("swap_sides", "a"), "Left and right swapped?"),
             (Fix("drop_point", "a", MARKING, index=0), f"point 1 of {MARKING}"),
-            (Fix("drop_marking", "a", MARKING), f"{MARKING}: fits nothing"),
+            (Fix("drop_marking", "a", MARKING), f"{MARKING}: fits no line"),
             (Fix("exclude_view", "a"), ""),
         ],
     )
@@ -168,7 +168,7 @@ class TestGuideOfFinding:
 class TestSentence:
     def test_names_the_view_by_its_letter_and_a_point_by_its_number(self):
         dropped = Fix("drop_point", "b", "Middle line", index=1)
-        assert sentence(GROUP, dropped) == "point 2 of Middle line in B was dropped"
+        assert sentence(GROUP, dropped) == "point 2 of Middle line in B was deleted"
         moved = sentence(GROUP, replace(dropped, action="move_point"), 3.14159)
         assert moved == "point 2 of Middle line in B moved 3.1 px"
 

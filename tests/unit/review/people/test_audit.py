@@ -130,8 +130,8 @@ class TestAudit:
         state = undo(store, said, if_match=state.etag, actor="anna")
         redo(store, said, if_match=state.etag, actor="anna")
         assert lines(store)[:6] == [
-            f"anna: did again: use of view {key}",
-            f"anna: took back: leaving out of view {key}",
+            f"anna: redid: use of view {key}",
+            f"anna: undid: leaving out of view {key}",
             f"anna: use of view {key}",
             f"anna: leaving out of view {key}",
             f"anna: balls of view {key}",
@@ -145,13 +145,13 @@ class TestAudit:
             job = jobs.submit("solve", "Solve demo", lambda _: None, actor="anna")
             jobs.wait(job.id, SECONDS)
         (entry,) = read_audit(store, AuditQuery(kinds=("job",)), EVERYTHING).items
-        assert (entry.sentence, entry.address) == ("asked for: Solve demo", "/jobs")
+        assert (entry.sentence, entry.address) == ("requested: Solve demo", "/jobs")
 
     def test_what_became_of_a_batch_is_said_in_words(self, store: Store, said: int) -> None:
         batch = make_batch(store, "demo", NewBatch("first look"), actor="bob")
         change_batch(store, batch.id, state="closed", actor="bob")
         remove_batch(store, batch.id, actor="bob")
-        did = ("deleted", "closed", "gave out")
+        did = ("deleted", "closed", "assigned")
         assert lines(store)[:3] == [f"bob: {verb} the batch “first look”" for verb in did]
 
     def test_what_has_no_words_of_its_own_names_its_person(self, store: Store, said: int) -> None:

@@ -150,7 +150,7 @@ class TestReadNoise:
         sigma, share = advice["calibration.line_sigma_px"], advice["calibration.line_share"]
         assert (sigma.present, sigma.agrees, share.present) == (None, False, None)
         assert sigma.low < LINE_NOISY < sigma.high and share.low <= 0.1
-        assert "weighed image by image" in " ".join(found.notices)
+        assert "noise of lines per image" in " ".join(found.notices)
         before = _spreads(store)
         state = apply_noise(store, found, actor="ben")
         assert state.policy.calibration.line_sigma_px == sigma.estimate

@@ -120,7 +120,7 @@ class TestSample:
             assert start_with(store, 1, "imported", actor="lea").source is TruthSource.SAMPLE
         audit = read_audit(store, AuditQuery(), EVERYTHING).items
         assert [one.sentence for one in audit if one.kind == "gold"] == [
-            "lets annotators of gold group 1 begin with what its dataset brought",
+            "lets annotators of gold group 1 begin with the imported annotations",
             "marked 1 group of a sample as gold",
         ]
 

@@ -244,7 +244,7 @@ class TestLeases:
         dan = Worker("dan")
         new = NewBatch("a", annotators=["ada", "dan"], reviewers=["bo"])
         batch = make_batch(store, dataset, new, actor="lead").id
-        with pytest.raises(ConflictError, match="nobody has handed"):
+        with pytest.raises(ConflictError, match="is not submitted"):
             leases.hand_back(batch, groups[3], BO, actor="bo")
         leases.hand_in(batch, groups[3], ADA, actor="ada")
         assert leases.next(batch, BO).group == groups[3]
@@ -257,9 +257,9 @@ class TestLeases:
         with store.read() as session:
             person = person_by_name(session, "ada")
             rings = read_rings(session, person.id, EVERYTHING, "", 9)
-        assert rings[0].sentence.endswith("back to you: the far goal line")
+        assert rings[0].sentence.endswith(" to you: the far goal line")
         told = read_audit(store, AuditQuery(), EVERYTHING).items[0]
-        assert told.sentence == "handed back to ada: the far goal line"
+        assert told.sentence == "returned to ada: the far goal line"
         assert leases.next(batch, dan).group == groups[0]
         assert leases.next(batch, dan, after=groups[2]).group == groups[4]
         lease = leases.next(batch, ADA)
@@ -333,7 +333,7 @@ class TestLeases:
         new = NewBatch("a", annotators=["ada", "bo"])
         batch = make_batch(store, dataset, new, actor="lead").id
         leases.hand_in(batch, groups[0], ADA, actor="ada")
-        with pytest.raises(ConflictError, match="ada has handed this group in"):
+        with pytest.raises(ConflictError, match="ada has submitted this group"):
             leases.hand_in(batch, groups[0], BO, actor="bo", done=done)
         (row,) = [one for one in list_batch_groups(store, batch) if one.group == groups[0]]
         assert row.handed_in_by == "ada"
