@@ -21,11 +21,6 @@ _TAKES = select(*TakeModel.__table__.columns)
 # What somebody made of a gold group tells nothing of its own: nobody is to know which one it is.
 _READY = (TakeModel.kind == INDEPENDENT, TakeModel.handed_in.is_not(None))
 _OF_COPY = _TAKES.where(TakeModel.copy_id == bindparam("copy"))
-_NOTE = (
-    update(TakeModel.__table__)  # type: ignore[arg-type]
-    .where(TakeModel.copy_id == bindparam("copy"), TakeModel.settled.is_(None))
-    .values(verdict=bindparam("said"), handed_in=bindparam("at_last"))
-)
 
 
 def insert_take(
@@ -169,10 +164,3 @@ def count_takes(session: Session, batch_id: int | None, person: str) -> int:
 def update_take(session: Session, take_id: int, **values: str | None) -> None:
     """Write when a take was handed in, judged or settled."""
     session.execute(update(TakeModel).where(TakeModel.id == take_id).values(**values))
-
-
-def note_verdict(session: Session, group_id: int, state: str, at: str) -> None:
-    """A verdict on a copy hands it in, one that is taken back opens it again; else nothing."""
-    said = None if state == "unreviewed" else state
-    values = {"said": said, "at_last": None if said is None else at}
-    session.execute(_NOTE, {"copy": group_id, **values})

@@ -14,9 +14,9 @@ from app.store.log import Entry, append
 from app.store.session import Session
 from app.store.settling import settle_judged
 from app.store.sight import COPIES
+from app.store.submissions import judge_copy
 from app.store.tables.groups import GroupModel
 from app.store.tables.verdicts import VerdictModel
-from app.store.takes import note_verdict
 
 
 @dataclass(frozen=True)
@@ -131,7 +131,12 @@ def insert_verdicts(
     session: Session, dataset_id: int, given: Sequence[StoredVerdict], *, actor: str, at: str
 ) -> None:
     """Insert verdicts on groups of a dataset, and log them under who gives them; work on these groups
-    that was given out is over by that."""
+    that was given out is over by that, and a copy is submitted.
+
+    Raises:
+        ForbiddenError: A group is somebody else's copy.
+        ConflictError: A group is a copy that was submitted.
+    """
     rows = [dict(vars(verdict)) for verdict in given]
     session.execute(insert(_VERDICT), rows)
     entries = []
@@ -144,7 +149,7 @@ def insert_verdicts(
         settle_judged(session, states, actor=actor, at=at)
         return
     for row in rows:
-        note_verdict(session, row["group_id"], row["state"], at)
+        judge_copy(session, row["group_id"], row["state"], actor=actor, at=at)
 
 
 def newest_verdict(session: Session) -> int:

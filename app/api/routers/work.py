@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Annotated
 
 from fastapi import APIRouter, Depends, Request, Response
+from starlette.background import BackgroundTask
 
 from app.api.deps import Actor, AppServices, AppStore, DatasetPath, Id, Sees
 from app.api.problem import responses
@@ -225,8 +226,9 @@ def hand_in(
     """Say that a group is annotated, so that a reviewer gets it."""
     worker, reply = asks.of_batch(services.store, batch), Reply(asked, _lease_answer)
     lease = Leases(services.store).hand_in(batch, group, worker, actor=actor, keep=reply.keep)
-    after_hand_in(services.store, group, services.paint)
-    return _told(services, lease, reply)
+    answer = _told(services, lease, reply)
+    answer.background = BackgroundTask(after_hand_in, services.store, group, services.paint)
+    return answer
 
 
 @router.delete(
@@ -238,7 +240,7 @@ def hand_in(
 def take_back(
     batch: Id, group: Id, services: AppServices, actor: Actor, asks: Asks, asked: AskedUnder
 ) -> Response:
-    """Say that a group is not annotated yet, after all."""
+    """Say that a group is not annotated yet, after all; 409 for one's own copy that is submitted."""
     worker, reply = asks.of_batch(services.store, batch), Reply(asked, _lease_answer)
     lease = Leases(services.store).hand_in(
         batch, group, worker, actor=actor, done=False, keep=reply.keep

@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from app.errors import ConflictError, ForbiddenError, NotFoundError
+from app.errors import ConflictError, NotFoundError
 from app.review.answers.keep import Keep, keep_nothing
 from app.review.datasets.dataset import need_dataset
 from app.review.editing.state import need_group
@@ -17,11 +17,11 @@ from app.review.editing.submit import solved
 from app.review.takes.copying import CopyOrder, copy_group, start_of
 from app.review.takes.handed_back import HandedBack, read_handed_back
 from app.soccer.actors import person_of
-from app.store.agreement import forget_open
 from app.store.clock import now
 from app.store.groups import read_groups
 from app.store.session import Session
 from app.store.store import Store
+from app.store.submissions import submit_copy
 from app.store.takes import (
     GOLD,
     INDEPENDENT,
@@ -32,7 +32,6 @@ from app.store.takes import (
     take_of_copy,
     takes_in,
     takes_of_group,
-    update_take,
 )
 
 
@@ -171,45 +170,21 @@ def begin(
 
 
 def hand_in(store: Store, take_id: int, *, actor: str, keep: Keep[TakeView] = keep_nothing) -> Take:
-    """Say that one's own annotation is done; from then on it stays as it is.
+    """Submit one's own annotation; from then on it stays as it is.
 
     ``keep`` keeps the answer in the transaction.
 
     Raises:
         NotFoundError: There is no such take.
         ForbiddenError: It is somebody else's.
+        ConflictError: It was submitted already.
     """
     with store.write() as session:
         take = read_take(session, take_id)
-        if person_of(actor) != take.person:
-            raise ForbiddenError(f"{take.person} hands this in, nobody else")
-        if take.handed_in is None:
-            update_take(session, take_id, handed_in=now())
+        submit_copy(session, take, actor=actor, at=now())
         handed = read_take(session, take_id)
         keep(show(session, handed))(session)
         return handed
-
-
-def reopen(store: Store, take_id: int, *, keep: Keep[TakeView] = keep_nothing) -> Take:
-    """Let the person of a take go on with it; ``keep`` keeps the answer in the transaction.
-
-    Raises:
-        NotFoundError: There is no such take.
-        ConflictError: It was decided about it.
-    """
-    with store.write() as session:
-        reopen_take(session, read_take(session, take_id))
-        opened = read_take(session, take_id)
-        keep(show(session, opened))(session)
-        return opened
-
-
-def reopen_take(session: Session, take: Take) -> None:
-    """``reopen`` within a write session; what was compared with it waits for no decision any more."""
-    if take.settled is not None:
-        raise ConflictError("this annotation was adjudicated already")
-    update_take(session, take.id, handed_in=None)
-    forget_open(session, take.group_id, take.batch_id or 0)
 
 
 def get_take(store: Store, take_id: int) -> Take:

@@ -10,12 +10,13 @@ from app.errors import ConflictError
 from app.review.answers.keep import Keep, keep_nothing
 from app.review.takes.adopt import adopt_take
 from app.review.takes.mixing import Terms, begin_next
-from app.review.takes.take import Take, TakeView, hand_in, read_take, reopen
+from app.review.takes.take import Take, TakeView, hand_in, read_take
 from app.review.work.batches import Batch, Part
 from app.soccer.actors import person_of
 from app.store.clock import now
 from app.store.session import Session
 from app.store.store import Store
+from app.store.submissions import require_open
 from app.store.takes import INDEPENDENT, count_left, take_of_copy, takes_of_batch
 from app.store.work import groups_of, groups_returned
 from app.store.work import hand_in as hand_in_group
@@ -111,17 +112,14 @@ def hand_in_own(
     done: bool,
     keep: Keep[TakeView] = keep_nothing,
 ) -> None:
-    """Hand an own annotation in, or go on with it while nothing was decided about it.
+    """Submit an own annotation; ``done`` False: refused, only a lead lets its person go on with it.
 
     ``keep`` keeps the answer in the transaction.
 
     Raises:
-        ConflictError: It was taken over, or decided about.
+        ConflictError: It was submitted before, or is not and shall be taken back.
     """
-    if done:
-        hand_in(store, take.id, actor=actor, keep=keep)
-        take_over_handed_in(store, batch, take.person)
-    elif take.verdict is not None:
-        raise ConflictError("you have judged this group", hint="Take your verdict back.")
-    else:
-        reopen(store, take.id, keep=keep)
+    if not done:
+        require_open(take)
+        raise ConflictError("this annotation is not submitted yet")
+    hand_in(store, take.id, actor=actor, keep=keep)

@@ -5,7 +5,7 @@ from random import Random
 
 import pytest
 
-from app.errors import ConflictError, ForbiddenError, NotFoundError
+from app.errors import ConflictError, ForbiddenError, InputError, NotFoundError
 from app.review.datasets.dataset import insert_dataset, list_datasets
 from app.review.datasets.delete import delete_dataset
 from app.review.doctor.database import examine
@@ -23,8 +23,11 @@ from app.review.people.roles import Role
 from app.review.policies.policy import change_policy
 from app.review.queue.changes import read_news
 from app.review.takes.adopt import adopt_take
+from app.review.takes.hand_back import hand_back_take
 from app.review.takes.mixing import Terms, begin_next, is_gold_turn
-from app.review.takes.take import begin_take, get_take, get_take_of, hand_in, list_takes, reopen
+from app.review.takes.take import begin_take, get_take, get_take_of, hand_in, list_takes
+from app.review.verdicts.bulk import give_verdicts, list_batches
+from app.review.verdicts.bulk_undo import undo_batch
 from app.review.verdicts.verdict import set_verdict
 from app.review.work.batches import NewBatch, make_batch
 from app.review.work.own import own_left
@@ -162,7 +165,7 @@ class TestHandIn:
         assert hand_in(store, take.id, actor="ann").handed_in is not None
         with pytest.raises(ConflictError):
             change(store, take.copy_id, SetBall(state.group.views[0].key, BALL))
-        reopen(store, take.id)
+        hand_back_take(store, take.id, "the ball", actor="lea")
         change(store, take.copy_id, SetBall(state.group.views[0].key, BALL))
 
     def test_nobody_hands_in_the_copy_of_somebody_else(self, store, state) -> None:
@@ -170,14 +173,44 @@ class TestHandIn:
         with pytest.raises(ForbiddenError):
             hand_in(store, take.id, actor="ben")
 
-    def test_a_verdict_does_it_until_it_is_taken_back(self, store, state) -> None:
+    def test_a_verdict_does_it_and_is_not_taken_back(self, store, state) -> None:
         take = begin_take(store, state.id, person="ann")
         judge(store, take.copy_id, "rejected", reason="other")
         found = get_take_of(store, take.copy_id)
         assert (found.verdict, found.handed_in is not None) == ("rejected", True)
-        judge(store, take.copy_id, "unreviewed")
-        found = get_take(store, take.id)
-        assert (found.verdict, found.handed_in) == (None, None)
+        for verdict in ("unreviewed", "accepted", "deferred"):
+            with pytest.raises(ConflictError, match="submitted"):
+                judge(store, take.copy_id, verdict)
+        assert get_take(store, take.id) == found
+
+    def test_only_its_person_judges_it(self, store, state) -> None:
+        take = begin_take(store, state.id, person="ann")
+        with pytest.raises(ForbiddenError, match="only ann"):
+            judge(store, take.copy_id, actor="ben")
+        dataset = load(store, take.copy_id).dataset_id
+        with pytest.raises(ForbiddenError, match="only ann"):
+            give_verdicts(store, dataset, "", "deferred", actor="ben")
+        give_verdicts(store, dataset, "", "deferred", actor="ann")
+        (batch,) = list_batches(store, dataset)
+        with pytest.raises(ConflictError, match="submitted"):
+            undo_batch(store, batch.id, actor="ann")
+        assert get_take(store, take.id).verdict == "deferred"
+
+    def test_a_lead_returns_it_with_a_reason_and_each_step_is_in_the_log(
+        self, store, state
+    ) -> None:
+        take = begin_take(store, state.id, person="ann")
+        hand_in(store, take.id, actor="ann")
+        with pytest.raises(ConflictError, match="submitted"):
+            hand_in(store, take.id, actor="ann")
+        with pytest.raises(InputError) as refused:
+            hand_back_take(store, take.id, "  ", actor="lea")
+        assert refused.value.pointer == "/reason"
+        hand_back_take(store, take.id, "the ball", actor="lea")
+        hand_in(store, take.id, actor="ann")
+        said = [(one.actor, one.body["did"]) for one in history(store, take.copy_id)[1:]]
+        assert said == [("ann", "handed in"), ("lea", "handed back"), ("ann", "handed in")]
+        assert faults(store) == []
 
 
 class TestAdoptTake:
