@@ -9,7 +9,7 @@ from typing import Annotated
 from fastapi import APIRouter, Depends, Header, Query, Request, Response
 from fastapi.responses import StreamingResponse
 
-from app.api.deps import AppServices, Sees
+from app.api.deps import AppServices, SeesWhole
 from app.api.events import Feed, hello
 from app.api.problem import Responses, responses
 from app.api.schemas.event import EVENTS
@@ -84,7 +84,7 @@ class Start:
 
 
 async def begin(
-    services: AppServices, sight: Sees, start: Annotated[Start, Depends()]
+    services: AppServices, sight: SeesWhole, start: Annotated[Start, Depends()]
 ) -> AsyncIterator[Feed]:
     """A feed for as long as the request lasts."""
     feed = services.events.subscribe(
@@ -102,7 +102,7 @@ async def begin(
 
 def under_way(
     services: AppServices,
-    sight: Sees,
+    sight: SeesWhole,
     start: Annotated[Start, Depends()],
     feed: Annotated[Feed, Depends(begin)],
 ) -> list[bytes]:

@@ -14,6 +14,7 @@ from app.review.people.passwords import LONGEST, hash_password, is_password
 from app.review.people.roles import Action, DatasetRoles, Role, Scope, Sight, may
 from app.review.people.tokens import hash_of, new_token
 from app.soccer.actors import with_token
+from app.store.blindness import Blindness
 from app.store.clock import text_of
 from app.store.logins import (
     delete_ended,
@@ -104,6 +105,18 @@ class Login:
     def sight(self) -> Sight:
         """What they see."""
         return self.roles.sight(self.owner)
+
+    @property
+    def sight_of_whole(self) -> Sight:
+        """What they see and nothing of which is hidden from them."""
+        return self.roles.sight_of_whole(self.owner)
+
+    @property
+    def blindness(self) -> Blindness | None:
+        """What is hidden from them while they annotate copies of it; None: nothing."""
+        if self.roles.is_admin or not self.roles.blind:
+            return None
+        return Blindness(self.name, self.roles.blind)
 
 
 @dataclass(frozen=True)
@@ -339,4 +352,19 @@ def roles_with(everywhere: Role, rights: Rights) -> DatasetRoles:
     single = {key: Role(role) for key, role in rights.roles.items()}
     roles = DatasetRoles(everywhere, single)
     copies = {key: roles.role_in(of_id) for key, of_id in rights.copies.items()}
-    return DatasetRoles(everywhere, {**single, **copies})
+    return DatasetRoles(everywhere, {**single, **copies}, blind=_blind_in(roles, rights))
+
+
+def _blind_in(roles: DatasetRoles, rights: Rights) -> dict[int, frozenset[int]]:
+    """The batches in which somebody annotates blind, by dataset.
+
+    Leads see everything. Who judges decides where people differ: also in a batch of their own, once
+    they have nothing left to annotate in it.
+    """
+    found: dict[int, frozenset[int]] = {}
+    for batch, dataset, waits in rights.blind:
+        role = roles.role_in(dataset)
+        if may(role, Action.LEAD) or (may(role, Action.REVIEW) and not waits):
+            continue
+        found[dataset] = found.get(dataset, frozenset()) | {batch}
+    return found

@@ -1,0 +1,94 @@
+"""Blindness: groups that whoever annotates copies of them, blind, does not see meanwhile.
+
+They are the originals of an open batch, those of their own copies, and every gold group of the
+dataset: the picture of a copy is found nowhere else, and nothing tells which copies are of gold
+groups. What was handed back to somebody after it was taken over is theirs to open again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from contextvars import ContextVar
+from dataclasses import dataclass
+from typing import Any
+
+from sqlalchemy import ColumnElement, and_, not_, or_, select
+
+from app.store.session import Session
+from app.store.tables.groups import GroupModel, ViewModel
+from app.store.tables.takes import GoldModel, TakeModel
+from app.store.tables.work import BatchGroupModel
+
+
+@dataclass(frozen=True)
+class Blindness:
+    """Open batches of copies that a person annotates, by their dataset's id."""
+
+    person: str
+    batches: Mapping[int, frozenset[int]]
+
+    def hides(self, dataset_id: int, group: Any) -> ColumnElement[bool]:
+        """Whether a group of a dataset is hidden from them, by the column of its id."""
+        ids = sorted(self.batches[dataset_id])
+        own = (TakeModel.batch_id.in_(ids), TakeModel.person == self.person)
+        returned = (
+            BatchGroupModel.batch_id.in_(ids),
+            BatchGroupModel.handed_in_by == self.person,
+            BatchGroupModel.handed_in.is_(None),
+            BatchGroupModel.settled.is_(None),
+        )
+        inside = select(BatchGroupModel.group_id).where(BatchGroupModel.batch_id.in_(ids))
+        gold = select(GoldModel.group_id).where(GoldModel.dataset_id == dataset_id)
+        copied = select(TakeModel.group_id).where(*own)
+        back = select(BatchGroupModel.group_id).where(*returned)
+        return and_(or_(group.in_(inside), group.in_(gold), group.in_(copied)), group.not_in(back))
+
+
+READER: ContextVar[Blindness | None] = ContextVar("reader", default=None)
+"""Whose request this is, where they annotate blind; None: nothing is hidden."""
+
+
+def is_blind(dataset_id: int) -> bool:
+    """Whether groups of a dataset are hidden from whoever asks."""
+    reader = READER.get()
+    return reader is not None and dataset_id in reader.batches
+
+
+def seen_in(dataset_id: int, group: Any) -> list[ColumnElement[bool]]:
+    """What holds of those groups of a dataset that whoever asks may see, by the column of their id."""
+    reader = READER.get()
+    if reader is None or dataset_id not in reader.batches:
+        return []
+    return [not_(reader.hides(dataset_id, group))]
+
+
+def seen_anywhere(dataset: Any, group: Any) -> list[ColumnElement[bool]]:
+    """The same of groups of several datasets, by the columns of both ids; also where there is no group."""
+    reader = READER.get()
+    if reader is None:
+        return []
+    return [
+        or_(dataset.is_(None), dataset != one, group.is_(None), not_(reader.hides(one, group)))
+        for one in sorted(reader.batches)
+    ]
+
+
+def is_hidden_group(session: Session, blindness: Blindness, dataset_id: int, **named: int) -> bool:
+    """Whether a group is hidden from somebody, or one that a view or a static camera is of.
+
+    Args:
+        session: Any session.
+        blindness: Theirs.
+        dataset_id: Where it is.
+        named: ``group``, ``view`` or ``station``, and its id.
+    """
+    ((kind, identity),) = named.items()
+    which = {
+        "group": GroupModel.id == identity,
+        "view": GroupModel.id.in_(select(ViewModel.group_id).where(ViewModel.id == identity)),
+        "station": GroupModel.id.in_(
+            select(ViewModel.group_id).where(ViewModel.station_id == identity)
+        ),
+    }[kind]
+    found = select(GroupModel.id).where(which, blindness.hides(dataset_id, GroupModel.id)).limit(1)
+    return session.scalar(found) is not None
