@@ -8,8 +8,8 @@ from typing import Any
 
 from sqlalchemy import ColumnElement, delete, func, insert, literal, select, update
 
-from app.store.blindness import seen_anywhere
 from app.store.group_rows import next_id
+from app.store.reader import seen_anywhere
 from app.store.session import Session
 from app.store.sight import Sight
 from app.store.tables.groups import DatasetModel

@@ -9,10 +9,10 @@ from typing import Any
 from sqlalchemy import Column, ColumnElement, Select, case, func, select
 from sqlalchemy.sql.visitors import iterate
 
-from app.store.blindness import seen_anywhere, seen_in
 from app.store.conditions import Condition
 from app.store.order import SORTED, Key, Order
 from app.store.policies import judged_since
+from app.store.reader import seen_anywhere, seen_in
 from app.store.session import Session
 from app.store.tables.queue import QUEUE_SCANNED, QueueModel
 

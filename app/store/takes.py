@@ -66,8 +66,10 @@ def takes_of_batch(session: Session, batch_id: int | None, dataset_id: int) -> S
     return session.execute(statement.order_by(TakeModel.id)).all()
 
 
-def count_left(session: Session, batch_id: int, dataset_id: int, person: str, verdicts: int) -> int:
-    """Of how many groups of a batch a person may still make a take, begun ones included.
+def count_left(
+    session: Session, batch_id: int, dataset_id: int, person: str, verdicts: int
+) -> tuple[int, int]:
+    """How many takes of a batch a person has begun, and of how many of its groups they may make one.
 
     ``verdicts`` people may have a group.
     """
@@ -84,7 +86,7 @@ def count_left(session: Session, batch_id: int, dataset_id: int, person: str, ve
         asked < verdicts,
     )
     begun = select(func.count()).select_from(take).where(*here, mine, *ends)
-    return (session.scalar(begun) or 0) + (session.scalar(free) or 0)
+    return session.scalar(begun) or 0, session.scalar(free) or 0
 
 
 def _copies_of(dataset_id: int) -> Select[int]:

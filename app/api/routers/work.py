@@ -29,7 +29,7 @@ from app.api.services import Services
 from app.review.agreement.weigh import after_hand_in
 from app.review.people.logins import Login
 from app.review.people.roles import Action, may
-from app.review.work import batches, progress
+from app.review.work import batches, own, progress
 from app.review.work.batches import Batch, NewBatch
 from app.review.work.leases import Lease, Leases, Worker
 from app.soccer.actors import LOCAL_USER
@@ -83,7 +83,7 @@ def my_work(store: AppStore, sight: Sees, asks: Asks) -> MyWork:
 @router.get("/datasets/{dataset}/batches", operation_id="listBatches", responses=responses(404))
 def list_batches(dataset: DatasetPath, store: AppStore) -> WorkBatchList:
     """The batches of a dataset."""
-    return WorkBatchList.model_validate({"items": batches.list_batches(store, dataset)})
+    return WorkBatchList.model_validate({"items": own.seen_batches(store, dataset)})
 
 
 @router.post(
@@ -135,7 +135,7 @@ def team_work(dataset: DatasetPath, store: AppStore) -> TeamWork:
 )
 def get_batch(batch: Id, store: AppStore) -> Batch:
     """One batch."""
-    return batches.get_batch(store, batch)
+    return own.seen_batch(store, batch)
 
 
 @router.patch(

@@ -212,7 +212,7 @@ class Access:
             told[HIDDEN] = partial(is_hidden, self._store, let.owned)
             receive, send, scope = concealment.receive(receive, told), concealment.send(send), told
         scope[RULE], scope[LOGIN] = asked.route, let.login
-        READER.set(let.login.blindness)
+        READER.set(let.login.reader)
         if asked.route in STREAMS:
             await self._stream(asked, action, scope, receive, send)
         else:

@@ -343,7 +343,7 @@ def _ownership(store: Store, named: Named, login: Login, sight: Sight) -> Owners
     if found is None or named.kind is OwnedKind.NEW_DATASET:
         return found
     hidden = role_at(found, roles, login.owner) is Role.NONE or is_hidden_from(
-        store, named, found, login.blindness
+        store, named, found, login.reader
     )
     return None if hidden else found
 

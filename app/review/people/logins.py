@@ -14,7 +14,6 @@ from app.review.people.passwords import LONGEST, hash_password, is_password
 from app.review.people.roles import Action, DatasetRoles, Role, Scope, Sight, may
 from app.review.people.tokens import hash_of, new_token
 from app.soccer.actors import with_token
-from app.store.blindness import Blindness
 from app.store.clock import text_of
 from app.store.logins import (
     delete_ended,
@@ -26,6 +25,7 @@ from app.store.logins import (
     touch_login,
 )
 from app.store.people import forget_links, person_by_id, person_by_name, update_person
+from app.store.reader import Reader
 from app.store.rights import Rights, rights_in, rights_of
 from app.store.second_factors import has_second_factor
 from app.store.session import Session
@@ -112,11 +112,13 @@ class Login:
         return self.roles.sight_of_whole(self.owner)
 
     @property
-    def blindness(self) -> Blindness | None:
-        """What is hidden from them while they annotate copies of it; None: nothing."""
-        if self.roles.is_admin or not self.roles.blind:
+    def reader(self) -> Reader | None:
+        """What is hidden from them; None: nothing."""
+        if self.roles.is_admin:
             return None
-        return Blindness(self.name, self.roles.blind)
+        return Reader(
+            self.name, self.roles.blind, lambda one: may(self.roles.role_in(one), Action.REVIEW)
+        )
 
 
 @dataclass(frozen=True)

@@ -14,9 +14,9 @@ from typing import Any
 from app.errors import NotFoundError
 from app.review.people.roles import DatasetRoles, Role, Sight
 from app.soccer.actors import is_of
-from app.store.blindness import Blindness, is_hidden_group
 from app.store.dataset_lookup import dataset_of, owner_of_job, versions_like
 from app.store.datasets import find_dataset
+from app.store.reader import Reader, is_hidden_group
 from app.store.session import Session
 from app.store.store import Store
 from app.store.uploads import get_upload
@@ -94,17 +94,15 @@ _GROUPS: Mapping[OwnedKind, str] = {
 """What can be hidden from whoever annotates copies of groups, and its name in ``is_hidden_group``."""
 
 
-def is_hidden_from(
-    store: Store, named: Named, found: Ownership, blindness: Blindness | None
-) -> bool:
+def is_hidden_from(store: Store, named: Named, found: Ownership, reader: Reader | None) -> bool:
     """Whether a group, or what belongs to one, is hidden from somebody who annotates blind."""
     kind, dataset = _GROUPS.get(named.kind), found.dataset
-    if blindness is None or kind is None or not isinstance(named.by, int):
+    if reader is None or kind is None or not isinstance(named.by, int):
         return False
-    if dataset is None or dataset not in blindness.batches:
+    if dataset is None or dataset not in reader.batches:
         return False
     with store.read() as session:
-        return is_hidden_group(session, blindness, dataset, **{kind: named.by})
+        return is_hidden_group(session, reader, dataset, **{kind: named.by})
 
 
 def find_ownership(store: Store, named: Named, sight: Sight) -> Ownership | None:

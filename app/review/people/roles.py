@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
 from app.errors import ForbiddenError
-from app.store.blindness import READER as READER
+from app.store.reader import READER as READER
 from app.store.sight import COPIES
 from app.store.sight import EVERYTHING as EVERYTHING
 from app.store.sight import Sight as Sight

@@ -14,11 +14,13 @@ from app.review.answers.keep import Keep, keep_nothing
 from app.review.datasets.dataset import need_dataset
 from app.review.editing.state import need_group
 from app.review.editing.submit import solved
-from app.review.takes.copying import CopyOrder, copy_group, start_of
+from app.review.takes.copying import CopyOrder, copy_group, gold_start_of, start_of, stripped
 from app.review.takes.handed_back import HandedBack, read_handed_back
 from app.soccer.actors import person_of
 from app.store.clock import now
+from app.store.gold import common_start
 from app.store.groups import read_groups
+from app.store.reader import READER
 from app.store.session import Session
 from app.store.store import Store
 from app.store.submissions import submit_copy
@@ -135,7 +137,8 @@ def begin(
         kind: ``independent`` or ``gold``.
         since: When the batch began: edits of the original from then on are not seen.
         blind: Begin with the group as it was then, else as the last take of it left it.
-        nameless: The copy does not say which group it is of.
+        nameless: The copy is of a batch with gold groups: it does not say which group it is of, and
+            begins with what all copies of such a batch begin with.
     """
     stored = need_group(session, group_id)
     others = [one for one in takes_of_group(session, group_id) if one.batch_id == batch_id]
@@ -150,11 +153,14 @@ def begin(
     ready = [one.copy_id for one in others if one.handed_in is not None]
     start = stored.group
     if kind == GOLD:
-        start = start_of(session, stored)
-    elif blind and since is not None:
-        start = start_of(session, stored, since=since)
+        start = gold_start_of(session, stored)
+    elif (blind or nameless) and since is not None:
+        start = start_of(session, stored, since)
     elif not blind and ready:
         start = need_group(session, ready[-1]).group
+    common = common_start(session, stored.dataset_id) if nameless else None
+    if common is not None:
+        start = stripped(start, common)
     order = CopyOrder(stored, batch_id, person, f"{batch_id or 0}-{place}" if nameless else None)
     copy_id = copy_group(session, order, start)
     take_id = insert_take(
@@ -250,6 +256,8 @@ def show(session: Session, take: Take) -> TakeView:
 
 def _shown(session: Session, takes: Sequence[Take]) -> list[TakeView]:
     heads = {row.id: row for row in names_of(session, [one.copy_id for one in takes])}
+    reader = READER.get()
+    blind = frozenset[int]() if reader is None else frozenset().union(*reader.batches.values())
     waiting = [one.copy_id for one in takes if one.handed_in is None and one.settled is None]
     back = read_handed_back(session, waiting)
     return [
@@ -259,14 +267,15 @@ def _shown(session: Session, takes: Sequence[Take]) -> list[TakeView]:
             group=one.copy_id,
             dataset=heads[one.copy_id].of_id,
             # A copy that says not what it is of has another key.
-            of=one.group_id if heads[one.copy_id].same else None,
+            of=one.group_id if heads[one.copy_id].same and one.batch_id not in blind else None,
             title=heads[one.copy_id].label or heads[one.copy_id].key,
             person=one.person,
             place=one.place,
             begun=one.begun,
             handed_in=one.handed_in,
             verdict=one.verdict,
-            settled=one.settled,
+            # Of a gold group nothing is ever decided.
+            settled=None if one.batch_id in blind else one.settled,
             handed_back=back.get(one.copy_id),
         )
         for one in takes

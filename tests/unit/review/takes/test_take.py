@@ -346,7 +346,7 @@ class TestBeginNext:
     def test_one_of_each_block_is_gold_and_nobody_knows_which(self) -> None:
         every, chance, kinds = 5, Random(4), list[str]()
         for _ in range(every * 100):
-            kinds.append("gold" if is_gold_turn(kinds, every, chance) else "independent")
+            kinds.append("gold" if is_gold_turn(kinds, every, 1000, chance) else "independent")
         blocks = [kinds[at : at + every] for at in range(0, len(kinds), every)]
         assert all(block.count("gold") == 1 for block in blocks)
         assert len({block.index("gold") for block in blocks}) == every

@@ -1,13 +1,13 @@
-"""Blindness: groups that whoever annotates copies of them, blind, does not see meanwhile.
+"""Reader: who asks, as far as it depends on it what an answer counts and shows.
 
-They are the originals of an open batch, those of their own copies, and every gold group of the
+Whoever annotates copies of groups, blind, does not see the originals meanwhile: those of an open batch, those of their own copies, and every gold group of the
 dataset: the picture of a copy is found nowhere else, and nothing tells which copies are of gold
 groups. What was handed back to somebody after it was taken over is theirs to open again.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextvars import ContextVar
 from dataclasses import dataclass
 from typing import Any
@@ -21,11 +21,19 @@ from app.store.tables.work import BatchGroupModel
 
 
 @dataclass(frozen=True)
-class Blindness:
-    """Open batches of copies that a person annotates, by their dataset's id."""
+class Reader:
+    """Somebody who asks, and is no admin.
+
+    Attributes:
+        person: Their name.
+        batches: Open batches of copies that they annotate blind, by their dataset's id.
+        judges: Whether they judge groups of a dataset: who does not may not know what people made of
+            groups independently.
+    """
 
     person: str
     batches: Mapping[int, frozenset[int]]
+    judges: Callable[[int], bool]
 
     def hides(self, dataset_id: int, group: Any) -> ColumnElement[bool]:
         """Whether a group of a dataset is hidden from them, by the column of its id."""
@@ -44,14 +52,20 @@ class Blindness:
         return and_(or_(group.in_(inside), group.in_(gold), group.in_(copied)), group.not_in(back))
 
 
-READER: ContextVar[Blindness | None] = ContextVar("reader", default=None)
-"""Whose request this is, where they annotate blind; None: nothing is hidden."""
+READER: ContextVar[Reader | None] = ContextVar("reader", default=None)
+"""Who asks; None: an admin, the server itself or a command, from whom nothing is hidden."""
 
 
 def is_blind(dataset_id: int) -> bool:
     """Whether groups of a dataset are hidden from whoever asks."""
     reader = READER.get()
     return reader is not None and dataset_id in reader.batches
+
+
+def judges_in(dataset_id: int) -> bool:
+    """Whether whoever asks may know what people made of groups independently."""
+    reader = READER.get()
+    return reader is None or reader.judges(dataset_id)
 
 
 def seen_in(dataset_id: int, group: Any) -> list[ColumnElement[bool]]:
@@ -73,12 +87,12 @@ def seen_anywhere(dataset: Any, group: Any) -> list[ColumnElement[bool]]:
     ]
 
 
-def is_hidden_group(session: Session, blindness: Blindness, dataset_id: int, **named: int) -> bool:
+def is_hidden_group(session: Session, reader: Reader, dataset_id: int, **named: int) -> bool:
     """Whether a group is hidden from somebody, or one that a view or a static camera is of.
 
     Args:
         session: Any session.
-        blindness: Theirs.
+        reader: Theirs.
         dataset_id: Where it is.
         named: ``group``, ``view`` or ``station``, and its id.
     """
@@ -90,5 +104,5 @@ def is_hidden_group(session: Session, blindness: Blindness, dataset_id: int, **n
             select(ViewModel.group_id).where(ViewModel.station_id == identity)
         ),
     }[kind]
-    found = select(GroupModel.id).where(which, blindness.hides(dataset_id, GroupModel.id)).limit(1)
+    found = select(GroupModel.id).where(which, reader.hides(dataset_id, GroupModel.id)).limit(1)
     return session.scalar(found) is not None
