@@ -62,6 +62,16 @@ def is_blind(dataset_id: int) -> bool:
     return reader is not None and dataset_id in reader.batches
 
 
+def reads_blind() -> bool:
+    """Whether groups of any dataset are hidden from whoever asks.
+
+    How much is written to the log between two of their steps tells them of what a submission leads
+    to, and nothing is led to by one of a gold group: they are not told ids of the log.
+    """
+    reader = READER.get()
+    return reader is not None and bool(reader.batches)
+
+
 def judges_in(dataset_id: int) -> bool:
     """Whether whoever asks may know what people made of groups independently."""
     reader = READER.get()

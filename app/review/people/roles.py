@@ -8,6 +8,7 @@ from enum import StrEnum
 
 from app.errors import ForbiddenError
 from app.store.reader import READER as READER
+from app.store.reader import reads_blind as reads_blind
 from app.store.sight import COPIES
 from app.store.sight import EVERYTHING as EVERYTHING
 from app.store.sight import Sight as Sight
