@@ -216,7 +216,11 @@ def count_reviewed(session: Session, dataset_id: int) -> dict[tuple[str | None, 
     """How many groups have a verdict that counts, by who gave it and their status."""
     statement = (
         select(QueueModel.reviewer, QueueModel.status, func.count())
-        .where(QueueModel.dataset_id == dataset_id, QueueModel.reviewer.is_not(None))
+        .where(
+            QueueModel.dataset_id == dataset_id,
+            QueueModel.reviewer.is_not(None),
+            *seen_in(dataset_id, QueueModel.group_id),
+        )
         .group_by(QueueModel.reviewer, QueueModel.status)
     )
     return {(name, status): count for name, status, count in session.execute(statement)}

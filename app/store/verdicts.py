@@ -11,6 +11,7 @@ from sqlalchemy import Table, bindparam, case, func, insert, select
 from app.store.aliases import shown_actor
 from app.store.group_rows import next_id
 from app.store.log import Entry, append
+from app.store.reader import seen_in
 from app.store.session import Session
 from app.store.settling import settle_judged
 from app.store.sight import COPIES
@@ -116,7 +117,7 @@ def count_by_judge(session: Session, dataset_id: int, since: str) -> Sequence[An
             func.count(recent.distinct()).label("groups"),
         )
         .join(GroupModel, GroupModel.id == VerdictModel.group_id)
-        .where(GroupModel.dataset_id == dataset_id)
+        .where(GroupModel.dataset_id == dataset_id, *seen_in(dataset_id, GroupModel.id))
         .group_by(actor)
     )
     return session.execute(statement).all()

@@ -38,7 +38,7 @@ export const frozen = computed(() => {
 	if (one === null || one.group !== groupDocument.value?.id) return '';
 	if (one.settled !== null) return 'This annotation was adjudicated already; it can no longer be changed.';
 	const mine = !isTeam || one.person === myName.value;
-	if (one.handed_in !== null) return mine ? '' : `${one.person} has handed this in; hand it back, or take it over.`;
+	if (one.handed_in !== null) return mine ? 'This is handed in; only a lead can hand it back.' : `${one.person} has handed this in; hand it back, or take it over.`;
 	return mine ? '' : `${one.person} judges this annotation.`;
 });
 

@@ -44,10 +44,11 @@ function Course({ results, person }) {
 /** @param {{one: PersonResultsJson}} props */
 function Person({ one }) {
 	const share = one.judged === 0 ? '–' : `${one.right} of ${one.judged} (${Math.round(100 * (one.right_low ?? 0))} to ${Math.round(100 * (one.right_high ?? 1))} %)`;
+	const again = one.results.filter(({ submissions }) => submissions > 1).length;
 	return html`
 		<tr>
 			<th scope="row">${one.person}</th>
-			<td data-numeric="true">${one.results.length}</td>
+			<td data-numeric="true">${one.results.length}${again > 0 ? html` <span title=${`${plural(again, 'group')} handed in again after a lead handed it back; the first annotation is measured`}>(${again} again)</span>` : null}</td>
 			<td data-numeric="true">${middleText(one.line_px, 1)}</td>
 			<td data-numeric="true">${middleText(one.ball_px, 1)}</td>
 			<td data-numeric="true">${middleText(one.ball_m, 2)}</td>
@@ -83,6 +84,7 @@ export function GoldCard({ dataset }) {
 			<h2 id="gold-title"><${Term} word="gold-group">Gold groups<//></h2>
 			${error || refused ? html`<${FormError} error=${error ?? refused} />` : null}
 			<p class="gold__about">${value?.groups.length ? `${plural(value.groups.length, 'group')} whose truth is known.` : 'There is none yet.'} Judge a group, then <em>Gold group: its truth is known</em> in its palette (<kbd>Ctrl K</kbd>); or let <em>Give out…</em> take those of a sample or a version. Batches mix them in; nobody is told which they are.</p>
+			<p class="gold__about">While a batch is open, its annotators see neither the originals of its groups nor gold groups, every copy begins alike, and what they hand in first is measured. This cannot hide what somebody remembers, finds in another dataset, or hears from others: make gold groups of frames that annotators have not seen.</p>
 			${value?.people.length ? html`
 				<div class="table__scroll" tabindex="0" role="region" aria-label="People and gold groups"><table class="table">
 					<thead><tr><th>Person</th><th data-numeric="true">groups</th><th data-numeric="true">lines, px</th><th data-numeric="true">ball, px</th><th data-numeric="true">ball, m</th><th data-numeric="true">verdicts as true</th><th>over time</th></tr></thead>

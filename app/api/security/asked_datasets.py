@@ -143,7 +143,6 @@ WHOLE_ROUTES = frozenset(
                 ("GET", "predictions"),
                 ("GET", "evaluations"),
                 ("GET", "verdict-batches"),
-                ("GET", "reviewers"),
                 ("GET", "noise"),
                 ("GET", "pitches"),
                 ("GET", "pictures"),
