@@ -122,8 +122,7 @@ def _imported(session: Session, stored: StoredGroup) -> Group:
         view = view_from_json(value, shared)
         if now is not None:
             # Which views are left out, and how noisy they are, copies of other groups have, too.
-            kept = {"included": now.included, "left_out": now.left_out, "noise": now.noise}
-            view = replace(view, **kept)
+            view = replace(view, included=now.included, left_out=now.left_out, noise=now.noise)
         views.append(view)
     return replace(stored.group, views=tuple(views))
 
