@@ -28,6 +28,7 @@ from app.store.agreement import (
     agreements_on,
     decide_agreement,
     never_compared,
+    never_taken_over,
     put_agreement,
     settle_rest,
     verdicts_asked,
@@ -133,13 +134,16 @@ def weigh(
 
 
 def weigh_left(store: Store, paint: PaintFollower | None = None) -> int:
-    """Compare what was handed in before a server was stopped, and was not compared any more.
+    """Compare what was handed in before a server was stopped, and was not compared any more; and
+    take over what waits for that.
 
     Returns:
-        How many groups.
+        How many groups were compared.
     """
     with store.read() as session:
-        left = never_compared(session)
+        left, waiting = never_compared(session), never_taken_over(session)
+    for copy_id in waiting:
+        after_hand_in(store, copy_id, paint)
     compared = 0
     for group_id, batch_id in left:
         try:

@@ -23,8 +23,9 @@ from app.review.people.roles import Role
 from app.review.policies.policy import change_policy
 from app.review.queue.changes import read_news
 from app.review.takes.adopt import adopt_take
+from app.review.takes.gold import mark
 from app.review.takes.hand_back import hand_back_take
-from app.review.takes.mixing import Terms, begin_next, is_gold_turn
+from app.review.takes.mixing import Terms, begin_next, count_gold_left, is_gold_turn
 from app.review.takes.take import begin_take, get_take, get_take_of, hand_in, list_takes
 from app.review.verdicts.bulk import give_verdicts, list_batches
 from app.review.verdicts.bulk_undo import undo_batch
@@ -157,6 +158,33 @@ class TestBeginTake:
         hand_in(store, take.id, actor="ann")
         adopted = adopt_take(store, take.id, actor="lea")
         assert adopted.group.views[0].balls == (BALL,)
+
+
+class TestStart:
+    @pytest.mark.parametrize(
+        ("starts", "balls", "lines"),
+        [
+            (("imported", "imported"), True, True),
+            (("imported", "without_balls"), False, True),
+            (("bare", "imported"), False, False),
+        ],
+    )
+    def test_every_copy_of_a_batch_with_gold_groups_begins_alike(
+        self, store, fill, make_group, starts, balls, lines
+    ) -> None:
+        groups = fill(*(make_group(number) for number in range(1, 6)))
+        for group, start in zip(groups[3:], starts, strict=True):
+            judge(store, group, actor="lea")
+            mark(store, group, start, actor="lea")
+        terms = Terms(7, load(store, groups[0]).dataset_id, groups[:3], 1, True, "2000", 2)
+        kinds = []
+        while (take := begin_next(store, terms, person="ann", chance=Random(3))) is not None:
+            kinds.append(take.kind)
+            copy = load(store, take.copy_id).group
+            assert [bool(view.balls) for view in copy.views] == [balls] * len(copy.views)
+            assert [bool(view.station.lines) for view in copy.views] == [lines] * len(copy.views)
+            hand_in(store, take.id, actor="ann")
+        assert sorted(kinds) == ["gold", "gold", "independent", "independent", "independent"]
 
 
 class TestHandIn:
@@ -350,3 +378,27 @@ class TestBeginNext:
         blocks = [kinds[at : at + every] for at in range(0, len(kinds), every)]
         assert all(block.count("gold") == 1 for block in blocks)
         assert len({block.index("gold") for block in blocks}) == every
+
+    @pytest.mark.parametrize(
+        ("every", "groups", "fresh", "runs_out"),
+        [(4, 10, 99, False), (2, 7, 3, True), (1, 3, 5, True), (5, 2, 1, False)],
+    )
+    def test_the_last_one_is_gold_as_often_and_what_is_left_falls_by_one(
+        self, every: int, groups: int, fresh: int, runs_out: bool
+    ) -> None:
+        chance, last = Random(8), set()
+        for _ in range(60):
+            kinds, free, gold = list[str](), groups, fresh
+            while True:
+                left = free + count_gold_left(kinds, every, free, gold)
+                if gold and is_gold_turn(kinds, every, free, chance):
+                    kinds, gold = [*kinds, "gold"], gold - 1
+                elif free:
+                    kinds, free = [*kinds, "independent"], free - 1
+                else:
+                    break
+                assert free + count_gold_left(kinds, every, free, gold) == left - 1
+            assert left == 0
+            last.add(kinds[-1])
+        # Where gold groups run out, ordinary ones are left.
+        assert last == ({"independent"} if runs_out else {"independent", "gold"})
