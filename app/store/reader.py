@@ -98,7 +98,7 @@ def seen_anywhere(dataset: Any, group: Any) -> list[ColumnElement[bool]]:
 
 
 def is_hidden_group(session: Session, reader: Reader, dataset_id: int, **named: int) -> bool:
-    """Whether a group is hidden from somebody, or one that a view or a static camera is of.
+    """Whether a group is hidden from somebody, or that of a view, or every one of a static camera.
 
     Args:
         session: Any session.
@@ -114,5 +114,10 @@ def is_hidden_group(session: Session, reader: Reader, dataset_id: int, **named: 
             select(ViewModel.group_id).where(ViewModel.station_id == identity)
         ),
     }[kind]
-    found = select(GroupModel.id).where(which, reader.hides(dataset_id, GroupModel.id)).limit(1)
-    return session.scalar(found) is not None
+    groups = select(GroupModel.id).where(which).limit(1)
+    hides = reader.hides(dataset_id, GroupModel.id)
+    hidden = session.scalar(groups.where(hides)) is not None
+    if kind != "station":
+        return hidden
+    # What other groups show of a camera that they share is no secret.
+    return hidden and session.scalar(groups.where(not_(hides))) is None

@@ -288,6 +288,23 @@ class TestReviewers:
         assert ask("rita", "POST", f"/batches/{batch}/next", {}).json()["group"] is None
         assert ask("rita", "GET", f"/groups/{groups[0]}").status_code == 200
 
+    def test_ordinary_work_in_the_same_dataset_goes_on_without_what_is_hidden(
+        self, made: Gold
+    ) -> None:
+        ask, other = made.team.ask, made.others[0]
+        blind = give_out(made.team, "anna", made.ordinary[3:5])
+        groups = ",".join(map(str, [made.golden[0], made.ordinary[3], other]))
+        body = {"name": "plain", "q": f"id:{groups}", "annotators": ["anna"], "skip_given": False}
+        plain = ask("lea", "POST", "/datasets/demo/batches", body).json()["id"]
+        given = ask("anna", "POST", f"/batches/{plain}/next", {}).json()["group"]
+        assert given == other and ask("anna", "GET", f"/groups/{other}").status_code == 200
+        # Nor are the originals opened by the batch whose copies she annotates.
+        for target in ("hand-in", "lease"):
+            at = f"/batches/{blind}/groups/{made.ordinary[3]}/{target}"
+            assert ask("anna", "PUT", at, {} if target == "lease" else None).status_code == 404
+        for batch in (blind, plain):
+            assert ask("lea", "PATCH", f"/batches/{batch}", {"state": "closed"}).status_code == 200
+
     def test_a_closed_batch_hides_nothing(self, made: Gold) -> None:
         ask, groups = made.team.ask, made.ordinary[2:3]
         batch = give_out(made.team, "anna", groups)

@@ -298,7 +298,9 @@ def open_for(
             continue
         # Where nobody annotates, a reviewer gets everything that waits.
         handed_in = (part is Part.REVIEWER) if batch.annotators else None
-        found = waiting_group(session, batch.id, worker.name, at, handed_in=handed_in, after=place)
+        found = waiting_group(
+            session, batch.id, batch.dataset_id, worker.name, at, handed_in=handed_in, after=place
+        )
         if found is not None:
             return found, part
     return None
