@@ -12,7 +12,7 @@ from typing import Annotated
 from fastapi import Depends, Header, Path, Query, Request
 
 from app.api.errors import PreconditionRequiredError
-from app.api.security.access import login_of, sight_of
+from app.api.security.access import login_of, sight_of, sight_of_whole
 from app.api.services import Services
 from app.errors import InputError
 from app.finite import MAX_ID
@@ -71,6 +71,11 @@ async def get_sight(request: Request) -> Sight:
     return sight_of(request.scope)
 
 
+async def get_sight_of_whole(request: Request) -> Sight:
+    """What whoever asks sees and nothing of which is hidden from them."""
+    return sight_of_whole(request.scope)
+
+
 async def require_if_match(
     if_match: Annotated[
         str | None,
@@ -105,6 +110,7 @@ AppServices = Annotated[Services, Depends(get_services)]
 AppStore = Annotated[Store, Depends(get_store)]
 Actor = Annotated[str, Depends(get_actor)]
 Sees = Annotated[Sight, Depends(get_sight)]
+SeesWhole = Annotated[Sight, Depends(get_sight_of_whole)]
 IfMatch = Annotated[str, Depends(require_if_match)]
 Id = Annotated[int, Path(ge=1, le=MAX_ID)]
 DatasetPath = Annotated[str, Path(max_length=200, description="Name or id of the dataset.")]

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import asyncio
 import functools
+import re
 import threading
 from collections.abc import AsyncIterator, Mapping
 from contextlib import suppress
@@ -54,6 +55,10 @@ PING_SECONDS = 15.0
 """Between two words to a listener whom there is nothing to tell, lest a proxy thinks it gone."""
 
 
+_ID = re.compile(rb"^id: \d+$", re.MULTILINE)
+"""How an event says its id."""
+
+
 @dataclass
 class Counts:
     """Listeners since the server started; ``resumed`` ones came back with the last id they saw."""
@@ -72,6 +77,7 @@ class Feed:
         position: Id of the log entry up to which it knows everything.
         sight: What its reader sees.
         began: Id of the newest log entry when it began to listen.
+        numbered: Its events have the ids of their log entries; else they all have 0.
 
     Attributes:
         lost: It did not keep up and was let go.
@@ -79,8 +85,10 @@ class Feed:
         loop: The event loop on which it is read.
     """
 
-    def __init__(self, dataset_id: int | None, position: int, sight: Sight, began: int):
-        self.dataset_id, self.position = dataset_id, position
+    def __init__(
+        self, dataset_id: int | None, position: int, sight: Sight, began: int, numbered: bool = True
+    ):
+        self.dataset_id, self.position, self._numbered = dataset_id, position, numbered
         self._sight, self._began = sight, began
         self.lost, self.told = False, monotonic()
         self._events: list[bytes] = []
@@ -105,7 +113,8 @@ class Feed:
         self.lost = self.lost or len(self._events) + len(events) > MAX_WAITING
         self._ended = self._ended or ended or self.lost
         if not self._ended:
-            self._events.extend(events)
+            plain = events if self._numbered else [_ID.sub(b"id: 0", event) for event in events]
+            self._events.extend(plain)
         self.told = monotonic()
         self._ready.set()
 
@@ -166,15 +175,17 @@ class Events:
         resumed: bool = False,
         sight: Sight = EVERYTHING,
         began: int | None = None,
+        numbered: bool = True,
     ) -> Feed:
         """Begin to listen, or go on where an earlier stream ended; on the event loop.
 
-        ``began`` is the newest entry of the log by now, where that is not the position.
+        ``began`` is the newest entry of the log by now, where that is not the position; ``numbered``
+        as ``Feed`` has it.
 
         Raises:
             OverloadedError: Too many listen, or the server stops.
         """
-        feed = Feed(dataset_id, position, sight, position if began is None else began)
+        feed = Feed(dataset_id, position, sight, position if began is None else began, numbered)
         with self._lock:
             self.require_room()
             self._feeds.add(feed)

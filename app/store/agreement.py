@@ -109,6 +109,14 @@ def never_compared(session: Session) -> list[tuple[int, int | None]]:
     return [(found.group_id, found.batch_id) for found in session.execute(statement)]
 
 
+def never_taken_over(session: Session) -> list[int]:
+    """Copies that were submitted in batches which ask for one annotation a group, and wait."""
+    take = TakeModel
+    ready = (take.kind == INDEPENDENT, take.handed_in.is_not(None), take.settled.is_(None))
+    statement = select(take.copy_id).join(BatchModel, BatchModel.id == take.batch_id)
+    return list(session.scalars(statement.where(*ready, BatchModel.verdicts == 1)))
+
+
 def verdicts_asked(session: Session, batch_id: int) -> int | None:
     """How many annotations of each group a batch asks for; None where there is no such batch."""
     asked: int | None = session.scalar(select(BatchModel.verdicts).where(BatchModel.id == batch_id))

@@ -9,6 +9,7 @@ from typing import Any
 from sqlalchemy import ColumnElement, delete, func, insert, literal, select, update
 
 from app.store.group_rows import next_id
+from app.store.reader import seen_anywhere
 from app.store.session import Session
 from app.store.sight import Sight
 from app.store.tables.groups import DatasetModel
@@ -92,4 +93,5 @@ def _seen(person_id: int, sight: Sight, since: str) -> list[ColumnElement[bool]]
     where = [BellModel.person_id == person_id, BellModel.at >= since]
     # What is of no dataset was told to them, and is theirs.
     seen = sight.condition(BellModel.dataset_id, literal(sight.name))
+    where += seen_anywhere(BellModel.dataset_id, BellModel.group_id)
     return where if seen is None else [*where, seen]

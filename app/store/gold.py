@@ -57,6 +57,14 @@ def gold_start(session: Session, group_id: int) -> str:
     return session.scalar(statement) or IMPORTED
 
 
+def common_start(session: Session, dataset_id: int) -> str | None:
+    """What everybody begins with in batches that mix the gold groups of a dataset in: that which
+    leaves least of those that its gold groups have; None where there is no gold group."""
+    mine = GoldModel.dataset_id == dataset_id
+    found = session.scalars(select(GoldModel.start).where(mine).distinct())
+    return max(found, key=(IMPORTED, WITHOUT_BALLS, BARE).index, default=None)
+
+
 def gold_heads(session: Session, dataset_id: int) -> Sequence[Any]:
     """The gold groups of a dataset without what is true of them, by id of the group."""
     statement = _HEADS.where(GoldModel.dataset_id == dataset_id).order_by(GoldModel.group_id)

@@ -12,6 +12,7 @@ from sqlalchemy.sql.visitors import iterate
 from app.store.conditions import Condition
 from app.store.order import SORTED, Key, Order
 from app.store.policies import judged_since
+from app.store.reader import seen_anywhere, seen_in
 from app.store.session import Session
 from app.store.tables.queue import QUEUE_SCANNED, QueueModel
 
@@ -26,7 +27,8 @@ _FEW = 10
 
 @dataclass(frozen=True)
 class Listing:
-    """The groups of a dataset that fulfil all conditions, as a session sees them.
+    """The groups of a dataset that fulfil all conditions, as a session sees them; those that are
+    hidden from whoever asks are none of them.
 
     What an index sorts by is read from there. What no index holds is read in the order in which
     the rows lie in the file: to fetch them one by one as an index has them takes ten times as long.
@@ -96,7 +98,8 @@ class Listing:
 
     @property
     def _where(self) -> list[ColumnElement[bool]]:
-        return [QueueModel.dataset_id == self.dataset_id, *self.conditions]
+        seen = seen_in(self.dataset_id, QueueModel.group_id)
+        return [QueueModel.dataset_id == self.dataset_id, *self.conditions, *seen]
 
     @property
     def _ids(self) -> Select[int]:
@@ -185,7 +188,10 @@ def count_states(session: Session, dataset_ids: Sequence[int]) -> Sequence[Any]:
             func.count().label("groups"),
             func.sum(case((QueueModel.solved, 1), else_=0)).label("solved"),
         )
-        .where(QueueModel.dataset_id.in_(dataset_ids))
+        .where(
+            QueueModel.dataset_id.in_(dataset_ids),
+            *seen_anywhere(QueueModel.dataset_id, QueueModel.group_id),
+        )
         .group_by(QueueModel.dataset_id, QueueModel.status)
     )
     return session.execute(statement).all()
@@ -210,7 +216,11 @@ def count_reviewed(session: Session, dataset_id: int) -> dict[tuple[str | None, 
     """How many groups have a verdict that counts, by who gave it and their status."""
     statement = (
         select(QueueModel.reviewer, QueueModel.status, func.count())
-        .where(QueueModel.dataset_id == dataset_id, QueueModel.reviewer.is_not(None))
+        .where(
+            QueueModel.dataset_id == dataset_id,
+            QueueModel.reviewer.is_not(None),
+            *seen_in(dataset_id, QueueModel.group_id),
+        )
         .group_by(QueueModel.reviewer, QueueModel.status)
     )
     return {(name, status): count for name, status, count in session.execute(statement)}

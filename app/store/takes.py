@@ -21,11 +21,6 @@ _TAKES = select(*TakeModel.__table__.columns)
 # What somebody made of a gold group tells nothing of its own: nobody is to know which one it is.
 _READY = (TakeModel.kind == INDEPENDENT, TakeModel.handed_in.is_not(None))
 _OF_COPY = _TAKES.where(TakeModel.copy_id == bindparam("copy"))
-_NOTE = (
-    update(TakeModel.__table__)  # type: ignore[arg-type]
-    .where(TakeModel.copy_id == bindparam("copy"), TakeModel.settled.is_(None))
-    .values(verdict=bindparam("said"), handed_in=bindparam("at_last"))
-)
 
 
 def insert_take(
@@ -71,8 +66,10 @@ def takes_of_batch(session: Session, batch_id: int | None, dataset_id: int) -> S
     return session.execute(statement.order_by(TakeModel.id)).all()
 
 
-def count_left(session: Session, batch_id: int, dataset_id: int, person: str, verdicts: int) -> int:
-    """Of how many groups of a batch a person may still make a take, begun ones included.
+def count_left(
+    session: Session, batch_id: int, dataset_id: int, person: str, verdicts: int
+) -> tuple[int, int]:
+    """How many takes of a batch a person has begun, and of how many of its groups they may make one.
 
     ``verdicts`` people may have a group.
     """
@@ -89,7 +86,7 @@ def count_left(session: Session, batch_id: int, dataset_id: int, person: str, ve
         asked < verdicts,
     )
     begun = select(func.count()).select_from(take).where(*here, mine, *ends)
-    return (session.scalar(begun) or 0) + (session.scalar(free) or 0)
+    return session.scalar(begun) or 0, session.scalar(free) or 0
 
 
 def _copies_of(dataset_id: int) -> Select[int]:
@@ -169,10 +166,3 @@ def count_takes(session: Session, batch_id: int | None, person: str) -> int:
 def update_take(session: Session, take_id: int, **values: str | None) -> None:
     """Write when a take was handed in, judged or settled."""
     session.execute(update(TakeModel).where(TakeModel.id == take_id).values(**values))
-
-
-def note_verdict(session: Session, group_id: int, state: str, at: str) -> None:
-    """A verdict on a copy hands it in, one that is taken back opens it again; else nothing."""
-    said = None if state == "unreviewed" else state
-    values = {"said": said, "at_last": None if said is None else at}
-    session.execute(_NOTE, {"copy": group_id, **values})

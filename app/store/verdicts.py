@@ -11,12 +11,13 @@ from sqlalchemy import Table, bindparam, case, func, insert, select
 from app.store.aliases import shown_actor
 from app.store.group_rows import next_id
 from app.store.log import Entry, append
+from app.store.reader import seen_in
 from app.store.session import Session
 from app.store.settling import settle_judged
 from app.store.sight import COPIES
+from app.store.submissions import judge_copy
 from app.store.tables.groups import GroupModel
 from app.store.tables.verdicts import VerdictModel
-from app.store.takes import note_verdict
 
 
 @dataclass(frozen=True)
@@ -116,7 +117,7 @@ def count_by_judge(session: Session, dataset_id: int, since: str) -> Sequence[An
             func.count(recent.distinct()).label("groups"),
         )
         .join(GroupModel, GroupModel.id == VerdictModel.group_id)
-        .where(GroupModel.dataset_id == dataset_id)
+        .where(GroupModel.dataset_id == dataset_id, *seen_in(dataset_id, GroupModel.id))
         .group_by(actor)
     )
     return session.execute(statement).all()
@@ -131,7 +132,12 @@ def insert_verdicts(
     session: Session, dataset_id: int, given: Sequence[StoredVerdict], *, actor: str, at: str
 ) -> None:
     """Insert verdicts on groups of a dataset, and log them under who gives them; work on these groups
-    that was given out is over by that."""
+    that was given out is over by that, and a copy is submitted.
+
+    Raises:
+        ForbiddenError: A group is somebody else's copy.
+        ConflictError: A group is a copy that was submitted.
+    """
     rows = [dict(vars(verdict)) for verdict in given]
     session.execute(insert(_VERDICT), rows)
     entries = []
@@ -144,7 +150,7 @@ def insert_verdicts(
         settle_judged(session, states, actor=actor, at=at)
         return
     for row in rows:
-        note_verdict(session, row["group_id"], row["state"], at)
+        judge_copy(session, row["group_id"], row["state"], actor=actor, at=at)
 
 
 def newest_verdict(session: Session) -> int:

@@ -23,6 +23,7 @@ from sqlalchemy import (
 
 from app.soccer.choices import BatchState
 from app.store.dialect.statements import insert as upsert
+from app.store.reader import seen_in
 from app.store.session import Session
 from app.store.tables.groups import DatasetModel
 from app.store.tables.log import LogModel
@@ -206,14 +207,23 @@ def hand_in(
 
 
 def waiting_group(
-    session: Session, batch_id: int, person: str, at: str, *, handed_in: bool | None, after: int
+    session: Session,
+    batch_id: int,
+    dataset_id: int,
+    person: str,
+    at: str,
+    *,
+    handed_in: bool | None,
+    after: int,
 ) -> Any | None:
     """The group (group_id, handed_in, handed_in_by) that a person would take next, if there is one.
 
     Args:
         session: A write session, so that nobody else takes it meanwhile.
         batch_id: The batch.
-        person: Who asks. What others have open, in any batch, is left out.
+        dataset_id: Its dataset.
+        person: Who asks. What others have open, in any batch, is left out, and what is hidden from
+            whoever asks.
         at: Now.
         handed_in: Whether it must have been handed in, or must not; None: either.
         after: Place after which to look first, and which is never meant; what else the person has
@@ -221,7 +231,10 @@ def waiting_group(
             0: what they have open comes first.
     """
     given = {"batch": batch_id, "person": person, "at": at, "after": after}
-    return session.execute(_waiting(handed_in, bool(after)), given).one_or_none()
+    waiting = _waiting(handed_in, bool(after))
+    if seen := seen_in(dataset_id, BatchGroupModel.group_id):
+        waiting = waiting.where(*seen)
+    return session.execute(waiting, given).one_or_none()
 
 
 @cache

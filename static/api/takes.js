@@ -9,7 +9,7 @@ import { request } from './client.js';
 /** @typedef {{group: number, title: string, by: string, at: string, reason: string}} HandedBackJson */
 /** @typedef {{count: number, median: number | null, low: number | null, high: number | null}} MiddleJson */
 /** @typedef {{line_px: number | null, lines_missing: number, ball_px: number | null, balls_missing: number, ball_m: number | null}} ErrorJson */
-/** @typedef {{group: number, label: string, handed_in: string, verdict: string | null, true_verdict: string, right: boolean | null, error: ErrorJson}} GoldResultJson */
+/** @typedef {{group: number, label: string, handed_in: string, verdict: string | null, true_verdict: string, right: boolean | null, error: ErrorJson, submissions: number}} GoldResultJson */
 /** @typedef {{person: string, results: GoldResultJson[], line_px: MiddleJson, ball_px: MiddleJson, ball_m: MiddleJson, judged: number, right: number, right_low: number | null, right_high: number | null}} PersonResultsJson */
 /** @typedef {{group: number, label: string, start: string, marked: string, marked_by: string, source: 'verdict' | 'sample' | 'version'}} GoldGroupJson */
 /** @typedef {{groups: GoldGroupJson[], people: PersonResultsJson[]}} GoldReportJson */

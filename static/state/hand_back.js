@@ -38,7 +38,7 @@ export const frozen = computed(() => {
 	if (one === null || one.group !== groupDocument.value?.id) return '';
 	if (one.settled !== null) return 'This annotation was adjudicated already; it can no longer be changed.';
 	const mine = !isTeam || one.person === myName.value;
-	if (one.handed_in !== null) return mine ? '' : `${one.person} has submitted this; return it, or take it over.`;
+	if (one.handed_in !== null) return mine ? 'This is submitted; only a lead can return it.' : `${one.person} has submitted this; return it, or take it over.`;
 	return mine ? '' : `${one.person} reviews this annotation.`;
 });
 

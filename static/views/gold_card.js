@@ -44,10 +44,11 @@ function Course({ results, person }) {
 /** @param {{one: PersonResultsJson}} props */
 function Person({ one }) {
 	const share = one.judged === 0 ? '–' : `${one.right} of ${one.judged} (${Math.round(100 * (one.right_low ?? 0))} to ${Math.round(100 * (one.right_high ?? 1))} %)`;
+	const again = one.results.filter(({ submissions }) => submissions > 1).length;
 	return html`
 		<tr>
 			<th scope="row">${one.person}</th>
-			<td data-numeric="true">${one.results.length}</td>
+			<td data-numeric="true">${one.results.length}${again > 0 ? html` <span title=${`${plural(again, 'group')} submitted again after a lead returned it; the first submission is measured`}>(${again} again)</span>` : null}</td>
 			<td data-numeric="true">${middleText(one.line_px, 1)}</td>
 			<td data-numeric="true">${middleText(one.ball_px, 1)}</td>
 			<td data-numeric="true">${middleText(one.ball_m, 2)}</td>
@@ -83,6 +84,7 @@ export function GoldCard({ dataset }) {
 			<h2 id="gold-title"><${Term} word="gold-group">Gold groups<//></h2>
 			${error || refused ? html`<${FormError} error=${error ?? refused} />` : null}
 			<p class="gold__about">${value?.groups.length ? `${plural(value.groups.length, 'group')} with known truth.` : 'None yet.'} Review a group, then choose <em>Mark as gold group</em> in its palette (<kbd>Ctrl K</kbd>); or let <em>Assign…</em> use groups of a sample or a version. Batches mix them in without marking them.</p>
+			<p class="gold__about">While a batch is open, its annotators see neither the originals of its groups nor gold groups, every copy begins alike, and their first submission is measured. This cannot hide what a person remembers, finds in another dataset, or hears from others: make gold groups of frames that annotators have not seen.</p>
 			${value?.people.length ? html`
 				<div class="table__scroll" tabindex="0" role="region" aria-label="People and gold groups"><table class="table">
 					<thead><tr><th>Person</th><th data-numeric="true">groups</th><th data-numeric="true">lines, px</th><th data-numeric="true">ball, px</th><th data-numeric="true">ball, m</th><th data-numeric="true">correct verdicts</th><th>over time</th></tr></thead>

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
+from typing import Any
 from urllib.parse import quote
 
 import pytest
 
+from app.api.security.asked_datasets import QUERIES
+from app.api.security.rules import RULES
 from app.review.editing.recompute import solve_dataset
 from app.review.importing.ingest import ingest
-from app.review.people.roles import Role
+from app.review.people.roles import Action, Role
 from app.store.sight import COPIES
 from tests.scenes import make_scenes
 from tests.security.apart import API, Apart, opened
@@ -31,6 +34,7 @@ def team(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Apart]:
         made.add("anna", Role.REVIEWER)
         made.add("olaf", Role.ANNOTATOR)
         made.add("berta", Role.NONE, demo=Role.REVIEWER)
+        made.add("vera", Role.VIEWER)
         yield made
 
 
@@ -115,3 +119,79 @@ def test_an_annotator_does_not_learn_what_others_made_of_a_group(team: Apart) ->
         team.ask(name, "GET", "/groups?dataset=demo").json()["items"] for name in ("olaf", "lea")
     ]
     assert [rows[0][0]["takes"] is None, rows[1][0]["takes"] is None] == [True, False]
+
+
+ASKS = "id:1 takes>=0"
+"""Of which the number of groups answers what others made of one."""
+
+
+def queries_in(document: dict[str, Any]) -> Iterator[tuple[str, str, str, tuple[str, ...]]]:
+    """Method, address, place (``query`` or ``body``) and way to each query that a request can hold."""
+    for path, operations in document["paths"].items():
+        for method, operation in operations.items():
+            for item in operation.get("parameters", []):
+                if item["in"] == "query" and item["name"] in QUERIES:
+                    yield method.upper(), path, "query", (item["name"],)
+            content = operation.get("requestBody", {}).get("content", {})
+            schema = content.get("application/json", {}).get("schema", {})
+            for way in _ways(document, schema, ()):
+                yield method.upper(), path, "body", way
+
+
+def _ways(document: dict[str, Any], schema: Any, way: tuple[str, ...]) -> Iterator[tuple[str, ...]]:
+    if len(way) > 5 or not isinstance(schema, dict):
+        return
+    if "$ref" in schema:
+        schema = document["components"]["schemas"][schema["$ref"].rpartition("/")[2]]
+    for one in (*schema.get("anyOf", []), *schema.get("oneOf", []), *schema.get("allOf", [])):
+        yield from _ways(document, one, way)
+    for name, inner in schema.get("properties", {}).items():
+        if name in QUERIES:
+            yield (*way, name)
+        yield from _ways(document, inner, (*way, name))
+
+
+def with_query(team: Apart, asked: tuple[str, str, str, tuple[str, ...]], query: str) -> Any:
+    """The arguments of a request about the dataset that holds a query there."""
+    method, path, place, way = asked
+    target = path.removeprefix(API).replace("{dataset}", "demo").replace("{group}", "1")
+    if place == "query":
+        return method, f"{target}?dataset=demo&{way[0]}={quote(query)}", None
+    body: Any = query
+    for name in reversed(way):
+        body = {name: body}
+    return method, target, {"dataset": "demo", **body} if path.startswith(f"{API}/pred") else body
+
+
+class TestQueries:
+    def test_every_place_that_takes_one_applies_the_rule_of_who_asks(self, team: Apart) -> None:
+        places = list(queries_in(team.app.openapi()))
+        assert len({path for _, path, _, _ in places}) > 10
+        assert {place for _, _, place, _ in places} == {"query", "body"}
+        for asked in places:
+            for name in ("vera", "olaf"):
+                answer = team.ask(name, *with_query(team, asked, ASKS))
+                assert answer.status_code == 403, (asked, name, answer.text[:200])
+            if RULES[f"{asked[0]} {asked[1]}"] is Action.READ:
+                method, target, _ = with_query(team, asked, "id:1")
+                assert team.ask("vera", method, target).status_code in (200, 422), asked
+
+    def test_what_a_lead_stored_counts_for_nobody_who_may_not_ask_it(self, team: Apart) -> None:
+        at = "/datasets/demo"
+        stored = {"name": "asked by a lead", "q": ASKS}
+        view = team.ask("lea", "POST", f"{at}/saved-views", stored)
+        assert view.status_code == 201 and view.json()["groups"] == 1
+        plain = team.ask("lea", "POST", f"{at}/saved-views", {"name": "plain", "q": "id:1"})
+        batch = team.ask("lea", "POST", f"{at}/batches", {**stored, "skip_given": False}).json()
+        bulk = {"q": ASKS, "state": "deferred"}
+        assert team.ask("lea", "POST", f"{at}/verdicts", bulk).json()["changed"] == 1
+        for name in ("vera", "olaf"):
+            for target in (f"{at}/saved-views", f"{at}/batches", f"{at}/verdict-batches"):
+                assert "takes" not in team.ask(name, "GET", target).text, (name, target)
+            assert "takes" not in team.ask(name, "GET", f"/batches/{batch['id']}").text
+            hidden = f"/saved-views/{view.json()['id']}"
+            assert team.ask(name, "GET", hidden).status_code == 404
+            assert team.ask(name, "GET", f"/saved-views/{plain.json()['id']}").status_code == 200
+        assert team.ask("olaf", "DELETE", hidden).status_code == 404
+        assert "takes" in team.ask("anna", "GET", f"{at}/saved-views").text
+        assert team.ask("lea", "DELETE", hidden).status_code == 200

@@ -9,13 +9,14 @@ from typing import Annotated
 from fastapi import APIRouter, Depends, Header, Query, Request, Response
 from fastapi.responses import StreamingResponse
 
-from app.api.deps import AppServices, Sees
+from app.api.deps import AppServices, SeesWhole
 from app.api.events import Feed, hello
 from app.api.problem import Responses, responses
 from app.api.schemas.event import EVENTS
 from app.api.security.requests import is_head
 from app.api.services import Services
 from app.review.datasets.dataset import dataset_id
+from app.review.people.roles import reads_blind
 
 _UNBUFFERED = {"Cache-Control": "no-cache", "X-Accel-Buffering": "no"}
 """What a proxy between asks for, which would hold events back otherwise."""
@@ -81,10 +82,14 @@ class Start:
             int(seen) if self.resumed else int(moment[1]) if moment and known else newest
         )
         self.solution = int(moment[2]) if moment and known else None
+        self.numbered = not reads_blind()
+        if not self.numbered:
+            # Whoever is told no id of the log is told all of it that they see.
+            self.position, self.solution, self.resumed = 0, 0, False
 
 
 async def begin(
-    services: AppServices, sight: Sees, start: Annotated[Start, Depends()]
+    services: AppServices, sight: SeesWhole, start: Annotated[Start, Depends()]
 ) -> AsyncIterator[Feed]:
     """A feed for as long as the request lasts."""
     feed = services.events.subscribe(
@@ -93,6 +98,7 @@ async def begin(
         resumed=start.resumed,
         sight=sight,
         began=start.newest,
+        numbered=start.numbered,
     )
     try:
         yield feed
@@ -102,7 +108,7 @@ async def begin(
 
 def under_way(
     services: AppServices,
-    sight: Sees,
+    sight: SeesWhole,
     start: Annotated[Start, Depends()],
     feed: Annotated[Feed, Depends(begin)],
 ) -> list[bytes]:

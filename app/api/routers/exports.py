@@ -10,7 +10,7 @@ from fastapi import APIRouter, Depends, Path, Request, Response
 from starlette.responses import FileResponse
 
 from app.api.cursor import parse_cursor
-from app.api.deps import Actor, AppServices, Sees
+from app.api.deps import Actor, AppServices, SeesWhole
 from app.api.jobs import ACCEPTED, job_address
 from app.api.problem import Responses, responses
 from app.api.reply import AskedUnder, Reply, document, nothing
@@ -75,7 +75,7 @@ def _export_answer(job: Job) -> Response:
 @router.get("", operation_id="listExports", responses=responses(404))
 def list_exports(
     services: AppServices,
-    sight: Sees,
+    sight: SeesWhole,
     dataset: DatasetFilter = None,
     limit: Limit = 50,
     cursor: Cursor = None,

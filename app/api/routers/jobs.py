@@ -7,7 +7,7 @@ from typing import Annotated
 from fastapi import APIRouter, Query, Response
 
 from app.api.cursor import parse_cursor
-from app.api.deps import Actor, AppServices, Id, Sees
+from app.api.deps import Actor, AppServices, Id, SeesWhole
 from app.api.problem import responses
 from app.api.reply import AskedUnder, Reply, document
 from app.api.schemas.job import JobDocument, JobKind, JobPage
@@ -29,7 +29,7 @@ DatasetFilter = Annotated[
 @router.get("", operation_id="listJobs", responses=responses(404))
 def list_jobs(
     services: AppServices,
-    sight: Sees,
+    sight: SeesWhole,
     dataset: DatasetFilter = None,
     kind: Annotated[JobKind | None, Query()] = None,
     state: Annotated[JobState | None, Query()] = None,

@@ -93,7 +93,7 @@ def get_session(request: Request, services: AppServices) -> SessionDocument:
     found = session_of(login, services.store)
     rules = team.sign_on and team.sign_on.rules
     ways = WaysIn(password=not (rules and rules.only), sign_on=rules.label if rules else None)
-    moment = None if login is None else services.events.moment()
+    moment = None if login is None or login.roles.blind else services.events.moment()
     return found.model_copy(update={"ways": ways, "moment": moment})
 
 

@@ -8,7 +8,7 @@ from app.api.deps import AppServices, DatasetPath, QueryText
 from app.api.problem import responses
 from app.api.schemas.statistics import StatisticsDocument
 from app.review.datasets.dataset import dataset_id
-from app.review.queue.statistics import Statistics, statistics
+from app.review.queue.statistics import Statistics, is_blind, statistics
 
 router = APIRouter(prefix="/datasets/{dataset}/statistics", tags=["datasets"])
 
@@ -24,9 +24,9 @@ def get_statistics(
 ) -> Statistics:
     """Distances, parallax, uncertainty, sizes, heights and positions, per match and split.
 
-    Every bar carries the query that opens the queue with the groups that it counts.
+    Of groups that are hidden from whoever asks nothing is counted. Every bar carries the query that opens the queue with the groups that it counts.
     """
     found = dataset_id(services.store, dataset)
-    if query.strip():
+    if query.strip() or is_blind(found):
         return statistics(services.store, found, query)
     return services.statistics.statistics(found)

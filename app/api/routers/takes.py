@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from fastapi import APIRouter, Request, Response
+from starlette.background import BackgroundTask
 
 from app.api.deps import Actor, AppServices, AppStore, DatasetPath, Id
 from app.api.problem import responses
@@ -62,15 +63,16 @@ def get_take(group: Id, store: AppStore) -> takes.TakeView:
     "/groups/{group}/hand-in",
     operation_id="handInTake",
     response_model=TakeDocument,
-    responses=responses(403, 404),
+    responses=responses(403, 404, 409),
 )
 def hand_in(group: Id, services: AppServices, actor: Actor, asked: AskedUnder) -> Response:
-    """Say that an independent annotation is done; a verdict on it does the same."""
+    """Submit an independent annotation; a verdict on it does the same. Only a lead can return it."""
     store, reply = services.store, Reply(asked, _take_answer)
     take = takes.get_take_of(store, group)
     handed = takes.hand_in(store, take.id, actor=actor, keep=reply.keep)
-    after_hand_in(store, group, services.paint)
-    return reply.made or _take_answer(takes.shown(store, handed))
+    answer = reply.made or _take_answer(takes.shown(store, handed))
+    answer.background = BackgroundTask(after_hand_in, store, group, services.paint)
+    return answer
 
 
 @router.post(

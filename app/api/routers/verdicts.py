@@ -6,6 +6,7 @@ from functools import partial
 from typing import Annotated
 
 from fastapi import APIRouter, Query, Response
+from starlette.background import BackgroundTasks
 
 from app.api.deps import Actor, AppServices, AppStore, DatasetPath, DryRun, Id, IfMatch
 from app.api.problem import responses
@@ -48,12 +49,16 @@ def put_verdict(
     said = (verdict.state, verdict.reason, verdict.note)
     change = partial(set_verdict, services.store, group, *said, if_match=if_match, actor=actor)
 
-    def hand_in(state: GroupState) -> None:
-        """A verdict on an independent annotation of a group, and on nothing else, hands that in."""
-        if state.is_copy:
-            after_hand_in(services.store, group, services.paint)
+    after = BackgroundTasks()
 
-    return change_group(asked, lambda: load_document(services.store, group), change, hand_in)
+    def hand_in(state: GroupState) -> None:
+        """A verdict on an independent annotation of a group, and on nothing else, submits that."""
+        if state.is_copy:
+            after.add_task(after_hand_in, services.store, group, services.paint)
+
+    answer = change_group(asked, lambda: load_document(services.store, group), change, hand_in)
+    answer.background = after
+    return answer
 
 
 @router.post(

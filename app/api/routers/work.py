@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Annotated
 
 from fastapi import APIRouter, Depends, Request, Response
+from starlette.background import BackgroundTask
 
 from app.api.deps import Actor, AppServices, AppStore, DatasetPath, Id, Sees
 from app.api.problem import responses
@@ -28,7 +29,7 @@ from app.api.services import Services
 from app.review.agreement.weigh import after_hand_in
 from app.review.people.logins import Login
 from app.review.people.roles import Action, may
-from app.review.work import batches, progress
+from app.review.work import batches, own, progress
 from app.review.work.batches import Batch, NewBatch
 from app.review.work.leases import Lease, Leases, Worker
 from app.soccer.actors import LOCAL_USER
@@ -82,7 +83,7 @@ def my_work(store: AppStore, sight: Sees, asks: Asks) -> MyWork:
 @router.get("/datasets/{dataset}/batches", operation_id="listBatches", responses=responses(404))
 def list_batches(dataset: DatasetPath, store: AppStore) -> WorkBatchList:
     """The batches of a dataset."""
-    return WorkBatchList.model_validate({"items": batches.list_batches(store, dataset)})
+    return WorkBatchList.model_validate({"items": own.seen_batches(store, dataset)})
 
 
 @router.post(
@@ -134,7 +135,7 @@ def team_work(dataset: DatasetPath, store: AppStore) -> TeamWork:
 )
 def get_batch(batch: Id, store: AppStore) -> Batch:
     """One batch."""
-    return batches.get_batch(store, batch)
+    return own.seen_batch(store, batch)
 
 
 @router.patch(
@@ -225,8 +226,9 @@ def hand_in(
     """Say that a group is annotated, so that a reviewer gets it."""
     worker, reply = asks.of_batch(services.store, batch), Reply(asked, _lease_answer)
     lease = Leases(services.store).hand_in(batch, group, worker, actor=actor, keep=reply.keep)
-    after_hand_in(services.store, group, services.paint)
-    return _told(services, lease, reply)
+    answer = _told(services, lease, reply)
+    answer.background = BackgroundTask(after_hand_in, services.store, group, services.paint)
+    return answer
 
 
 @router.delete(
@@ -238,7 +240,7 @@ def hand_in(
 def take_back(
     batch: Id, group: Id, services: AppServices, actor: Actor, asks: Asks, asked: AskedUnder
 ) -> Response:
-    """Say that a group is not annotated yet, after all."""
+    """Say that a group is not annotated yet, after all; 409 for one's own copy that is submitted."""
     worker, reply = asks.of_batch(services.store, batch), Reply(asked, _lease_answer)
     lease = Leases(services.store).hand_in(
         batch, group, worker, actor=actor, done=False, keep=reply.keep

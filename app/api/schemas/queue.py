@@ -193,6 +193,9 @@ class LogEntryDocument(Document):
         if body is not None and entry.kind == "comment":
             # Its writer may have deleted it since.
             body.pop("text", None)
+        # The annotation as it was submitted is in the log for what is measured, not for reading.
+        unshown = {"submitted", "inputs_hash"} if entry.kind == "take" else set[str]()
+        body = None if body is None else {k: v for k, v in body.items() if k not in unshown}
         return LogEntryDocument.model_validate({**vars(entry), "body": body})
 
 

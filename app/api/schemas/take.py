@@ -149,10 +149,14 @@ class AnnotationErrorDocument(Document):
 class GoldResultDocument(Document, shows=GoldResult):
     """What one person made of a gold group."""
 
-    handed_in: datetime
+    handed_in: datetime = Field(description="When they submitted it first.")
     true_verdict: str = Field(title="Known Verdict")
     right: bool | None = Field(description="Whether they judged as is true; null: not judged.")
     error: AnnotationErrorDocument
+    submissions: int = Field(
+        description="How often they submitted it. The first one is measured; there are more where a "
+        "lead returned it."
+    )
 
 
 class MiddleDocument(Document, shows=Middle):

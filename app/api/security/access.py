@@ -47,7 +47,7 @@ from app.errors import (
 )
 from app.review.people.access_tokens import AccessTokens
 from app.review.people.logins import Login, Logins
-from app.review.people.roles import EVERYTHING, Action, DatasetRoles, Sight, require_scope
+from app.review.people.roles import EVERYTHING, READER, Action, DatasetRoles, Sight, require_scope
 from app.store.store import Store
 
 log = structlog.get_logger("touchline.access")
@@ -91,6 +91,12 @@ def sight_of(scope: Mapping[str, Any]) -> Sight:
     """What whoever asks sees; everything on a server that somebody runs alone."""
     login = login_of(scope)
     return EVERYTHING if login is None else login.sight
+
+
+def sight_of_whole(scope: Mapping[str, Any]) -> Sight:
+    """The same without the datasets of which some groups are hidden from whoever asks."""
+    login = login_of(scope)
+    return EVERYTHING if login is None else login.sight_of_whole
 
 
 async def require_decided(request: Request) -> None:
@@ -208,6 +214,7 @@ class Access:
             told[HIDDEN] = partial(is_hidden, self._store, let.owned)
             receive, send, scope = concealment.receive(receive, told), concealment.send(send), told
         scope[RULE], scope[LOGIN] = asked.route, let.login
+        READER.set(let.login.reader)
         if asked.route in STREAMS:
             await self._stream(asked, action, scope, receive, send)
         else:

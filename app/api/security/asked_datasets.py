@@ -5,7 +5,6 @@ A route that stands in none of these tables is refused.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any
@@ -18,9 +17,16 @@ from app.api.security.bodies import VALUE
 from app.errors import ForbiddenError
 from app.finite import MAX_ID
 from app.review.people.logins import Login
-from app.review.people.ownership import Named, OwnedKind, Ownership, find_ownership, role_at
+from app.review.people.ownership import (
+    Named,
+    OwnedKind,
+    Ownership,
+    find_ownership,
+    is_hidden_from,
+    role_at,
+)
 from app.review.people.roles import EVERYTHING, Action, DatasetRoles, Role, Sight, require
-from app.review.queue.fields import BLIND
+from app.review.queue.fields import asks_blind
 from app.store.store import Store
 
 PATH: Mapping[str, OwnedKind] = {
@@ -111,6 +117,44 @@ EVERYWHERE_FIELDS: Mapping[str, tuple[str, ...]] = {
 FIXED: Mapping[str, Named] = {"POST /api/v1/practice": Named(OwnedKind.NEW_DATASET, "practice")}
 """Routes about one dataset that no request names."""
 
+WHOLE = frozenset(
+    {
+        OwnedKind.VERSION,
+        OwnedKind.EXPORT,
+        OwnedKind.JOB,
+        OwnedKind.PREDICTIONS,
+        OwnedKind.EVALUATION,
+        OwnedKind.BATCH,
+    }
+)
+"""Kinds that tell of all groups of a dataset at once."""
+WHOLE_ROUTES = frozenset(
+    {
+        "GET /api/v1/exports",
+        "POST /api/v1/exports",
+        "GET /api/v1/jobs",
+        "GET /api/v1/batches/{batch}/groups",
+        *(
+            f"{method} /api/v1/datasets/{{dataset}}/{what}"
+            for method, what in (
+                ("GET", "yield"),
+                ("POST", "yield"),
+                ("GET", "versions"),
+                ("GET", "predictions"),
+                ("GET", "evaluations"),
+                ("GET", "verdict-batches"),
+                ("GET", "noise"),
+                ("GET", "pitches"),
+                ("GET", "pictures"),
+                ("GET", "positions"),
+                ("GET", "paint"),
+                ("GET", "proposals"),
+                ("GET", "adjudications"),
+            )
+        ),
+    }
+)
+"""Routes that do, of the dataset that they name."""
 HERE, ALL = " in this dataset", " in all datasets"
 """Where a role would have to be, in a refusal."""
 OWNED = frozenset({OwnedKind.JOB, OwnedKind.EXPORT, OwnedKind.UPLOAD})
@@ -124,8 +168,8 @@ TEXTS = frozenset(
         OwnedKind.UPLOAD,
     }
 )
-_BLIND = re.compile(rf"\b({'|'.join(BLIND)})[:=<>]")
-"""Also within quotes: rather once too often."""
+QUERIES = ("q", "query")
+"""Names under which requests send queries of groups."""
 _ID: TypeAdapter[int] = TypeAdapter(Annotated[int, Field(ge=1, le=MAX_ID)])
 
 
@@ -243,11 +287,33 @@ def require_allowed(
             require(role, action, here)
             if asks_what_is_blind(asked):
                 require(role, Action.REVIEW, here)
+            whole = item.mention.named.kind in WHOLE or asked.route in WHOLE_ROUTES
+            if whole and item.ownership.dataset in roles.blind:
+                raise ForbiddenError(
+                    "you annotate copies of groups of this dataset without seeing the originals",
+                    hint="What tells of all its groups is shown once the batch is closed.",
+                )
 
 
 def asks_what_is_blind(asked: AskedAbout) -> bool:
-    """Whether a query of groups asks what others made of them: annotators are not to know."""
-    return any(name == "q" and _BLIND.search(value) is not None for name, value in asked.query)
+    """Whether a query of groups asks what others made of them: annotators are not to know.
+
+    Queries are parameters, and fields of bodies, named ``q`` or ``query``.
+    """
+    texts = [value for name, value in asked.query if name in QUERIES]
+    return any(asks_blind(text) for text in (*texts, *_queries_in(asked.body)))
+
+
+def _queries_in(body: Any) -> Iterator[str]:
+    """The queries that a JSON body holds, however deep."""
+    waiting = [body]
+    while waiting:
+        value = waiting.pop()
+        if isinstance(value, dict):
+            yield from (text for name in QUERIES if isinstance(text := value.get(name), str))
+            waiting.extend(value.values())
+        elif isinstance(value, list):
+            waiting.extend(value)
 
 
 def _names_what_is_nobodys(asked: AskedAbout) -> bool:
@@ -275,12 +341,15 @@ def _ownership(store: Store, named: Named, login: Login, sight: Sight) -> Owners
     found = find_ownership(store, named, sight)
     if found is None or named.kind is OwnedKind.NEW_DATASET:
         return found
-    return None if role_at(found, roles, login.owner) is Role.NONE else found
+    hidden = role_at(found, roles, login.owner) is Role.NONE or is_hidden_from(
+        store, named, found, login.reader
+    )
+    return None if hidden else found
 
 
 def _is_looked_for(named: Named, roles: DatasetRoles) -> bool:
     """Whether it matters where something is: who is the same everywhere is so there."""
-    return bool(roles.single) or named.kind in OWNED | {OwnedKind.NEW_DATASET}
+    return bool(roles.single or roles.blind) or named.kind in OWNED | {OwnedKind.NEW_DATASET}
 
 
 def _mentions(

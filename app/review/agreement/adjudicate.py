@@ -19,7 +19,7 @@ from app.review.people.roles import Action, may
 from app.review.takes.adopt import adopt_take
 from app.review.takes.hand_back import hand_back_take
 from app.review.takes.take import Take, TakeView
-from app.soccer.actors import person_of
+from app.soccer.actors import LOCAL_USER, person_of
 from app.store.agreement import OPEN, agreements_of, agreements_on
 from app.store.store import Store
 
@@ -196,13 +196,16 @@ def hand_back(
 
     Raises:
         NotFoundError: Nothing of the group waits for a decision, or it is no such annotation.
-        ForbiddenError: Others have to decide.
+        ForbiddenError: Others have to decide, or it is their own.
     """
     case = get_case(store, group_id, actor=actor)
     if case.refused is not None:
         raise ForbiddenError(case.refused)
-    if take_id not in [take.id for take in case.takes]:
+    take = next((one for one in case.takes if one.id == take_id), None)
+    if take is None:
         raise NotFoundError(f"annotation {take_id} is not one that waits for a decision here")
+    if take.person == person_of(actor) != LOCAL_USER:
+        raise ForbiddenError("you submitted this annotation yourself", hint="A lead can return it.")
     return hand_back_take(store, take_id, reason, actor=actor, keep=keep)
 
 

@@ -18,6 +18,8 @@ from app.review.editing.state import GroupState
 from app.review.editing.submit import solved
 from app.review.takes.adopt import adopt_take, give_verdict_of
 from app.review.takes.take import Take, find_take_of
+from app.review.work.batches import get_batch
+from app.review.work.own import take_over_handed_in
 from app.soccer.actors import SCRIPT
 from app.store.agreement import (
     AGREED,
@@ -26,6 +28,7 @@ from app.store.agreement import (
     agreements_on,
     decide_agreement,
     never_compared,
+    never_taken_over,
     put_agreement,
     settle_rest,
     verdicts_asked,
@@ -67,7 +70,11 @@ class Weighed:
 
 
 def after_hand_in(store: Store, copy_id: int, paint: PaintFollower | None = None) -> str | None:
-    """Weigh the group whose copy was just handed in; None where there is nothing to weigh yet.
+    """What follows from a copy that was submitted: where nobody else annotates the group it is taken
+    over, else the group is weighed; None where there is nothing to weigh yet.
+
+    It is done once the answer is sent: how long it takes would tell copies of gold groups, of which
+    nothing follows.
 
     Returns:
         ``agreed``: the first annotation was taken over; ``open``: somebody has to decide.
@@ -75,7 +82,14 @@ def after_hand_in(store: Store, copy_id: int, paint: PaintFollower | None = None
     take = find_take_of(store, copy_id)
     if take is None or take.kind != INDEPENDENT or take.handed_in is None:
         return None
-    return weigh(store, take.group_id, take.batch_id, paint)
+    try:
+        if take.batch_id is not None:
+            take_over_handed_in(store, get_batch(store, take.batch_id), take.person)
+        return weigh(store, take.group_id, take.batch_id, paint)
+    except ReviewError as error:
+        # It is tried again with the person's next group, and when the server starts.
+        log.warning("a submitted annotation waits to be taken over", copy=copy_id, error=str(error))
+        return None
 
 
 def weigh(
@@ -120,13 +134,16 @@ def weigh(
 
 
 def weigh_left(store: Store, paint: PaintFollower | None = None) -> int:
-    """Compare what was handed in before a server was stopped, and was not compared any more.
+    """Compare what was handed in before a server was stopped, and was not compared any more; and
+    take over what waits for that.
 
     Returns:
-        How many groups.
+        How many groups were compared.
     """
     with store.read() as session:
-        left = never_compared(session)
+        left, waiting = never_compared(session), never_taken_over(session)
+    for copy_id in waiting:
+        after_hand_in(store, copy_id, paint)
     compared = 0
     for group_id, batch_id in left:
         try:

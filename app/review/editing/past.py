@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import heapq
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from app.errors import NotFoundError
 from app.review.editing.ledger import Ledger, StationRecord
@@ -16,6 +16,7 @@ from app.store.aliases import shown_entries
 from app.store.groups import StoredGroup
 from app.store.log import LogEntry as LogEntry
 from app.store.log import group_entries, station_entries
+from app.store.reader import reads_blind
 from app.store.session import Session
 from app.store.store import Store
 
@@ -56,19 +57,17 @@ class Step:
 def history(store: Store, group_id: int) -> list[LogEntry]:
     """Everything that was said about a group and changed of its static cameras, oldest first.
 
+    Whoever annotates blind is told the places of entries in it instead of their ids.
+
     Raises:
         NotFoundError: There is no such group.
     """
     with store.read() as session:
         stored = need_group(session, group_id)
-        entries = list(_entries(session, stored))
-        first = next(entry.id for entry in entries if entry.group_id is not None)
-        told = (
-            entry
-            for entry in entries
-            if entry.group_id is not None or (entry.kind in STATION_EDITS and entry.id > first)
-        )
-        return shown_entries(session, told)
+        told = shown_entries(session, _told(session, stored))
+        if not reads_blind():
+            return told
+        return [replace(entry, id=place) for place, entry in enumerate(told, start=1)]
 
 
 def read_step(store: Store, group_id: int, entry_id: int) -> Step:
@@ -79,6 +78,9 @@ def read_step(store: Store, group_id: int, entry_id: int) -> Step:
     """
     with store.read() as session:
         stored = need_group(session, group_id)
+        if reads_blind():
+            place, told = entry_id - 1, _told(session, stored)
+            entry_id = told[place].id if place < len(told) else 0
         ledger = _static_cameras(stored)
         before: Group | None = None
         for entry in _entries(session, stored):
@@ -90,6 +92,17 @@ def read_step(store: Store, group_id: int, entry_id: int) -> Step:
                 (shown,) = shown_entries(session, [entry])
                 return _step(shown, before, ledger.group(group_id), stored.view_ids)
     raise NotFoundError(f"group {group_id} has no entry {entry_id}")
+
+
+def _told(session: Session, stored: StoredGroup) -> list[LogEntry]:
+    """The entries of a group's history."""
+    entries = list(_entries(session, stored))
+    first = next(entry.id for entry in entries if entry.group_id is not None)
+    return [
+        entry
+        for entry in entries
+        if entry.group_id is not None or (entry.kind in STATION_EDITS and entry.id > first)
+    ]
 
 
 def _entries(session: Session, stored: StoredGroup) -> Iterator[LogEntry]:

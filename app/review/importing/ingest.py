@@ -9,6 +9,7 @@ from itertools import islice
 from pathlib import Path
 
 from app.datasets.report import Report
+from app.errors import ConflictError
 from app.object_store.address import is_address
 from app.progress import TellProgress
 from app.review.datasets.dataset import insert_dataset
@@ -25,6 +26,7 @@ from app.soccer.group import Group, View
 from app.soccer.pitch import Pitch
 from app.soccer.policy import PAPER, Policy
 from app.store.clock import now
+from app.store.copy_datasets import is_copy
 from app.store.datasets import find_dataset
 from app.store.digest import source_hash
 from app.store.findings import group_findings, groups_told, replace_group_findings
@@ -209,7 +211,15 @@ def ingest_batch(
     """Bring a batch of groups, inside the caller's write transaction.
 
     ``stations`` are shared ones that are counted already: a dry run meets them again.
+
+    Raises:
+        ConflictError: The dataset holds somebody's own annotations, which they alone change.
     """
+    if is_copy(session, origin.dataset_id):
+        raise ConflictError(
+            "this dataset holds one person's own annotations; nothing is imported into it",
+            hint="Import into the dataset that they are of.",
+        )
     shared = SharedStations(session, origin.dataset_id, origin.source, origin.actor)
     for group in batch:
         shared.follow(view.station for view in group.views)

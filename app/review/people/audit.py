@@ -269,8 +269,10 @@ def _own(row: AuditRow, body: Mapping[str, Any]) -> str | None:
     """What became of batches, of somebody's own annotation, of gold groups and of guidelines; None: none of these."""
     did, person, group = (body.get(name) for name in ("did", "person", "group"))
     why = f": {body['reason']}" if body.get("reason") else ""
+    verdict = f", {body['verdict']}" if body.get("verdict") else ""
     said = {
         ("take", "adopted"): f"took over {person}’s independent annotation",
+        ("take", "handed in"): f"submitted their independent annotation{verdict}",
         ("take", "handed back"): f"returned to {person}{why}",
         ("work", "handed back"): f"returned to {person}{why}",
         ("work", "handed in"): f"submitted group {group} of batch {body.get('batch')}",

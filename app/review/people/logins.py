@@ -25,6 +25,7 @@ from app.store.logins import (
     touch_login,
 )
 from app.store.people import forget_links, person_by_id, person_by_name, update_person
+from app.store.reader import Reader
 from app.store.rights import Rights, rights_in, rights_of
 from app.store.second_factors import has_second_factor
 from app.store.session import Session
@@ -104,6 +105,20 @@ class Login:
     def sight(self) -> Sight:
         """What they see."""
         return self.roles.sight(self.owner)
+
+    @property
+    def sight_of_whole(self) -> Sight:
+        """What they see and nothing of which is hidden from them."""
+        return self.roles.sight_of_whole(self.owner)
+
+    @property
+    def reader(self) -> Reader | None:
+        """What is hidden from them; None: nothing."""
+        if self.roles.is_admin:
+            return None
+        return Reader(
+            self.name, self.roles.blind, lambda one: may(self.roles.role_in(one), Action.REVIEW)
+        )
 
 
 @dataclass(frozen=True)
@@ -339,4 +354,19 @@ def roles_with(everywhere: Role, rights: Rights) -> DatasetRoles:
     single = {key: Role(role) for key, role in rights.roles.items()}
     roles = DatasetRoles(everywhere, single)
     copies = {key: roles.role_in(of_id) for key, of_id in rights.copies.items()}
-    return DatasetRoles(everywhere, {**single, **copies})
+    return DatasetRoles(everywhere, {**single, **copies}, blind=_blind_in(roles, rights))
+
+
+def _blind_in(roles: DatasetRoles, rights: Rights) -> dict[int, frozenset[int]]:
+    """The batches in which somebody annotates blind, by dataset.
+
+    Leads see everything. Who judges decides where people differ: also in a batch of their own, once
+    they have nothing left to annotate in it.
+    """
+    found: dict[int, frozenset[int]] = {}
+    for batch, dataset, waits in rights.blind:
+        role = roles.role_in(dataset)
+        if may(role, Action.LEAD) or (may(role, Action.REVIEW) and not waits):
+            continue
+        found[dataset] = found.get(dataset, frozenset()) | {batch}
+    return found

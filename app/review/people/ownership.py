@@ -16,6 +16,7 @@ from app.review.people.roles import DatasetRoles, Role, Sight
 from app.soccer.actors import is_of
 from app.store.dataset_lookup import dataset_of, owner_of_job, versions_like
 from app.store.datasets import find_dataset
+from app.store.reader import Reader, is_hidden_group
 from app.store.session import Session
 from app.store.store import Store
 from app.store.uploads import get_upload
@@ -83,6 +84,25 @@ class Named:
 
     kind: OwnedKind
     by: str | int
+
+
+_GROUPS: Mapping[OwnedKind, str] = {
+    OwnedKind.GROUP: "group",
+    OwnedKind.VIEW: "view",
+    OwnedKind.STATION: "station",
+}
+"""What can be hidden from whoever annotates copies of groups, and its name in ``is_hidden_group``."""
+
+
+def is_hidden_from(store: Store, named: Named, found: Ownership, reader: Reader | None) -> bool:
+    """Whether a group, or what belongs to one, is hidden from somebody who annotates blind."""
+    kind, dataset = _GROUPS.get(named.kind), found.dataset
+    if reader is None or kind is None or not isinstance(named.by, int):
+        return False
+    if dataset is None or dataset not in reader.batches:
+        return False
+    with store.read() as session:
+        return is_hidden_group(session, reader, dataset, **{kind: named.by})
 
 
 def find_ownership(store: Store, named: Named, sight: Sight) -> Ownership | None:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
 from app.errors import ForbiddenError
+from app.store.reader import READER as READER
+from app.store.reader import reads_blind as reads_blind
 from app.store.sight import COPIES
 from app.store.sight import EVERYTHING as EVERYTHING
 from app.store.sight import Sight as Sight
@@ -120,11 +122,14 @@ class DatasetRoles:
         everywhere: In every dataset that ``single`` does not name.
         single: In one dataset, by its id; higher or lower than ``everywhere``.
         limited: They are of a token for one dataset: nothing else of its person's is its own.
+        blind: Open batches of copies that they annotate, by the dataset: its originals are hidden
+            from them meanwhile.
     """
 
     everywhere: Role
     single: Mapping[int, Role] = field(default_factory=dict)
     limited: bool = False
+    blind: Mapping[int, frozenset[int]] = field(default_factory=dict)
 
     @property
     def is_admin(self) -> bool:
@@ -146,7 +151,8 @@ class DatasetRoles:
 
     def only(self, dataset_id: int) -> DatasetRoles:
         """The same rights in one dataset, and none in any other."""
-        return DatasetRoles(Role.NONE, {dataset_id: self.role_in(dataset_id)}, limited=True)
+        role = self.role_in(dataset_id)
+        return DatasetRoles(Role.NONE, {dataset_id: role}, limited=True, blind=self.blind)
 
     def led(self) -> Sight:
         """The datasets of which they are a lead, and nothing that is of none."""
@@ -166,3 +172,12 @@ class DatasetRoles:
             key for key, role in self.single.items() if key > COPIES and role is not Role.NONE
         }
         return Sight(all_but, frozenset(named), name, frozenset(copies))
+
+    def sight_of_whole(self, name: str) -> Sight:
+        """The same without the datasets of which some groups are hidden from them."""
+        sight = self.sight(name)
+        if self.is_admin or not self.blind:
+            return sight
+        hidden = frozenset(self.blind)
+        named = sight.datasets | hidden if sight.all_but else sight.datasets - hidden
+        return replace(sight, datasets=named)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from typing import Literal, get_args
 
@@ -177,5 +178,16 @@ FIELDS = (
 )  # fmt: skip
 BLIND = ("annotations", "takes")
 """Fields that tell what others made of a group: for those alone who judge."""
+_BLIND = re.compile(rf"\b({'|'.join(BLIND)})[:=<>]")
 BY_NAME = {name: field for field in FIELDS for name in (field.name, *field.also)}
 """Fields by every name that is understood."""
+
+
+def asks_blind(query: str) -> bool:
+    """Whether a query asks what others made of groups; also within quotes: rather once too often.
+
+    Example:
+        >>> [asks_blind(text) for text in ("status:accepted takes>=2", "sort:value")]
+        [True, False]
+    """
+    return _BLIND.search(query) is not None

@@ -8,9 +8,11 @@ from typing import Any
 from app.errors import ConflictError, InputError, NotFoundError
 from app.review.answers.keep import Keep, keep_nothing
 from app.review.datasets.naming import checked_title
+from app.review.queue.fields import asks_blind
 from app.review.queue.query import parse_query
 from app.soccer.actors import LOCAL_USER, person_of
 from app.store.listing import Listing
+from app.store.reader import judges_in
 from app.store.saved_views import (
     dataset_saved_views,
     delete_saved_view,
@@ -42,7 +44,7 @@ def list_saved_views(store: Store, dataset_id: int) -> list[SavedView]:
     """The saved views of a dataset, by name, each with the number of groups that match."""
     with store.read() as session:
         rows = dataset_saved_views(session, dataset_id)
-        return [_saved_view(row, _matching(session, row)) for row in rows]
+        return [_saved_view(row, _matching(session, row)) for row in rows if _is_told(row)]
 
 
 def save_view(
@@ -106,9 +108,14 @@ def delete_view(store: Store, view_id: int, *, keep: Keep[SavedView] = keep_noth
 
 def _read(session: Session, view_id: int) -> SavedView:
     row = find_saved_view(session, view_id)
-    if row is None:
+    if row is None or not _is_told(row):
         raise NotFoundError(f"there is no saved view {view_id}")
     return _saved_view(row, _matching(session, row))
+
+
+def _is_told(row: Any) -> bool:
+    """Whether whoever asks may know of a view: its number of groups answers its query."""
+    return judges_in(row.dataset_id) or not asks_blind(row.query)
 
 
 def _matching(session: Session, row: Any) -> int:

@@ -13,6 +13,7 @@ from app.geometry.arrays import BoolArray, FloatArray, IntArray
 from app.review.queue.bins import ERROR_PERCENT, SIGMA_M, even, places
 from app.review.queue.query import NUMBERS, parse_query
 from app.store.listing import Listing
+from app.store.reader import is_blind as is_blind
 from app.store.store import Store
 
 

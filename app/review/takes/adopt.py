@@ -34,11 +34,9 @@ from app.store.queue import refresh_queue
 from app.store.session import Session
 from app.store.stations import groups_of_station, save_station
 from app.store.store import Store
+from app.store.submissions import KIND
 from app.store.takes import GOLD, update_take
 from app.store.verdicts import StoredVerdict, insert_verdicts, next_verdict_id, read_last_verdicts
-
-KIND = "take"
-"""Kind of the log's entries about what became of an own annotation."""
 
 
 def adopt_take(

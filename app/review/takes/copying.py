@@ -66,29 +66,28 @@ def copy_group(session: Session, order: CopyOrder, start: Group) -> int:
     return copy_id
 
 
-def start_of(session: Session, stored: StoredGroup, *, since: str | None = None) -> Group:
-    """A group as its annotator is to find it.
+def gold_start_of(session: Session, stored: StoredGroup) -> Group:
+    """A gold group as its own start says, before it is stripped as all copies of the batch are."""
+    if gold_start(session, stored.id) == IMPORTED:
+        return _imported(session, stored)
+    return stored.group
 
-    Args:
-        session: Any session.
-        stored: The group as it is.
-        since: Edits from this time on are left out, back to the import before; None: it is a gold
-            group, and is stripped of what it shall be measured by.
+
+def stripped(group: Group, start: str) -> Group:
+    """A group without what annotators of a batch with gold groups draw themselves.
+
+    Every copy of such a batch is stripped alike, ordinary ones too: else what a copy begins with
+    tells what it is of.
     """
-    if since is not None:
-        return _before(session, stored, since)
-    start = gold_start(session, stored.id)
-    group = _imported(session, stored) if start == IMPORTED else stored.group
-    views = tuple(
-        view if start == IMPORTED else _stripped(view, bare=start == BARE) for view in group.views
-    )
+    bare = start == BARE
+    group = replace(group, views=tuple(_stripped(view, start) for view in group.views))
     if start == IMPORTED:
-        return replace(group, views=views)
-    return replace(group, views=views, paint={} if start == BARE else group.paint)
+        return replace(group, paint={}, positions={})
+    return replace(group, paint={} if bare else group.paint)
 
 
-def _before(session: Session, stored: StoredGroup, since: str) -> Group:
-    """The group without its edits from a time on, the last one taken back first."""
+def start_of(session: Session, stored: StoredGroup, since: str) -> Group:
+    """A group without its edits from a time on, back to the import before, the last one first."""
     group = stored.group
     for entry in reversed(group_entries(session, stored.id, verdicts=False)):
         if entry.at < since:
@@ -115,19 +114,24 @@ def _imported(session: Session, stored: StoredGroup) -> Group:
     """
     (entry,) = newest_imports(session, [stored.id])
     body = entry.body["base"] or entry.body["group"]
-    stations = {view.key: view.station for view in stored.group.views}
+    present = {view.key: view for view in stored.group.views}
     views = []
     for value in body["views"]:
-        shared = stations.get(value["key"]) if isinstance(value["station"], str) else None
-        views.append(view_from_json(value, shared))
-    return replace(stored.group, views=tuple(views), paint={}, positions={})
+        now = present.get(value["key"])
+        shared = now.station if now and isinstance(value["station"], str) else None
+        view = view_from_json(value, shared)
+        if now is not None:
+            # Which views are left out, and how noisy they are, copies of other groups have, too.
+            view = replace(view, included=now.included, left_out=now.left_out, noise=now.noise)
+        views.append(view)
+    return replace(stored.group, views=tuple(views))
 
 
-def _stripped(view: View, *, bare: bool) -> View:
+def _stripped(view: View, start: str) -> View:
     station = view.station
-    if bare and not station.shared:
+    if start == BARE and not station.shared:
         station = replace(station, lines={}, proposed=())
-    return replace(view, station=station, balls=(), included=True, left_out=None, noise=1.0)
+    return replace(view, station=station, balls=view.balls if start == IMPORTED else ())
 
 
 def _own_view(view: View, own: dict[str, Station]) -> View:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Any
@@ -12,11 +12,15 @@ from app.datasets.camera_json import camera_from_json
 from app.errors import ConflictError, InputError, NotFoundError
 from app.review.answers.keep import Keep, keep_nothing
 from app.review.datasets.dataset import need_dataset
-from app.review.editing.state import GroupState, read_states
+from app.review.editing.known import known_calibrations
+from app.review.editing.state import GroupState, need_group, read_states
 from app.review.editing.submit import load_solved
 from app.review.takes.copying import aligned
 from app.review.takes.errors import AnnotationError, TrueView, error_of, world_error
 from app.soccer.frames import ImagePoint
+from app.soccer.group import Group
+from app.soccer.solution import Solution
+from app.solving.solve import solve
 from app.store.clock import now
 from app.store.codecs import group_from_json, group_to_json
 from app.store.copy_datasets import is_copy
@@ -33,6 +37,7 @@ from app.store.log import Entry, append
 from app.store.session import Session
 from app.store.store import Store
 from app.store.stored_json import Json
+from app.store.submissions import submissions_of
 from app.store.takes import GOLD, takes_in
 from app.store.views import group_dataset
 
@@ -69,7 +74,13 @@ class GoldGroup:
 
 @dataclass(frozen=True)
 class GoldResult:
-    """What one person made of a gold group; ``right``: whether they judged as is true, if they did."""
+    """What one person made of a gold group: what they submitted first, whatever was returned since.
+
+    Attributes:
+        handed_in: When they submitted it first.
+        right: Whether they judged as is true, if they did.
+        submissions: How often they submitted it: more than once where a lead returned it.
+    """
 
     group: int
     label: str
@@ -78,6 +89,7 @@ class GoldResult:
     true_verdict: str
     right: bool | None
     error: AnnotationError
+    submissions: int = 1
 
 
 @dataclass(frozen=True)
@@ -210,12 +222,15 @@ def read_report(store: Store, dataset: str | int) -> GoldReport:
         dataset_id = need_dataset(session, dataset)
         found: dict[str, list[GoldResult]] = {}
         known = {row.group_id: _known(session, row) for row in gold_heads(session, dataset_id)}
-        for take in takes_in(session, dataset_id, kind=GOLD):
-            if take.handed_in is None or take.group_id not in known:
+        takes = [one for one in takes_in(session, dataset_id, kind=GOLD) if one.group_id in known]
+        submitted = submissions_of(session, [take.copy_id for take in takes])
+        for take in takes:
+            made = submitted.get(take.copy_id, [])
+            if take.handed_in is None and not made:
                 continue
             gold, truth = known[take.group_id]
-            (state,) = read_states(session, [take.copy_id])
-            found.setdefault(take.person, []).append(_result(gold, truth, take, state))
+            result = _result(gold, truth, _first(session, take, made), max(len(made), 1))
+            found.setdefault(take.person, []).append(result)
     people = tuple(_person(name, results) for name, results in sorted(found.items()))
     return GoldReport(tuple(gold for gold, _ in known.values()), people)
 
@@ -300,13 +315,37 @@ def _need_gold(session: Session, group_id: int) -> tuple[int, GoldGroup]:
     return row.dataset_id, _known(session, row)[0]
 
 
-def _result(gold: GoldGroup, truth: Json, take: Any, state: GroupState) -> GoldResult:
+@dataclass(frozen=True)
+class _Submission:
+    """An annotation as it was submitted, with its solution."""
+
+    at: str
+    verdict: str | None
+    group: Group
+    solution: Solution | None
+
+
+def _first(session: Session, take: Any, made: Sequence[Mapping[str, Any]]) -> _Submission:
+    """What somebody submitted first of a copy; as the copy is now where no entry holds it."""
+    (state,) = read_states(session, [take.copy_id])
+    if not made:
+        return _Submission(take.handed_in, take.verdict, state.group, state.solution)
+    first = made[0]
+    stored = need_group(session, take.copy_id)
+    if first["inputs_hash"] == stored.inputs_hash:
+        return _Submission(first["at"], first["verdict"], state.group, state.solution)
+    group = group_from_json(first["submitted"])
+    known = known_calibrations(session, [group], state.policy)
+    return _Submission(first["at"], first["verdict"], group, solve(group, state.policy, known))
+
+
+def _result(gold: GoldGroup, truth: Json, said: _Submission, submissions: int) -> GoldResult:
     group = group_from_json(truth["group"])
-    solution = state.solution
+    solution = said.solution
     own = None if solution is None or solution.ball is None else solution.ball.point
     ball = None if truth["ball"] is None else tuple(truth["ball"])
-    verdict, judged = take.verdict, truth["verdict"] in JUDGED
-    annotated = aligned(group, state.group)
+    verdict, judged = said.verdict, truth["verdict"] in JUDGED
+    annotated = aligned(group, said.group)
     if ball is not None and "views" in truth:
         error = world_error(group, true_views(truth), annotated, ball, own)
     else:
@@ -314,11 +353,12 @@ def _result(gold: GoldGroup, truth: Json, take: Any, state: GroupState) -> GoldR
     return GoldResult(
         group=gold.group,
         label=gold.label,
-        handed_in=take.handed_in,
+        handed_in=said.at,
         verdict=verdict,
         true_verdict=truth["verdict"],
         right=verdict == truth["verdict"] if judged and verdict in JUDGED else None,
         error=error,
+        submissions=submissions,
     )
 
 

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from app.errors import ConflictError, InputError
+from app.errors import InputError
 from app.review.answers.keep import Keep, keep_nothing
 from app.review.editing.state import need_group
 from app.review.people.bell import RingKind, tell
-from app.review.takes.adopt import KIND
-from app.review.takes.handed_back import DID
-from app.review.takes.take import Take, TakeView, read_take, reopen_take, show
+from app.review.takes.take import Take, TakeView, read_take, show
 from app.soccer.actors import person_of
 from app.store.clock import now
 from app.store.groups import StoredGroup
 from app.store.log import Entry, append
 from app.store.session import Session
 from app.store.store import Store
+from app.store.submissions import KIND, RETURNED, return_copy
 from app.store.takes import take_of_copy
 from app.store.webhook_outbox import HANDED_BACK, announce, stamp
 
@@ -38,14 +37,18 @@ def hand_back_take(
     Raises:
         NotFoundError: There is no such take.
         ConflictError: It is not handed in, or it was decided about.
-        InputError: The sentence is too long.
+        InputError: There is no sentence, or it is too long.
     """
     said = checked_reason(reason)
+    if not said:
+        raise InputError(
+            "an annotation goes back with a reason",
+            hint="Say in a sentence what its person shall change.",
+            pointer="/reason",
+        )
     with store.write() as session:
         take = read_take(session, take_id)
-        if take.settled is None and take.handed_in is None:
-            raise ConflictError(f"{take.person} has not submitted this yet")
-        reopen_take(session, take)
+        return_copy(session, take)
         copy = take.copy_id
         note_hand_back(session, KIND, copy, take.person, said, actor=actor, batch=take.batch_id)
         back = read_take(session, take_id)
@@ -77,7 +80,7 @@ def note_hand_back(
         batch: Of which batch it is; None: of none.
     """
     group = need_group(session, group_id)
-    body: dict[str, str | int] = {"did": DID, "person": person, "reason": reason}
+    body: dict[str, str | int] = {"did": RETURNED, "person": person, "reason": reason}
     if batch is not None:
         body["batch"] = batch
     at = now()

@@ -9,9 +9,8 @@ from app.soccer.actors import person_of
 from app.store.listing import read_columns
 from app.store.log import read_entries_of
 from app.store.session import Session
+from app.store.submissions import RETURNED
 
-DID = "handed back"
-"""What an entry says was done."""
 _KINDS = ("work", "take")
 """Kinds of such entries: about groups of batches, and about own annotations."""
 
@@ -32,7 +31,7 @@ def read_handed_back(session: Session, group_ids: Sequence[int]) -> dict[int, Ha
     last = {
         entry.group_id: entry
         for entry in read_entries_of(session, group_ids, _KINDS)
-        if entry.group_id is not None and entry.body.get("did") == DID
+        if entry.group_id is not None and entry.body.get("did") == RETURNED
     }
     names = {
         row.group_id: row.label or row.key

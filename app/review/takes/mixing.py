@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from random import Random, SystemRandom
 
@@ -44,9 +44,10 @@ def begin_next(
 ) -> Take | None:
     """The take that a person shall work on now: the one that is open, else a new one.
 
-    New are, in the batch's order, groups that they have no take of and that fewer than
-    ``verdicts`` people have; or a gold group that they never had. Two who ask at once get what
-    they would have got one after the other.
+    New are groups that they have no take of and that fewer than ``verdicts`` people have, in the
+    batch's order; where gold groups are mixed in by chance, lest an order that is known tells which
+    ones they are; or a gold group that they never had. Two who ask at once get what they would have
+    got one after the other.
 
     Args:
         store: The database.
@@ -72,17 +73,16 @@ def _next(session: Session, terms: Terms, person: str, chance: Random) -> Take |
         return waiting
     begun = Counter(row.group_id for row in takes if row.kind == INDEPENDENT)
     had = {take.group_id for take in mine}
-    group_id = next(
-        (one for one in terms.groups if one not in had and begun[one] < terms.verdicts), None
-    )
-    if group_id is None:
+    free = [one for one in terms.groups if one not in had and begun[one] < terms.verdicts]
+    kind, choice = INDEPENDENT, free if terms.gold_every else free[:1]
+    if terms.gold_every and is_gold_turn(
+        [take.kind for take in mine], terms.gold_every, len(free), chance
+    ):
+        fresh = fresh_outside(session, terms.dataset_id, person, terms.groups)
+        kind, choice = (GOLD, fresh) if fresh else (kind, choice)
+    if not choice:
         return None
-    kind = INDEPENDENT
-    if terms.gold_every and is_gold_turn([t.kind for t in mine], terms.gold_every, chance):
-        inside = set(terms.groups)
-        fresh = [one for one in fresh_gold(session, terms.dataset_id, person) if one not in inside]
-        if fresh:
-            group_id, kind = chance.choice(fresh), GOLD
+    group_id = chance.choice(choice)
     return begin(
         session,
         group_id,
@@ -95,16 +95,45 @@ def _next(session: Session, terms: Terms, person: str, chance: Random) -> Take |
     )
 
 
-def is_gold_turn(kinds: Sequence[str], every: int, chance: Random) -> bool:
+def fresh_outside(
+    session: Session, dataset_id: int, person: str, groups: Collection[int]
+) -> list[int]:
+    """Gold groups of a dataset that a person never had, and that wait in no batch of theirs."""
+    inside = set(groups)
+    return [one for one in fresh_gold(session, dataset_id, person) if one not in inside]
+
+
+def is_gold_turn(kinds: Sequence[str], every: int, free: int, chance: Random) -> bool:
     """Whether the take after these is a gold one: one of each ``every``, at a place by chance.
+
+    The last ones of a batch, which may be fewer, have one among them, too: the last take is a gold
+    one as often as any other.
 
     Args:
         kinds: Of the takes of a person so far, in order.
         every: How many takes have one gold group among them.
+        free: How many ordinary groups there are left for them.
         chance: Decides where.
     """
     begun = len(kinds) % every
-    block = kinds[len(kinds) - begun :]
-    if GOLD in block:
+    if GOLD in kinds[len(kinds) - begun :] or (begun == 0 and free == 0):
         return False
-    return chance.randrange(every - begun) == 0
+    return chance.randrange(min(every - begun, free + 1)) == 0
+
+
+def count_gold_left(kinds: Sequence[str], every: int, free: int, fresh: int) -> int:
+    """How many gold takes are still to come, by ``is_gold_turn``: what is left for somebody counts
+    them, so that it falls by one with each take, whatever it is of.
+
+    Args:
+        kinds: Of the takes of a person so far, in order.
+        every: How many takes have one gold group among them.
+        free: How many ordinary groups there are left for them.
+        fresh: How many gold groups they never had.
+    """
+    begun = len(kinds) % every
+    due = begun > 0 and GOLD not in kinds[len(kinds) - begun :]
+    here = every - begun - due if begun else 0
+    rest = max(free - here, 0)
+    later = -(-rest // (every - 1)) if every > 1 else fresh if rest else 0
+    return min(due + later, fresh)

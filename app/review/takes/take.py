@@ -9,19 +9,21 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from app.errors import ConflictError, ForbiddenError, NotFoundError
+from app.errors import ConflictError, NotFoundError
 from app.review.answers.keep import Keep, keep_nothing
 from app.review.datasets.dataset import need_dataset
 from app.review.editing.state import need_group
 from app.review.editing.submit import solved
-from app.review.takes.copying import CopyOrder, copy_group, start_of
+from app.review.takes.copying import CopyOrder, copy_group, gold_start_of, start_of, stripped
 from app.review.takes.handed_back import HandedBack, read_handed_back
 from app.soccer.actors import person_of
-from app.store.agreement import forget_open
 from app.store.clock import now
+from app.store.gold import common_start
 from app.store.groups import read_groups
+from app.store.reader import READER
 from app.store.session import Session
 from app.store.store import Store
+from app.store.submissions import submit_copy
 from app.store.takes import (
     GOLD,
     INDEPENDENT,
@@ -32,7 +34,6 @@ from app.store.takes import (
     take_of_copy,
     takes_in,
     takes_of_group,
-    update_take,
 )
 
 
@@ -136,7 +137,8 @@ def begin(
         kind: ``independent`` or ``gold``.
         since: When the batch began: edits of the original from then on are not seen.
         blind: Begin with the group as it was then, else as the last take of it left it.
-        nameless: The copy does not say which group it is of.
+        nameless: The copy is of a batch with gold groups: it does not say which group it is of, and
+            begins with what all copies of such a batch begin with.
     """
     stored = need_group(session, group_id)
     others = [one for one in takes_of_group(session, group_id) if one.batch_id == batch_id]
@@ -151,11 +153,14 @@ def begin(
     ready = [one.copy_id for one in others if one.handed_in is not None]
     start = stored.group
     if kind == GOLD:
-        start = start_of(session, stored)
-    elif blind and since is not None:
-        start = start_of(session, stored, since=since)
+        start = gold_start_of(session, stored)
+    elif (blind or nameless) and since is not None:
+        start = start_of(session, stored, since)
     elif not blind and ready:
         start = need_group(session, ready[-1]).group
+    common = common_start(session, stored.dataset_id) if nameless else None
+    if common is not None:
+        start = stripped(start, common)
     order = CopyOrder(stored, batch_id, person, f"{batch_id or 0}-{place}" if nameless else None)
     copy_id = copy_group(session, order, start)
     take_id = insert_take(
@@ -171,45 +176,21 @@ def begin(
 
 
 def hand_in(store: Store, take_id: int, *, actor: str, keep: Keep[TakeView] = keep_nothing) -> Take:
-    """Say that an independent annotation is done; from then on it stays as it is.
+    """Submit an independent annotation; from then on it stays as it is.
 
     ``keep`` keeps the answer in the transaction.
 
     Raises:
         NotFoundError: There is no such take.
         ForbiddenError: It is somebody else's.
+        ConflictError: It was submitted already.
     """
     with store.write() as session:
         take = read_take(session, take_id)
-        if person_of(actor) != take.person:
-            raise ForbiddenError(f"only {take.person} can submit this")
-        if take.handed_in is None:
-            update_take(session, take_id, handed_in=now())
+        submit_copy(session, take, actor=actor, at=now())
         handed = read_take(session, take_id)
         keep(show(session, handed))(session)
         return handed
-
-
-def reopen(store: Store, take_id: int, *, keep: Keep[TakeView] = keep_nothing) -> Take:
-    """Let the person of a take go on with it; ``keep`` keeps the answer in the transaction.
-
-    Raises:
-        NotFoundError: There is no such take.
-        ConflictError: It was decided about it.
-    """
-    with store.write() as session:
-        reopen_take(session, read_take(session, take_id))
-        opened = read_take(session, take_id)
-        keep(show(session, opened))(session)
-        return opened
-
-
-def reopen_take(session: Session, take: Take) -> None:
-    """``reopen`` within a write session; what was compared with it waits for no decision any more."""
-    if take.settled is not None:
-        raise ConflictError("this annotation was adjudicated already")
-    update_take(session, take.id, handed_in=None)
-    forget_open(session, take.group_id, take.batch_id or 0)
 
 
 def get_take(store: Store, take_id: int) -> Take:
@@ -275,6 +256,8 @@ def show(session: Session, take: Take) -> TakeView:
 
 def _shown(session: Session, takes: Sequence[Take]) -> list[TakeView]:
     heads = {row.id: row for row in names_of(session, [one.copy_id for one in takes])}
+    reader = READER.get()
+    blind = frozenset[int]() if reader is None else frozenset().union(*reader.batches.values())
     waiting = [one.copy_id for one in takes if one.handed_in is None and one.settled is None]
     back = read_handed_back(session, waiting)
     return [
@@ -284,14 +267,15 @@ def _shown(session: Session, takes: Sequence[Take]) -> list[TakeView]:
             group=one.copy_id,
             dataset=heads[one.copy_id].of_id,
             # A copy that says not what it is of has another key.
-            of=one.group_id if heads[one.copy_id].same else None,
+            of=one.group_id if heads[one.copy_id].same and one.batch_id not in blind else None,
             title=heads[one.copy_id].label or heads[one.copy_id].key,
             person=one.person,
             place=one.place,
             begun=one.begun,
             handed_in=one.handed_in,
             verdict=one.verdict,
-            settled=one.settled,
+            # Of a gold group nothing is ever decided.
+            settled=None if one.batch_id in blind else one.settled,
             handed_back=back.get(one.copy_id),
         )
         for one in takes

@@ -15,6 +15,7 @@ from typing import Any
 from app.errors import ConflictError
 from app.review.answers.keep import Keep, keep_nothing
 from app.review.answers.saved_progress import SavedProgress
+from app.review.queue.fields import asks_blind
 from app.review.queue.query import MAX_LISTED_LENGTH, parse_query
 from app.review.verdicts.verdict import Verdict, check_verdict
 from app.store.batches import (
@@ -31,6 +32,7 @@ from app.store.clock import now
 from app.store.listing import Listing, read_columns
 from app.store.log import Entry, append
 from app.store.queue import edited_groups, refresh_verdicts
+from app.store.reader import judges_in
 from app.store.session import Session
 from app.store.solutions import present_keys
 from app.store.store import Store
@@ -210,9 +212,14 @@ def _require_expected(found: SortedOut, expected: int | None) -> None:
 
 
 def list_batches(store: Store, dataset_id: int, limit: int = 20) -> list[StoredBulkVerdict]:
-    """The newest bulk verdicts of a dataset, the newest first."""
+    """The newest bulk verdicts of a dataset, the newest first.
+
+    Those whose query asks what is for reviewers alone are told to these alone: they say how many
+    groups it found.
+    """
     with store.read() as session:
-        return read_batches(session, dataset_id, limit)
+        found = read_batches(session, dataset_id, limit)
+    return [one for one in found if judges_in(dataset_id) or not asks_blind(one.query)]
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,6 @@ from typing import get_args
 
 from app.errors import InputError
 from app.review.answers.keep import Keep, keep_nothing
-from app.review.editing.copies import require_unsettled
 from app.review.editing.etags import require_said, require_unchanged
 from app.review.editing.state import GroupState
 from app.review.editing.submit import read_solved
@@ -53,6 +52,8 @@ def set_verdict(
     Raises:
         InputError: Unknown state or reason, or a note is missing.
         StaleRevisionError: The group is not what the person saw.
+        ForbiddenError: It is somebody else's independent annotation.
+        ConflictError: It is an independent annotation that was submitted.
     """
     verdict = check_verdict(state, reason, note)
     while True:
@@ -64,7 +65,6 @@ def set_verdict(
         with store.write() as session:
             policy_hash = require_unchanged(session, group_id, if_match, what)
             require_said(session, group_id, record.said, if_match, what)
-            require_unsettled(session, stored.dataset_id, group_id)
             # Under another policy other gates may fail.
             if policy_hash == stored.policy.hash:
                 given = _given(session, stored, verdict, override, actor)

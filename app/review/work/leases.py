@@ -15,9 +15,10 @@ from app.review.answers.keep import Keep, keep_nothing
 from app.review.takes.hand_back import checked_reason, note_hand_back
 from app.review.takes.handed_back import HandedBack, read_handed_back
 from app.review.work.batches import WORK, Batch, Here, Part, read_batch
-from app.review.work.own import hand_in_own, next_own, own_of, returned_to, takes_part
+from app.review.work.own import as_seen, hand_in_own, next_own, own_of, returned_to, takes_part
 from app.store.clock import text_of
 from app.store.log import Entry, append
+from app.store.reader import is_blind
 from app.store.session import Session
 from app.store.store import Store
 from app.store.work import (
@@ -145,6 +146,7 @@ class Leases:
             batch = _open_batch(session, batch_id)
             if own_of(session, batch, group, worker.name) is not None:
                 return Lease(batch, group, Part.ANNOTATOR)
+            _require_given(session, batch, group, worker)
             parts, row = _need_parts(batch, worker), _group(session, batch, group)
             others = _others(session, batch, group, worker, self._now())
             if others and not take_over:
@@ -160,7 +162,7 @@ class Leases:
             NotFoundError: There is no such batch.
         """
         with self._store.write(lasting=False) as session:
-            batch = read_batch(session, batch_id, with_here=False)
+            batch = as_seen(session, read_batch(session, batch_id, with_here=False))
             end_lease_of(session, batch_id, group, worker.name)
             return Lease(batch, group, here=_here(session, batch, group, self._now()))
 
@@ -192,6 +194,7 @@ class Leases:
             return lease
         with self._store.write() as session:
             batch = _open_batch(session, batch_id)
+            _require_given(session, batch, group, worker)
             row = _group(session, batch, group)
             if Part.ANNOTATOR not in worker.parts(batch):
                 raise ConflictError(f'you are no annotator of the batch "{batch.name}"')
@@ -242,7 +245,7 @@ class Leases:
     ) -> Lease:
         """The answer once somebody's lease has ended with what they said of the group."""
         end_lease_of(session, batch_id, group, worker.name)
-        batch = read_batch(session, batch_id)
+        batch = as_seen(session, read_batch(session, batch_id))
         lease = Lease(batch, group, here=_here(session, batch, group, self._now()))
         keep(lease)(session)
         return lease
@@ -295,7 +298,9 @@ def open_for(
             continue
         # Where nobody annotates, a reviewer gets everything that waits.
         handed_in = (part is Part.REVIEWER) if batch.annotators else None
-        found = waiting_group(session, batch.id, worker.name, at, handed_in=handed_in, after=place)
+        found = waiting_group(
+            session, batch.id, batch.dataset_id, worker.name, at, handed_in=handed_in, after=place
+        )
         if found is not None:
             return found, part
     return None
@@ -320,7 +325,7 @@ def _open_batch(session: Session, batch_id: int) -> Batch:
     batch = read_batch(session, batch_id, with_here=False)
     if not batch.is_open:
         raise ConflictError(f'the batch "{batch.name}" is closed')
-    return batch
+    return as_seen(session, batch)
 
 
 def _need_parts(batch: Batch, worker: Worker) -> set[Part]:
@@ -339,8 +344,24 @@ def _part_in(parts: set[Part], row: Any) -> Part:
     return Part.REVIEWER
 
 
+def _require_given(session: Session, batch: Batch, group: int, worker: Worker) -> None:
+    """Who works on copies that tell nothing of their originals does not open these by the batch.
+
+    Raises:
+        NotFoundError: As of a group that is not in it.
+    """
+    if not is_blind(batch.dataset_id) or not takes_part(batch, worker.parts(batch)):
+        return
+    if group not in returned_to(session, batch, worker.name):
+        raise _no_group(batch, group)
+
+
+def _no_group(batch: Batch, group: int) -> NotFoundError:
+    return NotFoundError(f'the batch "{batch.name}" has no group {group}')
+
+
 def _group(session: Session, batch: Batch, group: int) -> Any:
     row = group_in(session, batch.id, group)
     if row is None:
-        raise NotFoundError(f'the batch "{batch.name}" has no group {group}')
+        raise _no_group(batch, group)
     return row

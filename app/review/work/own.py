@@ -5,17 +5,21 @@ everybody works on copies that nobody else sees.
 from __future__ import annotations
 
 from collections.abc import Collection
+from dataclasses import replace
 
 from app.errors import ConflictError
 from app.review.answers.keep import Keep, keep_nothing
+from app.review.queue.fields import asks_blind
 from app.review.takes.adopt import adopt_take
-from app.review.takes.mixing import Terms, begin_next
-from app.review.takes.take import Take, TakeView, hand_in, read_take, reopen
-from app.review.work.batches import Batch, Part
+from app.review.takes.mixing import Terms, begin_next, count_gold_left, fresh_outside
+from app.review.takes.take import Take, TakeView, hand_in, read_take
+from app.review.work.batches import Batch, Part, get_batch, list_batches
 from app.soccer.actors import person_of
 from app.store.clock import now
+from app.store.reader import READER, judges_in
 from app.store.session import Session
 from app.store.store import Store
+from app.store.submissions import require_open
 from app.store.takes import INDEPENDENT, count_left, take_of_copy, takes_of_batch
 from app.store.work import groups_of, groups_returned
 from app.store.work import hand_in as hand_in_group
@@ -38,13 +42,7 @@ def next_own(store: Store, batch: Batch, person: str) -> Take | None:
     """
     take_over_handed_in(store, batch, person)
     with store.read() as session:
-        # What was handed in before gold groups were mixed in waits for its reviewer.
-        waiting = [
-            row
-            for row in groups_of(session, batch.id)
-            if row.settled is None and row.handed_in is None
-        ]
-        groups = [row.group_id for row in waiting]
+        groups = _waiting(session, batch)
     terms = Terms(
         batch.id,
         batch.dataset_id,
@@ -66,8 +64,62 @@ def own_left(session: Session, batch: Batch, person: str) -> int:
     """Of how many groups somebody may still make an annotation of their own, begun ones and those
     that they have back included."""
     name = person_of(person)
-    left = count_left(session, batch.id, batch.dataset_id, name, batch.verdicts)
-    return left + len(returned_to(session, batch, person))
+    begun, free = count_left(session, batch.id, batch.dataset_id, name, batch.verdicts)
+    left = begun + free + len(returned_to(session, batch, person))
+    if batch.gold_every is None:
+        return left
+    takes = takes_of_batch(session, batch.id, batch.dataset_id)
+    kinds = [take.kind for take in takes if take.person == name]
+    fresh = len(fresh_outside(session, batch.dataset_id, name, _waiting(session, batch)))
+    return left + count_gold_left(kinds, batch.gold_every, free, fresh)
+
+
+def as_seen(session: Session, batch: Batch) -> Batch:
+    """A batch as whoever asks may see it.
+
+    Of one that they annotate blind they see their own part alone: counts of the groups change with
+    what is submitted of them, and not with what is submitted of a gold group.
+    """
+    if asks_blind(batch.query) and not judges_in(batch.dataset_id):
+        batch = replace(batch, query="")
+    reader = READER.get()
+    if reader is None or batch.id not in reader.batches.get(batch.dataset_id, ()):
+        return batch
+    takes = takes_of_batch(session, batch.id, batch.dataset_id)
+    done = [take.handed_in for take in takes if take.person == reader.person and take.handed_in]
+    left = own_left(session, batch, reader.person)
+    return replace(
+        batch,
+        query="",
+        groups=len(done) + left,
+        handed_in=len(done),
+        settled=0,
+        last=max(done, default=None),
+        here=[],
+    )
+
+
+def seen_batches(store: Store, dataset: str | int) -> list[Batch]:
+    """The batches of a dataset as whoever asks may see them."""
+    found = list_batches(store, dataset)
+    with store.read() as session:
+        return [as_seen(session, batch) for batch in found]
+
+
+def seen_batch(store: Store, batch_id: int) -> Batch:
+    """A batch as whoever asks may see it; raises NotFoundError where there is none."""
+    batch = get_batch(store, batch_id)
+    with store.read() as session:
+        return as_seen(session, batch)
+
+
+def _waiting(session: Session, batch: Batch) -> list[int]:
+    """The groups of a batch that wait; what was handed in otherwise waits for its reviewer."""
+    return [
+        row.group_id
+        for row in groups_of(session, batch.id)
+        if row.settled is None and row.handed_in is None
+    ]
 
 
 def take_over_handed_in(store: Store, batch: Batch, person: str) -> None:
@@ -111,17 +163,14 @@ def hand_in_own(
     done: bool,
     keep: Keep[TakeView] = keep_nothing,
 ) -> None:
-    """Hand an own annotation in, or go on with it while nothing was decided about it.
+    """Submit an own annotation; ``done`` False: refused, only a lead lets its person go on with it.
 
     ``keep`` keeps the answer in the transaction.
 
     Raises:
-        ConflictError: It was taken over, or decided about.
+        ConflictError: It was submitted before, or is not and shall be taken back.
     """
-    if done:
-        hand_in(store, take.id, actor=actor, keep=keep)
-        take_over_handed_in(store, batch, take.person)
-    elif take.verdict is not None:
-        raise ConflictError("you have reviewed this group", hint="Take your verdict back.")
-    else:
-        reopen(store, take.id, keep=keep)
+    if not done:
+        require_open(take)
+        raise ConflictError("this annotation is not submitted yet")
+    hand_in(store, take.id, actor=actor, keep=keep)

@@ -19,7 +19,8 @@ from app.review.importing.ingest import ingest
 from app.review.people.people import invite
 from app.review.people.roles import Role
 from app.review.queue.listing import list_groups
-from app.review.takes.take import Take, begin_take, get_take, list_takes, reopen
+from app.review.takes.hand_back import hand_back_take
+from app.review.takes.take import Take, begin_take, get_take, list_takes
 from app.review.verdicts.verdict import set_verdict
 from app.store.store import Store
 
@@ -228,10 +229,8 @@ class TestHandBack:
         assert [found(f"annotations:{one}") for one in ("waiting", "decided")] == [0, 1]
         assert list_groups(store, state.dataset_id, "takes:2").items[0].came_to == "decided"
 
-    def test_whoever_goes_on_by_themselves_leaves_nothing_that_waits(
-        self, store, state, takes
-    ) -> None:
-        reopen(store, takes[0].id)
+    def test_what_a_lead_returned_leaves_nothing_that_waits(self, store, state, takes) -> None:
+        hand_back_take(store, takes[0].id, "the ball", actor="lea")
         assert list_waiting(store, state.dataset) == []
 
     def test_nobody_hands_back_where_others_have_to_decide(self, store, state, takes) -> None:

@@ -6,7 +6,7 @@ import pytest
 from sqlalchemy import text
 
 from app.datasets.report import Report
-from app.errors import NotFoundError
+from app.errors import ConflictError, NotFoundError
 from app.review.datasets.dataset import get_dataset, list_datasets
 from app.review.editing.edit import IncludeView, SetBall, SetLines, SetStationLines
 from app.review.editing.past import history
@@ -16,6 +16,7 @@ from app.review.editing.submit import load, submit
 from app.review.editing.undo import undo
 from app.review.importing.cameras import ingest_cameras
 from app.review.importing.ingest import ensure_dataset, ingest
+from app.review.takes.take import begin_take
 from app.soccer.annotation import BallAnnotation, make_lines
 from app.soccer.frames import Box, ImagePoint
 from app.soccer.group import Group
@@ -60,6 +61,16 @@ def rows(store: Store) -> dict[str, int]:
 
 
 class TestIngest:
+    def test_nothing_is_imported_into_what_one_person_annotates_on_their_own(
+        self, store, fill, make_group
+    ) -> None:
+        (group,) = fill(make_group())
+        take = begin_take(store, group, person="ann")
+        name = load(store, take.copy_id).dataset
+        with pytest.raises(ConflictError, match="own annotations"):
+            ingest(store, name, [make_group(7)], source="test", actor="lea")
+        assert load(store, take.copy_id).group == load(store, group).group
+
     def test_a_group_comes_back_as_it_went_in(self, store, fill, make_group) -> None:
         group = make_group()
         state = load(store, fill(group, solved=False)[0])

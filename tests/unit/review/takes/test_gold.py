@@ -12,7 +12,9 @@ from app.review.editing.past import history
 from app.review.editing.submit import load, submit
 from app.review.takes.errors import polyline_distance
 from app.review.takes.gold import mark, middle_of, read_report, start_with, unmark, wilson
+from app.review.takes.hand_back import hand_back_take
 from app.review.takes.mixing import Terms, begin_next
+from app.review.takes.take import hand_in
 from app.review.verdicts.verdict import set_verdict
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import Box, ImagePoint
@@ -100,7 +102,7 @@ class TestMixing:
         assert len(shapes) == 1
         assert [copy.group.label for copy in copies] == ["Group 1", "Group 2", "Group 3"]
         kinds_of = {tuple(e.kind for e in history(store, copy.id)) for copy in copies}
-        assert kinds_of == {("import", "verdict")}
+        assert kinds_of == {("import", "verdict", "take")}
 
     @pytest.mark.parametrize(
         ("start", "balls", "lines"), [("without_balls", 0, True), ("bare", 0, False)]
@@ -144,6 +146,28 @@ class TestReadReport:
         assert (result.error.line_px, result.error.lines_missing) == (0.0, 1)
         assert result.error.ball_m is not None and result.error.ball_m > 0.0
         assert (person.line_px.count, person.line_px.low) == (1, None)
+
+    def test_what_was_submitted_first_is_measured_whatever_a_lead_returned_since(
+        self, store, terms
+    ) -> None:
+        take = next(
+            one
+            for one in iter(lambda: begin_next(store, terms, person="ann", chance=Random(1)), None)
+            if one.kind == "gold" or not hand_in(store, one.id, actor="ann")
+        )
+        view = load(store, take.copy_id).group.views[0]
+        box = view.balls[0].box
+        wrong = BallAnnotation(box=Box(box.x + 30.0, box.y, box.width, box.height))
+        change(store, take.copy_id, SetBall(view.key, wrong), "ann")
+        hand_in(store, take.id, actor="ann")
+        (first,) = read_report(store, terms.dataset_id).people[0].results
+        assert (first.error.ball_px, first.submissions) == (pytest.approx(30.0), 1)
+        hand_back_take(store, take.id, "look again", actor="lea")
+        assert read_report(store, terms.dataset_id).people[0].results == (first,)
+        change(store, take.copy_id, SetBall(view.key, view.balls[0]), "ann")
+        judge(store, take.copy_id, actor="ann")
+        (second,) = read_report(store, terms.dataset_id).people[0].results
+        assert second == replace(first, submissions=2)
 
 
 class TestNumbers:

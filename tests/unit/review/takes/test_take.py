@@ -5,7 +5,7 @@ from random import Random
 
 import pytest
 
-from app.errors import ConflictError, ForbiddenError, NotFoundError
+from app.errors import ConflictError, ForbiddenError, InputError, NotFoundError
 from app.review.datasets.dataset import insert_dataset, list_datasets
 from app.review.datasets.delete import delete_dataset
 from app.review.doctor.database import examine
@@ -23,8 +23,12 @@ from app.review.people.roles import Role
 from app.review.policies.policy import change_policy
 from app.review.queue.changes import read_news
 from app.review.takes.adopt import adopt_take
-from app.review.takes.mixing import Terms, begin_next, is_gold_turn
-from app.review.takes.take import begin_take, get_take, get_take_of, hand_in, list_takes, reopen
+from app.review.takes.gold import mark
+from app.review.takes.hand_back import hand_back_take
+from app.review.takes.mixing import Terms, begin_next, count_gold_left, is_gold_turn
+from app.review.takes.take import begin_take, get_take, get_take_of, hand_in, list_takes
+from app.review.verdicts.bulk import give_verdicts, list_batches
+from app.review.verdicts.bulk_undo import undo_batch
 from app.review.verdicts.verdict import set_verdict
 from app.review.work.batches import NewBatch, make_batch
 from app.review.work.own import own_left
@@ -156,13 +160,40 @@ class TestBeginTake:
         assert adopted.group.views[0].balls == (BALL,)
 
 
+class TestStart:
+    @pytest.mark.parametrize(
+        ("starts", "balls", "lines"),
+        [
+            (("imported", "imported"), True, True),
+            (("imported", "without_balls"), False, True),
+            (("bare", "imported"), False, False),
+        ],
+    )
+    def test_every_copy_of_a_batch_with_gold_groups_begins_alike(
+        self, store, fill, make_group, starts, balls, lines
+    ) -> None:
+        groups = fill(*(make_group(number) for number in range(1, 6)))
+        for group, start in zip(groups[3:], starts, strict=True):
+            judge(store, group, actor="lea")
+            mark(store, group, start, actor="lea")
+        terms = Terms(7, load(store, groups[0]).dataset_id, groups[:3], 1, True, "2000", 2)
+        kinds = []
+        while (take := begin_next(store, terms, person="ann", chance=Random(3))) is not None:
+            kinds.append(take.kind)
+            copy = load(store, take.copy_id).group
+            assert [bool(view.balls) for view in copy.views] == [balls] * len(copy.views)
+            assert [bool(view.station.lines) for view in copy.views] == [lines] * len(copy.views)
+            hand_in(store, take.id, actor="ann")
+        assert sorted(kinds) == ["gold", "gold", "independent", "independent", "independent"]
+
+
 class TestHandIn:
     def test_it_changes_no_more(self, store, state) -> None:
         take = begin_take(store, state.id, person="ann")
         assert hand_in(store, take.id, actor="ann").handed_in is not None
         with pytest.raises(ConflictError):
             change(store, take.copy_id, SetBall(state.group.views[0].key, BALL))
-        reopen(store, take.id)
+        hand_back_take(store, take.id, "the ball", actor="lea")
         change(store, take.copy_id, SetBall(state.group.views[0].key, BALL))
 
     def test_nobody_hands_in_the_copy_of_somebody_else(self, store, state) -> None:
@@ -170,14 +201,44 @@ class TestHandIn:
         with pytest.raises(ForbiddenError):
             hand_in(store, take.id, actor="ben")
 
-    def test_a_verdict_does_it_until_it_is_taken_back(self, store, state) -> None:
+    def test_a_verdict_does_it_and_is_not_taken_back(self, store, state) -> None:
         take = begin_take(store, state.id, person="ann")
         judge(store, take.copy_id, "rejected", reason="other")
         found = get_take_of(store, take.copy_id)
         assert (found.verdict, found.handed_in is not None) == ("rejected", True)
-        judge(store, take.copy_id, "unreviewed")
-        found = get_take(store, take.id)
-        assert (found.verdict, found.handed_in) == (None, None)
+        for verdict in ("unreviewed", "accepted", "deferred"):
+            with pytest.raises(ConflictError, match="submitted"):
+                judge(store, take.copy_id, verdict)
+        assert get_take(store, take.id) == found
+
+    def test_only_its_person_judges_it(self, store, state) -> None:
+        take = begin_take(store, state.id, person="ann")
+        with pytest.raises(ForbiddenError, match="only ann"):
+            judge(store, take.copy_id, actor="ben")
+        dataset = load(store, take.copy_id).dataset_id
+        with pytest.raises(ForbiddenError, match="only ann"):
+            give_verdicts(store, dataset, "", "deferred", actor="ben")
+        give_verdicts(store, dataset, "", "deferred", actor="ann")
+        (batch,) = list_batches(store, dataset)
+        with pytest.raises(ConflictError, match="submitted"):
+            undo_batch(store, batch.id, actor="ann")
+        assert get_take(store, take.id).verdict == "deferred"
+
+    def test_a_lead_returns_it_with_a_reason_and_each_step_is_in_the_log(
+        self, store, state
+    ) -> None:
+        take = begin_take(store, state.id, person="ann")
+        hand_in(store, take.id, actor="ann")
+        with pytest.raises(ConflictError, match="submitted"):
+            hand_in(store, take.id, actor="ann")
+        with pytest.raises(InputError) as refused:
+            hand_back_take(store, take.id, "  ", actor="lea")
+        assert refused.value.pointer == "/reason"
+        hand_back_take(store, take.id, "the ball", actor="lea")
+        hand_in(store, take.id, actor="ann")
+        said = [(one.actor, one.body["did"]) for one in history(store, take.copy_id)[1:]]
+        assert said == [("ann", "handed in"), ("lea", "handed back"), ("ann", "handed in")]
+        assert faults(store) == []
 
 
 class TestAdoptTake:
@@ -313,7 +374,31 @@ class TestBeginNext:
     def test_one_of_each_block_is_gold_and_nobody_knows_which(self) -> None:
         every, chance, kinds = 5, Random(4), list[str]()
         for _ in range(every * 100):
-            kinds.append("gold" if is_gold_turn(kinds, every, chance) else "independent")
+            kinds.append("gold" if is_gold_turn(kinds, every, 1000, chance) else "independent")
         blocks = [kinds[at : at + every] for at in range(0, len(kinds), every)]
         assert all(block.count("gold") == 1 for block in blocks)
         assert len({block.index("gold") for block in blocks}) == every
+
+    @pytest.mark.parametrize(
+        ("every", "groups", "fresh", "runs_out"),
+        [(4, 10, 99, False), (2, 7, 3, True), (1, 3, 5, True), (5, 2, 1, False)],
+    )
+    def test_the_last_one_is_gold_as_often_and_what_is_left_falls_by_one(
+        self, every: int, groups: int, fresh: int, runs_out: bool
+    ) -> None:
+        chance, last = Random(8), set()
+        for _ in range(60):
+            kinds, free, gold = list[str](), groups, fresh
+            while True:
+                left = free + count_gold_left(kinds, every, free, gold)
+                if gold and is_gold_turn(kinds, every, free, chance):
+                    kinds, gold = [*kinds, "gold"], gold - 1
+                elif free:
+                    kinds, free = [*kinds, "independent"], free - 1
+                else:
+                    break
+                assert free + count_gold_left(kinds, every, free, gold) == left - 1
+            assert left == 0
+            last.add(kinds[-1])
+        # Where gold groups run out, ordinary ones are left.
+        assert last == ({"independent"} if runs_out else {"independent", "gold"})

@@ -8,7 +8,7 @@ from datetime import UTC, datetime, timedelta
 import pytest
 
 from app.errors import ConflictError, HeldGroupError, InputError, NotFoundError
-from app.review.agreement.weigh import after_hand_in
+from app.review.agreement.weigh import after_hand_in, weigh_left
 from app.review.answers.keep import Kept
 from app.review.editing.replay import replay
 from app.review.editing.submit import load
@@ -288,8 +288,11 @@ class TestLeases:
         batch = make_batch(store, dataset, new, actor="lead").id
         had = 0
         while (copy := leases.next(batch, ADA).group) is not None:
+            # What is left falls by one with each, whatever it is a copy of.
+            assert [one.left for one in my_work(store, lambda _: ADA)] == [3 - had]
             leases.hand_in(batch, copy, ADA, actor="ada")
             had += 1
+            assert [one.left for one in my_work(store, lambda _: ADA)] == [3 - had]
         assert had == 3
         assert get_batch(store, batch).handed_in == 2
         found = leases.next(batch, BO)
@@ -303,6 +306,17 @@ class TestLeases:
         assert leases.next(batch, ADA).group is None
         judge(store, groups[0], "bo")
         assert leases.next(batch, BO).group == groups[1]
+
+    def test_what_was_submitted_before_a_stop_is_taken_over_when_the_server_starts(
+        self, store, dataset, groups, leases
+    ):
+        new = NewBatch("a", size=1, annotators=["ada"], reviewers=["bo"], gold_every=1000)
+        batch = make_batch(store, dataset, new, actor="lead").id
+        copy = leases.next(batch, ADA).group
+        leases.hand_in(batch, copy, ADA, actor="ada")
+        assert get_batch(store, batch).handed_in == 0
+        weigh_left(store)
+        assert get_batch(store, batch).handed_in == 1
 
     def test_nothing_is_given_out_of_a_closed_one(self, store, dataset, groups, leases):
         batch = make_batch(store, dataset, NewBatch("a"), actor="lead").id
