@@ -39,7 +39,8 @@ PLAIN_WORDS = """
     joined turns
     proof provider identities sign
     access account join links login logins passwords roles team tokens
-    bearer codes me remote rules tries users
+    bearer codes devices me remote rules tries users
+    characters corner null
     adopt aliases asked concealment needs ownership rights sight
     actors
     candidate drawn proposal propose scoring search straight
