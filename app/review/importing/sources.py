@@ -13,10 +13,10 @@ from app.datasets.file_tree import Limits, Root
 from app.datasets.format_names import ImportFormat
 from app.datasets.frame_list import read_frame_list
 from app.datasets.gamestate_reader import read_gamestate
-from app.datasets.guess_format import guess_format
 from app.datasets.issia import DEFAULT_SIZE as ISSIA_SIZE
 from app.datasets.issia_3d_reader import open_issia_3d
 from app.datasets.issia_reader import IssiaFolder, IssiaOptions, open_issia
+from app.datasets.looks_like import looks_like
 from app.datasets.parquet_reader import read_parquet
 from app.datasets.report import Report
 from app.datasets.sn_calibration import DEFAULT_SIZE
@@ -52,6 +52,7 @@ class Source:
         frames: A list of where the frames lie (``app.datasets.frame_list``), where it is not beside
             the labels.
         name: What people call it; the log keeps it. Empty: the path.
+        ball_category: COCO: name or id of the category that is the ball; empty: by its name.
     """
 
     format: str
@@ -63,6 +64,7 @@ class Source:
     flipped: frozenset[int] = frozenset()
     frames: Root | None = None
     name: str = ""
+    ball_category: str = ""
 
     @property
     def label(self) -> str:
@@ -108,9 +110,9 @@ class Imported:
             first = source.shown(problems[0].message)
             sentence += f". The first of {len(problems)} problems: " if problems[1:] else ": "
             sentence += first
-        guess = guess_format(source.path)
-        if guess is not None and guess != source.format:
-            return sentence, f"It looks like {guess}: choose that format and import it again."
+        look = looks_like(source.path, source.format)
+        if look is not None:
+            return sentence, look.sentence
         if self.report.read:
             return sentence, "Every record was left out; the report names each with its reason."
         return sentence, (
@@ -142,7 +144,7 @@ class Imported:
                 for problem in self.report.problems
             ],
             "more_skipped": self.report.dropped,
-            "remarks": list(self.result.problems),
+            "remarks": [*map(shown, self.report.remarks), *self.result.problems],
         }
 
 
@@ -225,7 +227,13 @@ def _groups(source: Source, report: Report, limits: Limits) -> Iterator[Group]:
         case "gamestate":
             return read_gamestate(path, report, calibration=calibration, limits=limits)
         case "coco":
-            return read_coco(path, report, calibration=calibration, limits=limits)
+            return read_coco(
+                path,
+                report,
+                calibration=calibration,
+                limits=limits,
+                ball_category=source.ball_category,
+            )
         case "parquet":
             return read_parquet(path, report, limits=limits)
         case _:
