@@ -160,8 +160,8 @@ class TestReadCoco:
         write_coco(tmp_path, [record := solved(soccer_group())])
         path = tmp_path / "annotations/instances_train.json"
         value = json.loads(path.read_text())
-        for record in value["images"]:
-            del record["touchline"]
+        for item in value["images"]:
+            del item["touchline"]
         path.write_text(json.dumps(value))
         (group,) = read_coco(tmp_path, report)
         for found, written in zip(group.views, record.group.views, strict=True):
