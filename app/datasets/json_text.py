@@ -26,6 +26,7 @@ _LITERAL_STRING = re.compile(_DOUBLE + b"|" + _SINGLE, re.DOTALL)
 _SURROGATE = re.compile(rb"\\u[dD]")
 # Words and exponents of which a number that is not finite may come; there are none in most files.
 _INFINITE = re.compile(rb"NaN|Infinity|\d[eE]\+?\d{2}|\d{309}")
+_NO_NUMBER = re.compile(r"\b(?:nan|inf|NaN|Infinity)\b")
 _PLAIN = (str, int, float, bool, type(None))
 
 
@@ -90,13 +91,16 @@ def _read_inner(text: str, path: str, record: str | None, report: Report | None)
     try:
         return _read(text.encode(), path, record, MAX_LITERAL_CHARACTERS, report)
     except (DatasetFormatError, UnicodeEncodeError):
-        return parse_literal(text, path, record)
+        return parse_literal(text, path, record, report)
 
 
-def parse_literal(text: str, path: str, record: str | None = None) -> Any:
+def parse_literal(
+    text: str, path: str, record: str | None = None, report: Report | None = None
+) -> Any:
     """The value of a Python literal of dicts, lists, tuples, strings, numbers and None.
 
-    Nothing is evaluated: names, calls, sets, bytes and complex numbers are refused.
+    Nothing is evaluated: names, calls, sets, bytes and complex numbers are refused. With a report
+    ``nan`` and ``inf``, as Python writes them, are None, and are counted there.
 
     Raises:
         DatasetFormatError: Not such a literal, too long or nested too deeply.
@@ -108,10 +112,39 @@ def parse_literal(text: str, path: str, record: str | None = None) -> Any:
         if _depth(text.encode(), _LITERAL_STRING) > MAX_DEPTH:
             problem = f"is nested deeper than {MAX_DEPTH} levels"
             raise ValueError(problem)
-        value = ast.literal_eval(text.strip())
+        if report is not None and _NO_NUMBER.search(text):
+            value = _literal_without_infinite(text.strip(), path, record, report)
+        else:
+            value = ast.literal_eval(text.strip())
         _require_plain(value)
     except (ValueError, SyntaxError, TypeError, MemoryError, RecursionError) as error:
         raise DatasetFormatError(path, record, None, problem) from error
+    return value
+
+
+class _Missing(ast.NodeTransformer):
+    """Puts None for the names of numbers that are not finite."""
+
+    def __init__(self) -> None:
+        self.count = 0
+
+    def visit_Name(self, node: ast.Name) -> ast.expr:
+        if node.id not in ("nan", "inf", "NaN", "Infinity"):
+            return node
+        self.count += 1
+        return ast.copy_location(ast.Constant(None), node)
+
+    def visit_UnaryOp(self, node: ast.UnaryOp) -> ast.AST:
+        named = isinstance(node.operand, ast.Name)
+        return self.visit(node.operand) if named else self.generic_visit(node)
+
+
+def _literal_without_infinite(text: str, path: str, record: str | None, report: Report) -> Any:
+    missing = _Missing()
+    value = ast.literal_eval(missing.visit(ast.parse(text, mode="eval")))
+    if missing.count:
+        numbers = "1 number is" if missing.count == 1 else f"{missing.count:,} numbers are"
+        report.note(path, record, None, f"{numbers} not finite (nan, inf); read as missing")
     return value
 
 

@@ -44,8 +44,7 @@ class MatchFrames:
             report.note(error.path, error.record, error.field, problem)
             return
         images = filter(_is_image, archive.names())
-        # By the name that the archive itself has, which may be spelt otherwise.
-        self._members = {name: archive.media(name).member or name for name in images}
+        self._members = {name: archive.own_name(name) for name in images}
         archive.close()
 
     def _member(self, name: str) -> Media:

@@ -43,7 +43,16 @@ class ViewGroups:
             yield self._group(self._waiting.pop(key))
 
     def rest(self) -> Iterator[Group]:
-        """Groups that have fewer views than they say, as they are."""
+        """Groups that have fewer views than they say, as they are, which is said."""
+        lacking = [
+            f"{key} ({len(items)} of {items[0].head.views})"
+            for key, items in self._waiting.items()
+            if items[0].head.views > len(items)
+        ]
+        if lacking:
+            count = "1 group has" if len(lacking) == 1 else f"{len(lacking):,} groups have"
+            shown = ", ".join(lacking[:5]) + (", ..." if len(lacking) > 5 else "")
+            self._report.remark(f"{count} fewer views than when it was written: {shown}")
         for key in list(self._waiting):
             yield self._group(self._waiting.pop(key))
 

@@ -99,14 +99,16 @@ class ZipTree:
 
     def media(self, name: str) -> Media:
         """Where a member can be read later."""
-        found = self._members.get(name)
-        # Who reads it later opens it by the name that the zip file itself has.
-        return self._media(name if found is None else found.filename)
+        return self._media(self.own_name(name))
 
     def media_inside(self, name: str, member: str) -> Media:
         """Where a member of a zip file that is a member can be read later."""
+        return self._media(f"{self.own_name(name)}/{member}")
+
+    def own_name(self, name: str) -> str:
+        """The name of a member as the zip file itself spells it, by which it is opened later."""
         found = self._members.get(name)
-        return self._media(f"{name if found is None else found.filename}/{member}")
+        return name if found is None else found.filename
 
     def _media(self, member: str) -> Media:
         if isinstance(self.path, StoredPath):

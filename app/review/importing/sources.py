@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
 from typing import Any, get_args
 
 from app.config import Settings
@@ -35,6 +36,39 @@ from app.store.store import Store
 
 FORMATS: tuple[str, ...] = get_args(ImportFormat)
 STATIC = ("issia", "issia-3d")
+
+
+BALLS_ELSEWHERE = ("sn-calibration", "coco")
+"""Formats that have no balls, or say themselves why there is none."""
+
+
+@dataclass
+class BallTally:
+    """Counts what groups bring on their way through an import."""
+
+    groups: int = 0
+    balls: int = 0
+    classes: Counter[str] = field(default_factory=Counter)
+    """Boxes that are no ball, by class."""
+
+    def watch(self, groups: Iterable[Group]) -> Iterator[Group]:
+        """The groups, each counted as it passes."""
+        for group in groups:
+            self.groups += 1
+            for view in group.views:
+                self.balls += len(view.balls)
+                self.classes.update(str(box.get("class")) for box in view.extras.boxes)
+            yield group
+
+    def without_ball(self) -> str | None:
+        """That the files bring no ball, with the classes that they have; None where they bring one."""
+        if self.balls or not self.groups:
+            return None
+        most = ", ".join(
+            f'"{name[:40]}" ({count:,})' for name, count in self.classes.most_common(12)
+        )
+        boxes = f"; its boxes are of {most}" if most else ""
+        return f"no ball was read from any of {self.groups:,} groups{boxes}"
 
 
 @dataclass(frozen=True)
@@ -201,10 +235,11 @@ def import_source(
     groups = _groups(source, report, limits) if folder is None else folder.groups()
     if source.frames is not None:
         groups = read_frame_list(source.frames, settings, report, limits).placed(iter(groups))
+    tally = BallTally()
     result = ingest(
         store,
         dataset,
-        groups,
+        tally.watch(groups),
         source=source.label,
         actor=actor,
         progress=progress,
@@ -214,6 +249,8 @@ def import_source(
     )
     if folder is not None and not dry_run:
         ingest_spare(store, dataset, _spare(folder), source=source.label, actor=actor)
+    if source.format not in BALLS_ELSEWHERE and (sentence := tally.without_ball()):
+        report.remark(sentence)
     return Imported(source, report, result)
 
 

@@ -53,6 +53,18 @@ class TestReadJson:
         assert str(problem).startswith(place)
         assert str(problem).endswith("read as missing")
 
+    def test_a_python_literal_with_nan_is_read_alike(self) -> None:
+        report = Report()
+        text = json.dumps("{'a': [nan, -inf, 1.5], 'b': 'nan'}").encode()
+        value = read_json(text, "f", report=report, double_encoded=True)
+        assert value == {"a": [None, None, 1.5], "b": "nan"}
+        assert [str(problem) for problem in report.problems] == [
+            "f: 2 numbers are not finite (nan, inf); read as missing"
+        ]
+        for bad in ("{'a': nan, 'b': open('x')}", "[nan, x]", "[nan.real]", "-nan()"):
+            with pytest.raises(DatasetFormatError, match="neither JSON nor"):
+                read_json(json.dumps(bad).encode(), "f", report=report, double_encoded=True)
+
     def test_words_in_texts_are_no_numbers(self) -> None:
         report = Report()
         text = b'{"NaN": "Infinity", "a": 1e10, "b": 1.5e+20}'

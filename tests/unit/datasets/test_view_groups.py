@@ -26,6 +26,9 @@ class TestViewGroups:
         (rest,) = groups.rest()
         assert (rest.key, report.imported) == ("other", 3)
         assert list(groups.rest()) == []
+        assert report.remarks == [
+            "1 group has fewer views than when it was written: other (1 of 2)"
+        ]
 
     def test_static_cameras_of_one_key_are_one_station(self, report: Report) -> None:
         groups = ViewGroups(report)
