@@ -13,7 +13,7 @@ from app.datasets.report import Report
 
 _SHOWN = 12
 """Categories that a sentence names."""
-HOW = "name the one that is with --ball-category NAME (REST: options.ball_category)"
+HOW = "if one of them is the ball, name it (Category of the ball, --ball-category)"
 
 
 @dataclass(frozen=True)
