@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from itertools import islice
 from pathlib import PurePosixPath
 
-from app.datasets.file_tree import FileTree, Root
+from app.datasets.file_tree import BROKEN, FileTree, Root
 from app.datasets.frame_names import IMAGE_SUFFIXES
 from app.datasets.guess_format import guess_format
 from app.datasets.report import Report
@@ -123,7 +123,7 @@ def looks_like(path: Root, format_: str) -> Look | None:
     try:
         with opened_tree(path, Report()) as tree:
             found = None if tree is None else _of_tree(tree)
-    except (ReviewError, OSError, ValueError):
+    except (*BROKEN, ReviewError, ValueError):
         found = None
     if found is not None and found.format != format_:
         return found
@@ -154,7 +154,7 @@ def _of_head(tree: FileTree, name: str) -> Look | None:
     try:
         with tree.open(name) as file:
             head = file.read(HEAD_BYTES)
-    except (ReviewError, OSError, ValueError, EOFError, RuntimeError):
+    except (*BROKEN, ReviewError, ValueError):
         return None
     patterns = _HEADS[PurePosixPath(name).suffix.lower()]
     return next(
