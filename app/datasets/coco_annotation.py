@@ -61,7 +61,11 @@ def ball_of(item: Mapping[str, Any], names: Sequence[str] = ()) -> BallAnnotatio
         if points:
             point = _center(points)
             box, hidden = Box(point.x, point.y, 0.0, 0.0), not point.visible
-    ours = box_from_corner(_around_polygons(item.get("segmentation")) if box is None else box)
+    if box is None:
+        box = _around_polygons(item.get("segmentation"))
+    if max(box.x + box.width, box.y + box.height) <= 1 and min(box.x, box.y) >= 0:
+        raise NoPlaceError("bbox", "is in fractions of the image, and COCO's are in pixels")
+    ours = box_from_corner(box)
     occluded = hidden or is_occluded(item)
     if ours.width and ours.height:
         return BallAnnotation(box=ours, occluded=occluded)

@@ -63,8 +63,12 @@ class Categories:
                 report.note(path, f"category {category.shown}", "id", "is there twice; left out")
 
     def find(self, value: Any) -> Category | None:
-        """The category of an annotation's ``category_id``."""
-        return self._index.find(value)
+        """The category of an annotation's ``category_id``; some tools write its name there."""
+        found = self._index.find(value)
+        if found is None and isinstance(value, str):
+            named = [item for item in self._all if item.name and same_name(item.name, value)]
+            return named[0] if len(named) == 1 else None
+        return found
 
     def count(self, category: Category) -> None:
         """Note a ball that was read."""

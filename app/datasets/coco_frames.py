@@ -11,6 +11,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import PurePosixPath
 from typing import Any
+from urllib.parse import unquote
 
 from app.datasets.file_tree import FileTree
 from app.datasets.picture_finder import (
@@ -20,6 +21,7 @@ from app.datasets.picture_finder import (
     PictureFinder,
     own_pictures,
 )
+from app.datasets.picture_names import picture_parts
 from app.datasets.report import Report
 from app.datasets.split_names import split_of
 from app.geometry.camera import Camera
@@ -45,6 +47,7 @@ class Frame:
         key: Its name as a key; unlike ``parts`` without the folders of another machine.
         group: Its ``group_id``, or None.
         view: Name of the view in that group.
+        named: Whether the file says that name; else it is the last part of the key.
         place: Name of its picture in the tree, once it is found.
     """
 
@@ -59,6 +62,7 @@ class Frame:
     camera: Camera | None
     balls: list[BallAnnotation] = field(default_factory=list)
     boxes: list[Mapping[str, Any]] = field(default_factory=list)
+    named: bool = False
     place: str | None = None
     scope: str = ""
 
@@ -128,10 +132,18 @@ def _find_pictures(file: FrameFile, finder: PictureFinder, report: Report) -> No
     first: dict[tuple[str, ...], Frame] = {}
     for frame in file.frames:
         first.setdefault(frame.parts, frame)
-    found = own_pictures({parts: finder.find(parts, file.home) for parts in first})
+    found = own_pictures({parts: _find(parts, file.home, finder) for parts in first})
     for frame in file.frames:
         frame.place = found[frame.parts].place
     _tell_pictures(file, found, first, finder, report)
+
+
+def _find(parts: tuple[str, ...], home: Home, finder: PictureFinder) -> Found:
+    found = finder.find(parts, home)
+    if found == Found() and any("%" in part for part in parts):
+        # Written as a part of an address: a%20b.jpg.
+        return finder.find(picture_parts(unquote("/".join(parts))), home)
+    return found
 
 
 def _tell_pictures(
@@ -210,7 +222,7 @@ def _join(frame: Frame, other: Frame, report: Report) -> None:
         )
         return
     if frame.group is None:
-        frame.group, frame.view = other.group, other.view
+        frame.group, frame.view, frame.named = other.group, other.view, other.named
     if frame.camera is None:
         frame.camera = other.camera
     elif other.camera is not None and other.camera != frame.camera:
@@ -274,6 +286,7 @@ def _grouped(frames: Sequence[Frame], report: Report) -> Iterator[tuple[str, lis
         groups.setdefault(frame.key if frame.group is None else frame.group, []).append(frame)
     taken = set(groups)
     for key, members in groups.items():
+        _tell_apart(members)
         views = Counter(frame.view for frame in members)
         scopes = list(dict.fromkeys(frame.scope for frame in members))
         if max(views.values()) == 1 or len(scopes) == 1:
@@ -287,6 +300,17 @@ def _grouped(frames: Sequence[Frame], report: Report) -> Iterator[tuple[str, lis
                 name = f"{scope}/{name}"
             taken.add(name)
             yield name, _apart(name, own, report)
+
+
+def _tell_apart(frames: Sequence[Frame]) -> None:
+    """Give views that no file names, and whose files have one name, their folders as well."""
+    if len({frame.split for frame in frames}) > 1:
+        return
+    for long in (lambda frame: frame.key, lambda frame: "/".join((frame.scope, frame.key))):
+        views = Counter(frame.view for frame in frames)
+        for frame in frames:
+            if frame.group is not None and not frame.named and views[frame.view] > 1:
+                frame.view = long(frame).strip("/")
 
 
 def _apart(key: str, frames: Sequence[Frame], report: Report) -> list[Frame]:

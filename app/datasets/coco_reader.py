@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import PurePosixPath
@@ -28,6 +27,7 @@ from app.datasets.trees import opened_tree
 from app.datasets.view_groups import PlacedView, ViewGroups
 from app.datasets.view_state import StateReader
 from app.errors import DatasetFormatError, UnsafePathError
+from app.finite import quoted
 from app.geometry.camera import Camera
 from app.soccer.annotation import BallAnnotation, Extras
 from app.soccer.frames import Box
@@ -107,9 +107,9 @@ def _value(tree: FileTree, name: str, report: Report, limits: Limits) -> dict[st
 
 def _tell_balls(files: list[_File], report: Report) -> None:
     """Which category of each foreign file was taken for the ball, or that it brought none."""
-    told = [file for file in files if file.frames.frames and not file.captions]
     some = any(file.categories.balls for file in files)
-    for file in told:
+    foreign = [file for file in files if file.frames.frames]
+    for file in [file for file in foreign if not file.captions] or foreign:
         file.categories.tell(alone=not some)
 
 
@@ -140,7 +140,9 @@ class _File:
         self.categories = Categories(
             self._listed("categories"), annotations, self.path, report, ball_category
         )
-        self._last = Counter(map(_last_part, value["images"]))
+        self._by_last: dict[str, list[int]] = {}
+        for index, item in enumerate(value["images"]):
+            self._by_last.setdefault(_last_part(item), []).append(index)
         self._images: IdIndex[int] = IdIndex()
         self._of_image: list[list[tuple[str, Mapping[str, Any]]]] = []
         self.captions = False
@@ -164,7 +166,7 @@ class _File:
             value = item.get("id") if isinstance(item, dict) else None
             if isinstance(item, dict) and not self._images.add(value, index):
                 known = id_text(value) is not None
-                problem = f"is {value}, as that of another image is" if known else "is missing"
+                problem = f"is {_spelt(value)}, as another image's is" if known else "is missing"
                 self._note(f"images[{index}]", "id", f"{problem}; no annotation joins this image")
         seen: dict[str, Mapping[str, Any]] = {}
         shared = captions = 0
@@ -178,9 +180,10 @@ class _File:
                 continue
             image = self._images.find(item["image_id"])
             if image is None:
+                image = self._image_by_name(item["image_id"])
+            if image is None:
                 self._report.counts["annotations without image"] += 1
-                shown = str(item["image_id"])[:40]
-                problem = f"is {shown}, which no image of the file has; left out"
+                problem = f"is {_spelt(item['image_id'])}, which no image of the file has; left out"
                 self._note(record, "image_id", problem)
                 continue
             if isinstance(item.get("caption"), str) and "category_id" not in item:
@@ -201,6 +204,12 @@ class _File:
             self._report.remark(
                 f"{self.path}: {shared:,} annotations have the id of another one; all are read"
             )
+
+    def _image_by_name(self, value: Any) -> int | None:
+        """The image that a file refers to by its name instead of its id."""
+        parts = picture_parts(value) if isinstance(value, str) else ()
+        found = self._by_last.get(parts[-1], []) if parts else []
+        return found[0] if len(found) == 1 else None
 
     def _note(self, record: str, field: str | None, problem: str) -> None:
         self._report.note(self.path, record, field, problem)
@@ -264,7 +273,7 @@ class _File:
         split = self._home.split or split_of_folders(parts[:-1])
         frame = Frame(
             self.path, image.record, parts, key, group, view, image.size(), split,
-            self._camera(image),
+            self._camera(image), named=image.value.get("view") is not None,
         )  # fmt: skip
         for record, item in self._of_image[index]:
             self._add(frame, item, record)
@@ -278,7 +287,7 @@ class _File:
             if not parts:
                 check_name(text)
                 raise image.error("file_name", "is no name of a file")
-            if not _is_relative(text) and self._last[parts[-1]] == 1:
+            if not _is_relative(text) and len(self._by_last[parts[-1]]) == 1:
                 key = parts[-1]
             return check_name(key)
         except UnsafePathError as error:
@@ -288,7 +297,7 @@ class _File:
         """One annotation of a frame: its ball, or the box of something else."""
         category = self.categories.find(item.get("category_id"))
         if category is None:
-            shown = "missing" if "category_id" not in item else str(item["category_id"])[:40]
+            shown = _spelt(item["category_id"]) if "category_id" in item else "missing"
             problem = f"is {shown}, which no category of the file has; kept as a box without class"
             self._note(record, "category_id", problem)
         try:
@@ -352,6 +361,13 @@ def _is_relative(name: str) -> bool:
         return bool(check_name(name.replace("\\", "/"))) and "://" not in name and "?" not in name
     except UnsafePathError:
         return False
+
+
+def _spelt(value: Any) -> str:
+    """A value as the file spells it, no longer than a sentence can take."""
+    if isinstance(value, str):
+        return quoted(value, 40)
+    return "null" if value is None else str(value)[:40]
 
 
 def _last_part(image: Any) -> str:

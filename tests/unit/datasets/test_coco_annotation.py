@@ -53,6 +53,8 @@ class TestBallOf:
         ("item", "field", "words"),
         [
             ({}, "bbox", "is missing, and so are keypoints"),
+            ({"bbox": [0.5, 0.4, 0.01, 0.02]}, "bbox", "fractions of the image"),
+            ({"keypoints": [0.5, 0.4, 2]}, "bbox", "fractions of the image"),
             ({"bbox": [1, 2, 3]}, "bbox", "has 3 numbers, not 4"),
             ({"bbox": [1, 2, -3, 4]}, "bbox", "negative"),
             ({"bbox": [1, 2, None, 4]}, "bbox", "null, not a number"),

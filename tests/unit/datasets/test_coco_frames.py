@@ -214,6 +214,25 @@ class TestFramesOfOneName:
         groups = read(tmp_path, report, **files)
         assert [view.key for view in groups["1"].views] == ["north", "south"]
 
+    def test_views_without_a_name_whose_files_share_one_have_their_folders_in_it(
+        self, tmp_path: Path, report: Report
+    ) -> None:
+        images = [image("north/f.jpg", 1, group_id="g"), image("south/f.jpg", 2, group_id="g")]
+        files = {"x.json": coco(images, [ball(1), ball(2, 2)])}
+        files |= {f"{side}__y.json": coco([image(group_id=2)]) for side in ("east", "west")}
+        groups = read(tmp_path, report, **files)
+        assert {key: [view.key for view in group.views] for key, group in groups.items()} == {
+            "g": ["north/f.jpg", "south/f.jpg"],
+            "2": ["east/a.jpg", "west/a.jpg"],
+        }
+        assert report.problems == []
+
+    def test_views_without_a_name_in_different_splits_are_of_different_groups(
+        self, tmp_path: Path, report: Report
+    ) -> None:
+        files = {f"{split}__y.json": coco([image(group_id=2)]) for split in ("train", "test")}
+        assert list(read(tmp_path, report, **files)) == ["test/2", "train/2"]
+
     def test_two_pictures_for_one_view_are_named(self, tmp_path: Path, report: Report) -> None:
         images = [image(f"{n}.jpg", n, group_id="g", view="north") for n in (1, 2)]
         groups = read(tmp_path, report, **{"x.json": coco(images, [ball(1), ball(2, 2)])})
@@ -239,6 +258,18 @@ class TestPicturesOfFrames:
         files = {"x.json": coco(), "p__1__a.jpg": "x", "p__2__a.jpg": "y"}
         assert pictures(read(tmp_path, report, **files), tmp_path) == {"a.jpg": None}
         assert "p/1/a.jpg and p/2/a.jpg cannot be told apart by a.jpg" in str(report.problems[0])
+
+    def test_a_name_may_be_written_as_a_part_of_an_address(
+        self, tmp_path: Path, report: Report
+    ) -> None:
+        files = {"x.json": coco([image("a%20b.jpg")]), "images__a b.jpg": "x"}
+        found = pictures(read(tmp_path, report, **files), tmp_path)
+        assert found == {"a%20b.jpg": "images/a b.jpg"}
+
+    def test_captions_alone_bring_no_ball(self, tmp_path: Path, report: Report) -> None:
+        caption = {"id": 1, "image_id": 1, "caption": "a ball"}
+        read(tmp_path, report, **{"captions_default.json": coco(annotations=[caption])})
+        assert "the file brings no ball" in report.problems[0].problem
 
     def test_a_picture_found_by_the_end_of_its_name_is_said(
         self, tmp_path: Path, report: Report

@@ -247,7 +247,7 @@ class TestJoins:
         ("annotation", "record", "field", "words"),
         [
             ({"image_id": 99}, "annotations[1]", "image_id", "is 99, which no image"),
-            ({"image_id": None}, "annotations[1]", "image_id", "is None, which no image"),
+            ({"image_id": None}, "annotations[1]", "image_id", "is null, which no image"),
             ({"category_id": 9}, "annotations[1]", "category_id", "is 9, which no category"),
             ({"iscrowd": 1}, "annotations[1]", "iscrowd", "a crowd is not one ball"),
             ({"bbox": None, "segmentation": {"counts": "x"}}, "annotations[1]", "bbox", "RLE"),
@@ -270,6 +270,14 @@ class TestJoins:
         (problem,) = report.problems
         assert (problem.record, problem.field) == (record, field)
         assert words in problem.problem
+
+    @pytest.mark.parametrize("name", ["a.jpg", "images\\a.jpg", "/x/a.jpg"])
+    def test_images_and_categories_may_be_referred_to_by_their_names(
+        self, read: Callable[[Any], list[Group]], report: Report, name: str
+    ) -> None:
+        (group,) = read(coco([image(identity=7)], [ball(name, category="Ball")]))
+        assert len(group.views[0].balls) == 1
+        assert report.problems == []
 
     def test_an_annotation_of_no_category_is_kept_as_a_box(
         self, read: Callable[[Any], list[Group]], report: Report
