@@ -100,9 +100,22 @@ def _value(tree: FileTree, name: str, report: Report, limits: Limits) -> dict[st
         report.skip(error)
         return None
     if isinstance(value, dict) and isinstance(value.get("images"), list):
-        return value
+        if not _is_gamestate(value.get("annotations")):
+            return value
+        report.note(shown, None, None, "is a file of sn-gamestate: import it as gamestate")
+        return None
     report.remark(f"{shown}: is no COCO file (it has no list of images) and was not read")
     return None
+
+
+def _is_gamestate(annotations: Any) -> bool:
+    """Whether annotations are those of sn-gamestate, whose files are alike but for their boxes."""
+    items = (
+        [item for item in annotations[:100] if isinstance(item, dict)]
+        if isinstance(annotations, list)
+        else []
+    )
+    return any("bbox_image" in item for item in items) and not any("bbox" in item for item in items)
 
 
 def _tell_balls(files: list[_File], report: Report) -> None:

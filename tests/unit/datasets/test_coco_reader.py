@@ -310,6 +310,13 @@ class TestJoins:
         read(coco(annotations=[ball(), ball(2, 2), ball(3, 3)]))
         assert report.counts["annotations without image"] == 2
 
+    def test_a_file_of_sn_gamestate_is_said_to_be_one(
+        self, read: Callable[[Any], list[Group]], report: Report
+    ) -> None:
+        person = {"id": "1", "image_id": "1", "category_id": 1, "bbox_image": {"x": 1, "y": 2}}
+        assert read(coco(annotations=[person])) == []
+        assert "import it as gamestate" in report.problems[0].problem
+
     def test_a_json_file_of_something_else_is_said(self, tmp_path: Path, report: Report) -> None:
         write(tmp_path, {"x.json": coco(), "package.json": {"name": "x"}})
         assert len(list(read_coco(tmp_path, report))) == 1
