@@ -38,7 +38,7 @@ FORMATS: tuple[str, ...] = get_args(ImportFormat)
 STATIC = ("issia", "issia-3d")
 
 
-BALLS_ELSEWHERE = ("sn-calibration", "coco")
+BALLS_ELSEWHERE = ("sn-calibration", "frames", "coco")
 """Formats that have no balls, or say themselves why there is none."""
 
 
