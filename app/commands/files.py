@@ -60,6 +60,10 @@ def import_(
             "--size", parser=parse_size, metavar="WxH", help="Default 960x540; ISSIA 1920x1080."
         ),
     ] = None,
+    ball_category: Annotated[
+        str,
+        typer.Option(metavar="NAME", help="COCO: the category that is the ball; default: by name."),
+    ] = "",
     policy: Annotated[
         str,
         typer.Option(
@@ -92,6 +96,7 @@ def import_(
             "frame_offset": parse_frame_offset(frame_offset),
             "flipped": sorted(parse_cameras(flip)),
             "size": None if size is None else [size.width, size.height],
+            **({"ball_category": ball_category} if ball_category else {}),
         }
         with connected(server) as client, show_progress("Importing") as progress:
             values, nothing = remote_files.import_values(
@@ -116,6 +121,7 @@ def import_(
         frame_offset=parse_frame_offset(frame_offset),
         flipped=parse_cameras(flip),
         frames=None if frames is None else _root(settings, frames),
+        ball_category=ball_category,
     )
     chosen = read_policy_option(policy)
     with opened_store(settings) as store, show_progress("Importing") as progress:

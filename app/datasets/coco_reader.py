@@ -1,7 +1,8 @@
-"""COCO, read: our own files as they were said, anybody's as images with boxes."""
+"""COCO, read: our own files as they were said, anybody's as images with boxes and points."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import PurePosixPath
@@ -9,27 +10,36 @@ from typing import Any
 
 from app.datasets.camera_json import camera_from_json
 from app.datasets.coco import CAMERA, OUTSIDE, PREFIX, STATE
+from app.datasets.coco_annotation import NoPlaceError, ball_of, box_of
+from app.datasets.coco_categories import Categories, Category
+from app.datasets.coco_frames import Frame, FrameFile, groups_of, split_of_folders
 from app.datasets.file_tree import DEFAULT_LIMITS, FileTree, Limits, Root
-from app.datasets.frame_names import IMAGE_SUFFIXES, UNASSIGNED
+from app.datasets.frame_names import UNASSIGNED
 from app.datasets.json_text import read_json
+from app.datasets.picture_finder import Home, PictureFinder
+from app.datasets.picture_names import picture_parts
+from app.datasets.record_ids import IdIndex, id_text
 from app.datasets.report import Report
 from app.datasets.safe_path import check_name
-from app.datasets.soccernet_v3 import SPLITS
+from app.datasets.split_names import split_in
 from app.datasets.synloc import camera_from_synloc, is_synloc
 from app.datasets.trees import opened_tree
 from app.datasets.view_groups import PlacedView, ViewGroups
-from app.datasets.view_state import GroupHead, StateReader
+from app.datasets.view_state import StateReader
 from app.errors import DatasetFormatError, UnsafePathError
+from app.finite import quoted
 from app.geometry.camera import Camera
 from app.soccer.annotation import BallAnnotation, Extras
 from app.soccer.frames import Box
-from app.soccer.group import Group, Station, View
+from app.soccer.group import Group, View
 from app.soccer.media import Media
-from app.soccer.pitch import Pitch
 
-BALLS = frozenset({"ball", "sports ball", "sports-ball", "soccer ball", "football"})
-"""Names of categories that are the ball, in lower case."""
-_FOLDERS = ("", "images/", "train/", "val/", "valid/", "test/")
+_OURS = ("manifest.json", "findings.json", "propose.json", "calibrate.json")
+"""JSON files that lie in folders of exports and are no labels."""
+_TASK = re.compile(
+    r"(?:instances|person_keypoints|keypoints|captions|stuff|panoptic|image_info)_(.+)"
+)
+"""Names of files of one set of images: what is before it says the task."""
 
 
 def read_coco(
@@ -38,6 +48,7 @@ def read_coco(
     *,
     calibration: str = "given",
     limits: Limits = DEFAULT_LIMITS,
+    ball_category: str = "",
 ) -> Iterator[Group]:
     """The images of every COCO file below ``root``.
 
@@ -49,66 +60,110 @@ def read_coco(
 
     Args:
         root: Folder, zip or one JSON file.
-        report: Takes what had to be left out.
+        report: Takes what had to be left out, and which category was taken for the ball.
         calibration: What counts for a view that has a camera and lines (images of others).
         limits: Caps on what is read.
+        ball_category: Name or id of the category of others that is the ball; empty: by its name.
     """
     with opened_tree(root, report, limits) as tree:
         if tree is None:
             return
         names = tree.names()
-        groups = ViewGroups(report)
-        found = False
+        finder, groups = PictureFinder(names), ViewGroups(report)
+        files: list[_File] = []
         for name in names:
             place = PurePosixPath(name)
-            if place.suffix.lower() != ".json" or place.name == "manifest.json":
+            if place.suffix.lower() != ".json" or place.name in _OURS:
                 continue
             value = _value(tree, name, report, limits)
             if value is not None:
-                found = True
-                for view in _File(tree, name, names, value, report, calibration).views():
+                file = _File(tree, name, finder, value, report, ball_category)
+                files.append(file)
+                for view in file.views():
                     yield from groups.add(view, tree.shown(name))
+                file.close()
         yield from groups.rest()
-        if not found:
+        foreign = [file.frames for file in files if file.frames.frames]
+        yield from groups_of(foreign, tree, names, calibration, report)
+        _tell_balls(files, report)
+        if not files:
             report.note(str(root), None, None, "holds no COCO file (images and annotations)")
 
 
 def _value(tree: FileTree, name: str, report: Report, limits: Limits) -> dict[str, Any] | None:
+    """A file with a list of images; None for any other, which is said."""
+    shown = tree.shown(name)
     try:
-        shown = tree.shown(name)
-        value = read_json(tree.read_bytes(name), shown, max_bytes=limits.file_bytes)
+        content = tree.read_bytes(name)
+        value = read_json(content, shown, max_bytes=limits.file_bytes, report=report)
     except DatasetFormatError as error:
         report.skip(error)
         return None
-    lists = isinstance(value, dict) and all(
-        isinstance(value.get(part), list) for part in ("images", "annotations")
+    if isinstance(value, dict) and isinstance(value.get("images"), list):
+        if not _is_gamestate(value.get("annotations")):
+            return value
+        report.note(shown, None, None, "is a file of sn-gamestate: import it as gamestate")
+        return None
+    report.remark(f"{shown}: is no COCO file (it has no list of images) and was not read")
+    return None
+
+
+def _is_gamestate(annotations: Any) -> bool:
+    """Whether annotations are those of sn-gamestate, whose files are alike but for their boxes."""
+    items = (
+        [item for item in annotations[:100] if isinstance(item, dict)]
+        if isinstance(annotations, list)
+        else []
     )
-    return value if lists else None
+    return any("bbox_image" in item for item in items) and not any("bbox" in item for item in items)
+
+
+def _tell_balls(files: list[_File], report: Report) -> None:
+    """Which category of each foreign file was taken for the ball, or that it brought none."""
+    some = any(file.categories.balls for file in files)
+    foreign = [file for file in files if file.frames.frames]
+    for file in [file for file in foreign if not file.captions] or foreign:
+        file.categories.tell(alone=not some)
 
 
 class _File:
-    """One file on its way to views."""
+    """One file on its way to views (images of ours) and frames (of others)."""
 
     def __init__(
         self,
         tree: FileTree,
         name: str,
-        names: list[str],
+        finder: PictureFinder,
         value: Mapping[str, Any],
         report: Report,
-        calibration: str,
+        ball_category: str,
     ):
-        self.path, self._tree, self._names = tree.shown(name), tree, set(names)
-        self._value, self._report, self._calibration = value, report, calibration
-        stem = PurePosixPath(name).stem.removeprefix(PREFIX).removeprefix(OUTSIDE)
-        self._split = stem if stem in SPLITS and stem != UNASSIGNED else ""
-        self._top = str(PurePosixPath(name).parent.parent)
-        self._categories = {
-            str(item.get("id")): str(item.get("name", "")).strip().lower()
-            for item in self._listed("categories")
-            if isinstance(item, dict)
-        }
-        self._of_image = self._by_image()
+        self.path, self._tree, self._finder = tree.shown(name), tree, finder
+        self._value, self._report = value, report
+        place = PurePosixPath(name)
+        stem = place.stem.removeprefix(PREFIX).removeprefix(OUTSIDE)
+        task = _TASK.fullmatch(place.stem)
+        subset = stem if task is None else task[1]
+        split = "" if stem == UNASSIGNED else split_in(stem) or split_of_folders(place.parts[:-1])
+        folder = "" if str(place.parent) == "." else str(place.parent)
+        known = task is not None or bool(split_in(stem))
+        self._home = Home(folder, subset if known and subset != "default" else "", split)
+        self.frames = FrameFile(self.path, self._home, [])
+        annotations = self._listed("annotations")
+        self.categories = Categories(
+            self._listed("categories"), annotations, self.path, report, ball_category
+        )
+        self._by_last: dict[str, list[int]] = {}
+        for index, item in enumerate(value["images"]):
+            self._by_last.setdefault(_last_part(item), []).append(index)
+        self._images: IdIndex[int] = IdIndex()
+        self._of_image: list[list[tuple[str, Mapping[str, Any]]]] = []
+        self.captions = False
+        self._join(annotations)
+
+    def close(self) -> None:
+        """Let go of everything but the frames: the next file may be as large."""
+        self._value, self._of_image = {}, []
 
     def _listed(self, name: str) -> list[Any]:
         """A list that need not be there."""
@@ -117,20 +172,66 @@ class _File:
             self._report.note(self.path, None, name, "is not a list; left out")
         return found if isinstance(found, list) else []
 
-    def _by_image(self) -> dict[str, list[Mapping[str, Any]]]:
-        found: dict[str, list[Mapping[str, Any]]] = {}
-        for index, item in enumerate(self._value["annotations"]):
-            if isinstance(item, dict) and "image_id" in item:
-                found.setdefault(str(item["image_id"]), []).append(item)
-            else:
-                self._note(f"annotations[{index}]", "image_id", "is missing")
-        return found
+    def _join(self, annotations: list[Any]) -> None:
+        """Give each annotation to its image; whatever joins none is named."""
+        for index, item in enumerate(self._value["images"]):
+            self._of_image.append([])
+            value = item.get("id") if isinstance(item, dict) else None
+            if isinstance(item, dict) and not self._images.add(value, index):
+                known = id_text(value) is not None
+                problem = f"is {_spelt(value)}, as another image's is" if known else "is missing"
+                self._note(f"images[{index}]", "id", f"{problem}; no annotation joins this image")
+        seen: dict[str, Mapping[str, Any]] = {}
+        shared = captions = 0
+        for index, item in enumerate(annotations):
+            record = f"annotations[{index}]"
+            if not isinstance(item, dict):
+                self._note(record, None, "is not an object; left out")
+                continue
+            if "image_id" not in item:
+                self._note(record, "image_id", "is missing; left out")
+                continue
+            image = self._images.find(item["image_id"])
+            if image is None:
+                image = self._image_by_name(item["image_id"])
+            if image is None:
+                self._report.counts["annotations without image"] += 1
+                problem = f"is {_spelt(item['image_id'])}, which no image of the file has; left out"
+                self._note(record, "image_id", problem)
+                continue
+            if isinstance(item.get("caption"), str) and "category_id" not in item:
+                captions += 1
+                continue
+            identity = id_text(item.get("id"))
+            other = None if identity is None else seen.setdefault(identity, item)
+            if other is not None and other is not item:
+                if other == item:
+                    self._note(record, "id", f"is {identity}: the same annotation twice; left out")
+                    continue
+                shared += 1
+            self._of_image[image].append((record, item))
+        if captions:
+            self.captions = captions == len(annotations)
+            self._report.counts["captions"] += captions
+        if shared:
+            self._report.remark(
+                f"{self.path}: {shared:,} annotations have the id of another one; all are read"
+            )
+
+    def _image_by_name(self, value: Any) -> int | None:
+        """The image that a file refers to by its name instead of its id."""
+        parts = picture_parts(value) if isinstance(value, str) else ()
+        found = self._by_last.get(parts[-1], []) if parts else []
+        return found[0] if len(found) == 1 else None
 
     def _note(self, record: str, field: str | None, problem: str) -> None:
         self._report.note(self.path, record, field, problem)
 
     def views(self) -> Iterator[PlacedView]:
-        """Image by image; what is wrong with one is reported and leaves it out."""
+        """Images of ours as views; those of others become ``frames``.
+
+        What is wrong with one is reported and leaves it out.
+        """
         for index, item in enumerate(self._value["images"]):
             record = f"images[{index}]"
             self._report.read += 1
@@ -139,7 +240,7 @@ class _File:
                 if STATE in image.value:
                     yield self._ours(image)
                 else:
-                    yield self._theirs(image, index)
+                    self.frames.frames.append(self._theirs(image, index))
             except DatasetFormatError as error:
                 self._report.skip(error)
 
@@ -163,7 +264,8 @@ class _File:
         return view.balls
 
     def _annotations(self, image: StateReader) -> list[Mapping[str, Any]]:
-        return self._of_image.get(str(image.value.get("id")), [])
+        found = self._images.find(image.value.get("id"))
+        return [] if found is None else [item for _, item in self._of_image[found]]
 
     def _box(self, item: Mapping[str, Any], record: str) -> Box | None:
         try:
@@ -172,32 +274,66 @@ class _File:
             self._note(record, "bbox", f"{error}; left out")
             return None
 
-    def _theirs(self, image: StateReader, index: int) -> PlacedView:
-        name = image.text("file_name")
-        key = _safe(image, "file_name", name)
-        group, view_key = self._placed(image, key)
-        balls, boxes = [], []
-        for item in self._annotations(image):
-            box = self._box(item, image.record)
-            if box is None:
-                continue
-            category = self._categories.get(str(item.get("category_id")), "")
-            if category in BALLS:
-                balls.append(BallAnnotation(box=box, occluded=item.get("occluded") is True))
+    def _media(self, name: str) -> Media | None:
+        """The frame of an image of ours, where it lies in the tree."""
+        place = self._finder.find(picture_parts(name), self._home).place
+        return None if place is None else self._tree.media(place)
+
+    def _theirs(self, image: StateReader, index: int) -> Frame:
+        parts = picture_parts(image.text("file_name"))
+        key = self._key(image, parts)
+        group, view = self._placed(image, key)
+        split = self._home.split or split_of_folders(parts[:-1])
+        frame = Frame(
+            self.path, image.record, parts, key, group, view, image.size(), split,
+            self._camera(image), named=image.value.get("view") is not None,
+        )  # fmt: skip
+        for record, item in self._of_image[index]:
+            self._add(frame, item, record)
+        return frame
+
+    def _key(self, image: StateReader, parts: tuple[str, ...]) -> str:
+        """Key of an image: its name; of one on another machine the last part, where that is enough."""
+        text = image.text("file_name")
+        key = "/".join(parts)
+        try:
+            if not parts:
+                check_name(text)
+                raise image.error("file_name", "is no name of a file")
+            if not _is_relative(text) and len(self._by_last[parts[-1]]) == 1:
+                key = parts[-1]
+            return check_name(key)
+        except UnsafePathError as error:
+            raise image.error("file_name", error.message) from error
+
+    def _add(self, frame: Frame, item: Mapping[str, Any], record: str) -> None:
+        """One annotation of a frame: its ball, or the box of something else."""
+        category = self.categories.find(item.get("category_id"))
+        if category is None:
+            shown = _spelt(item["category_id"]) if "category_id" in item else "missing"
+            problem = f"is {shown}, which no category of the file has; kept as a box without class"
+            self._note(record, "category_id", problem)
+        try:
+            if category is not None and category.ball:
+                self._add_ball(frame, item, category, record)
             else:
-                boxes.append(_shown(category, item, box))
-        station_key = key if group is None else f"{group}/{view_key}"
-        station = Station(station_key, image.size(), calibration=self._calibration)
-        if (camera := self._camera(image)) is not None:
-            station = station.with_given(camera)
-        media, extras = self._media(name), Extras(tuple(boxes))
-        view = View(view_key, station, tuple(balls), media, extras=extras)
-        if group is None:
-            label = f"Image {PurePosixPath(key).name}"
-            return PlacedView(GroupHead(key, "", self._split, label, Pitch(), 1), 0, view)
-        label = f"Group {PurePosixPath(group).name}"
-        # How many views it has is known once everything is read.
-        return PlacedView(GroupHead(group, "", self._split, label, Pitch()), index, view)
+                name = "" if category is None else category.name.lower()
+                frame.boxes.append(_shown(name, item, box_of(item)))
+        except NoPlaceError as error:
+            self._note(record, error.field, f"{error.problem}; left out")
+
+    def _add_ball(
+        self, frame: Frame, item: Mapping[str, Any], category: Category, record: str
+    ) -> None:
+        if item.get("iscrowd") in (1, "1"):
+            self._note(record, "iscrowd", "is 1: a crowd is not one ball; left out")
+            return
+        ball = ball_of(item, category.keypoints)
+        if ball in frame.balls:
+            self._note(record, "bbox", "puts a second ball at the same place; left out")
+            return
+        frame.balls.append(ball)
+        self.categories.count(category)
 
     def _camera(self, image: StateReader) -> Camera | None:
         """The camera that a file of somebody else gives; one that is none is reported."""
@@ -215,30 +351,42 @@ class _File:
     def _placed(self, image: StateReader, key: str) -> tuple[str | None, str]:
         """Group and name of a view; no group where the file says none."""
         group, view = image.value.get("group_id"), image.value.get("view")
-        if group is None or isinstance(group, bool) or not isinstance(group, str | int):
+        if group is None or isinstance(group, bool) or not isinstance(group, str | int | float):
             return None, key
         if view is None:
             view = PurePosixPath(key).name
-        if isinstance(view, bool) or not isinstance(view, str | int):
+        if isinstance(view, bool) or not isinstance(view, str | int | float):
             raise image.error("view", "is no name of a view")
-        return _safe(image, "group_id", str(group)), _safe(image, "view", str(view))
-
-    def _media(self, name: str) -> Media | None:
-        """The frame beside the annotations, where it lies in the tree."""
-        tops = ("", f"{self._top}/") if self._top != "." else ("",)
-        for top in tops:
-            for folder in _FOLDERS:
-                place = f"{top}{folder}{name}"
-                if place in self._names and PurePosixPath(place).suffix.lower() in IMAGE_SUFFIXES:
-                    return self._tree.media(place)
-        return None
+        return _safe(image, "group_id", group), _safe(image, "view", view)
 
 
-def _safe(image: StateReader, field: str, text: str) -> str:
+def _safe(image: StateReader, field: str, value: str | float) -> str:
+    text = value if isinstance(value, str) else id_text(value) or ""
     try:
         return str(PurePosixPath(check_name(text)))
     except UnsafePathError as error:
         raise image.error(field, error.message) from error
+
+
+def _is_relative(name: str) -> bool:
+    """Whether a name leads to a file below a folder, whichever that is."""
+    try:
+        return bool(check_name(name.replace("\\", "/"))) and "://" not in name and "?" not in name
+    except UnsafePathError:
+        return False
+
+
+def _spelt(value: Any) -> str:
+    """A value as the file spells it, no longer than a sentence can take."""
+    if isinstance(value, str):
+        return quoted(value, 40)
+    return "null" if value is None else str(value)[:40]
+
+
+def _last_part(image: Any) -> str:
+    name = image.get("file_name") if isinstance(image, dict) else None
+    parts = picture_parts(name) if isinstance(name, str) else ()
+    return parts[-1] if parts else ""
 
 
 def _shown(category: str, item: Mapping[str, Any], box: Box) -> Mapping[str, Any]:

@@ -8,13 +8,16 @@ from bisect import bisect_left
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO, Protocol
+from typing import IO, TYPE_CHECKING, Protocol
 
 from app.config import Settings
 from app.datasets.report import Report
 from app.errors import DatasetFormatError
 from app.object_store.path import StoredPath
 from app.soccer.media import Media
+
+if TYPE_CHECKING:
+    from app.datasets.zip_tree import ZipTree
 
 _CHUNK = 1024 * 1024
 BROKEN = (zipfile.BadZipFile, zlib.error, EOFError, RuntimeError, NotImplementedError, OSError)
@@ -78,7 +81,7 @@ class FileTree(Protocol):
     def media_inside(self, name: str, member: str) -> Media:
         """The same of a member of a zip file among the files."""
 
-    def nested(self, name: str, report: Report) -> FileTree:
+    def nested(self, name: str, report: Report) -> ZipTree:
         """The members of a zip file among the files, read in place.
 
         Raises:

@@ -53,6 +53,7 @@ class FrameList:
         limits: Limits = DEFAULT_LIMITS,
     ):
         self._settings, self._folder = settings, folder
+        self._shown, self._report = shown, report
         self._sealed: dict[str, str] = {}
         self._media: dict[tuple[str, str], Media] = {}
         value = read_json(content, shown, max_bytes=limits.file_bytes)
@@ -102,10 +103,22 @@ class FrameList:
         return self._sealed[address]
 
     def placed(self, groups: Iterator[Group]) -> Iterator[Group]:
-        """The groups, each view with the frame that the list names for it; others keep theirs."""
+        """The groups, each view with the frame that the list names for it; others keep theirs.
+
+        Entries that name no view are reported in the end.
+        """
+        unused = dict.fromkeys(self._media)
         for group in groups:
+            for view in group.views:
+                unused.pop((group.key, view.key), None)
             views = tuple(self._with_frame(group.key, view) for view in group.views)
             yield replace(group, views=views)
+        if unused:
+            count = "1 entry names" if len(unused) == 1 else f"{len(unused):,} entries name"
+            names = ", ".join(f"{group}/{view}" for group, view in list(unused)[:5])
+            more = ", ..." if len(unused) > 5 else ""
+            problem = f"{count} no view of what was read: {names}{more}"
+            self._report.note(self._shown, None, "frames", problem)
 
     def _with_frame(self, group: str, view: View) -> View:
         media = self._media.get((group, view.key))

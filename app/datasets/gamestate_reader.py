@@ -8,9 +8,11 @@ from pathlib import PurePosixPath
 from typing import Any
 
 from app.datasets import fields
+from app.datasets.ball_names import is_ball
 from app.datasets.file_tree import DEFAULT_LIMITS, FileTree, Limits, Root, files_inside
 from app.datasets.gamestate import BALL, LABELS, METADATA, PITCH
 from app.datasets.json_text import read_json
+from app.datasets.record_ids import IdIndex
 from app.datasets.report import Report
 from app.datasets.safe_path import check_name
 from app.datasets.sn_calibration_reader import lines_from_json
@@ -64,8 +66,10 @@ def read_gamestate(
 
 @dataclass
 class _Image:
-    """The annotations of one image."""
+    """An image and its annotations."""
 
+    record: dict[str, Any]
+    size: ImageSize
     lines: Lines = field(default_factory=dict)
     other_lines: tuple[Mapping[str, Any], ...] = ()
     balls: list[BallAnnotation] = field(default_factory=list)
@@ -78,7 +82,8 @@ class _Sequence:
 
     def __init__(self, tree: FileTree, name: str, names: list[str], report: Report, limits: Limits):
         self.path, self._report, self._tree = tree.shown(name), report, tree
-        value = read_json(tree.read_bytes(name), self.path, max_bytes=limits.file_bytes)
+        content = tree.read_bytes(name)
+        value = read_json(content, self.path, max_bytes=limits.file_bytes, report=report)
         if not isinstance(value, dict):
             raise DatasetFormatError(self.path, None, None, "is not an object")
         self._value = value
@@ -113,11 +118,18 @@ class _Sequence:
             calibration: What counts for a view that has a camera and lines.
             stems: Names that other files of this sequence have already; those of this one join.
         """
-        records = dict(self._records(stems))
-        images = self._annotated(records)
+        images: list[_Image] = []
+        index: IdIndex[_Image] = IdIndex()
+        for identity, record, size in self._records(stems):
+            image = _Image(record, size)
+            if not index.add(identity, image):
+                problem = f"is {identity}, as that of another image is; no annotation joins it"
+                self._report.note(self.path, str(record["file_name"]), "image_id", problem)
+            images.append(image)
+        self._annotate(index)
         common = {name: self._value[name] for name in ("info", "categories") if name in self._value}
-        for identity, (record, size) in records.items():
-            image = images[identity]
+        for image in images:
+            record, size = image.record, image.size
             key = str(record["file_name"])
             kept = {"image": record, **image.kept, **common}
             extras = Extras(tuple(image.boxes), image.other_lines, {METADATA: kept})
@@ -128,8 +140,8 @@ class _Sequence:
             label = f"{self.key} · {PurePosixPath(key).stem}"
             yield Group(name, (view,), match=self.key, split=self.split, label=label)
 
-    def _records(self, names: set[str]) -> Iterator[tuple[str, tuple[dict[str, Any], ImageSize]]]:
-        """Sound image records by their id as text, each name once."""
+    def _records(self, names: set[str]) -> Iterator[tuple[Any, dict[str, Any], ImageSize]]:
+        """Sound image records with their ids, each name once."""
         for index, record in enumerate(self._list("images")):
             self._report.read += 1
             where = f"images[{index}]"
@@ -150,38 +162,40 @@ class _Sequence:
                 self._report.note(self.path, where, None, str(error))
                 continue
             names.add(PurePosixPath(key).stem)
-            # Some tools spell the ids as numbers.
-            yield str(image.get("image_id", image.get("id"))), (image, size)
+            yield image.get("image_id", image.get("id")), image, size
 
-    def _annotated(
-        self, records: Mapping[str, tuple[dict[str, Any], ImageSize]]
-    ) -> dict[str, _Image]:
-        images = {identity: _Image() for identity in records}
+    def _annotate(self, images: IdIndex[_Image]) -> None:
+        """Give each annotation to its image; one that joins none is named."""
         categories = self._categories()
         for index, item in enumerate(self._list("annotations")):
             where = f"annotations[{index}]"
-            identity = str(item.get("image_id")) if isinstance(item, dict) else None
-            if identity is None or identity not in images:
+            image = images.find(item.get("image_id")) if isinstance(item, dict) else None
+            if image is None:
                 self._report.note(self.path, where, "image_id", "names no image of the file")
                 continue
-            name = categories.get(str(item.get("category_id")), "")
+            name = categories.find(item.get("category_id"))
+            if name is None:
+                shown = str(item.get("category_id"))[:40]
+                problem = f"is {shown}, which is no category; kept without its meaning"
+                self._report.note(self.path, where, "category_id", problem)
             if name == PITCH:
-                self._add_lines(images[identity], item, records[identity][1], where)
-            elif name == BALL:
-                self._add_ball(images[identity], item, where)
+                self._add_lines(image, item, image.size, where)
+            elif name is not None and is_ball(name):
+                self._add_ball(image, item, where)
             elif isinstance(item.get("bbox_image"), dict):
-                images[identity].boxes.append(_box(item))
+                image.boxes.append(_box(item))
             else:
-                images[identity].kept.setdefault("others", []).append(item)
-        return images
+                image.kept.setdefault("others", []).append(item)
 
-    def _categories(self) -> dict[str, str]:
-        """Name of each category by its id as text."""
-        found = {str(identity): name for identity, name in _IDS.items()}
+    def _categories(self) -> IdIndex[str]:
+        """Name of each category by its id; the usual ones where a file does not list them."""
+        found: IdIndex[str] = IdIndex()
         listed = self._value.get("categories")
         for item in listed if isinstance(listed, list) else []:
             if isinstance(item, dict) and isinstance(item.get("name"), str):
-                found[str(item.get("id"))] = item["name"].strip().lower()
+                found.add(item.get("id"), item["name"].strip().lower())
+        for identity, name in _IDS.items():
+            found.add(identity, name)
         return found
 
     def _add_lines(self, image: _Image, item: dict[str, Any], size: ImageSize, where: str) -> None:

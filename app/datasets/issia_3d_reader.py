@@ -17,6 +17,7 @@ from app.datasets.viper_reader import ViperTrack
 from app.errors import DatasetFormatError
 
 _AXES = re.compile(r"x_cam(\d{1,3})", re.ASCII)
+_AXIS = re.compile(r"([xy])_cam(\d{1,3})", re.ASCII)
 
 
 def open_issia_3d(
@@ -62,10 +63,22 @@ def _read_table(
             if frame in seen:
                 report.note(shown, record, "frame", f"is a second row of frame {frame}")
                 continue
+            if not seen:
+                _tell_halves(cells, shown, report)
             seen.add(frame)
             _read_row(cells, frame, found, DatasetFormatError(shown, record, None, ""), report)
     except DatasetFormatError as error:
         report.skip(error)
+
+
+def _tell_halves(columns: Mapping[str, str], shown: str, report: Report) -> None:
+    """Name each column of x without one of y, or the other way round: nothing is read of it."""
+    there = {(found[1], found[2]) for name in columns if (found := _AXIS.fullmatch(name))}
+    for axis, camera in sorted(there):
+        other = "y" if axis == "x" else "x"
+        if (other, camera) not in there:
+            problem = f"has no column {other}_cam{camera} beside it; left out"
+            report.note(shown, None, f"{axis}_cam{camera}", problem)
 
 
 def _frame(cells: Mapping[str, str]) -> int:

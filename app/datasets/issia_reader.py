@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import PurePosixPath
 from typing import Any
@@ -164,6 +164,16 @@ def complete(
         lines = _read_lines(options.lines, options.size, report, limits)
     for camera in found.tracks:
         found.stations[camera] = _station(camera, given.get(camera), lines.get(camera), options)
+    _tell_unused(found, {"camera": list(given), "line file": list(lines)}, report)
+
+
+def _tell_unused(found: IssiaFolder, brought: Mapping[str, Sequence[int]], report: Report) -> None:
+    """Say which numbers of cameras came without ground truth of that camera."""
+    for what, numbers in brought.items():
+        unused = sorted(set(numbers) - found.tracks.keys())
+        if unused and found.tracks:
+            names = ", ".join(f"cam{number}" for number in unused)
+            report.remark(f"{what} of {names} not used: there is no ground truth of that camera")
 
 
 def camera_number(name: str) -> int | None:
@@ -221,11 +231,14 @@ def _read_given(tree: FileTree, names: list[str], report: Report) -> dict[int, C
     cameras = cameras_of(tree, files[:1], side)
     for problem in side.problems:
         report.skip(problem)
-    return {
-        number: camera
-        for name, camera in cameras.items()
-        if (number := camera_number(name)) is not None
-    }
+    shown, given = tree.shown(files[0]), dict[int, Camera]()
+    for name, camera in cameras.items():
+        number = camera_number(name)
+        if number is None:
+            report.note(shown, name[:80], None, "has no camera number in its name; left out")
+        elif given.setdefault(number, camera) is not camera:
+            report.note(shown, name[:80], None, f"is a second camera {number}; left out")
+    return given
 
 
 def _read_lines(path: Root, size: ImageSize, report: Report, limits: Limits) -> dict[int, LineFile]:
@@ -242,11 +255,15 @@ def _own_lines(
 
 
 def _by_camera(files: Iterator[LineFile], side: Report, report: Report) -> dict[int, LineFile]:
-    lines = {}
+    lines: dict[int, LineFile] = {}
     for file in files:
         number = camera_number(PurePosixPath(file.stem).name)
-        if number is not None:
-            lines[number] = file
+        if number is None:
+            sentence = "has no camera number in its name; left out"
+            report.note(f"{file.place}.json", None, None, sentence)
+        elif lines.setdefault(number, file) is not file:
+            sentence = f"is a second file of lines of camera {number}; left out"
+            report.note(f"{file.place}.json", None, None, sentence)
     for problem in side.problems:
         report.skip(problem)
     return lines

@@ -10,6 +10,7 @@ from typing import Any, NoReturn
 
 import numpy as np
 
+from app.datasets.report import Report
 from app.errors import DatasetFormatError
 
 MAX_BYTES = 256 * 1024 * 1024
@@ -23,6 +24,9 @@ _STRING = re.compile(_DOUBLE, re.DOTALL)
 _LITERAL_STRING = re.compile(_DOUBLE + b"|" + _SINGLE, re.DOTALL)
 # Half of a character pair is no text and could not be stored.
 _SURROGATE = re.compile(rb"\\u[dD]")
+# Words and exponents of which a number that is not finite may come; there are none in most files.
+_INFINITE = re.compile(rb"NaN|Infinity|\d[eE]\+?\d{2}|\d{309}")
+_NO_NUMBER = re.compile(r"\b(?:nan|inf|NaN|Infinity)\b")
 _PLAIN = (str, int, float, bool, type(None))
 
 
@@ -33,6 +37,7 @@ def read_json(
     record: str | None = None,
     double_encoded: bool = False,
     max_bytes: int = MAX_BYTES,
+    report: Report | None = None,
 ) -> Any:
     """The value of JSON text.
 
@@ -42,24 +47,34 @@ def read_json(
         record: Record inside the file, for the error.
         double_encoded: Also accept a JSON string that holds JSON or a Python dict literal.
         max_bytes: Longest text that is looked at.
+        report: Takes one problem for each NaN, Infinity and number that is too large, which are
+            null in the value; without one, the first of them refuses the file.
 
     Raises:
-        DatasetFormatError: Not JSON, NaN or Infinity in it, too long or nested too deeply.
+        DatasetFormatError: Not JSON, too long, nested too deeply, or (without ``report``) with a
+            number in it that is not finite.
     """
-    value = _read(content, path, record, max_bytes)
+    value = _read(content, path, record, max_bytes, report)
     if double_encoded and isinstance(value, str):
-        return _read_inner(value, path, record)
+        return _read_inner(value, path, record, report)
     return value
 
 
-def _read(content: bytes, path: str, record: str | None, max_bytes: int) -> Any:
+def _read(
+    content: bytes, path: str, record: str | None, max_bytes: int, report: Report | None
+) -> Any:
     if len(content) > max_bytes:
         raise DatasetFormatError(path, record, None, f"is longer than {max_bytes:,} bytes")
     if _depth(content, _STRING) > MAX_DEPTH:
         raise DatasetFormatError(path, record, None, f"is nested deeper than {MAX_DEPTH} levels")
     try:
         text = content.decode("utf-8-sig")
-        value = json.loads(text, parse_constant=_refuse, parse_float=_finite)
+        if report is None:
+            value = json.loads(text, parse_constant=_refuse, parse_float=_finite)
+        else:
+            value = json.loads(text)
+            if _INFINITE.search(content):
+                value = _null_infinite(value, path, report)
         if _SURROGATE.search(content):
             json.dumps(value, ensure_ascii=False).encode()
         return value
@@ -72,17 +87,20 @@ def _read(content: bytes, path: str, record: str | None, max_bytes: int) -> Any:
         raise DatasetFormatError(path, record, None, str(error)) from error
 
 
-def _read_inner(text: str, path: str, record: str | None) -> Any:
+def _read_inner(text: str, path: str, record: str | None, report: Report | None) -> Any:
     try:
-        return _read(text.encode(), path, record, MAX_LITERAL_CHARACTERS)
+        return _read(text.encode(), path, record, MAX_LITERAL_CHARACTERS, report)
     except (DatasetFormatError, UnicodeEncodeError):
-        return parse_literal(text, path, record)
+        return parse_literal(text, path, record, report)
 
 
-def parse_literal(text: str, path: str, record: str | None = None) -> Any:
+def parse_literal(
+    text: str, path: str, record: str | None = None, report: Report | None = None
+) -> Any:
     """The value of a Python literal of dicts, lists, tuples, strings, numbers and None.
 
-    Nothing is evaluated: names, calls, sets, bytes and complex numbers are refused.
+    Nothing is evaluated: names, calls, sets, bytes and complex numbers are refused. With a report
+    ``nan`` and ``inf``, as Python writes them, are None, and are counted there.
 
     Raises:
         DatasetFormatError: Not such a literal, too long or nested too deeply.
@@ -94,10 +112,39 @@ def parse_literal(text: str, path: str, record: str | None = None) -> Any:
         if _depth(text.encode(), _LITERAL_STRING) > MAX_DEPTH:
             problem = f"is nested deeper than {MAX_DEPTH} levels"
             raise ValueError(problem)
-        value = ast.literal_eval(text.strip())
+        if report is not None and _NO_NUMBER.search(text):
+            value = _literal_without_infinite(text.strip(), path, record, report)
+        else:
+            value = ast.literal_eval(text.strip())
         _require_plain(value)
     except (ValueError, SyntaxError, TypeError, MemoryError, RecursionError) as error:
         raise DatasetFormatError(path, record, None, problem) from error
+    return value
+
+
+class _Missing(ast.NodeTransformer):
+    """Puts None for the names of numbers that are not finite."""
+
+    def __init__(self) -> None:
+        self.count = 0
+
+    def visit_Name(self, node: ast.Name) -> ast.expr:
+        if node.id not in ("nan", "inf", "NaN", "Infinity"):
+            return node
+        self.count += 1
+        return ast.copy_location(ast.Constant(None), node)
+
+    def visit_UnaryOp(self, node: ast.UnaryOp) -> ast.AST:
+        named = isinstance(node.operand, ast.Name)
+        return self.visit(node.operand) if named else self.generic_visit(node)
+
+
+def _literal_without_infinite(text: str, path: str, record: str | None, report: Report) -> Any:
+    missing = _Missing()
+    value = ast.literal_eval(missing.visit(ast.parse(text, mode="eval")))
+    if missing.count:
+        numbers = "1 number is" if missing.count == 1 else f"{missing.count:,} numbers are"
+        report.note(path, record, None, f"{numbers} not finite (nan, inf); read as missing")
     return value
 
 
@@ -124,6 +171,31 @@ def _depth(content: bytes, strings: re.Pattern[bytes]) -> int:
         steps[letters == opening] = 1
         steps[letters == closing] = -1
     return int(np.cumsum(steps).max(initial=0))
+
+
+def _null_infinite(value: Any, path: str, report: Report, place: tuple[str | int, ...] = ()) -> Any:
+    """The value with null for each number that is not finite, which is reported with its place."""
+    if isinstance(value, dict):
+        return {
+            key: _null_infinite(item, path, report, (*place, key)) for key, item in value.items()
+        }
+    if isinstance(value, list):
+        return [
+            _null_infinite(item, path, report, (*place, index)) for index, item in enumerate(value)
+        ]
+    if not isinstance(value, float) or math.isfinite(value):
+        return value
+    what = "is NaN, which is not a number" if math.isnan(value) else "is too large for a number"
+    report.note(path, *_spelt(place), f"{what}; read as missing")
+    return None
+
+
+def _spelt(place: tuple[str | int, ...]) -> tuple[str | None, str | None]:
+    """Record and field of a place: ``("annotations", 3, "area")`` is annotations[3] and area."""
+    parts = [f"[{name}]" if isinstance(name, int) else f".{name}"[:80] for name in place]
+    head = 2 if len(parts) > 2 else 0
+    record, field = ("".join(some).removeprefix(".") for some in (parts[:head], parts[head:]))
+    return record or None, field or None
 
 
 def _refuse(name: str) -> NoReturn:

@@ -32,7 +32,7 @@ class MatchFrames:
     def __init__(self, tree: FileTree, match: str, names: Collection[str], report: Report):
         self._tree, self._match = tree, match
         self._loose = {name for name in names if _is_image(name)}
-        self._members: set[str] = set()
+        self._members: dict[str, str] = {}
         if ARCHIVE in names:
             self._open(report)
 
@@ -43,12 +43,13 @@ class MatchFrames:
             problem = f"{error.problem} Its match is imported without these frames."
             report.note(error.path, error.record, error.field, problem)
             return
-        self._members = {name for name in archive.names() if _is_image(name)}
+        images = filter(_is_image, archive.names())
+        self._members = {name: archive.own_name(name) for name in images}
         archive.close()
 
     def _member(self, name: str) -> Media:
         """Where a member of the archive is."""
-        return self._tree.media_inside(self._match + ARCHIVE, name)
+        return self._tree.media_inside(self._match + ARCHIVE, self._members[name])
 
     @property
     def some(self) -> bool:

@@ -214,8 +214,14 @@ def read_sn_calibration(
         infos = read_match_info(tree, names, report)
         places = _places(infos)
         ours = Ours(places, _sizes(places))
+        unused = dict.fromkeys(infos)
         for file in line_files_of(tree, names, size, report, ours):
+            unused.pop(file.place, None)
             yield _group(file, infos.get(file.place, {}), calibration)
+        if unused:
+            count = "1 image" if len(unused) == 1 else f"{len(unused):,} images"
+            shown = ", ".join(list(unused)[:5]) + (", ..." if len(unused) > 5 else "")
+            report.remark(f"{count} of match_info.json without a file of lines: {shown}")
 
 
 def _group(file: LineFile, record: Mapping[str, Any], calibration: str) -> Group:

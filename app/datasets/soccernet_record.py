@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from app.datasets import fields
+from app.datasets.ball_names import is_ball
 from app.datasets.exact import exact_inverse
 from app.datasets.report import Report
 from app.datasets.sn_calibration import spelling
@@ -125,7 +126,7 @@ def _add_box(item: Any, where: str, builder: _Builder) -> None:
     name = item.get("class")
     if name is not None and not isinstance(name, str):
         builder.note(f"{where}.class", "is neither text nor null")
-    if not isinstance(name, str) or name.strip() != BALL:
+    if not isinstance(name, str) or not is_ball(name):
         builder.boxes.append(item)
         return
     try:

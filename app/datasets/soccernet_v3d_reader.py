@@ -66,6 +66,10 @@ def read_soccernet_v3d(
             for group in matches.read_match(folder):
                 yield reader.labelled(group, tree.shown(folder + LABELS))
         yield from reader.tabled(tree, names, limits)
+        if unused := table.unused():
+            count = "1 action" if len(unused) == 1 else f"{len(unused):,} actions"
+            shown = ", ".join(unused[:5]) + (", ..." if len(unused) > 5 else "")
+            report.remark(f"{count} of the split lists did not come: {shown}")
 
 
 class _Reader:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import PurePosixPath
 
 from app.datasets import fields
@@ -67,14 +67,27 @@ class SnTable:
     folder: str
     rows: Mapping[str, Mapping[str, Mapping[str, TableRow]]]
     lists: Mapping[tuple[str, str], str]
+    asked: set[tuple[str, str]] = field(default_factory=set)
+    """Entries of the lists that some group has asked for."""
 
     def split(self, match: str, main: str) -> str:
         """Split of a group: as the lists have it, else as its rows do."""
         folder, stem = PurePosixPath(match).name, PurePosixPath(main).stem
+        self.asked.add((folder, stem))
         if (folder, stem) in self.lists:
             return self.lists[folder, stem]
         rows = self.rows.get(match, {}).get(main, {}).values()
         return next((row.split for row in rows if row.split), "")
+
+    def unused(self) -> list[str]:
+        """Actions of the split lists that no group is; replays are listed with their action."""
+        known = {(match, stem.partition("_")[0]) for match, stem in self.asked}
+        entries = ((match, stem.partition("_")[0]) for match, stem in self.lists)
+        return [
+            f"{match}/{stem}"
+            for match, stem in dict.fromkeys(entries)
+            if (match, stem) not in known
+        ]
 
 
 def read_snv3d_table(tree: FileTree, names: list[str], report: Report, limits: Limits) -> SnTable:

@@ -30,20 +30,32 @@ class ViewGroups:
         self._report = report
         self._waiting: dict[str, list[PlacedView]] = {}
         self._shared: dict[str, Station] = {}
+        self._done: set[str] = set()
+        """Groups that were ready: whatever comes of them afterwards comes twice."""
 
     def add(self, item: PlacedView, path: str) -> Iterator[Group]:
         """The group that this view completes, if it does; ``path`` is the file that it comes from."""
         key = item.head.key
-        waiting = self._waiting.setdefault(key, [])
-        if any(other.view.key == item.view.key for other in waiting):
+        waiting = [] if key in self._done else self._waiting.setdefault(key, [])
+        if key in self._done or any(other.view.key == item.view.key for other in waiting):
             self._report.note(path, key, item.view.key, "comes twice; the first one counts")
             return
         waiting.append(item)
         if len(waiting) == item.head.views:
+            self._done.add(key)
             yield self._group(self._waiting.pop(key))
 
     def rest(self) -> Iterator[Group]:
-        """Groups that have fewer views than they say, as they are."""
+        """Groups that have fewer views than they say, as they are, which is said."""
+        lacking = [
+            f"{key} ({len(items)} of {items[0].head.views})"
+            for key, items in self._waiting.items()
+            if items[0].head.views > len(items)
+        ]
+        if lacking:
+            count = "1 group has" if len(lacking) == 1 else f"{len(lacking):,} groups have"
+            shown = ", ".join(lacking[:5]) + (", ..." if len(lacking) > 5 else "")
+            self._report.remark(f"{count} fewer views than when it was written: {shown}")
         for key in list(self._waiting):
             yield self._group(self._waiting.pop(key))
 

@@ -43,7 +43,8 @@ def first_names(path: Path, most: int) -> list[str]:
             break
         name, extra, comment = _ENTRY.unpack_from(records, at)
         start = at + _ENTRY.size
-        names.append(records[start : start + name].decode("utf-8", errors="replace"))
+        text = records[start : start + name].decode("utf-8", errors="replace")
+        names.append(text.replace("\\", "/"))
         at = start + name + extra + comment
     return names
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import stat
 import zipfile
 from collections import Counter
+from contextlib import suppress
 from dataclasses import replace
 from typing import IO
 
@@ -18,6 +19,8 @@ from app.object_store.path import StoredPath
 from app.soccer.media import Media
 
 _RATIO_FLOOR = 1024 * 1024
+_UTF_8 = 0x800
+"""Flag of members whose names say that they are UTF-8."""
 
 
 class ZipTree:
@@ -96,13 +99,21 @@ class ZipTree:
 
     def media(self, name: str) -> Media:
         """Where a member can be read later."""
-        if isinstance(self.path, StoredPath):
-            return Media(self.path.sealed(), name)
-        return Media(str(self.path), name)
+        return self._media(self.own_name(name))
 
     def media_inside(self, name: str, member: str) -> Media:
         """Where a member of a zip file that is a member can be read later."""
-        return self.media(f"{name}/{member}")
+        return self._media(f"{self.own_name(name)}/{member}")
+
+    def own_name(self, name: str) -> str:
+        """The name of a member as the zip file itself spells it, by which it is opened later."""
+        found = self._members.get(name)
+        return name if found is None else found.filename
+
+    def _media(self, member: str) -> Media:
+        if isinstance(self.path, StoredPath):
+            return Media(self.path.sealed(), member)
+        return Media(str(self.path), member)
 
     def close(self) -> None:
         """Close the zip file."""
@@ -118,17 +129,18 @@ class ZipTree:
             )
             report.note(str(self.path), None, None, damage)
         # Names that differ in case alone are one file on some disks: which one is meant?
-        folded = Counter(member.filename.rstrip("/").casefold() for member in members)
+        names = [member_name(member) for member in members]
+        folded = Counter(name.rstrip("/").casefold() for name in names)
         checked = {}
-        for member in members:
+        for name, member in zip(names, members, strict=True):
             # A name that begins with NUL is empty, which ``is_dir`` does not survive.
-            if member.filename.endswith("/") or any(map(is_hidden, member.filename.split("/"))):
+            if name.endswith("/") or any(map(is_hidden, name.split("/"))):
                 continue
-            problem = self._problem(member, folded)
+            problem = self._problem(member, name, folded)
             if problem is None:
-                checked[member.filename] = member
+                checked[name] = member
             else:
-                report.note(str(self.path), member.filename[:200], None, problem)
+                report.note(str(self.path), name[:200], None, problem)
         return checked
 
     def _check_totals(self, members: list[zipfile.ZipInfo]) -> None:
@@ -142,24 +154,37 @@ class ZipTree:
             raise DatasetFormatError(shown, None, None, problem)
         self._count, self._total = len(members), total
 
-    def _problem(self, member: zipfile.ZipInfo, folded: Counter[str]) -> str | None:
+    def _problem(self, member: zipfile.ZipInfo, name: str, folded: Counter[str]) -> str | None:
         kind = stat.S_IFMT(member.external_attr >> 16)
         if kind not in (0, stat.S_IFREG):
             return "is a link or device, not a plain file"
         if member.flag_bits & UNREADABLE:
             return "has a name that is no text, so it cannot be read"
-        if folded[member.filename.casefold()] > 1:
+        if folded[name.casefold()] > 1:
             return "is there more than once, or under names that differ in case alone"
         if member.file_size > _RATIO_FLOOR and (
             member.file_size > self._limits.ratio * max(member.compress_size, 1)
         ):
             return f"grows more than {self._limits.ratio} times when it is unpacked"
         try:
-            # ZipInfo itself cuts a name at NUL and turns backslashes; look at the original.
-            check_name(member.orig_filename)
+            # ZipInfo itself cuts a name at NUL; look at the original.
+            check_name(member.orig_filename.replace("\\", "/"))
         except UnsafePathError as error:
             return error.message
         return None
+
+
+def member_name(member: zipfile.ZipInfo) -> str:
+    """The name of a member with forward slashes, in the letters that its writer meant.
+
+    Windows' own programs wrote backslashes. Names without the mark for UTF-8 are read as cp437,
+    and many programs write UTF-8 all the same: what is UTF-8 byte for byte is taken for that.
+    """
+    name = member.filename
+    if not name.isascii() and not member.flag_bits & _UTF_8:
+        with suppress(UnicodeError):
+            name = name.encode("cp437").decode("utf-8")
+    return name.replace("\\", "/")
 
 
 def _open_zip(path: Root) -> zipfile.ZipFile:

@@ -1,13 +1,15 @@
 // @ts-check
 /** What can be imported, and what each format does not say itself. */
 
-/** @typedef {{name: string, label: string, hint: string, kind: 'size' | 'calibration' | 'offset' | 'cameras'}} FormatOption */
+/** @typedef {{name: string, label: string, hint: string, kind: 'size' | 'calibration' | 'offset' | 'cameras' | 'text'}} FormatOption */
 /** @typedef {{name: string, label: string, note: string, options: FormatOption[], lines?: boolean}} ImportFormat   `lines`: static cameras, whose lines are files of their own */
 
 /** @type {FormatOption} */
 const CALIBRATION = { name: 'calibration', label: 'Where a view has a given camera and lines', hint: 'which of them is used', kind: 'calibration' };
 /** @type {FormatOption} */
 const SIZE = { name: 'size', label: 'Size of the images', hint: 'width x height, for example 960x540; empty: the usual one', kind: 'size' };
+/** @type {FormatOption} */
+const CATEGORY = { name: 'ball_category', label: 'Category of the ball', hint: 'name or id, where the file calls it neither ball nor anything alike', kind: 'text' };
 /** @type {FormatOption[]} */
 const STATIC = [
 	CALIBRATION, SIZE,
@@ -24,7 +26,7 @@ export const IMPORT_FORMATS = [
 	{ name: 'sn-calibration', label: 'sn-calibration', note: 'a JSON of lines for each frame', options: [CALIBRATION, SIZE] },
 	{ name: 'cameras', label: 'Cameras', note: 'camera JSON for known frames', options: [] },
 	{ name: 'gamestate', label: 'sn-gamestate', note: 'Labels-GameState.json', options: [CALIBRATION] },
-	{ name: 'coco', label: 'COCO', note: 'as Touchline exports it', options: [CALIBRATION] },
+	{ name: 'coco', label: 'COCO', note: 'as Touchline, CVAT, Label Studio, Roboflow or FiftyOne export it', options: [CALIBRATION, CATEGORY] },
 	{ name: 'parquet', label: 'Parquet', note: 'as Touchline exports it', options: [] },
 ];
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from zipfile import ZipFile
@@ -79,6 +80,38 @@ class TestImportOfNothing:
         )
         page.get_by_role("link", name="All datasets").click()
         expect(page.get_by_role("region", name="sample")).to_be_visible()
+
+
+@pytest.fixture
+def things(tmp_path: Path, server: str) -> Iterator[Path]:
+    """A zip of COCO in which the ball is called "thing", with one annotation of no image."""
+    box = {"category_id": 7, "bbox": [600, 300, 12, 12]}
+    value = {
+        "images": [{"id": 1, "file_name": "a.jpg", "width": 1280, "height": 720}],
+        "annotations": [{"id": 1, "image_id": 1.0, **box}, {"id": 2, "image_id": 99, **box}],
+        "categories": [{"id": 7, "name": "thing"}],
+    }
+    target = tmp_path / "things.zip"
+    with ZipFile(target, "w") as archive:
+        archive.writestr("annotations\\instances_default.json", json.dumps(value))
+    yield target
+    delete_dataset(server, "things")
+
+
+class TestImportOfForeignCoco:
+    def test_says_that_no_category_is_the_ball_and_takes_the_one_that_is_named(
+        self, things: Path, open_page: OpenPage
+    ) -> None:
+        page = open_page("/import")
+        bring_in(page, things, "things")
+        report = page.get_by_role("region", name="What happened")
+        expect(report).to_contain_text('none of its categories ("thing") is taken for it')
+        expect(report).to_contain_text("is 99, which no image of the file has")
+        page.get_by_label("Category of the ball").fill("Thing")
+        page.get_by_role("button", name="Import", exact=True).click()
+        expect(report).to_contain_text('category "thing" is the ball (1 annotation)')
+        expect(report).to_contain_text("1 record is left out")
+        assert serious_in_both(page) == []
 
 
 class TestGroupsWithoutAPicture:

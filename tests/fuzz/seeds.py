@@ -55,6 +55,7 @@ def seeds() -> Iterator[Case]:
     with tempfile.TemporaryDirectory(prefix="touchline-seeds-") as name:
         yield from _exported(Path(name))
         yield from _carried(Path(name))
+    yield from _foreign()
     yield from _predicted()
     yield Case("policy", {"policy.yaml": policy_to_yaml(PAPER).encode()}, "policy.yaml")
     yield Case("text", {"licence.txt": b"Free for research.\n"}, "licence.txt")
@@ -106,6 +107,30 @@ def _predicted() -> Iterator[Case]:
     yield Case("predictions-csv", {"r.csv": rows})
     table = b'frame,camera,ball_bbox,score\n358,3,"[1, 2, 3, 4]",1\n'
     yield Case("predictions-csv", {"r.csv": table})
+
+
+def _foreign() -> Iterator[Case]:
+    """COCO of other tools: two files of one frame, a group of two views, points and polygons."""
+    size = {"width": 640, "height": 360}
+    images = [
+        {"id": 1, "file_name": "images\\7.png", "group_id": "kick", "view": "a", **size},
+        {"id": 2.0, "file_name": "/x/8.png", "group_id": "kick", "view": "b", **size},
+    ]
+    annotations = [
+        {"id": 1, "image_id": 1.0, "category_id": "1", "bbox": [10, 20, 8, 9], "iscrowd": 0},
+        {"id": 2, "image_id": 2, "category_id": 1, "keypoints": [10, 20, 2], "area": 0.0},
+        {"id": 3, "image_id": 2, "category_id": 2, "segmentation": [[1, 2, 30, 4, 5, 60]]},
+    ]
+    categories = [{"id": 1, "name": "sports_ball", "keypoints": ["center"]}, {"id": 2, "name": "x"}]
+    first = {"images": images, "annotations": annotations, "categories": categories}
+    people = {"id": 1, "image_id": 1, "category_id": 2, "bbox": [1, 2, 3, 4], "attributes": {}}
+    second = {"images": images[:1], "annotations": [people], "categories": categories}
+    files = {
+        "annotations/instances_train.json": first,
+        "annotations/person_keypoints_train.json": second,
+    }
+    frames = {"images/7.png": b"x", "images/8.png": b"x"}
+    yield Case("coco", {name: json.dumps(value).encode() for name, value in files.items()} | frames)
 
 
 def _files(root: Path) -> Files:

@@ -55,6 +55,11 @@ class ImportOptions(BaseModel):
     size: tuple[Side, Side] | None = Field(
         default=None, description="Width and height of the annotated images, where files lack it."
     )
+    ball_category: Annotated[str, Field(max_length=200)] = Field(
+        default="",
+        description="COCO: name or id of the category that is the ball; empty: by names such as "
+        "ball, sports_ball and soccer-ball.",
+    )
     lines: ImportPlace | None = Field(
         default=None, description="ISSIA: line files of the static cameras."
     )

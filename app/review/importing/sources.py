@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
 from typing import Any, get_args
 
 from app.config import Settings
@@ -13,10 +14,10 @@ from app.datasets.file_tree import Limits, Root
 from app.datasets.format_names import ImportFormat
 from app.datasets.frame_list import read_frame_list
 from app.datasets.gamestate_reader import read_gamestate
-from app.datasets.guess_format import guess_format
 from app.datasets.issia import DEFAULT_SIZE as ISSIA_SIZE
 from app.datasets.issia_3d_reader import open_issia_3d
 from app.datasets.issia_reader import IssiaFolder, IssiaOptions, open_issia
+from app.datasets.looks_like import looks_like
 from app.datasets.parquet_reader import read_parquet
 from app.datasets.report import Report
 from app.datasets.sn_calibration import DEFAULT_SIZE
@@ -37,6 +38,39 @@ FORMATS: tuple[str, ...] = get_args(ImportFormat)
 STATIC = ("issia", "issia-3d")
 
 
+BALLS_ELSEWHERE = ("sn-calibration", "frames", "coco")
+"""Formats that have no balls, or say themselves why there is none."""
+
+
+@dataclass
+class BallTally:
+    """Counts what groups bring on their way through an import."""
+
+    groups: int = 0
+    balls: int = 0
+    classes: Counter[str] = field(default_factory=Counter)
+    """Boxes that are no ball, by class."""
+
+    def watch(self, groups: Iterable[Group]) -> Iterator[Group]:
+        """The groups, each counted as it passes."""
+        for group in groups:
+            self.groups += 1
+            for view in group.views:
+                self.balls += len(view.balls)
+                self.classes.update(str(box.get("class")) for box in view.extras.boxes)
+            yield group
+
+    def without_ball(self) -> str | None:
+        """That the files bring no ball, with the classes that they have; None where they bring one."""
+        if self.balls or not self.groups:
+            return None
+        most = ", ".join(
+            f'"{name[:40]}" ({count:,})' for name, count in self.classes.most_common(12)
+        )
+        boxes = f"; its boxes are of {most}" if most else ""
+        return f"no ball was read from any of {self.groups:,} groups{boxes}"
+
+
 @dataclass(frozen=True)
 class Source:
     """Files of one format, and what they do not say themselves.
@@ -52,6 +86,7 @@ class Source:
         frames: A list of where the frames lie (``app.datasets.frame_list``), where it is not beside
             the labels.
         name: What people call it; the log keeps it. Empty: the path.
+        ball_category: COCO: name or id of the category that is the ball; empty: by its name.
     """
 
     format: str
@@ -63,6 +98,7 @@ class Source:
     flipped: frozenset[int] = frozenset()
     frames: Root | None = None
     name: str = ""
+    ball_category: str = ""
 
     @property
     def label(self) -> str:
@@ -108,9 +144,9 @@ class Imported:
             first = source.shown(problems[0].message)
             sentence += f". The first of {len(problems)} problems: " if problems[1:] else ": "
             sentence += first
-        guess = guess_format(source.path)
-        if guess is not None and guess != source.format:
-            return sentence, f"It looks like {guess}: choose that format and import it again."
+        look = looks_like(source.path, source.format)
+        if look is not None:
+            return sentence, look.sentence
         if self.report.read:
             return sentence, "Every record was left out; the report names each with its reason."
         return sentence, (
@@ -142,7 +178,7 @@ class Imported:
                 for problem in self.report.problems
             ],
             "more_skipped": self.report.dropped,
-            "remarks": list(self.result.problems),
+            "remarks": [*map(shown, self.report.remarks), *self.result.problems],
         }
 
 
@@ -199,10 +235,11 @@ def import_source(
     groups = _groups(source, report, limits) if folder is None else folder.groups()
     if source.frames is not None:
         groups = read_frame_list(source.frames, settings, report, limits).placed(iter(groups))
+    tally = BallTally()
     result = ingest(
         store,
         dataset,
-        groups,
+        tally.watch(groups),
         source=source.label,
         actor=actor,
         progress=progress,
@@ -212,6 +249,8 @@ def import_source(
     )
     if folder is not None and not dry_run:
         ingest_spare(store, dataset, _spare(folder), source=source.label, actor=actor)
+    if source.format not in BALLS_ELSEWHERE and (sentence := tally.without_ball()):
+        report.remark(sentence)
     return Imported(source, report, result)
 
 
@@ -225,7 +264,13 @@ def _groups(source: Source, report: Report, limits: Limits) -> Iterator[Group]:
         case "gamestate":
             return read_gamestate(path, report, calibration=calibration, limits=limits)
         case "coco":
-            return read_coco(path, report, calibration=calibration, limits=limits)
+            return read_coco(
+                path,
+                report,
+                calibration=calibration,
+                limits=limits,
+                ball_category=source.ball_category,
+            )
         case "parquet":
             return read_parquet(path, report, limits=limits)
         case _:

@@ -43,7 +43,8 @@ class ImportRequest:
         source: ``{"upload": id}`` or ``{"folder": path}``.
         lines: The same for ISSIA's line files, or None.
         frames: The same for a list of frames, or None.
-        options: ``calibration``, ``frame_offset``, ``flipped``, ``size`` ([width, height]).
+        options: ``calibration``, ``frame_offset``, ``flipped``, ``size`` ([width, height]),
+            ``ball_category``.
         policy: Name of a shipped one for a dataset that is made; None: as its pictures suggest.
     """
 
@@ -223,6 +224,7 @@ def source_of(settings: Settings, request: ImportRequest) -> Source:
         frame_offset=offset,
         flipped=frozenset(options.get("flipped", ())),
         name=name,
+        ball_category=options.get("ball_category", ""),
     )
 
 

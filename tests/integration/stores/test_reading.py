@@ -173,6 +173,7 @@ class TestFrameLists:
             {**entry, "view": "x", "path": "s3://other-data/x.zip"},
             {**entry, "view": "x", "path": "s3://frames/../x.zip"},
             {**entry, "view": "x", "path": "/etc/passwd"},
+            {**entry, "group": "gone", "view": "x"},
         ]
         file = tmp_path / "frames.json"
         file.write_text(json.dumps({"frames": entries}))
@@ -183,7 +184,9 @@ class TestFrameLists:
             "frames/3",
             "frames/4",
             "frames/5",
+            None,
         ]
+        assert report.problems[-1].problem == "1 entry names no view of what was read: gone/x"
         placed, wrong = groups[0].views, groups[1].views[0].media
         assert placed[0].media is not None and placed[1].media is not None and wrong is not None
         assert read_frame(placed[0].media, None, False, settings) == frame

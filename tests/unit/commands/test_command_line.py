@@ -238,6 +238,19 @@ class TestImport:
             code, told, err = run("import", name, out, "--dataset", name, "--json")
             assert (code, json.loads(told)["new"]) == (0, 2), err
 
+    def test_coco_says_which_category_is_the_ball(self, run: Run, tmp_path: Path) -> None:
+        value = {
+            "images": [{"id": 1, "file_name": "a.jpg", "width": 1280, "height": 720}],
+            "annotations": [{"id": 1, "image_id": 1, "category_id": 7, "bbox": [1, 2, 3, 4]}],
+            "categories": [{"id": 7, "name": "thing"}],
+        }
+        (tmp_path / "x.json").write_text(json.dumps(value))
+        command = ("import", "coco", tmp_path / "x.json", "--dataset", "things")
+        code, out, err = run(*command)
+        assert (code, 'none of its categories ("thing")' in out + err) == (0, True)
+        code, out, err = run(*command, "--ball-category", "Thing")
+        assert (code, 'category "thing" is the ball' in out + err) == (0, True)
+
     def test_nothing_to_import_is_a_failure(self, run: Run, tmp_path: Path) -> None:
         (tmp_path / "empty").mkdir()
         code, _, err = run("import", "soccernet-v3", tmp_path / "empty", "--dataset", "x")

@@ -114,6 +114,41 @@ class TestReadGamestate:
         _, second = read(labels)
         assert second.views[0].balls[0].point == ImagePoint(0.5, 1.25)
 
+    @pytest.mark.parametrize("spelt", [float, str, lambda n: f"{n}.0"])
+    def test_ids_that_are_equal_as_numbers_join(
+        self, read: Read, labels: Value, report: Report, spelt: Callable[[int], Any]
+    ) -> None:
+        for item in labels["annotations"]:
+            item["image_id"] = spelt(int(item["image_id"]))
+            item["category_id"] = spelt(item["category_id"])
+        first, second = read(labels)
+        assert (len(first.views[0].balls), len(second.views[0].balls)) == (1, 1)
+        assert list(first.views[0].station.lines) == ["Goal left post left"]
+
+    def test_a_category_that_is_not_listed_is_named(
+        self, read: Read, labels: Value, report: Report
+    ) -> None:
+        labels["annotations"][0]["category_id"] = 77
+        before = len(report.problems)
+        read(labels)
+        assert ("annotations[0]", "category_id") in [
+            (problem.record, problem.field) for problem in report.problems[before:]
+        ]
+
+    def test_another_spelling_of_the_ball_is_the_ball(self, read: Read, labels: Value) -> None:
+        (category,) = (item for item in labels["categories"] if item["name"] == "ball")
+        category["name"] = "Sports_Ball"
+        assert len(read(labels)[0].views[0].balls) == 1
+
+    def test_one_number_that_is_none_loses_no_sequence(
+        self, read: Read, labels: Value, report: Report
+    ) -> None:
+        labels["annotations"][0]["score"] = float("nan")
+        assert len(read(labels)) == 2
+        assert ("annotations[0]", "score") in [
+            (problem.record, problem.field) for problem in report.problems
+        ]
+
     def test_people_are_shown_like_everywhere_and_kept_whole(
         self, read: Read, labels: Value
     ) -> None:

@@ -9,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from app.datasets.json_text import MAX_DEPTH, parse_literal, read_json
+from app.datasets.report import Report
 from app.errors import DatasetFormatError
 
 PLAIN = st.recursive(
@@ -30,6 +31,45 @@ class TestReadJson:
     def test_numbers_that_are_not_finite_are_refused(self, text: str) -> None:
         with pytest.raises(DatasetFormatError, match="f: holds"):
             read_json(text.encode(), "f")
+
+    @pytest.mark.parametrize(
+        ("text", "value", "place"),
+        [
+            ('{"a": [{"b": NaN, "c": 1}]}', {"a": [{"b": None, "c": 1}]}, "f, a[0], b: is NaN"),
+            ('{"a": {"7.png": {"x": [1, 1e999]}}}', {"a": {"7.png": {"x": [1, None]}}},
+             "f, a.7.png, x[1]: is too large"),
+            ('{"a": -Infinity}', {"a": None}, "f, a: is too large"),
+            ("NaN", None, "f: is NaN"),
+            (json.dumps('{"a": NaN}'), {"a": None}, "f, a: is NaN"),
+            (f"[{'9' * 400}.5]", [None], "f, [0]: is too large"),
+        ],
+    )  # fmt: skip
+    def test_with_a_report_one_bad_number_is_missing_and_the_rest_is_read(
+        self, text: str, value: Any, place: str
+    ) -> None:
+        report = Report()
+        assert read_json(text.encode(), "f", report=report, double_encoded=True) == value
+        (problem,) = report.problems
+        assert str(problem).startswith(place)
+        assert str(problem).endswith("read as missing")
+
+    def test_a_python_literal_with_nan_is_read_alike(self) -> None:
+        report = Report()
+        text = json.dumps("{'a': [nan, -inf, 1.5], 'b': 'nan'}").encode()
+        value = read_json(text, "f", report=report, double_encoded=True)
+        assert value == {"a": [None, None, 1.5], "b": "nan"}
+        assert [str(problem) for problem in report.problems] == [
+            "f: 2 numbers are not finite (nan, inf); read as missing"
+        ]
+        for bad in ("{'a': nan, 'b': open('x')}", "[nan, x]", "[nan.real]", "-nan()"):
+            with pytest.raises(DatasetFormatError, match="neither JSON nor"):
+                read_json(json.dumps(bad).encode(), "f", report=report, double_encoded=True)
+
+    def test_words_in_texts_are_no_numbers(self) -> None:
+        report = Report()
+        text = b'{"NaN": "Infinity", "a": 1e10, "b": 1.5e+20}'
+        assert read_json(text, "f", report=report) == json.loads(text)
+        assert report.problems == []
 
     def test_broken_text_names_its_line(self) -> None:
         with pytest.raises(DatasetFormatError, match="f, line 2, column 1: is not JSON"):

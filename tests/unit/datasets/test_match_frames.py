@@ -30,6 +30,12 @@ class TestMatchFrames:
         assert frames.find("8.png") is None
         assert frames.some
 
+    def test_members_with_backslashes_keep_the_name_by_which_they_are_opened(
+        self, tmp_path: Path, make_zip: Callable[..., Path], report: Report
+    ) -> None:
+        path = make_zip({"frames\\7.png": b"x"}, tmp_path / "Frames-v3.zip")
+        assert _frames(tmp_path, report).find("7.png") == Media(str(path), "frames\\7.png")
+
     @pytest.mark.parametrize("inside", ["", "v3_frames/", "Frames-v3/", "frames/"])
     def test_loose_frames_are_found_alike(
         self, tmp_path: Path, report: Report, inside: str

@@ -38,6 +38,11 @@ def _read(value: Any, report: Report | None = None) -> ImageRecord:
 
 
 class TestRecordFromJson:
+    @pytest.mark.parametrize("name", ["Ball", "ball ", "Sports_Ball", "football", "Balls"])
+    def test_the_ball_is_known_in_every_spelling(self, image: MakeImage, name: str) -> None:
+        value = image(bboxes=[{"class": name, "ID": None, "points": BALL}])
+        assert len(_read(value).balls) == 1
+
     def test_ball_lines_and_size_become_annotations(self, image: MakeImage) -> None:
         record = _read(image())
         assert record.size == ImageSize(1280, 720)

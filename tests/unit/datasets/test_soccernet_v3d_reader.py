@@ -125,3 +125,19 @@ class TestReadSoccernetV3d:
         rows = table(match, "7,0,5,1280,720,,train")
         read(json.dumps(solved_labels), rows)
         assert [item.record for item in report.problems] == ["7_5.png"]
+
+    def test_actions_of_the_split_lists_that_did_not_come_are_said(
+        self,
+        read: Callable[..., list[Group]],
+        solved_labels: Value,
+        match: str,
+        tmp_path: Path,
+        report: Report,
+    ) -> None:
+        folder = match.rpartition("/")[2]
+        lines = [f"{folder}/7", f"{folder}/7_1", f"{folder}/99", f"{folder}/99_1", "Other/1"]
+        (tmp_path / "SNv3D-train.txt").write_text("\n".join(lines))
+        read(json.dumps(solved_labels), table(match, "7,1,,1280,720,,test"))
+        assert report.remarks == [
+            f"2 actions of the split lists did not come: {folder}/99, Other/1"
+        ]

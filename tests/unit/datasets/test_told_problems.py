@@ -10,10 +10,13 @@ from typing import Any
 import pytest
 
 from app.datasets.camera_json import camera_to_json
+from app.datasets.issia_3d_reader import open_issia_3d
 from app.datasets.issia_reader import IssiaOptions, open_issia
 from app.datasets.report import Report
+from app.datasets.sn_calibration_reader import read_sn_calibration
 from app.datasets.soccernet_v3_reader import read_soccernet_v3
 from app.geometry.camera import Camera
+from app.soccer.frames import ImageSize
 
 Value = dict[str, Any]
 Spoil = Callable[[Value], object]
@@ -153,3 +156,44 @@ def test_an_xgtf_file_without_a_number_says_which(folder: Path, report: Report) 
     assert issia(folder, report) == 1
     (problem,) = report.problems
     assert str(problem).endswith("ball.xgtf: has no camera number in its name")
+
+
+def test_cameras_and_lines_that_join_no_ground_truth_are_said(
+    folder: Path, tmp_path: Path, camera: Camera, report: Report
+) -> None:
+    value = camera_to_json(camera)
+    cameras = {"cam3": value, "camera_3": value, "cam5": value, "stand": value}
+    (folder / "issia_calibration.json").write_text(json.dumps(cameras))
+    lines = tmp_path / "lines"
+    lines.mkdir()
+    for name in ("cam3", "camera-3", "cam6", "stand"):
+        (lines / f"{name}.json").write_text(json.dumps({"Middle line": LINE}))
+    assert issia(folder, report, lines=lines) == 1
+    assert [(problem.record, problem.problem) for problem in report.problems] == [
+        ("camera_3", "is a second camera 3; left out"),
+        ("stand", "has no camera number in its name; left out"),
+        (None, "is a second file of lines of camera 3; left out"),
+        (None, "has no camera number in its name; left out"),
+    ]
+    assert report.remarks == [
+        "camera of cam5 not used: there is no ground truth of that camera",
+        "line file of cam6 not used: there is no ground truth of that camera",
+    ]
+
+
+def test_half_a_pair_of_columns_is_named(tmp_path: Path, report: Report) -> None:
+    (tmp_path / "ISSIA-3D.csv").write_text("frame,x_cam1,y_cam1,x_cam2,y_cam4\n7,1,2,3,4\n")
+    found = open_issia_3d(tmp_path, IssiaOptions(), report)
+    assert len(list(found.groups())) == 1
+    assert [(problem.field, problem.problem) for problem in report.problems] == [
+        ("x_cam2", "has no column y_cam2 beside it; left out"),
+        ("y_cam4", "has no column x_cam4 beside it; left out"),
+    ]
+
+
+def test_images_of_match_info_without_lines_are_said(tmp_path: Path, report: Report) -> None:
+    (tmp_path / "00001.json").write_text(json.dumps({"Middle line": [{"x": 0.5, "y": 0.5}]}))
+    (tmp_path / "match_info.json").write_text(json.dumps({"00001.jpg": "a", "00002.jpg": "b"}))
+    groups = list(read_sn_calibration(tmp_path, ImageSize(960, 540), report))
+    assert [group.match for group in groups] == ["a"]
+    assert report.remarks == ["1 image of match_info.json without a file of lines: 00002"]

@@ -148,6 +148,33 @@ class TestZipTree:
         assert tree.names() == ["good"]
         assert len(report.problems) == 1
 
+    @pytest.mark.parametrize(
+        ("written", "marked", "name"),
+        [
+            (b"set\\images\\1.jpg", 0, "set/images/1.jpg"),
+            ("bälle/1.jpg".encode(), 0, "bälle/1.jpg"),
+            ("bälle/1.jpg".encode(), 0x800, "bälle/1.jpg"),
+            ("bälle/1.jpg".encode("cp437"), 0, "bälle/1.jpg"),
+            ("мяч\\1.jpg".encode(), 0, "мяч/1.jpg"),
+        ],
+    )
+    def test_names_of_other_programs_are_read_as_they_were_meant_and_opened_as_they_are(
+        self, make_zip: MakeZip, report: Report, written: bytes, marked: int, name: str
+    ) -> None:
+        stand_in = "x" * len(written)
+        path = make_zip({stand_in: "one", "folder\\": ""})
+        content = bytearray(path.read_bytes().replace(stand_in.encode(), written))
+        for signature, flags in ((b"PK\x03\x04", 6), (b"PK\x01\x02", 8)):
+            at = content.index(signature) + flags
+            content[at : at + 2] = marked.to_bytes(2, "little")
+        path.write_bytes(content)
+        tree = ZipTree(path, report, Limits())
+        assert (tree.names(), tree.read_bytes(name)) == ([name], b"one")
+        media = tree.media(name)
+        assert media.member is not None
+        assert Archives().read(Path(media.path), media.member, 10) == b"one"
+        assert report.problems == []
+
     def test_a_name_with_nul_is_left_out(self, make_zip: MakeZip, report: Report) -> None:
         path = make_zip({"aXb.json": "evil", "good": "1"})
         path.write_bytes(path.read_bytes().replace(b"aXb.json", b"a\x00b.json"))

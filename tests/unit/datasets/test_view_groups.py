@@ -26,6 +26,9 @@ class TestViewGroups:
         (rest,) = groups.rest()
         assert (rest.key, report.imported) == ("other", 3)
         assert list(groups.rest()) == []
+        assert report.remarks == [
+            "1 group has fewer views than when it was written: other (1 of 2)"
+        ]
 
     def test_static_cameras_of_one_key_are_one_station(self, report: Report) -> None:
         groups = ViewGroups(report)
@@ -40,3 +43,19 @@ class TestViewGroups:
         assert list(groups.add(placed("a"), "a.json")) == []
         (problem,) = report.problems
         assert (problem.path, "comes twice" in problem.problem) == ("a.json", True)
+
+    def test_a_group_that_comes_again_in_another_file_is_not_handed_on_twice(
+        self, report: Report
+    ) -> None:
+        groups = ViewGroups(report)
+        found = [
+            group
+            for path in ("a.json", "b.json")
+            for key in ("a", "b")
+            for group in groups.add(placed(key), path)
+        ]
+        assert (len(found), report.imported, list(groups.rest())) == (1, 2, [])
+        assert [(problem.path, problem.field) for problem in report.problems] == [
+            ("b.json", "a"),
+            ("b.json", "b"),
+        ]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import json
 import zipfile
 from pathlib import Path
 from typing import Any
@@ -274,6 +275,22 @@ class TestOutcome:
         job = finished(app, api.post(API, json=body(format="coco")))
         assert (job.state, "soccernet-v3" in job.problem["hint"]) == ("failed", True)
         assert str(tree) not in str((job.problem, job.result))
+
+    def test_the_category_of_the_ball_is_named_for_coco(self, app, api, tree) -> None:
+        value = {
+            "images": [{"id": 1, "file_name": "a.jpg", "width": 1280, "height": 720}],
+            "annotations": [{"id": 1, "image_id": 1, "category_id": 7, "bbox": [1, 2, 3, 4]}],
+            "categories": [{"id": 7, "name": "thing"}],
+        }
+        (tree / "c").mkdir()
+        (tree / "c/x.json").write_text(json.dumps(value))
+        asked = body(format="coco", source={"folder": "data/c"}, dataset="things")
+        job = finished(app, api.post(API, json=asked))
+        assert [item["field"] for item in job.result["skipped"]] == ["categories"]
+        job = finished(app, api.post(API, json=asked | {"options": {"ball_category": "Thing"}}))
+        assert (job.result["skipped"], job.result["changed"]) == ([], 1)
+        assert 'x.json: category "thing" is the ball (1 annotation)' in job.result["remarks"]
+        assert str(tree) not in str(job.result)
 
     def test_a_dry_run_that_reads_nothing_fails_alike(self, app, api, tree) -> None:
         job = finished(app, api.post(API, json=body(format="coco", dry_run=True)))

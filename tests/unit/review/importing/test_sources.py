@@ -302,3 +302,41 @@ def _write_labels(store: Store, make_group: Make, root: Path) -> Path:
 def _log_size(store: Store) -> int:
     with store.read() as session:
         return len(session.scalars(select(LogModel.id)).all())
+
+
+class TestRemarks:
+    def test_files_without_any_ball_say_so_with_what_they_have(
+        self, store: Store, tmp_path: Path
+    ) -> None:
+        box = {"class": "Player team left", "points": {"x1": 1, "y1": 2, "x2": 3, "y2": 4}}
+        image = {"imageMetadata": {"width": 1280, "height": 720}, "bboxes": [box], "lines": []}
+        (tmp_path / "Labels-v3.json").write_text(json.dumps({"actions": {"7.png": image}}))
+        imported = import_source(store, "x", Source("soccernet-v3", tmp_path), store.settings)
+        assert imported.values()["remarks"][0] == (
+            'no ball was read from any of 1 groups; its boxes are of "Player team left" (1)'
+        )
+
+    def test_a_category_that_is_named_is_the_ball_and_the_report_says_so(
+        self, store: Store, tmp_path: Path
+    ) -> None:
+        value = {
+            "images": [{"id": 1, "file_name": "a.jpg", "width": 1280, "height": 720}],
+            "annotations": [{"id": 1, "image_id": 1.0, "category_id": "7", "bbox": [1, 2, 3, 4]}],
+            "categories": [{"id": 7, "name": "thing"}],
+        }
+        (tmp_path / "x.json").write_text(json.dumps(value))
+        plain = Source("coco", tmp_path, name="up.zip")
+        dry = import_source(store, "x", plain, store.settings, dry_run=True).values()
+        assert (dry["outcome"], dry["skipped"][0]["field"]) == ("partial", "categories")
+        named = replace(plain, ball_category="Thing")
+        imported = import_source(store, "x", named, store.settings)
+        assert 'x.json: category "thing" is the ball (1 annotation)' in imported.values()["remarks"]
+        (group,) = groups_of(store, "x").values()
+        assert len(group.views[0].balls) == 1
+
+    def test_what_files_are_is_said_where_nothing_can_be_read(
+        self, store: Store, tmp_path: Path
+    ) -> None:
+        (tmp_path / "a.json").write_text(json.dumps({"shapes": [], "imagePath": "a.jpg"}))
+        imported = import_source(store, "x", Source("coco", tmp_path), store.settings)
+        assert imported.nothing_read()[1].startswith("It looks like LabelMe")
