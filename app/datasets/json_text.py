@@ -10,6 +10,7 @@ from typing import Any, NoReturn
 
 import numpy as np
 
+from app.datasets.report import Report
 from app.errors import DatasetFormatError
 
 MAX_BYTES = 256 * 1024 * 1024
@@ -32,6 +33,7 @@ def read_json(
     *,
     record: str | None = None,
     double_encoded: bool = False,
+    allow_nan: bool = False,
     max_bytes: int = MAX_BYTES,
 ) -> Any:
     """The value of JSON text.
@@ -41,25 +43,54 @@ def read_json(
         path: File as the user knows it, for the error.
         record: Record inside the file, for the error.
         double_encoded: Also accept a JSON string that holds JSON or a Python dict literal.
+        allow_nan: Take NaN, Infinity and numbers too large as floats that are not finite, for a
+            reader that refuses them field by field (``fields.number``).
         max_bytes: Longest text that is looked at.
 
     Raises:
         DatasetFormatError: Not JSON, NaN or Infinity in it, too long or nested too deeply.
     """
-    value = _read(content, path, record, max_bytes)
+    value = _read(content, path, record, max_bytes, allow_nan)
     if double_encoded and isinstance(value, str):
-        return _read_inner(value, path, record)
+        return _read_inner(value, path, record, allow_nan)
     return value
 
 
-def _read(content: bytes, path: str, record: str | None, max_bytes: int) -> Any:
+def read_json_lines(content: bytes, path: str, report: Report) -> list[Any] | None:
+    """The objects of JSON lines, an object a line, NaN allowed; None where the text is something else.
+
+    A line that cannot be read is reported and left out.
+    """
+    lines = [(at, line) for at, line in enumerate(content.splitlines(), 1) if line.strip()]
+    if len(lines) < 2 or len(content) > MAX_BYTES:
+        return None
+    found, problems = [], []
+    for number, line in lines:
+        try:
+            found.append(read_json(line, path, record=f"line {number}", allow_nan=True))
+        except DatasetFormatError as error:
+            problems.append(error)
+    if len(found) < max(len(problems), 1) or not all(isinstance(item, dict) for item in found):
+        return None
+    for problem in problems:
+        report.read += 1
+        report.skip(problem)
+    return found
+
+
+def _read(
+    content: bytes, path: str, record: str | None, max_bytes: int, allow_nan: bool = False
+) -> Any:
     if len(content) > max_bytes:
         raise DatasetFormatError(path, record, None, f"is longer than {max_bytes:,} bytes")
     if _depth(content, _STRING) > MAX_DEPTH:
         raise DatasetFormatError(path, record, None, f"is nested deeper than {MAX_DEPTH} levels")
     try:
         text = content.decode("utf-8-sig")
-        value = json.loads(text, parse_constant=_refuse, parse_float=_finite)
+        if allow_nan:
+            value = json.loads(text)
+        else:
+            value = json.loads(text, parse_constant=_refuse, parse_float=_finite)
         if _SURROGATE.search(content):
             json.dumps(value, ensure_ascii=False).encode()
         return value
@@ -72,9 +103,9 @@ def _read(content: bytes, path: str, record: str | None, max_bytes: int) -> Any:
         raise DatasetFormatError(path, record, None, str(error)) from error
 
 
-def _read_inner(text: str, path: str, record: str | None) -> Any:
+def _read_inner(text: str, path: str, record: str | None, allow_nan: bool) -> Any:
     try:
-        return _read(text.encode(), path, record, MAX_LITERAL_CHARACTERS)
+        return _read(text.encode(), path, record, MAX_LITERAL_CHARACTERS, allow_nan)
     except (DatasetFormatError, UnicodeEncodeError):
         return parse_literal(text, path, record)
 

@@ -176,7 +176,13 @@ def import_source(
     if source.format == "cameras":
         cameras = read_cameras(source.path, report, limits)
         result = ingest_cameras(
-            store, dataset, cameras, source=source.label, actor=actor, dry_run=dry_run
+            store,
+            dataset,
+            cameras,
+            source=source.label,
+            actor=actor,
+            size=source.size,
+            dry_run=dry_run,
         )
         return Imported(source, report, result)
     if source.format == "touchline":
