@@ -41,7 +41,8 @@ def predict(store, path, states, factor: float, name: str):
         for view in state.solution.views:
             box = view.ball.optimized_box
             d, (x, y) = box.width * factor, box.center
-            bbox = [x - d / 2, y - d / 2, d, d]
+            # COCO counts from the corner of the first pixel.
+            bbox = [x + 0.5 - d / 2, y + 0.5 - d / 2, d, d]
             frame = f"{MATCH}/{view.view}"
             values.append({"image_id": frame, "category_id": 1, "bbox": bbox, "score": 0.9})
     path.write_text(json.dumps(values))
