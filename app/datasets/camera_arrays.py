@@ -111,11 +111,12 @@ class _StorageLoader(yaml.SafeLoader):
         return super().compose_node(parent, index)
 
 
+def _matrix(loader: _StorageLoader, node: yaml.MappingNode) -> dict[Any, Any]:
+    return dict(loader.construct_mapping(node, deep=True))
+
+
 for _kind in ("matrix", "nd-matrix"):
-    _StorageLoader.add_constructor(
-        f"tag:yaml.org,2002:opencv-{_kind}",
-        lambda loader, node: loader.construct_mapping(node, deep=True),
-    )
+    _StorageLoader.add_constructor(f"tag:yaml.org,2002:opencv-{_kind}", _matrix)
 
 
 def opencv_storage(content: bytes, path: str) -> Any:

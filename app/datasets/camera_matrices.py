@@ -139,7 +139,7 @@ def _rotation(value: Any) -> FloatArray:
         return np.asarray(cv2.Rodrigues(_numbers(inner, 3))[0], dtype=float)
     matrix = _numbers(inner, 9).reshape(3, 3)
     left, _, right = np.linalg.svd(matrix)
-    nearest = left @ right
+    nearest: FloatArray = left @ right
     if np.abs(nearest - matrix).max() > MAX_SKEWNESS:
         raise ValueError("is no rotation: its rows are not perpendicular unit vectors")
     if np.linalg.det(nearest) < 0:
@@ -175,10 +175,11 @@ def _decomposed(matrix: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]
     q, r = np.linalg.qr(np.flipud(matrix[:, :3]).T)
     upper, rotation = np.fliplr(np.flipud(r.T)), np.flipud(q.T)
     signs = np.diag(np.sign(np.diag(upper)))
-    upper, rotation = upper @ signs, signs @ rotation
-    position = -np.linalg.solve(matrix[:, :3], matrix[:, 3])
+    turned: FloatArray = signs @ rotation
+    upper = upper @ signs
+    position: FloatArray = -np.linalg.solve(matrix[:, :3], matrix[:, 3])
     upper[1, 0] = upper[2, 0] = upper[2, 1] = 0.0
-    return _intrinsic(upper), rotation, position
+    return _intrinsic(upper), turned, position
 
 
 def _distortion(value: Any) -> FloatArray:

@@ -82,10 +82,8 @@ def line_documents(value: Any, path: str, report: Report) -> list[LineDocument]:
     for number, (name, item) in enumerate(items):
         document = _document(item)
         if document is None or not name:
-            problem = (
-                f"{json_kind(item)}; {MEANT}" if name else "has no name of its image (file_name)"
-            )
-            problems.append(DatasetFormatError(path, name or f"image {number}", None, problem))
+            why = f"{json_kind(item)}; {MEANT}" if name else "has no name of its image (file_name)"
+            problems.append(DatasetFormatError(path, name or f"image {number}", None, why))
         else:
             found.append(LineDocument(document.lines, _stem(name), document.size))
     if not any(document.lines for document in found):

@@ -61,9 +61,9 @@ def score_files(
     if not scores:
         raise report.refusal(f"{lines} holds no line files")
     if all(score is None for score in scores):
-        frame, camera = sorted(frames)[0], sorted(found)[0]
+        frame, other = sorted(frames)[0], sorted(found)[0]
         raise InputError(
-            f'no camera belongs to a line file: cameras are called "{camera}", frames "{frame}"',
+            f'no camera belongs to a line file: cameras are called "{other}", frames "{frame}"',
             hint="A camera of the frame 00002 lies in camera_00002.json.",
         )
     # A line file that cannot be read is a frame without a camera.

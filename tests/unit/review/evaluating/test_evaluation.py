@@ -148,6 +148,17 @@ class TestRunEvaluation:
             assert caught.value.message.endswith(f": {values[1]['image_id']}")
         assert list_evaluations(store, "demo") == []
 
+    def test_predictions_of_other_frames_than_take_part_are_no_evaluation(
+        self, store, states, tmp_path
+    ) -> None:
+        train = predict(store, tmp_path / "t.json", states[:2], 1.0, "train")
+        request = EvaluationRequest(predictions=train.id, split="test")
+        with pytest.raises(
+            InputError, match='none of the 4 frames of "train" is among the 2 frames'
+        ):
+            run_evaluation(store, "demo", request, actor="ann")
+        assert list_evaluations(store, "demo") == []
+
     def test_a_truth_that_was_a_prediction_is_counted_and_warned_of(
         self, store, states, exact, loose
     ) -> None:
