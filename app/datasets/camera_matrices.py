@@ -175,11 +175,11 @@ def _decomposed(matrix: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]
     q, r = np.linalg.qr(np.flipud(matrix[:, :3]).T)
     upper, rotation = np.fliplr(np.flipud(r.T)), np.flipud(q.T)
     signs = np.diag(np.sign(np.diag(upper)))
-    turned: FloatArray = signs @ rotation
+    turned: FloatArray = np.asarray(signs @ rotation, dtype=float)
     upper = upper @ signs
-    position: FloatArray = -np.linalg.solve(matrix[:, :3], matrix[:, 3])
+    position = -np.linalg.solve(matrix[:, :3], matrix[:, 3])
     upper[1, 0] = upper[2, 0] = upper[2, 1] = 0.0
-    return _intrinsic(upper), turned, position
+    return _intrinsic(upper), turned, np.asarray(position, dtype=float)
 
 
 def _distortion(value: Any) -> FloatArray:

@@ -178,7 +178,7 @@ def _items(
     if ending in (".yml", ".yaml"):
         return [(None, opencv_storage(content, shown))]
     try:
-        value = read_json(content, shown, double_encoded=True, allow_nan=True)
+        value = read_json(content, shown, double_encoded=True, nan="keep")
     except DatasetFormatError:
         lines = read_json_lines(content, shown, report)
         if lines is None:

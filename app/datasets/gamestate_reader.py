@@ -78,7 +78,7 @@ class _Sequence:
 
     def __init__(self, tree: FileTree, name: str, names: list[str], report: Report, limits: Limits):
         self.path, self._report, self._tree = tree.shown(name), report, tree
-        value = read_json(tree.read_bytes(name), self.path, max_bytes=limits.file_bytes)
+        value = read_json(tree.read_bytes(name), self.path, max_bytes=limits.file_bytes, nan="null")
         if not isinstance(value, dict):
             raise DatasetFormatError(self.path, None, None, "is not an object")
         self._value = value

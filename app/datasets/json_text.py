@@ -6,13 +6,14 @@ import ast
 import json
 import math
 import re
-from typing import Any, NoReturn
+from typing import Any, Literal, NoReturn
 
 import numpy as np
 
 from app.datasets.report import Report
 from app.errors import DatasetFormatError
 
+NanRule = Literal["refuse", "keep", "null"]
 MAX_BYTES = 256 * 1024 * 1024
 MAX_LITERAL_CHARACTERS = 16 * 1024 * 1024
 MAX_DEPTH = 64
@@ -24,6 +25,10 @@ _STRING = re.compile(_DOUBLE, re.DOTALL)
 _LITERAL_STRING = re.compile(_DOUBLE + b"|" + _SINGLE, re.DOTALL)
 # Half of a character pair is no text and could not be stored.
 _SURROGATE = re.compile(rb"\\u[dD]")
+# A string stays; numbers of Python that are not finite do not.
+_NOT_FINITE = re.compile(
+    rf"({(_DOUBLE + b'|' + _SINGLE).decode()})|(?<![\w.])-?(?:nan|inf)(?![\w.])", re.DOTALL
+)
 _PLAIN = (str, int, float, bool, type(None))
 
 
@@ -33,7 +38,7 @@ def read_json(
     *,
     record: str | None = None,
     double_encoded: bool = False,
-    allow_nan: bool = False,
+    nan: NanRule = "refuse",
     max_bytes: int = MAX_BYTES,
 ) -> Any:
     """The value of JSON text.
@@ -43,16 +48,17 @@ def read_json(
         path: File as the user knows it, for the error.
         record: Record inside the file, for the error.
         double_encoded: Also accept a JSON string that holds JSON or a Python dict literal.
-        allow_nan: Take NaN, Infinity and numbers too large as floats that are not finite, for a
-            reader that refuses them field by field (``fields.number``).
+        nan: What becomes of NaN, Infinity and numbers too large: ``refuse`` the text; ``keep`` them as
+            floats that are not finite, for a reader that refuses them field by field
+            (``fields.number``); ``null``, for one that keeps fields which it does not read.
         max_bytes: Longest text that is looked at.
 
     Raises:
         DatasetFormatError: Not JSON, NaN or Infinity in it, too long or nested too deeply.
     """
-    value = _read(content, path, record, max_bytes, allow_nan)
+    value = _read(content, path, record, max_bytes, nan)
     if double_encoded and isinstance(value, str):
-        return _read_inner(value, path, record, allow_nan)
+        return _read_inner(value, path, record, nan)
     return value
 
 
@@ -67,7 +73,7 @@ def read_json_lines(content: bytes, path: str, report: Report) -> list[Any] | No
     found, problems = [], []
     for number, line in lines:
         try:
-            found.append(read_json(line, path, record=f"line {number}", allow_nan=True))
+            found.append(read_json(line, path, record=f"line {number}", nan="keep"))
         except DatasetFormatError as error:
             problems.append(error)
     if len(found) < max(len(problems), 1) or not all(isinstance(item, dict) for item in found):
@@ -79,7 +85,7 @@ def read_json_lines(content: bytes, path: str, report: Report) -> list[Any] | No
 
 
 def _read(
-    content: bytes, path: str, record: str | None, max_bytes: int, allow_nan: bool = False
+    content: bytes, path: str, record: str | None, max_bytes: int, nan: NanRule = "refuse"
 ) -> Any:
     if len(content) > max_bytes:
         raise DatasetFormatError(path, record, None, f"is longer than {max_bytes:,} bytes")
@@ -87,10 +93,7 @@ def _read(
         raise DatasetFormatError(path, record, None, f"is nested deeper than {MAX_DEPTH} levels")
     try:
         text = content.decode("utf-8-sig")
-        if allow_nan:
-            value = json.loads(text)
-        else:
-            value = json.loads(text, parse_constant=_refuse, parse_float=_finite)
+        value = json.loads(text, **_PARSERS[nan])
         if _SURROGATE.search(content):
             json.dumps(value, ensure_ascii=False).encode()
         return value
@@ -103,10 +106,12 @@ def _read(
         raise DatasetFormatError(path, record, None, str(error)) from error
 
 
-def _read_inner(text: str, path: str, record: str | None, allow_nan: bool) -> Any:
+def _read_inner(text: str, path: str, record: str | None, nan: NanRule) -> Any:
     try:
-        return _read(text.encode(), path, record, MAX_LITERAL_CHARACTERS, allow_nan)
+        return _read(text.encode(), path, record, MAX_LITERAL_CHARACTERS, nan)
     except (DatasetFormatError, UnicodeEncodeError):
+        if nan != "refuse":
+            text = _NOT_FINITE.sub(lambda found: found[1] or "None", text)
         return parse_literal(text, path, record)
 
 
@@ -166,3 +171,15 @@ def _finite(text: str) -> float:
     if not math.isfinite(number):
         raise ValueError(f"holds {text[:20]}, which is too large for a number")
     return number
+
+
+def _finite_or_none(text: str) -> float | None:
+    number = float(text)
+    return number if math.isfinite(number) else None
+
+
+_PARSERS: dict[NanRule, dict[str, Any]] = {
+    "refuse": {"parse_constant": _refuse, "parse_float": _finite},
+    "keep": {},
+    "null": {"parse_constant": lambda _: None, "parse_float": _finite_or_none},
+}

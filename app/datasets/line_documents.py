@@ -47,7 +47,7 @@ def read_line_documents(content: bytes, path: str, report: Report) -> list[LineD
         DatasetFormatError: It is neither, or holds something else.
     """
     try:
-        value = read_json(content, path, allow_nan=True)
+        value = read_json(content, path, nan="keep")
     except DatasetFormatError:
         value = read_json_lines(content, path, report)
         if value is None:

@@ -86,7 +86,7 @@ class MatchReader:
     def _labels(self, folder: str, path: str) -> dict[str, Any]:
         content = self.tree.read_bytes(folder + self.file)
         limit = self.limits.file_bytes
-        labels = read_json(content, path, double_encoded=True, max_bytes=limit)
+        labels = read_json(content, path, double_encoded=True, max_bytes=limit, nan="null")
         if not isinstance(labels, dict):
             raise DatasetFormatError(path, None, None, "is not an object")
         return labels

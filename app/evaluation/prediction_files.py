@@ -45,6 +45,7 @@ from app.evaluation.prediction_run import (
 )
 from app.evaluation.prediction_table import is_mot, read_table
 from app.geometry.camera import Camera
+from app.soccer.camera_size import other_size
 from app.soccer.choices import PredictionFormat
 from app.soccer.frames import Box, ImageSize
 
@@ -152,7 +153,7 @@ def read_predicted_cameras(
     size: ImageSize | None = None,
     limits: Limits = DEFAULT_LIMITS,
 ) -> ReadPredictedCameras:
-    """Read SoccerNet camera JSON files; one of a static camera's name serves all its frames.
+    """Read camera files; one called like a static camera, or like views of one match, serves all of them.
 
     Args:
         path: Folder, zip or file.
@@ -175,7 +176,14 @@ def read_predicted_cameras(
             found.unknown[name] += 1
             found.reasons[name] = names.why_not(name)
         for identity in ids:
-            found.cameras[identity] = _sized(camera, size, names.frames[identity].size)
+            annotated = names.frames[identity].size
+            if (other := other_size(camera, size or annotated)) is not None:
+                told = (
+                    f"was made for {other.width} x {other.height}: its principal point is the middle of "
+                    f"that; say so (--cameras-size {other.width}x{other.height})"
+                )
+                found.report.note(path.name, name, "principal_point", told)
+            found.cameras[identity] = _sized(camera, size, annotated)
     return found
 
 
@@ -220,7 +228,7 @@ def _json_documents(tree: FileTree, path: Path) -> Documents:
             continue
         shown, content = tree.shown(name), tree.read_bytes(name)
         try:
-            value = read_json(content, shown, allow_nan=True)
+            value = read_json(content, shown, nan="keep")
         except DatasetFormatError:
             value = read_json_lines(content, shown, Report())
             if value is None:

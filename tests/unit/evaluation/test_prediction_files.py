@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import json
 import zipfile
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -441,6 +442,12 @@ class TestPredictedCameras:
         found = read_predicted_cameras(tmp_path, names, size=ImageSize(640, 360))
         assert found.cameras[1].focal_length == pytest.approx((2000, 2000))
         assert found.cameras[1].principal_point == pytest.approx((639.5, 359.5))
+
+    def test_of_another_size_are_told(self, tmp_path, names) -> None:
+        camera = replace(camera_at(50.0), principal_point=(479.5, 269.5))
+        write(tmp_path / "camera_7.json", json.dumps(camera_to_json(camera)))
+        ((record, _, problem),) = problems(read_predicted_cameras(tmp_path, names))
+        assert (record, "--cameras-size 960x540" in problem) == ("7", True)
 
     def test_without_any_it_is_refused(self, tmp_path, names) -> None:
         with pytest.raises(InputError, match="no camera files"):
