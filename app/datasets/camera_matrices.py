@@ -40,6 +40,10 @@ _COUNTS = (4, 5, 8, 12, 14)
 """Lengths of OpenCV's distortion: k1 k2 p1 p2, k3, k4 k5 k6, s1 .. s4, two tilts."""
 MAX_SKEWNESS = 1e-2
 """How far the rows of R may be from a rotation's; files round."""
+MAX_NUMBERS = 1000
+"""Of one field; a matrix has a dozen."""
+MAX_NUMBER = 1e12
+"""No number is beyond; a projection matrix has any scale."""
 MAX_DISTANCE_M = 1000.0
 """No camera of a pitch stands farther away: beyond it the file is in other units."""
 
@@ -113,31 +117,39 @@ def _first(value: Mapping[str, Any], names: Sequence[str]) -> str | None:
 
 def _numbers(value: Any, count: int) -> FloatArray:
     """Numbers of a list, nested as it may be, or of OpenCV's ``{rows, cols, data}``."""
+    flat = _flat(value)
+    if len(flat) != count:
+        poses = len(flat) // count if len(flat) % count == 0 else 0
+        more = f": {poses} poses, and a camera has one" if poses > 1 else ""
+        raise ValueError(f"has {len(flat)} numbers, not {count}{more}")
+    return np.array(flat)
+
+
+def _flat(value: Any) -> list[float]:
     if isinstance(value, dict) and "data" in value:
         value = value["data"]
     flat: list[float] = []
     pending = [value]
     while pending:
-        item = pending.pop(0)
+        item = pending.pop()
         if isinstance(item, (list, tuple)):
-            pending = [*item, *pending]
+            if len(item) > MAX_NUMBERS:
+                raise ValueError(f"has more than {MAX_NUMBERS} numbers")
+            pending.extend(reversed(item))
         else:
             flat.append(fields.number(item))
-    if len(flat) != count:
-        poses = (
-            f": {len(flat) // count} poses, and a camera has one"
-            if len(flat) % count == 0 and flat
-            else ""
-        )
-        raise ValueError(f"has {len(flat)} numbers, not {count}{poses}")
-    return np.array(flat)
+            if abs(flat[-1]) > MAX_NUMBER:
+                raise ValueError("is beyond any camera")
+        if len(flat) + len(pending) > MAX_NUMBERS:
+            raise ValueError(f"has more than {MAX_NUMBERS} numbers")
+    return flat
 
 
 def _rotation(value: Any) -> FloatArray:
-    inner = value["data"] if isinstance(value, dict) and "data" in value else value
-    if np.size(np.array(inner, dtype=object)) == 3:
-        return np.asarray(cv2.Rodrigues(_numbers(inner, 3))[0], dtype=float)
-    matrix = _numbers(inner, 9).reshape(3, 3)
+    numbers = _flat(value)
+    if len(numbers) == 3:
+        return np.asarray(cv2.Rodrigues(np.array(numbers))[0], dtype=float)
+    matrix = _numbers(numbers, 9).reshape(3, 3)
     left, _, right = np.linalg.svd(matrix)
     nearest: FloatArray = left @ right
     if np.abs(nearest - matrix).max() > MAX_SKEWNESS:
@@ -186,15 +198,13 @@ def _distortion(value: Any) -> FloatArray:
     result = np.zeros(12)
     if value is None:
         return result
-    if isinstance(value, dict) and "data" in value:
-        value = value["data"]
-    size = int(np.size(np.array(value, dtype=object)))
-    numbers = _numbers(value, size)
-    if size == 1 or size == 2:
+    numbers = _flat(value)
+    size = len(numbers)
+    if size in (1, 2):
         result[:size] = numbers
     elif size in _COUNTS:
         result[: min(size, 12)] = numbers[:12]
-        if size == 14 and np.any(numbers[12:]):
+        if size == 14 and any(numbers[12:]):
             raise ValueError("tilts the sensor (tau x, tau y), which is not supported")
     else:
         raise ValueError(f"has {size} numbers; OpenCV's distortion has 4, 5, 8, 12 or 14")
