@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -334,6 +335,19 @@ class TestCheck:
     def test_what_makes_no_dataset_takes_no_policy(self, form: str) -> None:
         with pytest.raises(InputError, match="does not use --policy"):
             Source(form, Path("x")).check(policy=True)
+
+    def test_the_browser_offers_the_options_that_a_format_uses(self) -> None:
+        text = Path("static/state/import_formats.js").read_text(encoding="utf-8")
+        names = {"CALIBRATION": "calibration", "SIZE": "size", "OFFSET": "frame_offset"}
+        names["FLIPPED"] = "flipped"
+        offered = re.findall(
+            r"name: '([a-z0-9-]+)', label: .*?, options: \[(.*?)\]( , lines|, lines)?", text
+        )
+        assert len(offered) > 5
+        for form, options, lines in offered:
+            found = {names[name] for name in re.findall(r"[A-Z]{4,}", options)}
+            found |= {"lines"} if lines else set()
+            assert found == {name for name in USERS if form in USERS[name]} - {"frames", "policy"}
 
     def test_nothing_is_imported_then(self, store: Store, tmp_path: Path) -> None:
         source = Source("coco", tmp_path, size=SIZE)
