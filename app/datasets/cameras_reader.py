@@ -25,6 +25,7 @@ from app.errors import DatasetFormatError
 from app.geometry.camera import Camera
 
 _FILE = re.compile(r"(?:camera_)?(.+)\.(?:json|jsonl|ndjson|npz|ya?ml)", re.ASCII | re.IGNORECASE)
+_ENDINGS = ".json, .jsonl, .npz, .yml"
 _IMAGE = re.compile(r"\.(?:png|jpe?g|webp|bmp|tiff?)", re.ASCII | re.IGNORECASE)
 _ABSOLUTE = re.compile(r"/|[A-Za-z]:/")
 
@@ -69,8 +70,13 @@ def read_cameras(path: Root, report: Report, limits: Limits = DEFAULT_LIMITS) ->
         if tree is None:
             return {}
         names = tree.names()
-        places = _places(tree, names)
-        cameras = cameras_of(tree, _camera_files(names), report, places, limits)
+        files = _camera_files(names)
+        if names and not files:
+            endings = sorted({PurePosixPath(name).suffix.lower() or "no ending" for name in names})
+            report.note(
+                str(path), None, None, f"holds no camera files ({_ENDINGS}), but {_some(endings)}"
+            )
+        cameras = cameras_of(tree, files, report, _places(tree, names), limits)
     report.imported += len(cameras)
     return cameras
 
@@ -102,6 +108,10 @@ def _places(tree: FileTree, names: list[str]) -> dict[str, str]:
             file = PurePosixPath(CAMERAS, *lines.parts[1:-1], f"camera_{lines.name}.json")
             found[str(file)] = place
     return found
+
+
+def _some(endings: Sequence[str]) -> str:
+    return ", ".join(endings[:5]) + (" and others" if len(endings) > 5 else "")
 
 
 def _camera_files(names: Iterable[str]) -> list[str]:

@@ -20,7 +20,7 @@ MAX_PER_FRAME = 1000
 """Detections of one frame; more is no detector's output but an accident."""
 MAX_BOXES = 5_000_000
 _LARGEST_SHARE = 2.0
-"""No ball of a whole file lies nearer to the corner, in pixels; shares of an image do."""
+"""Hardly a ball lies nearer to the corner, in pixels; shares of an image do."""
 
 T = TypeVar("T")
 
@@ -62,7 +62,7 @@ class PredictionRun:
         self.left_out = 0
         self.matched = False
         self._total = 0
-        self._largest = 0.0
+        self._near_corner = 0
 
     def frame(self, name: str) -> NamedFrame | None:
         """The frame of a name; a name that is none is counted."""
@@ -131,7 +131,7 @@ class PredictionRun:
         self._total += 1
         if len(found) >= MAX_PER_FRAME or self._total > MAX_BOXES:
             raise ValueError(f"is one of more than {MAX_PER_FRAME} boxes of its frame")
-        self._largest = max(self._largest, box.x + box.width, box.y + box.height)
+        self._near_corner += max(box.x + box.width, box.y + box.height) <= _LARGEST_SHARE
         if from_corner or seen != frame.size:
             # Images are resized about the corner of their first pixel.
             corner = box if from_corner else box_to_corner(box)
@@ -155,9 +155,9 @@ class PredictionRun:
                 hint="Say which one is the ball (category).",
                 pointer="/category",
             )
-        if self.found.boxes and self._largest <= _LARGEST_SHARE:
+        if 2 * self._near_corner > self.found.boxes:
             raise InputError(
-                f"all boxes of {path.name} lie within {_LARGEST_SHARE:g} pixels of the corner",
+                f"most boxes of {path.name} lie within {_LARGEST_SHARE:g} pixels of the corner",
                 hint="They seem to be shares of the image; boxes are in pixels here.",
             )
         if not self.matched and not self.found.unknown and not report.problems:

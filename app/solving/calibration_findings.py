@@ -205,7 +205,7 @@ def _camera_size(calibration: Calibration, size: ImageSize, view: str | None) ->
         "camera_size",
         f"The given camera was made for pictures of {other.width} x {other.height}: its principal "
         f"point ({x:g}, {y:g}) is their middle, and the view has {size.width} x {size.height}. Import "
-        f"the cameras again with --size {other.width}x{other.height}.",
+        f"the cameras again for that size (--size {other.width}x{other.height}).",
         view,
         number=aside,
         threshold=0.02 * max(size.width, size.height) / 2,

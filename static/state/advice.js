@@ -38,7 +38,7 @@ export function findingTitle(group, finding) {
 
 /** Findings that a reason to reject follows from. */
 const OF_FINDING = /** @type {Record<string, string>} */ ({
-	sides_swapped: 'sides_confused', not_synchronous: 'not_same_instant', views_contradict: 'not_same_instant',
+	camera_size: 'bad_calibration', sides_swapped: 'sides_confused', not_synchronous: 'not_same_instant', views_contradict: 'not_same_instant',
 });
 /** The reason that fits when nothing but the gate is known. */
 const OF_GATE = /** @type {Record<string, string>} */ ({

@@ -138,11 +138,12 @@ class Imported:
 
     def nothing_read(self) -> tuple[str, str]:
         """Why nothing could be imported, naming the file, and what to do about it."""
-        source, problems = self.source, self.report.problems
+        source = self.source
+        problems = [problem.message for problem in self.report.problems] + self.result.problems
         name = source.shown(str(source.path))
         sentence = f"nothing could be imported from {name} as {source.format}"
         if problems:
-            first = source.shown(problems[0].message)
+            first = source.shown(problems[0])
             sentence += f". The first of {len(problems)} problems: " if problems[1:] else ": "
             sentence += first
         guess = guess_format(source.path)

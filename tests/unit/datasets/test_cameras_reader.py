@@ -122,6 +122,15 @@ class TestReadCameras:
         assert read_cameras(tmp_path, report) == {"cam2": camera}
         assert "cam1, x_focal_length: is inf, not a finite number" in str(report.problems[0])
 
+    def test_a_folder_without_camera_files_says_what_it_holds(
+        self, tmp_path: Path, report: Report
+    ) -> None:
+        (tmp_path / "a.homographies").write_text("1 0 0\n")
+        assert read_cameras(tmp_path, report) == {}
+        assert "holds no camera files (.json, .jsonl, .npz, .yml), but .homographies" in str(
+            report.problems[0]
+        )
+
     def test_a_second_camera_of_a_name_is_named(
         self, tmp_path: Path, camera: Camera, report: Report
     ) -> None:

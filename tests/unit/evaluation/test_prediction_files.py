@@ -402,7 +402,7 @@ class TestCsv:
         assert refused.value.record is None
 
     def test_shares_of_the_image_are_no_pixels(self, tmp_path, names) -> None:
-        text = "image,x,y,w,h\n7.png,0.5,0.5,0.01,0.01\n"
+        text = "image,x,y,w,h\n7.png,0.5,0.5,0.01,0.01\n7.png,0.5,0.5,0.1,0.1\n7.png,300,3,3,3\n"
         with pytest.raises(InputError, match="within 2 pixels of the corner"):
             read_predictions(write(tmp_path / "p.csv", text), "csv", names)
 
