@@ -159,6 +159,7 @@ def evaluate(
         PredictionSource(careful, careful_format, None, careful_category, careful_size),
         version,
     )
+    request.check()
     server = given_server()
     run = _evaluate if server is None else partial(_evaluate_at, server)
     with show_progress("Evaluating") as progress:

@@ -57,7 +57,11 @@ def import_(
     size: Annotated[
         ImageSize | None,
         typer.Option(
-            "--size", parser=parse_size, metavar="WxH", help="Default 960x540; ISSIA 1920x1080."
+            "--size",
+            parser=parse_size,
+            metavar="WxH",
+            help="Size of the annotated images: default 960x540, ISSIA 1920x1080; of cameras the "
+            "size that they were made for, default that of each view.",
         ),
     ] = None,
     ball_category: Annotated[
@@ -65,12 +69,13 @@ def import_(
         typer.Option(metavar="NAME", help="COCO: the category that is the ball; default: by name."),
     ] = "",
     policy: Annotated[
-        str,
+        str | None,
         typer.Option(
             metavar=POLICY_OR_FILE,
             help="Judges the dataset where this import makes it.",
+            show_default="paper",
         ),
-    ] = "paper",
+    ] = None,
     frames: Annotated[
         str | None,
         typer.Option(
@@ -101,7 +106,8 @@ def import_(
         with connected(server) as client, show_progress("Importing") as progress:
             values, nothing = remote_files.import_values(
                 client, dataset, format_, path if is_address(path) else Path(path), options,
-                lines=lines, frames=frames, policy=policy, dry_run=dry_run, progress=progress,
+                lines=lines, frames=frames, policy=policy or _usual_policy(format_),
+                dry_run=dry_run, progress=progress,
             )  # fmt: skip
         print_import(values, json_)
         if nothing is not None:
@@ -123,7 +129,8 @@ def import_(
         frames=None if frames is None else _root(settings, frames),
         ball_category=ball_category,
     )
-    chosen = read_policy_option(policy)
+    source.check(policy=policy is not None)
+    chosen = read_policy_option(policy or "paper")
     with opened_store(settings) as store, show_progress("Importing") as progress:
         imported = import_source(
             store, dataset, source, settings, progress,
@@ -133,6 +140,11 @@ def import_(
     if not imported.something:
         complain(*imported.nothing_read())
         raise typer.Exit(1)
+
+
+def _usual_policy(format_: str) -> str | None:
+    """The policy of a dataset that an import makes; None where the format brings none into being."""
+    return None if format_ in ("cameras", "touchline") else "paper"
 
 
 def _root(settings: Settings, text: str) -> Path | StoredPath:

@@ -9,13 +9,17 @@ from typing import Annotated
 import typer
 
 from app.commands.options import Json, Size, Workers, read_settings
-from app.commands.terminal import print_values, show_progress
+from app.commands.terminal import complain, print_values, show_progress
 
 commands = typer.Typer()
 
 LineFiles = Annotated[
     Path, typer.Argument(metavar="IN", exists=True, help="Folder or zip of line files.")
 ]
+
+
+PROBLEMS = 10
+"""Problems that are printed one by one."""
 
 
 class Labels(StrEnum):
@@ -76,6 +80,21 @@ def calibrate(
             progress=progress,
         )
     print_values(result, json_)
+    _tell_problems(result["problems"])
+    if not result["calibrated"]:
+        first = result["failed"][0]
+        complain(
+            f"none of {result['frames']} frames could be calibrated: {first['frame']}: {first['reason']}"
+        )
+        raise typer.Exit(1)
+
+
+def _tell_problems(problems: list[str]) -> None:
+    """What could not be read, on stderr; ``--json`` has all of it."""
+    for problem in problems[:PROBLEMS]:
+        complain(problem)
+    if len(problems) > PROBLEMS:
+        complain(f"... and {len(problems) - PROBLEMS} more problems; --json names all")
 
 
 def _file(text: str | None, option: str) -> Path | None:
@@ -109,3 +128,4 @@ def score(
     with show_progress("Scoring") as progress:
         result = score_files(lines, cameras, size=size, without=without, progress=progress)
     print_values(result, json_)
+    _tell_problems(result["problems"])

@@ -26,7 +26,7 @@ def import_values(
     *,
     lines: Path | None,
     frames: str | None,
-    policy: str,
+    policy: str | None,
     dry_run: bool,
     progress: TellProgress,
 ) -> tuple[dict[str, Any], tuple[str, str | None] | None]:
@@ -42,7 +42,7 @@ def import_values(
     from app.soccer.policy import POLICIES
     from touchline.errors import JobError
 
-    if policy not in POLICIES:
+    if policy is not None and policy not in POLICIES:
         raise InputError(
             "a policy in a file cannot be sent with an import",
             hint=f"Name one of {', '.join(POLICIES)}, and change its thresholds in the browser.",

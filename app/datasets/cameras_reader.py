@@ -1,16 +1,21 @@
-"""Cameras, read: one a file (``camera_00002.json``), ISSIA's six in one, or SynLoc's images."""
+"""Cameras, read: one a file (``camera_00002.json``), or several in one, as many tools write them."""
 
 from __future__ import annotations
 
 import re
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import PurePosixPath
 from typing import Any
 
+from app.datasets.camera_arrays import cameras_of_arrays, opencv_storage
 from app.datasets.camera_json import camera_from_json
+from app.datasets.camera_matrices import camera_from_matrices, holds_matrices
+from app.datasets.corner_origin import HALF
 from app.datasets.file_tree import DEFAULT_LIMITS, FileTree, Limits, Root
-from app.datasets.json_text import read_json
+from app.datasets.json_kind import is_camera, json_kind
+from app.datasets.json_text import read_json, read_json_lines
 from app.datasets.match_info import place_of, read_match_info
 from app.datasets.report import Report
 from app.datasets.sn_calibration import CAMERAS, LINES
@@ -19,25 +24,59 @@ from app.datasets.trees import opened_tree
 from app.errors import DatasetFormatError
 from app.geometry.camera import Camera
 
-_FILE = re.compile(r"(?:camera_)?(.+)\.json", re.ASCII | re.IGNORECASE)
+_FILE = re.compile(r"(?:camera_)?(.+)\.(?:json|jsonl|ndjson|npz|ya?ml)", re.ASCII | re.IGNORECASE)
+_ENDINGS = ".json, .jsonl, .npz, .yml"
+_IMAGE = re.compile(r"\.(?:png|jpe?g|webp|bmp|tiff?)", re.ASCII | re.IGNORECASE)
+_ABSOLUTE = re.compile(r"/|[A-Za-z]:/")
 
-_NO_CAMERAS = ("manifest.json", "match_info.json", "findings.json", "calibrate.json")
+_NO_CAMERAS = (
+    "manifest.json", "match_info.json", "findings.json", "calibrate.json", "leave_one_out.json",
+    "propose.json", "snap.json",
+)  # fmt: skip
+_WRAPPERS = (
+    "cam_params",
+    "camera",
+    "camera_params",
+    "camera_parameters",
+    "calibration",
+    "parameters",
+)
+"""Fields in which tools keep the camera beside what else they say of it (PnLCalib: cam_params)."""
+_NAMES = (
+    "file_name", "filename", "image_ids", "image_id", "image_name", "image_path", "image", "img",
+    "path", "view", "frame", "frame_id", "name", "id",
+)  # fmt: skip
+"""Fields that name the image of a camera, those that say most first (TVCalib: image_ids)."""
+_TVCALIB = ("aov_radian", "loss_ndc_total")
+_CAMERA_FIELDS = ("tilt_degrees", "roll_degrees", "y_focal_length", "radial_distortion")
+_MEANT = (
+    "; a camera is SoccerNet's object (pan_degrees, tilt_degrees, roll_degrees, position_meters, "
+    "x_focal_length, y_focal_length, principal_point), or K, R and t (docs/formats.md#cameras)"
+)
 
 
 def read_cameras(path: Root, report: Report, limits: Limits = DEFAULT_LIMITS) -> dict[str, Camera]:
     """Every camera below ``path``, by key.
 
-    ``path`` is a folder or zip of ``camera_<stem>.json``, one such file, or a file with ISSIA's
-    ``{"cam1": {...}, ...}`` (also inside ``{"cameras": {...}}``, also double-encoded), or a COCO
-    file of SynLoc, whose cameras are called like their images. The key is the stem, with
-    ``<league>/<season>/<match>/`` before it where the file lies that deep. In an export as
+    ``path`` is a folder or zip of ``camera_<stem>.json``, one such file, or a file with several:
+    ``{"cam1": {...}, ...}`` (also inside ``{"cameras": {...}}``, also double-encoded), a list or JSON
+    lines whose objects name their image, numpy's ``.npz`` with K, R and t of each frame, or a COCO
+    file of SynLoc. A camera is SoccerNet's object, also within PnLCalib's ``cam_params``, or matrices
+    (``camera_matrices``). The key is the stem of the file or the image, with
+    ``<league>/<season>/<match>/`` before it where it lies that deep. In an export as
     sn-calibration ``match_info.json`` says where each frame came from: that is its key.
     """
     with opened_tree(path, report, limits) as tree:
         if tree is None:
             return {}
         names = tree.names()
-        cameras = cameras_of(tree, _camera_files(names), report, _places(tree, names))
+        files = _camera_files(names)
+        if names and not files:
+            endings = sorted({PurePosixPath(name).suffix.lower() or "no ending" for name in names})
+            report.note(
+                str(path), None, None, f"holds no camera files ({_ENDINGS}), but {_some(endings)}"
+            )
+        cameras = cameras_of(tree, files, report, _places(tree, names), limits)
     report.imported += len(cameras)
     return cameras
 
@@ -47,6 +86,7 @@ def cameras_of(
     names: Sequence[str],
     report: Report,
     places: Mapping[str, str] | None = None,
+    limits: Limits = DEFAULT_LIMITS,
 ) -> dict[str, Camera]:
     """The cameras of some files of a tree, by key: that of ``places``, or made from the name."""
     cameras: dict[str, Camera] = {}
@@ -54,7 +94,7 @@ def cameras_of(
     stems = Counter(_key(name, deep=False) for name in names)
     for name in names:
         deep = stems[_key(name, deep=False)] > 1
-        _read_file(tree, name, known.get(name) or _key(name, deep), cameras, report)
+        _read_file(tree, name, known.get(name) or _key(name, deep), cameras, report, limits)
     return cameras
 
 
@@ -70,9 +110,13 @@ def _places(tree: FileTree, names: list[str]) -> dict[str, str]:
     return found
 
 
+def _some(endings: Sequence[str]) -> str:
+    return ", ".join(endings[:5]) + (" and others" if len(endings) > 5 else "")
+
+
 def _camera_files(names: Iterable[str]) -> list[str]:
-    """Camera files; where none is called ``camera_...``, every JSON file may be one."""
-    names = [name for name in names if name.lower().endswith(".json")]
+    """Camera files; where none is called ``camera_...``, every file of such an ending may be one."""
+    names = [name for name in names if _FILE.fullmatch(PurePosixPath(name).name)]
     named = [name for name in names if PurePosixPath(name).name.startswith("camera_")]
     return named or [name for name in names if PurePosixPath(name).name not in _NO_CAMERAS]
 
@@ -87,33 +131,139 @@ def _key(name: str, deep: bool) -> str:
 
 
 def _read_file(
-    tree: FileTree, name: str, key: str, cameras: dict[str, Camera], report: Report
+    tree: FileTree,
+    name: str,
+    key: str,
+    cameras: dict[str, Camera],
+    report: Report,
+    limits: Limits,
 ) -> None:
     shown = tree.shown(name)
     try:
-        value = read_json(tree.read_bytes(name), shown, double_encoded=True)
+        items = _items(tree.read_bytes(name), name, key, shown, report, limits)
     except DatasetFormatError as error:
         report.read += 1
         report.skip(error)
         return
-    several = _several(value)
-    for record, item in several.items() if several is not None else ((None, value),):
+    stems = Counter(_record_key(record, deep=False) for record, _ in items if record)
+    for record, item in items:
         report.read += 1
+        called = key if record is None else record
+        if record is not None:
+            called = _record_key(record, deep=stems[_record_key(record, deep=False)] > 1)
         try:
-            read = camera_from_synloc if is_synloc(item) else camera_from_json
-            cameras[record or key] = read(item, shown, record)
+            camera = _camera(item, shown, record)
+            if called in cameras:
+                problem = f'is a second camera called "{called}"; the first one is used'
+                raise DatasetFormatError(shown, record, None, problem)
+            cameras[called] = camera
         except DatasetFormatError as error:
             report.skip(error)
 
 
-def _several(value: Any) -> dict[str, Any] | None:
+def _record_key(record: str, deep: bool) -> str:
+    """Key of a camera that is named in a file: as ``_key`` of the image's place."""
+    name = record.replace("\\", "/")
+    place = PurePosixPath(name)
+    if not _IMAGE.fullmatch(place.suffix):
+        return record
+    place = place.with_suffix("")
+    if _ABSOLUTE.match(name):
+        return place.name
+    folders = place.parts[:-1]
+    keep = folders if deep else folders[-3:] if len(folders) >= 3 else ()
+    return "/".join((*keep, place.name))
+
+
+_Items = list[tuple[str | None, Any]]
+"""Camera objects of a file, each with its name; None: it is called like the file."""
+
+
+def _items(
+    content: bytes, name: str, key: str, shown: str, report: Report, limits: Limits
+) -> _Items:
+    ending = PurePosixPath(name).suffix.lower()
+    if ending == ".npz":
+        return cameras_of_arrays(content, key, shown, limits)
+    if ending in (".yml", ".yaml"):
+        return [(None, opencv_storage(content, shown))]
+    try:
+        value = read_json(content, shown, double_encoded=True, nan="keep")
+    except DatasetFormatError:
+        lines = read_json_lines(content, shown, report)
+        if lines is None:
+            raise
+        value = lines
+    several = _several(value, shown)
+    if several is not None:
+        return several
+    # A camera file is called like its view; any other may say the name of its image inside.
+    own = None if PurePosixPath(name).name.startswith("camera_") else _image_name(value)
+    return [(own, value)]
+
+
+def _several(value: Any, shown: str) -> _Items | None:
     """The cameras by name when the file holds several, else None."""
-    if not isinstance(value, dict) or "pan_degrees" in value:
+    if isinstance(value, dict) and isinstance(value.get("cameras"), (dict, list)):
+        value = value["cameras"]
+    elif not isinstance(value, (dict, list)) or is_camera(value) or is_camera(_inner(value)):
         return None
-    if isinstance(value.get("cameras"), dict):
-        return dict(value["cameras"])
-    if (images := images_of(value)) is not None:
-        return images
+    elif isinstance(value, dict) and (images := images_of(value)) is not None:
+        return list(images.items())
+    if isinstance(value, list):
+        if not any(map(is_camera, map(_inner, value))):
+            return None
+        return [_named(item, number) for number, item in enumerate(value)]
+    if not any(map(is_camera, map(_inner, value.values()))) and json_kind(value)[:5] == "holds":
+        raise DatasetFormatError(shown, None, None, json_kind(value))
     if not any(isinstance(item, dict) for item in value.values()):
         return None
-    return {name: item for name, item in value.items() if not name.startswith("_")}
+    return [(name, item) for name, item in value.items() if not name.startswith("_")]
+
+
+def _inner(value: Any) -> Any:
+    """The camera within what a tool says of it; the value itself where it is none."""
+    if isinstance(value, dict) and not is_camera(value):
+        for name in _WRAPPERS:
+            if is_camera(value.get(name)):
+                return value[name]
+    return value
+
+
+def _named(item: Any, number: int) -> tuple[str | None, Any]:
+    return _image_name(item) or f"camera {number}", item
+
+
+def _image_name(value: Any) -> str | None:
+    """How a camera object names its image; None where it does not."""
+    if not isinstance(value, dict):
+        return None
+    for field in _NAMES:
+        name = value.get(field)
+        if isinstance(name, list) and len(name) == 1:
+            name = name[0]
+        if isinstance(name, str) and name.strip():
+            return name.strip()
+        if isinstance(name, int) and not isinstance(name, bool):
+            return str(name)
+    return None
+
+
+def _camera(item: Any, shown: str, record: str | None) -> Camera:
+    if is_synloc(item):
+        return camera_from_synloc(item, shown, record)
+    value = item["cam_params"] if isinstance(item, dict) and "cam_params" in item else _inner(item)
+    if isinstance(value, dict) and "pan_degrees" not in value:
+        if holds_matrices(value):
+            return camera_from_matrices(value, shown, record)
+        known = {"position_meters", "x_focal_length", "lens", *_CAMERA_FIELDS}
+        if not known & value.keys():
+            raise DatasetFormatError(shown, record, None, f"{json_kind(value)}{_MEANT}")
+    elif isinstance(value, list):
+        raise DatasetFormatError(shown, record, None, json_kind(value))
+    camera = camera_from_json(value, shown, record)
+    if isinstance(item, dict) and any(name in item for name in _TVCALIB):
+        # TVCalib's middle of W x H is (W / 2, H / 2), ours ((W - 1) / 2, (H - 1) / 2).
+        x, y = camera.principal_point
+        camera = replace(camera, principal_point=(x - HALF, y - HALF))
+    return camera

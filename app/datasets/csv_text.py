@@ -76,7 +76,12 @@ class CsvTable:
 
 
 def read_rows(
-    content: bytes, path: str, required: Iterable[str], limits: Limits
+    content: bytes,
+    path: str,
+    required: Iterable[str],
+    limits: Limits,
+    *,
+    delimiter: str = ",",
 ) -> Iterator[tuple[int, Mapping[str, str]]]:
     """The rows of a CSV file with their line numbers, each by name of column.
 
@@ -85,6 +90,7 @@ def read_rows(
         path: File as the user knows it, for the error.
         required: Columns without which the file is another one.
         limits: Caps on what is read.
+        delimiter: What stands between cells.
 
     Raises:
         DatasetFormatError: No such table; also in the middle, where the file stops being one.
@@ -96,7 +102,7 @@ def read_rows(
     except UnicodeDecodeError as error:
         raise DatasetFormatError(path, None, None, "is not UTF-8 text") from error
     csv.field_size_limit(MAX_CELL)
-    reader = csv.reader(io.StringIO(text, newline=""), strict=True)
+    reader = csv.reader(io.StringIO(text, newline=""), strict=True, delimiter=delimiter)
     try:
         header = [name.strip() for name in next(reader, [])]
         missing = [name for name in required if name not in header]

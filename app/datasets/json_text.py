@@ -6,13 +6,14 @@ import ast
 import json
 import math
 import re
-from typing import Any, NoReturn
+from typing import Any, Literal, NoReturn
 
 import numpy as np
 
 from app.datasets.report import Report
 from app.errors import DatasetFormatError
 
+NanRule = Literal["refuse", "keep"]
 MAX_BYTES = 256 * 1024 * 1024
 MAX_LITERAL_CHARACTERS = 16 * 1024 * 1024
 MAX_DEPTH = 64
@@ -36,6 +37,7 @@ def read_json(
     *,
     record: str | None = None,
     double_encoded: bool = False,
+    nan: NanRule = "refuse",
     max_bytes: int = MAX_BYTES,
     report: Report | None = None,
 ) -> Any:
@@ -46,22 +48,51 @@ def read_json(
         path: File as the user knows it, for the error.
         record: Record inside the file, for the error.
         double_encoded: Also accept a JSON string that holds JSON or a Python dict literal.
+        nan: Without a report: whether NaN, Infinity and numbers that are too large refuse the text, or
+            are kept, for a reader that refuses them field by field (``fields.number``).
         max_bytes: Longest text that is looked at.
         report: Takes one problem for each NaN, Infinity and number that is too large, which are
-            null in the value; without one, the first of them refuses the file.
+            null in the value.
 
     Raises:
         DatasetFormatError: Not JSON, too long, nested too deeply, or (without ``report``) with a
             number in it that is not finite.
     """
-    value = _read(content, path, record, max_bytes, report)
+    value = _read(content, path, record, max_bytes, nan, report)
     if double_encoded and isinstance(value, str):
-        return _read_inner(value, path, record, report)
+        return _read_inner(value, path, record, nan, report)
     return value
 
 
+def read_json_lines(content: bytes, path: str, report: Report) -> list[Any] | None:
+    """The objects of JSON lines, an object a line, NaN allowed; None where the text is something else.
+
+    A line that cannot be read is reported and left out.
+    """
+    lines = [(at, line) for at, line in enumerate(content.splitlines(), 1) if line.strip()]
+    if len(lines) < 2 or len(content) > MAX_BYTES:
+        return None
+    found, problems = [], []
+    for number, line in lines:
+        try:
+            found.append(read_json(line, path, record=f"line {number}", nan="keep"))
+        except DatasetFormatError as error:
+            problems.append(error)
+    if len(found) < max(len(problems), 1) or not all(isinstance(item, dict) for item in found):
+        return None
+    for problem in problems:
+        report.read += 1
+        report.skip(problem)
+    return found
+
+
 def _read(
-    content: bytes, path: str, record: str | None, max_bytes: int, report: Report | None
+    content: bytes,
+    path: str,
+    record: str | None,
+    max_bytes: int,
+    nan: NanRule,
+    report: Report | None,
 ) -> Any:
     if len(content) > max_bytes:
         raise DatasetFormatError(path, record, None, f"is longer than {max_bytes:,} bytes")
@@ -69,12 +100,12 @@ def _read(
         raise DatasetFormatError(path, record, None, f"is nested deeper than {MAX_DEPTH} levels")
     try:
         text = content.decode("utf-8-sig")
-        if report is None:
+        if report is None and nan == "refuse":
             value = json.loads(text, parse_constant=_refuse, parse_float=_finite)
         else:
             value = json.loads(text)
-            if _INFINITE.search(content):
-                value = _null_infinite(value, path, report)
+        if report is not None and _INFINITE.search(content):
+            value = _null_infinite(value, path, report)
         if _SURROGATE.search(content):
             json.dumps(value, ensure_ascii=False).encode()
         return value
@@ -87,11 +118,14 @@ def _read(
         raise DatasetFormatError(path, record, None, str(error)) from error
 
 
-def _read_inner(text: str, path: str, record: str | None, report: Report | None) -> Any:
+def _read_inner(
+    text: str, path: str, record: str | None, nan: NanRule, report: Report | None
+) -> Any:
     try:
-        return _read(text.encode(), path, record, MAX_LITERAL_CHARACTERS, report)
+        return _read(text.encode(), path, record, MAX_LITERAL_CHARACTERS, nan, report)
     except (DatasetFormatError, UnicodeEncodeError):
-        return parse_literal(text, path, record, report)
+        # A literal has no number that is not finite: what is missing there is refused by its field.
+        return parse_literal(text, path, record, Report() if nan == "keep" else report)
 
 
 def parse_literal(

@@ -26,7 +26,7 @@ LINES, CAMERAS = "lines", "cameras"
 _FOLDER = re.compile(rf"({'|'.join((*SPLITS, UNASSIGNED))})-(\d{{1,5}})x(\d{{1,5}})", re.ASCII)
 _PLAIN = re.compile(r"[A-Za-z0-9_-]+", re.ASCII)
 LARGEST_UNIT = 2.0
-"""A file in which any coordinate lies further from 0 is in pixels."""
+"""A file in which at least half of the points have a coordinate further from 0 is in pixels."""
 # SoccerNet spells this one with a space at the end; its readers look it up that way.
 _SPELLING = {"Goal left post left": "Goal left post left "}
 

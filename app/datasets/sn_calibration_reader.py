@@ -11,7 +11,7 @@ from typing import Any
 from app.datasets import fields
 from app.datasets.file_tree import DEFAULT_LIMITS, FileTree, Limits, Root
 from app.datasets.frame_names import IMAGE_SUFFIXES
-from app.datasets.json_text import read_json
+from app.datasets.line_documents import LineDocument, read_line_documents
 from app.datasets.match_info import METADATA, PLACE, match_of, place_of, read_match_info
 from app.datasets.report import Report
 from app.datasets.sn_calibration import LARGEST_UNIT, LineFile, split_and_size
@@ -22,7 +22,7 @@ from app.soccer.annotation import Extras, Lines, make_lines
 from app.soccer.frames import ImagePoint, ImageSize
 from app.soccer.group import Group, Station, View
 from app.soccer.media import Media
-from app.soccer.pitch import WITHOUT_GEOMETRY, canonical_marking
+from app.soccer.pitch import WITHOUT_GEOMETRY, marking_like
 
 _OTHER_FILES = ("manifest.json", "findings.json", "calibrate.json", "leave_one_out.json")
 _OTHER_PREFIXES = ("camera_", "Labels-", "match_info")
@@ -38,17 +38,18 @@ def read_line_files(
 ) -> Iterator[LineFile]:
     """The line files of a folder or zip (or one file), by name.
 
-    Coordinates are normalised by (width - 1, height - 1), or pixels when any lies beyond 2.
-    Points outside the image are kept. Unknown markings and unreadable points are reported; the
-    rest of the file is kept.
+    Coordinates are normalised by (width - 1, height - 1), or pixels when at least half of a file's
+    points lie beyond 2. Points outside the image are kept. Unknown markings and unreadable points
+    are reported; the rest of the file is kept. A file may hold the lines of many images
+    (``line_documents``).
 
     Args:
         path: Folder, zip or JSON file.
         size: Size of the annotated images, pixels.
         report: Takes what had to be left out.
         limits: Caps on what is read.
-        by_folder: Whether a folder that is called as in our exports (``test-1280x720``) says the
-            size of its images.
+        by_folder: Whether a folder that is called as in our exports (``test-1280x720``), or a file
+            itself, says the size of its images; else all lines are in pixels of ``size``.
     """
     with opened_tree(path, report, limits) as tree:
         if tree is None:
@@ -56,7 +57,8 @@ def read_line_files(
         names = tree.names()
         places = _places(read_match_info(tree, names, Report()))
         sizes = _sizes(map(_whole, names), path.stem) if by_folder else {}
-        yield from line_files_of(tree, names, size, report, Ours(places, sizes))
+        ours = Ours(places, sizes, own_sizes=by_folder)
+        yield from line_files_of(tree, names, size, report, ours)
 
 
 @dataclass(frozen=True)
@@ -66,6 +68,8 @@ class Ours:
     places: Mapping[str, str] = field(default_factory=dict)
     """Where a frame would lie without the folders of the export."""
     sizes: Mapping[str, ImageSize] = field(default_factory=dict)
+    own_sizes: bool = False
+    """Whether the size that a file says itself is that of its lines."""
 
 
 _NOTHING = Ours()
@@ -81,14 +85,31 @@ def line_files_of(
     # Names of an export are in no order of a match's frames.
     ordered = sorted(places, key=places.__getitem__) if ours.places else list(places)
     stems = Counter(PurePosixPath(place).name for place in places.values())
+    seen: set[str] = set()
     for name in ordered:
         whole, place = wholes[name], PurePosixPath(places[name])
         key = place.name if stems[place.name] == 1 else str(place)
-        media = _media(tree, beside.get(whole))
-        empty = LineFile(key, ours.sizes.get(whole, size), {}, (), media, whole)
-        file = _read_line_file(tree, name, empty, report)
-        if file is not None:
-            yield file
+        said = ours.sizes.get(whole)
+        for document in _documents(tree, name, report):
+            named, where = key, whole
+            if document.name is not None and document.name != place.name:
+                named, where = document.name, str(PurePosixPath(whole).parent / document.name)
+                if named in seen:
+                    named = f"{key}/{named}"
+            report.read += 1
+            if named in seen:
+                report.note(
+                    tree.shown(name), document.name, None, "is a second record of its image"
+                )
+                continue
+            seen.add(named)
+            drawn = document.size or said or size
+            stays = said is not None or (ours.own_sizes and document.size is not None)
+            lines, others = lines_from_json(document.lines, drawn, tree.shown(name), report)
+            media = _media(tree, beside.get(where))
+            file = LineFile(named, drawn, lines, others, media, where)
+            report.imported += 1
+            yield file if stays else _resized(file, size)
 
 
 def _whole(name: str) -> str:
@@ -104,16 +125,32 @@ def _sizes(places: Iterable[str], top: str = "") -> dict[str, ImageSize]:
     return {whole: found[1] for whole, found in said.items() if found}
 
 
-def _read_line_file(tree: FileTree, name: str, empty: LineFile, report: Report) -> LineFile | None:
-    report.read += 1
+def _documents(tree: FileTree, name: str, report: Report) -> list[LineDocument]:
     try:
-        value = read_json(tree.read_bytes(name), tree.shown(name))
-        lines, others = lines_from_json(value, empty.size, tree.shown(name), report)
+        return read_line_documents(tree.read_bytes(name), tree.shown(name), report)
     except DatasetFormatError as error:
+        report.read += 1
         report.skip(error)
-        return None
-    report.imported += 1
-    return replace(empty, lines=lines, others=others)
+        return []
+
+
+def _resized(file: LineFile, size: ImageSize) -> LineFile:
+    """The same in pixels of another size."""
+    if file.size == size:
+        return file
+    x, y = (size.width - 1) / (file.size.width - 1), (size.height - 1) / (file.size.height - 1)
+    lines = {
+        marking: [(point[0] * x, point[1] * y) for point in points]
+        for marking, points in file.lines.items()
+    }
+    others = tuple(
+        {
+            **line,
+            "points": [value * (y if at % 2 else x) for at, value in enumerate(line["points"])],
+        }
+        for line in file.others
+    )
+    return replace(file, size=size, lines=make_lines(lines), others=others)
 
 
 def _is_line_file(name: str) -> bool:
@@ -139,7 +176,10 @@ def _media(tree: FileTree, image: str | None) -> Media | None:
 def lines_from_json(
     value: Any, size: ImageSize, path: str, report: Report
 ) -> tuple[Lines, tuple[Mapping[str, Any], ...]]:
-    """Lines with geometry, and the others, of one parsed line file, in pixels.
+    """Lines with geometry, and the others, of one image, in pixels.
+
+    Coordinates are pixels when at least half of all points lie beyond 2, so that no single point
+    decides (decision 0067); in a normalised file such points are left out and reported.
 
     Raises:
         DatasetFormatError: The file is no object at all.
@@ -149,8 +189,12 @@ def lines_from_json(
     known: dict[str, list[ImagePoint]] = {}
     others = []
     points = {name: _points(item, path, name, report) for name, item in value.items()}
-    in_pixels = any(max(map(abs, p)) > LARGEST_UNIT for line in points.values() for p in line)
-    for name, line in points.items():
+    every = [point for line in points.values() for _, point in line]
+    in_pixels = 2 * sum(map(_is_beyond, every)) >= max(len(every), 1)
+    for name, numbered in points.items():
+        line = [point for _, point in numbered]
+        if not in_pixels:
+            line = _near(numbered, path, name, report)
         pixels = [ImagePoint(*p) if in_pixels else size.unit_to_pixel(*p) for p in line]
         marking = _marking(name, path, report)
         if marking is None:
@@ -161,29 +205,69 @@ def lines_from_json(
     return make_lines(known), tuple(others)
 
 
-def _points(value: Any, path: str, name: str, report: Report) -> list[tuple[float, float]]:
-    points = []
+_Numbered = list[tuple[int, tuple[float, float]]]
+"""Points of a line, each with its number in the file, from 1."""
+
+
+def _is_beyond(point: tuple[float, float]) -> bool:
+    return max(map(abs, point)) > LARGEST_UNIT
+
+
+def _near(line: _Numbered, path: str, name: str, report: Report) -> list[tuple[float, float]]:
+    """The points of a line of a normalised file that can be normalised; others are reported."""
+    far = [number for number, point in line if _is_beyond(point)]
+    if far:
+        x, y = next(point for _, point in line if _is_beyond(point))
+        problem = f"({x:g}, {y:g}) is far outside the image, and the file is normalised"
+        report.note(path, None, name, f"{problem}; {_left_out(far)}")
+    return [point for _, point in line if not _is_beyond(point)]
+
+
+def _left_out(numbers: Sequence[int]) -> str:
+    listed = ", ".join(map(str, numbers[:10])) + (", ..." if len(numbers) > 10 else "")
+    return f"points {listed} are left out" if len(numbers) > 1 else f"point {listed} is left out"
+
+
+def _points(value: Any, path: str, name: str, report: Report) -> _Numbered:
+    """The sound points of a line; they are in no order, so that one less says nothing false."""
+    points: _Numbered = []
+    bad: list[int] = []
+    first = ""
     try:
-        for item in fields.sequence(value):
-            point = fields.mapping(item)
-            if "x" not in point or "y" not in point:
-                raise ValueError("has a point without x or y")
-            points.append((fields.pixel(point["x"]), fields.pixel(point["y"])))
+        listed = fields.sequence(value)
     except ValueError as error:
-        # A line that lost points in the middle would say something its annotator did not.
         report.note(path, None, name, f"{error}; the line is left out")
         return []
+    for number, item in enumerate(listed, 1):
+        try:
+            points.append((number, _point(item)))
+        except ValueError as error:
+            bad.append(number)
+            first = first or str(error)
+    if bad:
+        report.note(path, None, name, f"{first}; {_left_out(bad)}")
     return points
+
+
+def _point(item: Any) -> tuple[float, float]:
+    """A point as ``{"x", "y"}`` or ``[x, y]``."""
+    if isinstance(item, (list, tuple)):
+        x, y = fields.numbers(item, 2)
+    else:
+        point = fields.mapping(item)
+        if "x" not in point or "y" not in point:
+            raise ValueError("has a point without x or y")
+        x, y = point["x"], point["y"]
+    return fields.pixel(x), fields.pixel(y)
 
 
 def _marking(name: str, path: str, report: Report) -> str | None:
     """The marking of that name; None (reported unless the format knows it) for any other."""
-    try:
-        return canonical_marking(name)
-    except UnknownMarkingError as error:
-        if name.strip() not in WITHOUT_GEOMETRY:
-            report.note(path, None, name, f"{error.message}; kept without geometry")
-        return None
+    found = marking_like(name)
+    if found is None and name.replace("_", " ").strip() not in WITHOUT_GEOMETRY:
+        problem = UnknownMarkingError(name).message
+        report.note(path, None, name, f"{problem}; kept without geometry")
+    return found
 
 
 def read_sn_calibration(
@@ -213,7 +297,7 @@ def read_sn_calibration(
         names = tree.names()
         infos = read_match_info(tree, names, report)
         places = _places(infos)
-        ours = Ours(places, _sizes(places))
+        ours = Ours(places, _sizes(places), own_sizes=True)
         unused = dict.fromkeys(infos)
         for file in line_files_of(tree, names, size, report, ours):
             unused.pop(file.place, None)

@@ -29,7 +29,10 @@ def open_tree(path: Root, report: Report, limits: Limits = DEFAULT_LIMITS) -> Fi
         return None
     try:
         with open_plain(path) as file:
-            is_zip = file.read(2) == b"PK" or path.suffix.lower() == ".zip"
+            # Arrays of numpy are a zip, too, and one file to whoever reads them.
+            is_zip = path.suffix.lower() != ".npz" and (
+                file.read(2) == b"PK" or path.suffix.lower() == ".zip"
+            )
         return ZipTree(path, report, limits) if is_zip else FileAlone(path, report, limits)
     except DatasetFormatError as error:
         report.skip(error)

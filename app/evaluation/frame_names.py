@@ -13,6 +13,7 @@ from app.soccer.frames import ImageSize
 from app.soccer.group import Group, Station, View
 
 _SUFFIX = re.compile(r"\.(png|jpe?g|webp|bmp|txt|json)$", re.IGNORECASE | re.ASCII)
+_NUMBER = re.compile(r"(?:frame|image|img)?[ _-]?(\d{1,9})", re.IGNORECASE | re.ASCII)
 _MATCH = " - "
 """Stands in the name of every SoccerNet match."""
 _HOLDER = re.compile(
@@ -28,7 +29,12 @@ _SEVERAL = -1
 
 @dataclass(frozen=True)
 class NamedFrame:
-    """A frame of a dataset by its names; ``station`` is the key of a static camera or empty."""
+    """A frame of a dataset by its names.
+
+    Attributes:
+        station: Key of a static camera, or empty.
+        picture: Name of its picture's file with the last folder, ``images/0004.jpg``, or empty.
+    """
 
     id: int
     group: str
@@ -36,6 +42,7 @@ class NamedFrame:
     match: str
     size: ImageSize
     station: str = ""
+    picture: str = ""
 
 
 @dataclass(frozen=True)
@@ -56,6 +63,8 @@ class FrameNames:
     _index: Mapping[str, int] = field(repr=False)
     _telling: frozenset[str] = field(repr=False)
     """Names of the index that tell the match, whatever stands before them."""
+    _numbered: Mapping[int, int] = field(default_factory=dict, repr=False)
+    _views: Mapping[str, tuple[int, ...]] = field(default_factory=dict, repr=False)
 
     @staticmethod
     def of(frames: Iterable[NamedFrame]) -> FrameNames:
@@ -64,6 +73,8 @@ class FrameNames:
         index: dict[str, int] = {}
         telling: set[str] = set()
         stations: dict[str, list[int]] = {}
+        numbered: dict[int, int] = {}
+        views: dict[str, list[int]] = {}
         for frame in known.values():
             if frame.station:
                 stations.setdefault(frame.station, []).append(frame.id)
@@ -73,8 +84,18 @@ class FrameNames:
                 other = index.setdefault(name, frame.id)
                 if other != frame.id:
                     index[name] = _SEVERAL
+            for number in _numbers(frame):
+                if numbered.setdefault(number, frame.id) != frame.id:
+                    numbered[number] = _SEVERAL
+            if not frame.station:
+                views.setdefault(_bare(frame.view), []).append(frame.id)
         by_station = {key: tuple(ids) for key, ids in stations.items()}
-        return FrameNames(known, by_station, index, frozenset(telling))
+        rigs = {
+            key: tuple(ids)
+            for key, ids in views.items()
+            if len(ids) > 1 and len({known[identity].match for identity in ids}) == 1
+        }
+        return FrameNames(known, by_station, index, frozenset(telling), numbered, rigs)
 
     def find(self, name: str) -> NamedFrame | None:
         """The one frame that a name means, or None.
@@ -83,6 +104,26 @@ class FrameNames:
         """
         identity = self._lookup(name)
         return self.frames[identity] if identity is not None and identity != _SEVERAL else None
+
+    def find_number(self, text: str) -> NamedFrame | None:
+        """The one frame whose view or picture has a number for its name, ``4`` for ``0004.jpg``."""
+        bare = text.removesuffix(".0")
+        identity = self._numbered.get(int(bare)) if bare.isascii() and bare.isdigit() else None
+        return self.frames[identity] if identity is not None and identity != _SEVERAL else None
+
+    def why_not_number(self, text: str) -> str:
+        """Why ``find_number`` found nothing, in words."""
+        bare = text.removesuffix(".0")
+        if bare.isascii() and bare.isdigit() and int(bare) in self._numbered:
+            return "is the number of several frames of the dataset; name the picture or the camera, too"
+        return "is no number in the name of a picture of the dataset"
+
+    def examples(self, most: int = 3) -> list[str]:
+        """How some frames of the dataset are called."""
+        found = list(self.frames.values())[:most]
+        return [
+            f"{frame.station}/{frame.group}" if frame.station else frame.view for frame in found
+        ]
 
     def why_not(self, name: str) -> str:
         """Why ``find`` found nothing, in words."""
@@ -93,8 +134,9 @@ class FrameNames:
         return "is no frame of the dataset"
 
     def of_station(self, name: str) -> tuple[int, ...]:
-        """Ids of all frames of a static camera; empty when there is none of that name."""
-        return self.stations.get(_bare(name).rsplit("/", 1)[-1], ())
+        """Ids of all frames of a camera of a rig: a static one, or views of one match called alike."""
+        last = _bare(name).rsplit("/", 1)[-1]
+        return self.stations.get(last) or self._views.get(_bare(name)) or self._views.get(last, ())
 
     def _lookup(self, name: str) -> int | None:
         parts = _bare(name).split("/")
@@ -129,7 +171,8 @@ def _short(frame: NamedFrame) -> set[str]:
     """Names that another match could have as well."""
     last = _bare(frame.match).rsplit("/", 1)[-1]
     within = _within(frame)
-    return _glued(within | ({f"{last}/{name}" for name in within} if last else set()))
+    pictures = {_bare(frame.picture), _bare(frame.picture).rsplit("/", 1)[-1]} - {""}
+    return pictures | _glued(within | ({f"{last}/{name}" for name in within} if last else set()))
 
 
 def _within(frame: NamedFrame) -> set[str]:
@@ -140,6 +183,15 @@ def _within(frame: NamedFrame) -> set[str]:
 
 def _glued(names: set[str]) -> set[str]:
     return names | {name.replace("/", glue) for name in names for glue in ("_", "__", "-")}
+
+
+def _numbers(frame: NamedFrame) -> set[int]:
+    """Numbers that a frame's view, picture or (static camera) group is called by."""
+    names = {_bare(name).rsplit("/", 1)[-1] for name in (frame.view, frame.picture)}
+    if frame.station:
+        names = {_bare(frame.group)}
+    found = (_NUMBER.fullmatch(name) for name in names)
+    return {int(match[1]) for match in found if match}
 
 
 def _exported(frame: NamedFrame) -> Iterator[str]:

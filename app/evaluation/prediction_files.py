@@ -2,16 +2,18 @@
 
 Three formats, each a file, a folder or a zip:
 
-``coco``  COCO results: ``[{"image_id", "category_id", "bbox": [x, y, w, h], "score"}]``, pixels.
-          ``image_id`` is the name of a frame, or an id of the ``images`` of a COCO document (in
-          the same file, in another JSON file beside it, or handed over with it).
-``yolo``  A text file per frame, a line per ball: ``class cx cy w h [confidence]``, shares of the
-          image.
-``csv``   A table. The frame stands in ``league, season, match, main_action, replay`` as in
-          SNv3D.csv, or in ``frame`` (with ``camera``), ``image`` or ``file_name``; the box in
-          ``ball_bbox`` (``[x, y, w, h]``) or in ``x, y, w, h``; ``score`` may be missing.
+``coco``  COCO results: ``[{"image_id", "category_id", "bbox": [x, y, w, h], "score"}]``, pixels
+          from the corner of the first pixel. ``file_name`` names the frame where it is there; else
+          ``image_id`` does, or is an id of the ``images`` of a COCO document (in the same file, in
+          another JSON file beside it, or handed over with it).
+``yolo``  A text file per frame, a line per ball: ``class cx cy w h [confidence] [track]``, shares
+          of the image.
+``csv``   A table (``prediction_table``). The frame stands in ``league, season, match, main_action,
+          replay`` as in SNv3D.csv, in ``image`` or ``file_name``, or in ``frame`` (with ``camera``);
+          the box in ``ball_bbox`` (``[x, y, w, h]``), ``x, y, w, h``, corners or centre and size;
+          ``score`` may be missing. MOT's text files, too.
 
-What is wrong is reported with file, record and field, and left out; frames that the dataset does
+Names count before numbers. What is wrong is reported with file, record and field, and left out; frames that the dataset does
 not have are counted and listed. Nothing is evaluated.
 """
 
@@ -25,9 +27,9 @@ from typing import Any, get_args
 
 from app.datasets import fields
 from app.datasets.cameras_reader import read_cameras
-from app.datasets.csv_text import is_missing, numbers_in, read_rows
 from app.datasets.file_tree import DEFAULT_LIMITS, FileTree, Limits
-from app.datasets.json_text import read_json
+from app.datasets.json_kind import json_kind
+from app.datasets.json_text import read_json, read_json_lines
 from app.datasets.report import Report
 from app.datasets.trees import opened_tree
 from app.errors import DatasetFormatError, InputError
@@ -37,22 +39,30 @@ from app.evaluation.prediction_run import (
     PredictionRun,
     ReadPredictions,
     in_field,
+    is_ball,
     noted,
     read_field,
 )
+from app.evaluation.prediction_table import is_mot, read_table
 from app.geometry.camera import Camera
+from app.soccer.camera_size import other_size
 from app.soccer.choices import PredictionFormat
 from app.soccer.frames import Box, ImageSize
 
 FORMATS: tuple[str, ...] = get_args(PredictionFormat)
 AUTO = "auto"
 """In the place of a format: as the endings of the files tell."""
-ENDINGS = ((".csv", "csv"), (".json", "coco"), (".txt", "yolo"))
+ENDINGS = (
+    (".csv", "csv"),
+    (".tsv", "csv"),
+    (".json", "coco"),
+    (".jsonl", "coco"),
+    (".txt", "yolo"),
+)
 """Formats by the endings of their files; where several are there, the first."""
-_SCORES = ("score", "confidence", "conf")
-_NAMES = ("image", "file_name", "image_id", "path", "name")
-_SIDES = (("x", "y", "w", "h"), ("x", "y", "width", "height"))
-_NUMBER_ALONE = "is a number; the COCO document with its images must come with the results"
+_NAMES = ("file_name", "filename", "image_name", "image_path", "image", "path")
+_LISTS = ("predictions", "results", "detections")
+_NUMBER_ALONE = "is a number; give each result a file_name, or hand over the COCO document with its images (--images)"
 _NOT_LABELS = frozenset({"classes.txt", "readme.txt", "license.txt", "licence.txt"})
 
 
@@ -101,23 +111,39 @@ def read_predictions(
         if tree is None:
             raise run.found.report.problems[0]
         run.found.format = kind
+        if images is not None and kind != "coco":
+            raise _unused("images", "a COCO document", kind)
+        if size is not None and kind == "yolo":
+            raise _unused("size", "a size: its numbers are shares of the image", kind)
         if kind == "coco":
             beside = [] if images is None else _document(images, run, limits)
             _read_coco(_json_documents(tree, path), run, beside)
         elif kind == "yolo":
             _read_yolo(tree, path, run)
         else:
-            _read_csv(tree, path, run, limits)
+            read_table(tree, path, run, limits)
     run.finish(path)
     return run.found
+
+
+def _unused(option: str, what: str, kind: str) -> InputError:
+    return InputError(
+        f"{kind} does not use {what}", hint=f"Leave {option} out.", pointer=f"/{option}"
+    )
 
 
 def _told_by_endings(path: Path, limits: Limits) -> str:
     """The format of predictions by the endings of their files; ``coco`` where none tells it."""
     # What is wrong is reported by whoever reads them then.
     with opened_tree(path, Report(), limits) as tree:
-        endings = set() if tree is None else {Path(name).suffix.lower() for name in tree.names()}
-    return next((kind for ending, kind in ENDINGS if ending in endings), "coco")
+        names = [] if tree is None else tree.names()
+        endings = {PurePosixPath(name).suffix.lower() for name in names}
+        kind = next((kind for ending, kind in ENDINGS if ending in endings), "coco")
+        if tree is not None and kind == "yolo":
+            first = next(name for name in names if name.lower().endswith(".txt"))
+            # MOT's files end as YOLO's do.
+            return "csv" if is_mot(tree.read_bytes(first)) else kind
+    return kind
 
 
 def read_predicted_cameras(
@@ -127,7 +153,7 @@ def read_predicted_cameras(
     size: ImageSize | None = None,
     limits: Limits = DEFAULT_LIMITS,
 ) -> ReadPredictedCameras:
-    """Read SoccerNet camera JSON files; one of a static camera's name serves all its frames.
+    """Read camera files; one called like a static camera, or like views of one match, serves all of them.
 
     Args:
         path: Folder, zip or file.
@@ -150,7 +176,14 @@ def read_predicted_cameras(
             found.unknown[name] += 1
             found.reasons[name] = names.why_not(name)
         for identity in ids:
-            found.cameras[identity] = _sized(camera, size, names.frames[identity].size)
+            annotated = names.frames[identity].size
+            if (other := other_size(camera, size or annotated)) is not None:
+                told = (
+                    f"was made for {other.width} x {other.height}: its principal point is the middle of "
+                    f"that; say so (--cameras-size {other.width}x{other.height})"
+                )
+                found.report.note(path.name, name, "principal_point", told)
+            found.cameras[identity] = _sized(camera, size, annotated)
     return found
 
 
@@ -172,7 +205,7 @@ def _document(path: Path, run: PredictionRun, limits: Limits) -> Documents:
 
 
 def _read_coco(documents: Documents, run: PredictionRun, beside: Documents) -> None:
-    images = _coco_images([*documents, *beside])
+    known = _CocoImages.of([*documents, *beside], run.found.report)
     several = any(isinstance(value, list) for _name, value in documents)
     for shown, value in documents:
         # Beside results, a document with annotations is the truth that they belong to.
@@ -184,71 +217,135 @@ def _read_coco(documents: Documents, run: PredictionRun, beside: Documents) -> N
         for number, item in enumerate(annotations):
             run.found.report.read += 1
             with noted(run.found.report, shown, f"result {number}"):
-                _add_coco(run, item, images)
+                _add_coco(run, item, known)
 
 
 def _json_documents(tree: FileTree, path: Path) -> Documents:
     found = []
+    other = None
     for name in tree.names():
-        if not name.lower().endswith(".json"):
+        if not name.lower().endswith((".json", ".jsonl")):
             continue
-        value = read_json(tree.read_bytes(name), tree.shown(name))
+        shown, content = tree.shown(name), tree.read_bytes(name)
+        try:
+            value = read_json(content, shown, nan="keep")
+        except DatasetFormatError:
+            value = read_json_lines(content, shown, Report())
+            if value is None:
+                raise
         if not isinstance(value, (list, dict)):
-            raise DatasetFormatError(
-                tree.shown(name), None, None, "is neither a list nor an object"
-            )
+            raise DatasetFormatError(shown, None, None, "is neither a list nor an object")
+        if isinstance(value, dict):
+            listed = (value[name] for name in _LISTS if isinstance(value.get(name), list))
+            value = next(listed, value)
         if isinstance(value, list) or "images" in value or "annotations" in value:
-            found.append((tree.shown(name), value))
+            found.append((shown, value))
+        else:
+            other = f"{json_kind(value)}; {_RESULTS}"
     if not found:
-        raise DatasetFormatError(str(path), None, None, "holds no COCO results")
+        problem = other or "holds no COCO results"
+        raise DatasetFormatError(str(path), None, None, problem)
     return found
 
 
-def _coco_images(documents: Documents) -> dict[Any, tuple[str, ImageSize | None]]:
-    """Name and size of each image of the COCO documents, by its id."""
-    images: dict[Any, tuple[str, ImageSize | None]] = {}
-    for shown, value in documents:
-        listed = value.get("images", []) if isinstance(value, dict) else []
-        for number, item in enumerate(listed if isinstance(listed, list) else []):
-            try:
-                image = fields.mapping(item)
-                size = None
-                if image.get("width") and image.get("height"):
-                    size = ImageSize(fields.whole(image["width"]), fields.whole(image["height"]))
-                identity = image.get("id")
-                if not isinstance(identity, (int, str)):
-                    raise ValueError("has no id")
-                images[identity] = (str(image.get("file_name", "")), size)
-            except ValueError as error:
-                raise DatasetFormatError(shown, f"image {number}", None, str(error)) from error
-    return images
+_RESULTS = 'COCO results are [{"file_name", "category_id", "bbox": [x, y, w, h], "score"}, ...]'
 
 
-def _add_coco(
-    run: PredictionRun, item: Any, images: Mapping[Any, tuple[str, ImageSize | None]]
-) -> None:
+@dataclass(frozen=True)
+class _CocoImages:
+    """Images and classes of COCO documents.
+
+    Attributes:
+        names: Name of the file by id; numbers that are equal are one id, however they are written.
+        sizes: Size by name of the file, where the document says it.
+        classes: Name by number; empty where no class is called ball.
+    """
+
+    names: Mapping[str, str]
+    sizes: Mapping[str, ImageSize]
+    classes: Mapping[int, str]
+
+    @staticmethod
+    def of(documents: Documents, report: Report) -> _CocoImages:
+        names: dict[str, str] = {}
+        sizes: dict[str, ImageSize] = {}
+        classes: dict[int, str] = {}
+        for shown, value in documents:
+            listed = value.get("images", []) if isinstance(value, dict) else []
+            for number, item in enumerate(listed if isinstance(listed, list) else []):
+                try:
+                    image = fields.mapping(item)
+                    name = str(image.get("file_name", ""))
+                    names[_identity(image.get("id"))] = name
+                    if image.get("width") and image.get("height"):
+                        width, height = fields.whole(image["width"]), fields.whole(image["height"])
+                        sizes[name] = ImageSize(width, height)
+                except ValueError as error:
+                    report.note(shown, f"image {number}", None, str(error))
+            listed = value.get("categories", []) if isinstance(value, dict) else []
+            for item in listed if isinstance(listed, list) else []:
+                if isinstance(item, dict) and isinstance(item.get("id"), int):
+                    classes[item["id"]] = str(item.get("name", ""))
+        return _CocoImages(names, sizes, classes if any(map(is_ball, classes.values())) else {})
+
+
+def _identity(value: Any) -> str:
+    """An id of an image as text, 1.0 like 1.
+
+    Raises:
+        ValueError: It is neither a number nor a name.
+    """
+    if isinstance(value, str) and value.strip():
+        return value.strip()
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or value % 1:
+        raise ValueError("is missing or neither a number nor a name")
+    return str(int(value))
+
+
+def _add_coco(run: PredictionRun, item: Any, known: _CocoImages) -> None:
     value = fields.mapping(item)
-    identity = value.get("image_id")
-    if isinstance(identity, bool) or not isinstance(identity, (int, str)):
-        raise FieldError("image_id", "is missing or neither a number nor a name")
+    own = next((name for field in _NAMES if isinstance(name := value.get(field), str) and name), "")
+    identity = ""
+    if not own or value.get("image_id") is not None:
+        with in_field("image_id"):
+            identity = _identity(value.get("image_id"))
     box = read_field(value, "bbox", lambda item: Box(*fields.numbers(item, 4)))
     score = read_field(value, "score", fields.number) if "score" in value else None
-    if not run.wants(
-        read_field(value, "category_id", fields.whole) if "category_id" in value else 1
-    ):
+    category = read_field(value, "category_id", fields.whole) if "category_id" in value else 1
+    if not run.wants(category, known.classes.get(category, "")):
         return
-    name, size = images.get(identity, ("", None))
-    frame = _coco_frame(run, identity, name)
+    named = known.names.get(identity, "")
+    if own:
+        frame = run.frame(own)
+        if problem := _contradiction(run, own, identity, named, frame):
+            raise FieldError("file_name", problem)
+    elif named or isinstance(value["image_id"], str):
+        frame = run.frame(named or identity)
+    else:
+        frame = None
+        run.miss(f"image {identity}", _NUMBER_ALONE)
     if frame is not None:
         with in_field("bbox"):
-            run.add(frame, box, score, size)
+            run.add(frame, box, score, known.sizes.get(own or named), from_corner=True)
 
 
-def _coco_frame(run: PredictionRun, identity: int | str, name: str) -> NamedFrame | None:
-    if name or isinstance(identity, str):
-        return run.frame(name or str(identity))
-    run.miss(f"image {identity}", _NUMBER_ALONE)
-    return None
+def _contradiction(
+    run: PredictionRun, own: str, identity: str, named: str, frame: NamedFrame | None
+) -> str | None:
+    """Why the name and the number of a result mean two frames, in words; None where they do not."""
+    # Ultralytics' number is that of the name, and no id of a document.
+    stem = PurePosixPath(own.replace("\\", "/")).stem
+    if frame is None or not identity or identity == stem or identity == stem.lstrip("0"):
+        return None
+    other = run.names.find(named or identity)
+    if other is None or other.id == frame.id:
+        return None
+    said = (
+        f'image {identity} of the COCO document is "{named}"'
+        if named
+        else f'image_id is "{identity}"'
+    )
+    return f'is "{own}", but {said}: two frames'
 
 
 def _read_yolo(tree: FileTree, path: Path, run: PredictionRun) -> None:
@@ -259,104 +356,63 @@ def _read_yolo(tree: FileTree, path: Path, run: PredictionRun) -> None:
     ]
     if not names:
         raise DatasetFormatError(str(path), None, None, "holds no text files")
+    rows: list[tuple[str, int, NamedFrame | None, list[str]]] = []
     for name in names:
         shown = tree.shown(name)
         try:
             lines = tree.read_bytes(name).decode("utf-8-sig").splitlines()
         except UnicodeDecodeError as error:
             raise DatasetFormatError(shown, None, None, "is not UTF-8 text") from error
+        if is_mot("\n".join(lines[:20]).encode()):
+            raise DatasetFormatError(
+                shown, None, None, "is a table with commas (MOT): read it as csv"
+            )
         boxes = [(number, line.split()) for number, line in enumerate(lines, 1) if line.strip()]
         frame = run.names.find(name)
         if frame is None:
             run.found.unknown[name] += len(boxes)
             run.found.reasons[name] = run.names.why_not(name)
-        for number, cells in boxes:
-            run.found.report.read += 1
-            with noted(run.found.report, shown, f"line {number}"):
-                _add_yolo(run, frame, cells)
+        else:
+            run.matched = True
+        rows.extend((shown, number, frame, cells) for number, cells in boxes)
+    tracked = _has_tracks([cells for _, _, _, cells in rows])
+    if tracked:
+        run.found.report.note(str(path), None, None, _TRACKED)
+    for shown, number, frame, cells in rows:
+        run.found.report.read += 1
+        with noted(run.found.report, shown, f"line {number}"):
+            _add_yolo(run, frame, cells, tracked)
 
 
-def _add_yolo(run: PredictionRun, frame: NamedFrame | None, cells: list[str]) -> None:
-    if len(cells) not in (5, 6):
+_TRACKED = "the sixth number is the id of a track and no confidence: its boxes count as sure"
+
+
+def _has_tracks(rows: list[list[str]]) -> bool:
+    """Whether the last of six numbers is the id of a track, as a tracker writes it without confidence.
+
+    All of them are whole then, and one is beyond 1.
+    """
+    last = [cells[5] for cells in rows if len(cells) == 6]
+    return (
+        bool(last) and all(cell.isdigit() for cell in last) and any(int(cell) > 1 for cell in last)
+    )
+
+
+def _add_yolo(
+    run: PredictionRun, frame: NamedFrame | None, cells: list[str], tracked: bool
+) -> None:
+    if len(cells) not in (5, 6, 7):
         raise ValueError(
-            f"has {len(cells)} numbers, not class, cx, cy, w, h and maybe a confidence"
+            f"has {len(cells)} numbers, not class, cx, cy, w, h, and maybe a confidence and a track"
         )
     category = fields.whole(cells[0])
     x, y, width, height = (fields.number(cell) for cell in cells[1:5])
     if not all(-1 <= value <= 2 for value in (x, y, width, height)):
         raise ValueError("is in pixels; YOLO's numbers are shares of the image")
-    score = fields.number(cells[5]) if len(cells) == 6 else None
+    score = fields.number(cells[5]) if len(cells) > 5 and not tracked else None
     if not run.wants(category) or frame is None:
         return
     across, down = frame.size.width, frame.size.height
     box = Box((x - width / 2) * across, (y - height / 2) * down, width * across, height * down)
     with in_field("cx, cy, w, h"):
-        run.add(frame, box, score, frame.size)
-
-
-def _read_csv(tree: FileTree, path: Path, run: PredictionRun, limits: Limits) -> None:
-    names = [name for name in tree.names() if name.lower().endswith(".csv")]
-    if len(names) != 1:
-        what = "no CSV file" if not names else f"{len(names)} CSV files; one is read"
-        raise DatasetFormatError(str(path), None, None, f"holds {what}")
-    shown = tree.shown(names[0])
-    for line, cells in read_rows(tree.read_bytes(names[0]), shown, (), limits):
-        run.found.report.read += 1
-        with noted(run.found.report, shown, f"line {line}"):
-            _add_row(run, cells)
-    if not run.found.report.read:
-        raise DatasetFormatError(shown, None, None, "holds no row: is it complete?")
-
-
-def _add_row(run: PredictionRun, cells: Mapping[str, str]) -> None:
-    box = _row_box(cells)
-    if box is None:
-        return
-    score_name = next((name for name in _SCORES if not is_missing(cells.get(name))), None)
-    score = read_field(cells, score_name, fields.number) if score_name else None
-    category = cells.get("class", cells.get("category_id"))
-    if not run.wants(fields.whole(category) if not is_missing(category) else 0):
-        return
-    frame = run.frame(_row_name(cells))
-    if frame is not None:
-        size = None
-        if not is_missing(cells.get("img_w")) and not is_missing(cells.get("img_h")):
-            size = ImageSize(
-                read_field(cells, "img_w", fields.whole), read_field(cells, "img_h", fields.whole)
-            )
-        with in_field("ball_bbox" if "ball_bbox" in cells else "x, y, w, h"):
-            run.add(frame, box, score, size)
-
-
-def _row_box(cells: Mapping[str, str]) -> Box | None:
-    """The box of a row; None where the row has none."""
-    if "ball_bbox" in cells:
-        if is_missing(cells["ball_bbox"]):
-            return None
-        return read_field(cells, "ball_bbox", lambda text: Box(*numbers_in(text, 4)))
-    for sides in _SIDES:
-        if all(side in cells for side in sides):
-            if all(is_missing(cells[side]) for side in sides):
-                return None
-            return Box(*(read_field(cells, side, fields.number) for side in sides))
-    raise FieldError("ball_bbox", "is missing, and so are x, y, w and h")
-
-
-def _row_name(cells: Mapping[str, str]) -> str:
-    """How a row calls its frame."""
-    if not is_missing(cells.get("main_action")):
-        action = read_field(cells, "main_action", fields.whole)
-        replay = cells.get("replay")
-        image = f"{action}" if is_missing(replay) else f"{action}_{fields.whole(replay)}"
-        parts = [cells.get(name, "").strip() for name in ("league", "season", "match")]
-        return "/".join([part for part in parts if part] + [image])
-    if not is_missing(cells.get("frame")):
-        camera = cells.get("camera")
-        if is_missing(camera):
-            return cells["frame"].strip()
-        number = (camera or "").strip().removeprefix("cam")
-        return f"cam{number}/{cells['frame'].strip().removesuffix('.0')}"
-    for name in _NAMES:
-        if not is_missing(cells.get(name)):
-            return cells[name].strip()
-    raise FieldError("frame", "is missing, and so is every other name of the frame")
+        run.add(frame, box, score, frame.size, from_corner=True)

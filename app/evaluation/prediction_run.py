@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar
 
+from app.datasets.corner_origin import box_from_corner, box_to_corner
 from app.datasets.report import Report
 from app.errors import InputError
 from app.evaluation.frame import Detection
@@ -17,6 +19,8 @@ from app.soccer.frames import Box, ImageSize
 MAX_PER_FRAME = 1000
 """Detections of one frame; more is no detector's output but an accident."""
 MAX_BOXES = 5_000_000
+_LARGEST_SHARE = 2.0
+"""Hardly a ball lies nearer to the corner, in pixels; shares of an image do."""
 
 T = TypeVar("T")
 
@@ -53,15 +57,29 @@ class PredictionRun:
     def __init__(self, names: FrameNames, category: int | None, size: ImageSize | None):
         self.names, self.category, self.size = names, category, size
         self.found = ReadPredictions()
-        self.categories: Counter[int] = Counter()
+        self.categories: Counter[int | str] = Counter()
+        self.labels: dict[int | str, str] = {}
         self.left_out = 0
+        self.matched = False
         self._total = 0
+        self._near_corner = 0
 
     def frame(self, name: str) -> NamedFrame | None:
         """The frame of a name; a name that is none is counted."""
         found = self.names.find(name)
         if found is None:
             self.miss(name, self.names.why_not(name))
+        else:
+            self.matched = True
+        return found
+
+    def numbered(self, text: str) -> NamedFrame | None:
+        """The frame of a number as its picture or view has it in its name, ``4`` for ``0004.jpg``."""
+        found = self.names.find(text) or self.names.find_number(text)
+        if found is None:
+            self.miss(text, self.names.why_not_number(text))
+        else:
+            self.matched = True
         return found
 
     def miss(self, name: str, why: str) -> None:
@@ -69,15 +87,26 @@ class PredictionRun:
         self.found.unknown[name] += 1
         self.found.reasons[name] = why
 
-    def wants(self, category: int) -> bool:
-        """Whether a box of that class is a ball."""
+    def wants(self, category: int | str, label: str = "") -> bool:
+        """Whether a box of that class is a ball; ``label`` is what the file calls the class."""
         self.categories[category] += 1
-        if self.category is None or category == self.category:
+        if label:
+            self.labels[category] = label
+        wanted = is_ball(label) if self.category is None and label else None
+        if wanted or (wanted is None and self.category in (None, category)):
             return True
         self.left_out += 1
         return False
 
-    def add(self, frame: NamedFrame, box: Box, score: float | None, size: ImageSize | None) -> None:
+    def add(
+        self,
+        frame: NamedFrame,
+        box: Box,
+        score: float | None,
+        size: ImageSize | None,
+        *,
+        from_corner: bool = False,
+    ) -> None:
         """Keep a box.
 
         Args:
@@ -85,6 +114,8 @@ class PredictionRun:
             box: Pixels of an image of ``size``.
             score: None where the file has none.
             size: None: the size that the caller named, else the annotated size.
+            from_corner: Whether (0, 0) is the corner of the first pixel, as in COCO and YOLO, and
+                not its centre.
 
         Raises:
             ValueError: It cannot be a box of that image, or there are too many.
@@ -100,23 +131,65 @@ class PredictionRun:
         self._total += 1
         if len(found) >= MAX_PER_FRAME or self._total > MAX_BOXES:
             raise ValueError(f"is one of more than {MAX_PER_FRAME} boxes of its frame")
-        found.append(Detection(_scaled(box, seen, frame.size), 1.0 if score is None else score))
+        self._near_corner += max(box.x + box.width, box.y + box.height) <= _LARGEST_SHARE
+        if from_corner or seen != frame.size:
+            # Images are resized about the corner of their first pixel.
+            corner = box if from_corner else box_to_corner(box)
+            box = box_from_corner(_scaled(corner, seen, frame.size))
+        found.append(Detection(box, 1.0 if score is None else score))
 
     def finish(self, path: Path) -> None:
         """Refuse a file that says nothing, or whose ball cannot be told from other classes."""
-        if self.category is None and len(self.categories) > 1:
-            classes = ", ".join(map(str, sorted(self.categories)))
+        report = self.found.report
+        unlabelled = [name for name in self.categories if name not in self.labels]
+        if self.category is None and len(self.categories) > 1 and unlabelled:
             raise InputError(
-                f"{path.name} holds several classes ({classes})",
+                f"{path.name} holds several classes ({self._classes()})",
                 hint="Say which one is the ball (category).",
                 pointer="/category",
             )
-        report = self.found.report
+        if self.categories and self.left_out == self.categories.total():
+            wanted = "called ball" if self.category is None else f"{self.category}"
+            raise InputError(
+                f"{path.name} holds no class {wanted}; its classes are {self._classes()}",
+                hint="Say which one is the ball (category).",
+                pointer="/category",
+            )
+        if 2 * self._near_corner > self.found.boxes:
+            raise InputError(
+                f"most boxes of {path.name} lie within {_LARGEST_SHARE:g} pixels of the corner",
+                hint="They seem to be shares of the image; boxes are in pixels here.",
+            )
+        if not self.matched and not self.found.unknown and not report.problems:
+            raise InputError(
+                f"{path.name} holds no prediction that belongs to a frame: is it complete?",
+                pointer="/upload",
+            )
         if not self.found.detections and not self.found.unknown and report.problems:
             raise report.problems[0]
         report.imported = self.found.boxes
         if self.left_out:
             report.counts["other classes"] = self.left_out
+
+    def _classes(self) -> str:
+        """The classes of the file, with their names where it says them."""
+        names = sorted(self.categories, key=lambda name: (isinstance(name, str), name))
+        return ", ".join(
+            f"{name} ({self.labels[name]})" if self.labels.get(name, name) != name else f"{name}"
+            for name in names[:20]
+        )
+
+
+def is_ball(label: str) -> bool:
+    """Whether the name of a class is that of a ball.
+
+    Example:
+        >>> is_ball("sports ball"), is_ball("soccer-ball"), is_ball("Balloon")
+        (True, True, False)
+    """
+    return not {"ball", "balls", "football", "soccerball"}.isdisjoint(
+        re.split(r"[^a-z]+", label.lower())
+    )
 
 
 def box_problem(box: Box, size: ImageSize) -> str | None:

@@ -15,6 +15,7 @@ FINDING_KINDS = (
     "paint_disagrees",
     "no_paint",
     "picture_geometry",
+    "camera_size",
     "view_disagrees",
     "views_contradict",
     "not_synchronous",

@@ -70,6 +70,20 @@ def canonical_marking(name: str) -> str:
     return stripped
 
 
+def marking_like(name: str) -> str | None:
+    """The marking that a name means, whatever its capitals, spaces, dots and underscores.
+
+    Example:
+        >>> marking_like("Big_rect_left_top"), marking_like("Line unknown")
+        ('Big rect. left top', None)
+    """
+    return _LOOSE.get(_letters(name))
+
+
+def _letters(name: str) -> str:
+    return "".join(letter for letter in name.lower() if letter.isalnum())
+
+
 def twin_marking(marking: str) -> str:
     """The marking that this one becomes when the pitch is turned by 180 degrees.
 
@@ -85,6 +99,7 @@ def twin_marking(marking: str) -> str:
 
 
 _KNOWN = frozenset(MARKINGS)
+_LOOSE = {_letters(marking): marking for marking in MARKINGS}
 _SWAP = {"left": "right", "right": "left", "top": "bottom", "bottom": "top"}
 
 

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
+from app.soccer.camera_size import other_size
 from app.soccer.finding import Finding, Fix
 from app.soccer.frames import ImageSize, height_above_grass
 from app.soccer.solution import Calibration
@@ -42,6 +43,7 @@ def calibration_findings(
     yield from _not_annotated(calibration, size, view)
     yield from _under_constrained(calibration, view)
     yield from _picture_geometry(calibration, size, view)
+    yield from _camera_size(calibration, size, view)
     yield from _implausible_camera(calibration, view)
 
 
@@ -187,6 +189,26 @@ def _picture_geometry(
         number=number,
         threshold=threshold,
         fix=None if view is None else Fix("free_picture", view),
+    )
+
+
+def _camera_size(calibration: Calibration, size: ImageSize, view: str | None) -> Iterator[Finding]:
+    """A given camera whose principal point is the middle of another size."""
+    if calibration.camera is None or calibration.source != "given":
+        return
+    other = other_size(calibration.camera, size)
+    if other is None:
+        return
+    x, y = calibration.camera.principal_point
+    aside = float(np.hypot(x - (size.width - 1) / 2, y - (size.height - 1) / 2))
+    yield Finding(
+        "camera_size",
+        f"The given camera was made for pictures of {other.width} x {other.height}: its principal "
+        f"point ({x:g}, {y:g}) is their middle, and the view has {size.width} x {size.height}. Import "
+        f"the cameras again for that size (--size {other.width}x{other.height}).",
+        view,
+        number=aside,
+        threshold=0.02 * max(size.width, size.height) / 2,
     )
 
 

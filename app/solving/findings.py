@@ -23,6 +23,7 @@ HIGH_SIGMA_M = 0.25
 """Beyond it more than one ball in twenty is half a metre off or more."""
 
 _BY_WEIGHT = (
+    "camera_size",
     "sides_swapped",
     "wrong_label",
     "several_balls",

@@ -20,6 +20,7 @@ const TITLES = /** @type {Record<string, string>} */ ({
 	high_uncertainty: 'The position of the ball is uncertain',
 	implausible_ball: 'The ball is where no ball can be',
 	picture_geometry: 'The picture of @ was stretched or cropped',
+	camera_size: 'The camera of @ was made for pictures of another size',
 	paint_disagrees: 'The paint of @ lies elsewhere than its lines',
 	no_paint: 'The camera of @ is not on its paint',
 	implausible_camera: 'The camera of @ is where no camera can be',
@@ -37,7 +38,7 @@ export function findingTitle(group, finding) {
 
 /** Findings that a reason to reject follows from. */
 const OF_FINDING = /** @type {Record<string, string>} */ ({
-	sides_swapped: 'sides_confused', not_synchronous: 'not_same_instant', views_contradict: 'not_same_instant',
+	camera_size: 'bad_calibration', sides_swapped: 'sides_confused', not_synchronous: 'not_same_instant', views_contradict: 'not_same_instant',
 });
 /** The reason that fits when nothing but the gate is known. */
 const OF_GATE = /** @type {Record<string, string>} */ ({

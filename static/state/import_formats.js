@@ -10,21 +10,19 @@ const CALIBRATION = { name: 'calibration', label: 'Where a view has a given came
 const SIZE = { name: 'size', label: 'Size of the images', hint: 'width x height, for example 960x540; empty: the usual one', kind: 'size' };
 /** @type {FormatOption} */
 const CATEGORY = { name: 'ball_category', label: 'Category of the ball', hint: 'name or id, where the file calls it neither ball nor anything alike', kind: 'text' };
-/** @type {FormatOption[]} */
-const STATIC = [
-	CALIBRATION, SIZE,
-	{ name: 'frame_offset', label: 'Frame offset', hint: 'number in the ground truth minus number in the video: 8, or by camera 1=8,2=9', kind: 'offset' },
-	{ name: 'flipped', label: 'Mirrored cameras', hint: 'numbers, for example 2,6', kind: 'cameras' },
-];
+/** @type {FormatOption} */
+const OFFSET = { name: 'frame_offset', label: 'Frame offset', hint: 'number in the ground truth minus number in the video: 8, or by camera 1=8,2=9', kind: 'offset' };
+/** @type {FormatOption} */
+const FLIPPED = { name: 'flipped', label: 'Mirrored cameras', hint: 'numbers, for example 2,6', kind: 'cameras' };
 
 /** @type {ImportFormat[]} */
 export const IMPORT_FORMATS = [
 	{ name: 'soccernet-v3', label: 'SoccerNet-v3', note: 'a folder or zip with Labels-v3.json', options: [] },
 	{ name: 'soccernet-v3d', label: 'SoccerNet-v3D', note: 'Labels-v3D.json or SNv3D.csv', options: [CALIBRATION] },
-	{ name: 'issia', label: 'ISSIA', note: 'XGTF ground truth of the static cameras', options: STATIC, lines: true },
-	{ name: 'issia-3d', label: 'ISSIA-3D', note: 'ISSIA-3D.csv and issia_calibration.json', options: STATIC, lines: true },
+	{ name: 'issia', label: 'ISSIA', note: 'XGTF ground truth of the static cameras', options: [CALIBRATION, SIZE, OFFSET, FLIPPED], lines: true },
+	{ name: 'issia-3d', label: 'ISSIA-3D', note: 'ISSIA-3D.csv and issia_calibration.json', options: [CALIBRATION, SIZE, FLIPPED], lines: true },
 	{ name: 'sn-calibration', label: 'sn-calibration', note: 'a JSON of lines for each frame', options: [CALIBRATION, SIZE] },
-	{ name: 'cameras', label: 'Cameras', note: 'camera JSON for known frames', options: [] },
+	{ name: 'cameras', label: 'Cameras', note: 'cameras for known frames', options: [{ ...SIZE, hint: 'for which the cameras were made, for example 960x540; empty: that of each view' }] },
 	{ name: 'gamestate', label: 'sn-gamestate', note: 'Labels-GameState.json', options: [CALIBRATION] },
 	{ name: 'coco', label: 'COCO', note: 'as Touchline, CVAT, Label Studio, Roboflow or FiftyOne export it', options: [CALIBRATION, CATEGORY] },
 	{ name: 'parquet', label: 'Parquet', note: 'as Touchline exports it', options: [] },

@@ -60,6 +60,7 @@ FINDINGS: dict[str, tuple[tuple[str, ...], str]] = {
         "where paint was read and shows too little, correct the lines",
     ),
     "picture_geometry": (("free_picture",), ""),
+    "camera_size": ((), "import the cameras again with the size that they were made for"),
     "view_disagrees": (("exclude_view",), "or correct its ball: `PATCH /views/{id}/ball`"),
     "views_contradict": (("exclude_view",), ""),
     "not_synchronous": ((), "correct a ball, or reject: `PUT /groups/{id}/verdict`"),

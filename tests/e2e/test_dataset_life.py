@@ -42,7 +42,7 @@ def _boxes(labels: dict[str, dict[str, dict[str, object]]], match: str) -> Itera
             for item in frame["bboxes"]:  # type: ignore[attr-defined]
                 if item["class"] == "Ball":
                     x1, y1, x2, y2 = (item["points"][key] for key in ("x1", "y1", "x2", "y2"))
-                    box = [x1 - 0.5, y1 - 0.5, x2 - x1 + 1, y2 - y1 + 1]
+                    box = [x1, y1, x2 - x1 + 1, y2 - y1 + 1]
                     yield {"image_id": f"{match}/{name}", "category_id": 1, "bbox": box, "score": 1}
 
 

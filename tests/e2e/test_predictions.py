@@ -71,7 +71,12 @@ def upload(page: Page, name: str, document: Document, off: float) -> tuple[int, 
         if view["balls"] and view["balls"][0]["box"]
     }
     rows = [
-        {"image_id": f"{document['match']}/{key}", "category_id": 1, "bbox": box, "score": score}
+        {
+            "image_id": f"{document['match']}/{key}",
+            "category_id": 1,
+            "score": score,
+            "bbox": [box[0] + 0.5, box[1] + 0.5, *box[2:]],
+        }
         for key, ball in boxes.items()
         for box, score in ((ball, 0.83), ([40.0, 300.0, 12.0, 12.0], 0.12))
     ]

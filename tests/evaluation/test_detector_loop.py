@@ -13,6 +13,7 @@ from typer.testing import CliRunner
 from app.commands.command_line import app as cli
 from app.config import Settings
 from app.errors import InputError
+from app.evaluation.frame import Detection
 from app.evaluation.overlap import iou
 from app.review.editing.edit import SetBall
 from app.review.editing.recompute import solve_dataset
@@ -22,7 +23,7 @@ from app.review.evaluating.detect import DetectRequest, detect
 from app.review.evaluating.evaluation import tables_of
 from app.review.evaluating.evaluation_run import EvaluationRequest, run_evaluation
 from app.review.evaluating.onnx_model import OnnxModel
-from app.review.evaluating.predictions import view_predictions
+from app.review.evaluating.predictions import delete_predictions, view_predictions
 from app.review.importing.sources import Source, import_source
 from app.sample.truth import read_truth
 from app.sample.write import write_sample
@@ -118,6 +119,18 @@ class TestDetect:
                 hits += any(iou(place, careful) > 0.3 for place in places)
         # A matched filter finds some; were boxes misplaced by a letterbox, it would find none.
         assert hits >= found_at_least(detected[0].report["looked_at"])
+
+    def test_boxes_are_half_a_pixel_before_the_numbers_of_the_model(
+        self, store, model, monkeypatch
+    ) -> None:
+        # YOLO counts from the corner of the first pixel.
+        seen = [Detection(Box(100.5, 50.5, 8, 8), 0.9)]
+        monkeypatch.setattr(OnnxModel, "detect", lambda *_, **__: seen)
+        found = detect(store, "drawn", model, DetectRequest("fixed"), actor="ann")
+        view = next(iter(_states(store)[0].view_ids.values()))
+        boxes = next(boxes for item, boxes in view_predictions(store, view) if item == found)
+        assert [(box.x, box.y, box.width) for box in boxes] == [(100, 50, 8)]
+        delete_predictions(store, found.id, actor="ann")
 
     def test_no_solve_has_seen_them(self, store, detected) -> None:
         for state in _states(store):

@@ -56,7 +56,8 @@ def _branch(
 ) -> tuple[list[onnx.NodeProto], list[onnx.TensorProto]]:
     """One size of ball: contrast of disc and surround, peaks alone, as boxes."""
     cells = width * height
-    across, down = np.meshgrid(np.arange(width), np.arange(height))
+    # YOLO counts from the corner of the first pixel.
+    across, down = np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5)
     places = np.stack([across.ravel(), down.ravel(), np.full(cells, side), np.full(cells, side)])
     silent_classes = np.zeros((1, classes - 1, cells), np.float32)
     constants = {

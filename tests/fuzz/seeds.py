@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import tempfile
 from collections.abc import Iterator
@@ -12,6 +13,7 @@ import cv2
 import numpy as np
 
 from app.config import Settings
+from app.datasets.camera_json import camera_to_json
 from app.datasets.export_record import ExportRecord
 from app.review.exporting.formats import FORMATS, WriteOptions, write_format
 from app.review.importing.carry import carry_out
@@ -97,6 +99,31 @@ def _carried(folder: Path) -> Iterator[Case]:
         store.close()
 
 
+def _foreign() -> Iterator[Case]:
+    """Cameras and lines in the shapes of other tools."""
+    camera = looking(*CAMERAS["7.png"])
+    k = [[1500.0, 0, 639.5], [0, 1500.0, 359.5], [0, 0, 1]]
+    t = (-camera.rotation @ camera.position).tolist()
+    matrices = {"K": k, "R": camera.rotation.tolist(), "t": t, "k": [0.1, 0, 0, 0, 0]}
+    lines = [json.dumps({"image_ids": f"{name}.jpg", **camera_to_json(camera)}) for name in "ab"]
+    arrays = io.BytesIO()
+    np.savez(arrays, **{name: np.stack([value] * 2) for name, value in matrices.items()})
+    for name, content in (
+        ("7.json", json.dumps(matrices)),
+        ("all.json", json.dumps({"7.jpg": {"cam_params": camera_to_json(camera)}})),
+        ("per_sample_output.json", "\n".join(lines)),
+        (
+            "7.yml",
+            f"%YAML:1.0\n---\nK: !!opencv-matrix\n   data: {np.ravel(k).tolist()}\nP: {matrices['R']}\n",
+        ),
+    ):
+        yield Case("cameras", {name: content.encode()})
+    yield Case("cameras", {"7.npz": arrays.getvalue()})
+    drawn = {"Side_line_bottom": [[0.1, 0.9], [0.9, 0.95]], "Line unknown": []}
+    shapes = {"1.jpg": {"width": 1280, "height": 720, "lines": drawn}, "2.jpg": drawn}
+    yield Case("sn-calibration", {"lines.json": json.dumps(shapes).encode()})
+
+
 def _predicted() -> Iterator[Case]:
     box = {"image_id": f"{MATCH}/7.png", "category_id": 1, "bbox": [10, 20, 8, 9], "score": 0.5}
     document = {"images": [{"id": 5, "file_name": "7_1.png", "width": 640, "height": 360}]}
@@ -105,6 +132,9 @@ def _predicted() -> Iterator[Case]:
     yield Case("predictions-yolo", {"7_1.txt": b"0 0.5 0.5 0.01 0.02 0.9\n0 0.1 0.2 0.01 0.02\n"})
     rows = b"image,x,y,w,h,score\n7.png,600,300,9,9,0.5\n7_1.png,1,2,3,4,\n"
     yield Case("predictions-csv", {"r.csv": rows})
+    corners = b"Image;x1;y1;x2;y2;conf;class;name\n7.png;600,5;300;609;309;0,5;32;sports ball\n"
+    yield Case("predictions-csv", {"r.csv": corners})
+    yield Case("predictions-csv", {"gt.txt": b"7,1,600,300,9,9,0.5,-1,-1,-1\n"})
     table = b'frame,camera,ball_bbox,score\n358,3,"[1, 2, 3, 4]",1\n'
     yield Case("predictions-csv", {"r.csv": table})
 

@@ -19,7 +19,7 @@ describe('suggestedReason', () => {
 	}
 
 	for (const [kind, reason] of Object.entries({
-		sides_swapped: 'sides_confused', not_synchronous: 'not_same_instant', views_contradict: 'not_same_instant',
+		camera_size: 'bad_calibration', sides_swapped: 'sides_confused', not_synchronous: 'not_same_instant', views_contradict: 'not_same_instant',
 	})) {
 		it(`is ${reason} where ${kind} was found, whatever fails`, () => {
 			assert.equal(suggestedReason(failing('sigma', 'ball_size', kind)), reason);

@@ -53,7 +53,9 @@ class ImportOptions(BaseModel):
         default=[], max_length=100, description="ISSIA: cameras whose videos are mirrored."
     )
     size: tuple[Side, Side] | None = Field(
-        default=None, description="Width and height of the annotated images, where files lack it."
+        default=None,
+        description="Width and height of the annotated images, where files lack it; of cameras: of the "
+        "images that they were made for.",
     )
     ball_category: Annotated[str, Field(max_length=200)] = Field(
         default="",

@@ -14,7 +14,7 @@ from app.config import Settings
 from app.datasets.cameras_reader import read_cameras
 from app.datasets.cameras_writer import camera_name, write_cameras
 from app.datasets.file_tree import Limits
-from app.datasets.json_text import read_json
+from app.datasets.line_documents import read_line_documents
 from app.datasets.report import Report
 from app.datasets.safe_path import resolve_inside
 from app.datasets.sn_calibration import LineFile
@@ -151,7 +151,7 @@ class _Match:
 
 
 def _line_values(lines: Path, settings: Settings, report: Report) -> dict[str, Any]:
-    """What the line files hold, by stem with folders; an error where it cannot be read."""
+    """The lines of each image, by stem with folders; an error where they cannot be read."""
     values: dict[str, Any] = {}
     with opened_tree(lines, report, Limits.of(settings)) as tree:
         if tree is None:
@@ -160,11 +160,17 @@ def _line_values(lines: Path, settings: Settings, report: Report) -> dict[str, A
             place = PurePosixPath(name)
             if place.suffix.lower() != ".json":
                 continue
+            whole = str(place.with_suffix(""))
             try:
-                value = read_json(tree.read_bytes(name), tree.shown(name))
+                found = read_line_documents(tree.read_bytes(name), tree.shown(name), report)
             except ReviewError as error:
-                value = error
-            values[str(place.with_suffix(""))] = value
+                values[whole] = error
+                continue
+            for document in found:
+                alone = document.name in (None, place.stem)
+                values[whole if alone else str(place.with_name(str(document.name)))] = (
+                    document.lines
+                )
     return values
 
 

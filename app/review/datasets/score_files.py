@@ -12,7 +12,7 @@ from app.datasets.json_text import read_json
 from app.datasets.plain_file import read_plain
 from app.datasets.report import Report
 from app.datasets.sn_calibration_reader import read_line_files
-from app.errors import DatasetFormatError
+from app.errors import DatasetFormatError, InputError
 from app.geometry.camera import Camera
 from app.progress import TellProgress
 from app.soccer.annotation import lines_without
@@ -48,16 +48,24 @@ def score_files(
     dropped = _wrong_labels(without) if without is not None else set()
     pitch = Pitch()
     scores = []
+    frames: set[str] = set()
     for file in read_line_files(lines, size, report, by_folder=True):
         kept = lines_without(
             file.lines, {marking for stem, marking in dropped if stem == file.stem}
         )
         camera = found.get(file.stem)
+        frames.add(file.stem)
         scores.append(None if camera is None else score_frame(camera, kept, pitch, file.size))
         if progress is not None:
             progress(len(scores))
     if not scores:
         raise report.refusal(f"{lines} holds no line files")
+    if all(score is None for score in scores):
+        frame, other = sorted(frames)[0], sorted(found)[0]
+        raise InputError(
+            f'no camera belongs to a line file: cameras are called "{other}", frames "{frame}"',
+            hint="A camera of the frame 00002 lies in camera_00002.json.",
+        )
     # A line file that cannot be read is a frame without a camera.
     scores.extend([None] * (report.read - len(scores)))
     total = score(scores)

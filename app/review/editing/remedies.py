@@ -46,6 +46,7 @@ BETTER_CAUSES = frozenset(
         "several_balls",
         "under_constrained",
         "picture_geometry",
+        "camera_size",
         "paint_disagrees",
         "implausible_camera",
     }

@@ -9,6 +9,7 @@ import cv2
 import numpy as np
 
 from app.config import Settings
+from app.datasets.corner_origin import box_from_corner
 from app.errors import ImageError, InputError, NotFoundError, StorageError, TooLargeError
 from app.evaluation.frame import Detection
 from app.progress import TellProgress
@@ -133,7 +134,10 @@ def _in_annotated(
     x, y = row.width / width, row.height / height
     return [
         Detection(
-            Box(item.box.x * x, item.box.y * y, item.box.width * x, item.box.height * y),
+            # YOLO counts from the corner of the first pixel.
+            box_from_corner(
+                Box(item.box.x * x, item.box.y * y, item.box.width * x, item.box.height * y)
+            ),
             item.score,
         )
         for item in model.detect(picture, min_score=request.min_score, most=MOST)

@@ -80,6 +80,21 @@ class EvaluationRequest:
             )
         if len(self.name) > MAX_NAME:
             raise InputError(f"a name has at most {MAX_NAME} characters", pointer="/name")
+        check_groups(self.groups, self.version)
+
+
+def check_groups(groups: str, version: int | str | None) -> None:
+    """Refuse a rule for groups beside a version, which has its own groups.
+
+    Raises:
+        InputError: There are both.
+    """
+    if version is not None and groups != EvaluationRequest.groups:
+        raise InputError(
+            f"a version has its own groups, so that groups {quoted(groups)} is not used",
+            hint="Leave the groups or the version out.",
+            pointer="/groups",
+        )
 
 
 def run_evaluation(
@@ -111,6 +126,7 @@ def run_evaluation(
         inputs = _inputs(session, sets)
     if not truth.frames:
         raise _no_frames(found, request)
+    _require_common_frames(truth, inputs, sets)
     options = Options(
         boxes=request.boxes,
         min_score=request.min_score,
@@ -219,6 +235,22 @@ def _no_frames(dataset: DatasetHead, request: EvaluationRequest) -> InputError:
     if request.groups == "accepted":
         hint = "Nobody has accepted a group; evaluate the passing ones, or accept some."
     return InputError(f'no group of "{dataset.name}" takes part{of}', hint=hint)
+
+
+def _require_common_frames(truth: Truth, inputs: Inputs, sets: Mapping[str, PredictionSet]) -> None:
+    """Refuse predictions of which none belongs to a frame that takes part: AP 0 would be false."""
+    frames = {frame.id for frame in truth.frames}
+    for name, predicted in (
+        ("predictions", {*(inputs.detections or {}), *(inputs.cameras or {})}),
+        ("careful", set(inputs.careful or {})),
+    ):
+        if predicted and not predicted & frames:
+            raise InputError(
+                f'none of the {len(predicted)} frames of "{sets[name].name}" is among the {len(frames)} '
+                "frames that take part",
+                hint="Name the split or the version that the predictions were made for.",
+                pointer=f"/{name}",
+            )
 
 
 def _save(store: Store, values: Mapping[str, Any], result: Evaluation) -> StoredEvaluation:

@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from app.errors import NotFoundError
+from app.errors import InputError, NotFoundError
 from app.evaluation.prediction_files import AUTO
 from app.progress import TellProgress
-from app.review.evaluating.evaluation_run import EvaluationRequest, run_evaluation
+from app.review.evaluating.evaluation_run import EvaluationRequest, check_groups, run_evaluation
 from app.review.evaluating.prediction_reader import PredictionFiles
 from app.review.evaluating.predictions import add_predictions, find_predictions
 from app.review.versions.version import find_version
@@ -46,6 +46,28 @@ class PredictionSource:
         """Whether it names nothing at all."""
         return self.boxes is None and self.cameras is None
 
+    def check(self, prefix: str = "") -> None:
+        """Refuse options that nothing uses: those of files where none is read.
+
+        Args:
+            prefix: Before the names of its options, ``careful-``.
+
+        Raises:
+            InputError: Naming the option.
+        """
+        given = {
+            f"{prefix}format": self.format != AUTO,
+            "images": self.images is not None,
+            f"{prefix}category": self.category is not None,
+            f"{prefix}size": self.size is not None,
+        }
+        unused = next((name for name, is_given in given.items() if is_given), None)
+        if unused is not None and (self.boxes is None or not Path(self.boxes).exists()):
+            there = "there is none" if self.boxes is None else f'"{self.boxes}" is no file'
+            raise InputError(f"--{unused} says how to read a file of boxes, and {there}")
+        if self.cameras_size is not None and self.cameras is None:
+            raise InputError("--cameras-size is the size of predicted cameras, and there are none")
+
 
 @dataclass(frozen=True)
 class SourcesRequest:
@@ -62,6 +84,16 @@ class SourcesRequest:
     predictions: PredictionSource
     careful: PredictionSource
     version: str | None = None
+
+    def check(self) -> None:
+        """Refuse options that nothing uses.
+
+        Raises:
+            InputError: Naming the option.
+        """
+        self.predictions.check()
+        self.careful.check("careful-")
+        check_groups(self.request.groups, self.version)
 
 
 @dataclass(frozen=True)
@@ -93,6 +125,7 @@ def evaluate_sources(
         NotFoundError: There is no such dataset, version, file or set.
         InputError: A file cannot be used, or nothing is left to evaluate.
     """
+    asked.check()
     pinned = None if asked.version is None else find_version(store, dataset, asked.version).id
     found, drawn = (
         None if source.is_empty else prediction_set(store, dataset, source, actor=actor)

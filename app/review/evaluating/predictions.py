@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from itertools import count
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import Any
 
 from app.canonical import canonical
@@ -20,13 +20,16 @@ from app.evaluation.frame import Detection
 from app.evaluation.frame_names import FrameNames, NamedFrame
 from app.evaluation.prediction_files import ReadPredictedCameras
 from app.evaluation.prediction_run import ReadPredictions, listed
+from app.finite import quoted
 from app.geometry.camera import Camera
+from app.object_store.address import unseal
 from app.review.answers.keep import Keep, keep_nothing
 from app.review.datasets.dataset import read_dataset_head
 from app.review.datasets.naming import require_name
 from app.review.evaluating.prediction_reader import PredictionFiles, Read, read_files
 from app.review.people.deeds import note_deed
 from app.soccer.frames import ImageSize
+from app.soccer.media import Media
 from app.store.clock import now
 from app.store.predictions import PredictedBox as PredictedBox
 from app.store.predictions import PredictionSet as PredictionSet
@@ -81,7 +84,7 @@ def add_predictions(
     names = frame_names(store, dataset)
     boxes, cameras = read(files, names, Limits.of(store.settings))
     if not boxes.detections and not cameras.cameras and _is_for_another(boxes, cameras):
-        raise _nothing_known(boxes, cameras)
+        raise _nothing_known(boxes, cameras, names)
     return save_predictions(
         store,
         dataset,
@@ -176,6 +179,7 @@ def frame_names(store: Store, dataset: str | int) -> FrameNames:
             match=row.match,
             size=ImageSize(row.width, row.height),
             station=row.station if row.shared else "",
+            picture=_picture(row.media),
         )
         for row in rows
     )
@@ -287,15 +291,27 @@ def _is_for_another(boxes: ReadPredictions, cameras: ReadPredictedCameras) -> bo
     return bool(boxes.unknown or cameras.unknown or boxes.report.problems)
 
 
-def _nothing_known(boxes: ReadPredictions, cameras: ReadPredictedCameras) -> InputError:
+def _nothing_known(
+    boxes: ReadPredictions, cameras: ReadPredictedCameras, names: FrameNames
+) -> InputError:
     if boxes.report.problems and not boxes.unknown:
         return boxes.report.problems[0]
     unknown, reasons = boxes.unknown + cameras.unknown, {**boxes.reasons, **cameras.reasons}
-    name = sorted(unknown)[0]
+    first = sorted(unknown)
+    others = f" (also {', '.join(map(quoted, first[1:3]))})" if first[1:] else ""
     return InputError(
-        f'none of the {len(unknown)} frames belongs to the dataset: "{name}" {reasons[name]}',
-        hint="Frames are called <match>/7_1.png, <camera>/<frame>, or as an export calls them.",
+        f"none of the {len(unknown)} frames belongs to the dataset: {quoted(first[0], 80)} "
+        f"{reasons[first[0]]}{others}",
+        hint=f"Frames of the dataset are called {', '.join(map(quoted, names.examples()))}, with their match "
+        "before them where several have one of that name, or as an export calls them.",
     )
+
+
+def _picture(media: Media | None) -> str:
+    """Name of the file of a picture with its last folder; empty where a view has none of its own."""
+    if media is None or media.frame is not None:
+        return ""
+    return "/".join(PurePosixPath(media.member or unseal(media.path)[0]).parts[-2:])
 
 
 def _report(boxes: ReadPredictions, cameras: ReadPredictedCameras) -> Json:

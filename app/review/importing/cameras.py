@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import PurePosixPath
 
 from app.geometry.camera import Camera
 from app.review.datasets.dataset import get_dataset_head
 from app.review.importing.ingest import IngestReport, attempt
+from app.soccer.camera_size import other_size
+from app.soccer.frames import ImageSize
 from app.store.clock import now
 from app.store.codecs import camera_to_json
 from app.store.group_revisions import bump_groups, refresh_inputs_hashes
@@ -21,6 +23,8 @@ from app.store.views import dataset_views
 
 BATCH = 50
 """Cameras a transaction."""
+EXAMPLES = 3
+"""Names of views that are shown where a camera has none of them."""
 
 
 @dataclass(frozen=True)
@@ -29,6 +33,8 @@ class _Place:
 
     station: int
     group: int | None
+    match: str
+    size: ImageSize
 
 
 def ingest_cameras(
@@ -38,23 +44,27 @@ def ingest_cameras(
     *,
     source: str,
     actor: str,
+    size: ImageSize | None = None,
     dry_run: bool = False,
 ) -> IngestReport:
     """Attach given calibrations to what they name; attaching them again changes nothing.
 
     A name is the key of a static camera (``cam3``), the stem of a view (``7_1``, ``00002``), or
-    ``<match>/<stem>`` where a stem alone means several.
+    ``<match>/<stem>`` where a stem alone means views of several matches. Views of one match that
+    are called alike are one camera of a rig, and all of them get it.
 
     Args:
         store: The database.
         dataset: Name of an existing dataset.
-        cameras: By name, as ``datasets.camera_json.read_cameras`` reads them.
+        cameras: By name, as ``datasets.cameras_reader.read_cameras`` reads them.
         source: Where they come from, for the log.
         actor: Who imports.
+        size: Size of the images that the cameras were made for; None: that of each view.
         dry_run: Dry run: report what would happen, change nothing.
 
     Returns:
-        ``changed`` and ``unchanged`` count cameras; ``problems`` name those that fit nothing.
+        ``changed`` and ``unchanged`` count views and static cameras that a camera was attached to;
+        ``problems`` name cameras that fit nothing, several views, or pictures of another size.
 
     Raises:
         NotFoundError: There is no such dataset.
@@ -64,12 +74,22 @@ def ingest_cameras(
         places = _places(session, found.id)
     known = []
     for name in sorted(cameras):
-        fitting = places.get(name, [])
-        if len(fitting) == 1:
-            known.append((fitting[0], cameras[name]))
-        else:
-            views = "several views have" if fitting else "no view has"
-            report.problems.append(f'camera "{name}": {views} this name')
+        fitting = _fitting(places, name)
+        matches = {place.match for place in fitting}
+        if not fitting:
+            report.problems.append(f'camera "{name}": no view has this name{_examples(places)}')
+            continue
+        if len(matches) > 1:
+            report.problems.append(
+                f'camera "{name}": views of {len(matches)} matches have this name; call it '
+                f'"{sorted(matches)[0]}/{name}", or like the other match'
+            )
+            continue
+        if len(fitting) > 1:
+            report.problems.append(f'camera "{name}" is that of {len(fitting)} views of this name')
+        report.problems.extend(_of_other_size(name, cameras[name], fitting, size))
+        for place in fitting:
+            known.append((place, _sized(cameras[name], size, place.size)))
     for start in range(0, len(known), BATCH):
         with attempt(store, keep=not dry_run) as session:
             batch = known[start : start + BATCH]
@@ -82,12 +102,50 @@ def _places(session: Session, dataset_id: int) -> dict[str, list[_Place]]:
     for row in dataset_views(session, dataset_id):
         stem = str(PurePosixPath(row.key).with_suffix(""))
         names = {row.station} if row.shared else {stem, f"{row.match}/{stem}"}
-        place = _Place(row.station_id, None if row.shared else row.group_id)
+        size = ImageSize(row.width, row.height)
+        place = _Place(row.station_id, None if row.shared else row.group_id, row.match, size)
         for name in names:
             known = places.setdefault(name, [])
             if place not in known:
                 known.append(place)
     return places
+
+
+def _fitting(places: Mapping[str, list[_Place]], name: str) -> list[_Place]:
+    """What a name means; folders before it do not matter where no match could be one of them."""
+    parts = name.split("/")
+    for start in range(len(parts)):
+        found = places.get("/".join(parts[start:]), [])
+        if found and (start == 0 or not any(place.match for place in found)):
+            return found
+    return []
+
+
+def _examples(places: Mapping[str, list[_Place]]) -> str:
+    names = [f'"{name}"' for name in sorted(places) if "/" not in name]
+    more = " and more" if len(names) > EXAMPLES else ""
+    return f"; views are called {', '.join(names[:EXAMPLES])}{more}" if names else ""
+
+
+def _sized(camera: Camera, made_for: ImageSize | None, size: ImageSize) -> Camera:
+    if made_for is None or made_for == size:
+        return camera
+    return camera.scaled(size.width / made_for.width, size.height / made_for.height)
+
+
+def _of_other_size(
+    name: str, camera: Camera, fitting: Sequence[_Place], made_for: ImageSize | None
+) -> Iterator[str]:
+    """What to say of a camera whose principal point is the middle of another size than was said."""
+    for size in sorted({made_for or place.size for place in fitting}, key=lambda it: it.width):
+        other = other_size(camera, size)
+        if other is not None:
+            x, y = camera.principal_point
+            yield (
+                f'camera "{name}": its principal point ({x:g}, {y:g}) is the middle of '
+                f"{other.width} x {other.height}, not of {size.width} x {size.height}; import it again "
+                f"with --size {other.width}x{other.height}"
+            )
 
 
 def _attach_batch(

@@ -24,6 +24,7 @@ from app.datasets.sn_calibration import DEFAULT_SIZE
 from app.datasets.sn_calibration_reader import read_sn_calibration
 from app.datasets.soccernet_v3_reader import read_soccernet_v3
 from app.datasets.soccernet_v3d_reader import read_soccernet_v3d
+from app.errors import InputError
 from app.progress import TellProgress
 from app.review.importing.cameras import ingest_cameras
 from app.review.importing.ingest import IngestReport, ingest
@@ -36,6 +37,23 @@ from app.store.store import Store
 
 FORMATS: tuple[str, ...] = get_args(ImportFormat)
 STATIC = ("issia", "issia-3d")
+_OF_GROUPS = tuple(name for name in FORMATS if name not in ("cameras", "touchline"))
+USERS: Mapping[str, tuple[str, ...]] = {
+    "calibration": (*STATIC, "soccernet-v3d", "sn-calibration", "gamestate", "coco"),
+    "size": (*STATIC, "sn-calibration", "cameras"),
+    "lines": STATIC,
+    "frame_offset": ("issia",),
+    "flipped": STATIC,
+    "ball_category": ("coco",),
+    "frames": _OF_GROUPS,
+    "policy": _OF_GROUPS,
+}
+"""Which formats use an option; any other would ignore it, so it is refused there."""
+_TYPED = {
+    "ball_category": "--ball-category",
+    "frame_offset": "--frame-offset",
+    "flipped": "--flip",
+}
 
 
 BALLS_ELSEWHERE = ("sn-calibration", "frames", "coco")
@@ -82,7 +100,8 @@ class Source:
         calibration: Which calibration counts where there are both.
         frame_offset: ISSIA: number in the XGTF file minus number in video, also by camera.
         flipped: ISSIA: cameras whose frames are mirrored.
-        size: Size of the annotated images, for formats that do not say it; None: the usual one.
+        size: Size of the annotated images, for formats that do not say it; None: the usual one. Of
+            ``cameras``: that of the images that they were made for; None: that of each view.
         frames: A list of where the frames lie (``app.datasets.frame_list``), where it is not beside
             the labels.
         name: What people call it; the log keeps it. Empty: the path.
@@ -99,6 +118,29 @@ class Source:
     frames: Root | None = None
     name: str = ""
     ball_category: str = ""
+
+    def check(self, *, policy: bool = False) -> None:
+        """Refuse an option that the format does not use.
+
+        Args:
+            policy: Whether a policy was named for the dataset.
+
+        Raises:
+            InputError: Naming the option, and the formats that use it.
+        """
+        usual = Source(self.format, self.path)
+        given = {
+            name
+            for name in USERS
+            if name != "policy" and getattr(self, name) != getattr(usual, name)
+        }
+        for name in sorted(given | ({"policy"} if policy else set())):
+            if self.format not in USERS[name]:
+                raise InputError(
+                    f"{self.format} does not use {_TYPED.get(name, f'--{name}')}",
+                    hint=f"Leave it out. It is for {', '.join(sorted(USERS[name]))}.",
+                    pointer="/policy" if name == "policy" else f"/options/{name}",
+                )
 
     @property
     def label(self) -> str:
@@ -137,11 +179,12 @@ class Imported:
 
     def nothing_read(self) -> tuple[str, str]:
         """Why nothing could be imported, naming the file, and what to do about it."""
-        source, problems = self.source, self.report.problems
+        source = self.source
+        problems = [problem.message for problem in self.report.problems] + self.result.problems
         name = source.shown(str(source.path))
         sentence = f"nothing could be imported from {name} as {source.format}"
         if problems:
-            first = source.shown(problems[0].message)
+            first = source.shown(problems[0])
             sentence += f". The first of {len(problems)} problems: " if problems[1:] else ": "
             sentence += first
         look = looks_like(source.path, source.format)
@@ -207,12 +250,22 @@ def import_source(
         dry_run: Dry run: report what would happen, change nothing.
         policy: Of a dataset that is made; None: as its first pictures suggest. A dataset that a
             ``touchline`` file makes has the policy of the file.
+
+    Raises:
+        InputError: The format does not use one of the options.
     """
+    source.check()
     report, limits = Report(), Limits.of(settings)
     if source.format == "cameras":
         cameras = read_cameras(source.path, report, limits)
         result = ingest_cameras(
-            store, dataset, cameras, source=source.label, actor=actor, dry_run=dry_run
+            store,
+            dataset,
+            cameras,
+            source=source.label,
+            actor=actor,
+            size=source.size,
+            dry_run=dry_run,
         )
         return Imported(source, report, result)
     if source.format == "touchline":

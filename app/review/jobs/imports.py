@@ -201,7 +201,7 @@ def source_of(settings: Settings, request: ImportRequest) -> Source:
     """What a request means, under a name that tells nobody where it lies.
 
     Raises:
-        InputError: Unknown format or unusable path.
+        InputError: Unknown format, unusable path, or an option that the format does not use.
         NotFoundError: There is no such upload or folder.
     """
     if request.format not in FORMATS:
@@ -214,7 +214,7 @@ def source_of(settings: Settings, request: ImportRequest) -> Source:
     offset = options.pop("frame_offset", 8)
     if isinstance(offset, dict):
         offset = {int(camera): number for camera, number in offset.items()}
-    return Source(
+    source = Source(
         request.format,
         path,
         size=None if size is None else ImageSize(*size),
@@ -226,6 +226,8 @@ def source_of(settings: Settings, request: ImportRequest) -> Source:
         name=name,
         ball_category=options.get("ball_category", ""),
     )
+    source.check(policy=request.policy is not None)
+    return source
 
 
 def _place(settings: Settings, source: Mapping[str, str]) -> tuple[Root, str]:

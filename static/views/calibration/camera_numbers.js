@@ -8,7 +8,7 @@ import { profileOf, unbend } from '../../geometry/fisheye.js';
 /** @typedef {{name: string, label: string, value: number | null, digits: number, unit: string, sigma: number | null}} CameraNumber */
 
 /** Kinds of findings that speak about a camera. */
-const ABOUT_CAMERAS = new Set(['implausible_camera', 'under_constrained', 'picture_geometry', 'paint_disagrees', 'no_paint', 'sides_swapped', 'view_disagrees']);
+const ABOUT_CAMERAS = new Set(['implausible_camera', 'under_constrained', 'picture_geometry', 'camera_size', 'paint_disagrees', 'no_paint', 'sides_swapped', 'view_disagrees']);
 
 /**
  * @param {CalibrationJson | null} calibration @param {{width: number, height: number}} size of the image, pixels

@@ -429,6 +429,21 @@ class TestCalibrateAndScore:
         assert (code, table["completeness"]) == (0, 1.0)
         assert table["jac_1"] > 0.9
 
+    def test_frames_of_which_none_is_calibrated_are_a_failure(
+        self, run: Run, tmp_path: Path
+    ) -> None:
+        (tmp_path / "00001.json").write_text('{"Middle line": [[0.5, 0.1], [0.5, 0.9]]}')
+        code, told, err = run("calibrate", tmp_path, tmp_path / "out", "--workers", "1", "--json")
+        assert (code, json.loads(told)["calibrated"]) == (1, 0)
+        assert "none of 1 frames could be calibrated: 00001: " in err
+
+    def test_an_import_of_nothing_usable_makes_no_dataset(self, run: Run, tmp_path: Path) -> None:
+        (tmp_path / "00001.json").write_text('{"kp": {"3": {"x": 0.4, "y": 0.3}}, "lines": {}}')
+        code, _, err = run("import", "sn-calibration", tmp_path, "--dataset", "nothing")
+        assert code == 1
+        assert "keypoints that a detector predicted" in err
+        assert "nothing" not in run("datasets", "list")[1]
+
     def test_no_line_file_is_one_sentence(self, run: Run, tmp_path: Path) -> None:
         (tmp_path / "empty").mkdir()
         code, _, err = run("calibrate", tmp_path / "empty", tmp_path / "out", "--workers", "1")

@@ -43,7 +43,13 @@ def truth(tmp_path, scenes) -> Path:
         {
             "image_id": f"{scene.group.match}/{view.view}",
             "category_id": 1,
-            "bbox": [view.ball_box.x, view.ball_box.y, view.ball_box.width, view.ball_box.height],
+            # COCO counts from the corner of the first pixel.
+            "bbox": [
+                view.ball_box.x + 0.5,
+                view.ball_box.y + 0.5,
+                view.ball_box.width,
+                view.ball_box.height,
+            ],
             "score": 0.9,
         }
         for scene in scenes
@@ -102,7 +108,8 @@ class TestEvaluate:
         half.write_text(json.dumps(halves))
         lines = ["image,x,y,w,h"]
         for item in json.loads(truth.read_text()):
-            lines.append(",".join([item["image_id"], *map(str, item["bbox"])]))
+            x, y, *sides = item["bbox"]
+            lines.append(",".join([item["image_id"], *map(str, [x - 0.5, y - 0.5, *sides])]))
         careful = tmp_path / "careful.csv"
         careful.write_text("\n".join(lines))
         size = scenes[0].group.views[0].size

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import json
+import math
 import time
 from typing import Any
 
@@ -8,7 +9,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from app.datasets.json_text import MAX_DEPTH, parse_literal, read_json
+from app.datasets.json_text import (
+    MAX_DEPTH,
+    parse_literal,
+    read_json,
+    read_json_lines,
+)
 from app.datasets.report import Report
 from app.errors import DatasetFormatError
 
@@ -144,3 +150,36 @@ class TestParseLiteral:
 
     def test_a_dict_of_python_values(self) -> None:
         assert parse_literal("{'a': [1, 2.5, None, True]}", "f") == {"a": [1, 2.5, None, True]}
+
+
+class TestNan:
+    @pytest.mark.parametrize("text", ["NaN", "Infinity", "-Infinity", "1e999"])
+    def test_is_kept_or_null_as_the_reader_wants(self, text: str) -> None:
+        content = f'{{"a": {text}, "b": 1.5}}'.encode()
+        report = Report()
+        assert read_json(content, "f", report=report) == {"a": None, "b": 1.5}
+        assert [problem.record for problem in report.problems] == ["a"]
+        assert not math.isfinite(read_json(content, "f", nan="keep")["a"])
+
+    def test_is_null_in_a_python_literal(self) -> None:
+        content = json.dumps("{'a': nan, 'b': [-inf, 'nan'], \"it's nan\": 1}").encode()
+        found = read_json(content, "f", double_encoded=True, nan="keep")
+        assert found == {"a": None, "b": [None, "nan"], "it's nan": 1}
+
+
+class TestReadJsonLines:
+    def test_an_object_a_line(self) -> None:
+        report = Report()
+        assert read_json_lines(b'{"a": 1}\n\n{"a": 2}\n', "f", report) == [{"a": 1}, {"a": 2}]
+        assert report.problems == []
+
+    def test_a_bad_line_is_named(self) -> None:
+        report = Report()
+        assert read_json_lines(b'{"a": 1}\n{"a": \n', "f", report) == [{"a": 1}]
+        assert (report.read, report.problems[0].record) == (1, "line 2")
+
+    @pytest.mark.parametrize("text", ['{\n"a": [\n{}\n', "1\n2\n", '{"a": 1}', ""])
+    def test_anything_else_is_none(self, text: str) -> None:
+        report = Report()
+        assert read_json_lines(text.encode(), "f", report) is None
+        assert report.problems == []

@@ -25,7 +25,7 @@ class TestLinesFromJson:
         lines, _ = lines_from_json({"Middle line": LINE}, ImageSize(961, 541), "f", report)
         assert lines["Middle line"] == ((240.0, 270.0), (960.0, -67.5))
 
-    def test_a_file_with_any_coordinate_above_two_is_in_pixels(self, report: Report) -> None:
+    def test_a_file_with_half_of_its_points_beyond_two_is_in_pixels(self, report: Report) -> None:
         value = {"Middle line": [{"x": 1.5, "y": 0.5}, {"x": 640, "y": 2}]}
         lines, _ = lines_from_json(value, DEFAULT_SIZE, "f", report)
         assert lines["Middle line"] == ((1.5, 0.5), (640.0, 2.0))
@@ -62,6 +62,47 @@ class TestLinesFromJson:
         lines, _ = lines_from_json(value, DEFAULT_SIZE, "a.json", report)
         assert list(lines) == ["Middle line"]
         assert [problem.field for problem in report.problems] == ["Circle left"]
+
+    def test_one_far_point_does_not_make_a_normalised_file_one_of_pixels(
+        self, report: Report
+    ) -> None:
+        value = {"Middle line": [*LINE, {"x": 2.31, "y": 0.2}], "Circle left": LINE}
+        lines, _ = lines_from_json(value, ImageSize(961, 541), "a.json", report)
+        assert lines["Middle line"] == ((240.0, 270.0), (960.0, -67.5))
+        (problem,) = report.problems
+        assert (problem.path, problem.field) == ("a.json", "Middle line")
+        assert "(2.31, 0.2) is far outside" in problem.problem
+        assert "point 3 is left out" in problem.problem
+
+    @pytest.mark.parametrize("far", [2.5, 900.0, -1e5])
+    def test_points_near_the_corner_of_a_file_of_pixels_are_pixels(
+        self, report: Report, far: float
+    ) -> None:
+        value = {"Middle line": [{"x": 0.5, "y": 1.5}, {"x": 300, "y": 2}, {"x": far, "y": 400}]}
+        lines, _ = lines_from_json(value, DEFAULT_SIZE, "f", report)
+        assert lines["Middle line"] == ((0.5, 1.5), (300.0, 2.0), (far, 400.0))
+        assert report.problems == []
+
+    @pytest.mark.parametrize("bad", [float("nan"), float("inf"), None, "a", 1e300])
+    def test_a_bad_number_costs_its_own_point_alone(self, report: Report, bad: Any) -> None:
+        value = {"Middle line": [LINE[0], {"x": bad, "y": 0.5}, LINE[1]]}
+        lines, _ = lines_from_json(value, ImageSize(961, 541), "a.json", report)
+        assert lines["Middle line"] == ((240.0, 270.0), (960.0, -67.5))
+        (problem,) = report.problems
+        assert problem.field == "Middle line"
+        assert problem.problem.endswith("; point 2 is left out")
+
+    @pytest.mark.parametrize(
+        "name", ["Goal_left_post_left", "goal left post left", "Goal left post left "]
+    )
+    def test_capitals_and_underscores_do_not_matter(self, report: Report, name: str) -> None:
+        lines, _ = lines_from_json({name: LINE}, DEFAULT_SIZE, "f", report)
+        assert list(lines) == ["Goal left post left"]
+
+    def test_pairs_are_points(self, report: Report) -> None:
+        value = {"Middle line": [[0.25, 0.5], [1.0, -0.125]]}
+        lines, _ = lines_from_json(value, ImageSize(961, 541), "f", report)
+        assert lines["Middle line"] == ((240.0, 270.0), (960.0, -67.5))
 
     def test_a_list_is_no_line_file(self, report: Report) -> None:
         with pytest.raises(DatasetFormatError, match="not an object"):
@@ -104,6 +145,71 @@ class TestReadLineFiles:
         path = make_zip({"1.json": '{"Middle line": [', "2.json": "[]", "3.json": "{}"})
         assert [file.stem for file in read_line_files(path, DEFAULT_SIZE, report)] == ["3"]
         assert (report.read, report.imported, len(report.problems)) == (3, 1, 2)
+
+    @pytest.mark.parametrize(
+        "value",
+        [
+            {
+                "00001.jpg": {"Middle line": LINE},
+                "test/00002.png": {"lines": {"Middle line": LINE}},
+            },
+            [
+                {"file_name": "00001.jpg", "lines": {"Middle line": LINE}},
+                {"image": "00002.jpg", "annotations": [{"class": "Middle line", "points": LINE}]},
+            ],
+        ],
+        ids=["object", "list"],
+    )
+    def test_a_file_may_hold_many_images(self, tmp_path: Path, report: Report, value: Any) -> None:
+        (tmp_path / "lines.json").write_text(json.dumps(value))
+        (tmp_path / "00001.jpg").write_bytes(b"x")
+        first, second = read_line_files(tmp_path, DEFAULT_SIZE, report)
+        assert [first.stem, second.stem] == ["00001", "00002"]
+        assert first.media == Media(str(tmp_path / "00001.jpg"))
+        assert first.lines == second.lines
+        assert (report.read, report.imported, report.problems) == (2, 2, [])
+
+    def test_lines_inside_an_object_are_of_the_size_that_it_says(
+        self, tmp_path: Path, report: Report
+    ) -> None:
+        value = {"image": "00001.jpg", "width": 1281, "height": 721, "lines": {"Middle line": LINE}}
+        (tmp_path / "00001.json").write_text(json.dumps(value))
+        (own,) = read_line_files(tmp_path, DEFAULT_SIZE, report, by_folder=True)
+        (usual,) = read_line_files(tmp_path, DEFAULT_SIZE, report)
+        assert (own.size, own.lines["Middle line"][0]) == (ImageSize(1281, 721), (320.0, 360.0))
+        assert usual.size == DEFAULT_SIZE
+        assert usual.lines["Middle line"][0] == pytest.approx(DEFAULT_SIZE.unit_to_pixel(0.25, 0.5))
+
+    def test_a_bad_image_of_many_is_named_and_the_others_are_read(
+        self, tmp_path: Path, report: Report
+    ) -> None:
+        value = {"1.jpg": {"Middle line": LINE}, "2.jpg": None}
+        (tmp_path / "all.json").write_text(json.dumps(value))
+        assert [file.stem for file in read_line_files(tmp_path, DEFAULT_SIZE, report)] == ["1"]
+        assert (report.read, report.problems[0].record) == (2, "2.jpg")
+
+    @pytest.mark.parametrize(
+        ("value", "what"),
+        [
+            ({"kp": {"3": {"x": 0.4, "y": 0.2, "p": 0.7}}, "lines": {}}, "keypoints"),
+            ({"lines": {"1": {"x_1": 0.1}}}, 'an object with "lines"'),
+            ({"pan_degrees": 1.0}, "holds a camera: import it as cameras"),
+            ({"images": [], "annotations": []}, "COCO document"),
+            ([[1, 0, 0], [0, 1, 0], [0, 0, 1]], "homography"),
+            ({"Corner flag": LINE}, 'an object with "Corner flag"'),
+            ([], "is a list of 0 values"),
+            ("text", "not an object"),
+        ],
+    )
+    def test_a_file_that_holds_no_lines_says_what_it_is(
+        self, tmp_path: Path, report: Report, value: Any, what: str
+    ) -> None:
+        (tmp_path / "00001.json").write_text(json.dumps(value))
+        assert list(read_line_files(tmp_path, DEFAULT_SIZE, report)) == []
+        (problem,) = report.problems
+        assert what in problem.problem
+        assert 'lines are {"Side line top"' in problem.problem
+        assert report.read == 1
 
 
 class TestReadSnCalibration:

@@ -33,6 +33,19 @@ class TestReadSoccernetV3:
         assert report.problems == []
         assert (report.read, report.imported) == (2, 2)
 
+    @pytest.mark.parametrize("bad", ["NaN", "1e999"])
+    def test_a_number_that_is_none_costs_its_own_line_alone(
+        self, labels: dict[str, Any], write_labels: Write, report: Report, bad: str
+    ) -> None:
+        root = write_labels(labels)
+        (file,) = root.rglob("Labels-v3.json")
+        text = file.read_text()
+        line = text.index('"points": [', text.index('"lines"')) + len('"points": [')
+        file.write_text(text[:line] + bad + text[text.index(",", line) :])
+        assert len(_read(root, report)) == 2
+        assert len(report.problems) == 1
+        assert report.problems[0].record == "7.png"
+
     @pytest.mark.parametrize("depth", [0, 1, 2, 3])
     def test_any_folder_down_to_the_match_will_do(
         self, labels: dict[str, Any], write_labels: Write, report: Report, match: str, depth: int

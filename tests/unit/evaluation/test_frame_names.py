@@ -120,3 +120,46 @@ class TestOfStation:
     def test_is_every_frame_of_the_camera(self, names) -> None:
         assert names.of_station("camera/cam3.json") == (4, 5)
         assert names.of_station("cam9") == ()
+
+
+class TestFindNumber:
+    @pytest.fixture
+    def pictures(self) -> FrameNames:
+        return FrameNames.of(
+            [
+                NamedFrame(1, "kick0", "north", "", SIZE, picture="images/0004.jpg"),
+                NamedFrame(2, "kick0", "south", "", SIZE, picture="images/frame_000005.jpg"),
+                NamedFrame(3, "kick1", "0006.jpg", "", SIZE),
+                NamedFrame(4, "kick1", "south", "", SIZE, picture="other/0007.jpg"),
+                NamedFrame(5, "kick2", "south", "", SIZE, picture="another/0007.jpg"),
+            ]
+        )
+
+    @pytest.mark.parametrize(
+        ("text", "found"),
+        [("4", 1), ("0004", 1), ("4.0", 1), ("5", 2), ("6", 3), ("7", None), ("x", None)],
+    )
+    def test_a_number_is_that_in_the_name_of_a_picture(
+        self, pictures: FrameNames, text: str, found: int | None
+    ) -> None:
+        frame = pictures.find_number(text)
+        assert (frame and frame.id) == found
+
+    def test_says_why_there_is_none(self, pictures: FrameNames) -> None:
+        assert "several frames" in pictures.why_not_number("7")
+        assert "is no number in the name" in pictures.why_not_number("99")
+
+    @pytest.mark.parametrize(
+        ("name", "found"), [("0004.jpg", 1), ("other/0007.jpg", 4), ("0007.jpg", None)]
+    )
+    def test_pictures_are_names_too(
+        self, pictures: FrameNames, name: str, found: int | None
+    ) -> None:
+        frame = pictures.find(name)
+        assert (frame and frame.id) == found
+
+    def test_views_of_one_match_that_are_called_alike_are_one_camera(
+        self, pictures: FrameNames
+    ) -> None:
+        assert pictures.of_station("south") == (2, 4, 5)
+        assert pictures.of_station("north") == ()

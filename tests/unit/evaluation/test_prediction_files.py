@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import json
 import zipfile
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -96,7 +97,8 @@ class TestCoco:
         path = write(tmp_path / "r.json", [result(), result("7_1", score=1), result(score=0)])
         found = read_predictions(path, "coco", names)
         assert [item.score for item in found.detections[1]] == [0.5, 0]
-        assert found.detections[1][0].box == Box(10, 20, 8, 9)
+        # COCO counts from the corner of the first pixel.
+        assert found.detections[1][0].box == Box(9.5, 19.5, 8, 9)
         assert (found.boxes, found.report.read, found.without_score) == (3, 3, 0)
 
     def test_unknown_frames_are_counted_and_named(self, tmp_path, names) -> None:
@@ -121,7 +123,7 @@ class TestCoco:
         path = write(tmp_path / "results" / "r.json", [result(5)])
         found = read_predictions(path, "coco", names, images=images)
         # Half the annotated size: the document says so.
-        assert found.detections[2][0].box == Box(20, 40, 16, 18)
+        assert found.detections[2][0].box == Box(19.5, 39.5, 16, 18)
 
     def test_numbers_alone_are_never_guessed(self, tmp_path, names) -> None:
         found = read_predictions(write(tmp_path / "r.json", [result(1)]), "coco", names)
@@ -168,8 +170,12 @@ class TestCoco:
             read_predictions(path, "coco", names)
 
     def test_a_file_that_is_something_else_is_refused(self, tmp_path, names) -> None:
-        for text, words in (("{]", "not JSON"), ('{"a": 1}', "no COCO results"), ("[NaN]", "NaN")):
-            with pytest.raises(DatasetFormatError, match=words):
+        for text, words in (
+            ("{]", "not JSON"),
+            ('{"a": 1}', 'an object with "a"; COCO results are'),
+            ("[]", "no prediction"),
+        ):
+            with pytest.raises(InputError, match=words):
                 read_predictions(write(tmp_path / "r.json", text), "coco", names)
 
     def test_a_missing_file_and_an_unknown_format_are_refused(self, tmp_path, names) -> None:
@@ -181,17 +187,108 @@ class TestCoco:
     def test_a_size_of_the_callers_scales_pixels(self, tmp_path, names) -> None:
         path = write(tmp_path / "r.json", [result()])
         found = read_predictions(path, "coco", names, size=ImageSize(2560, 1440))
-        assert found.detections[1][0].box == Box(5, 10, 4, 4.5)
+        assert found.detections[1][0].box == Box(4.5, 9.5, 4, 4.5)
+
+    @pytest.mark.parametrize("field", ["file_name", "image", "image_path"])
+    def test_a_name_counts_before_a_number(self, tmp_path, names, field: str) -> None:
+        numbered = {"image_id": 7, field: "7.png"}
+        images = [{"id": 7, "file_name": "7_1.png"}, {"id": 1, "file_name": "7.png"}]
+        document = write(tmp_path / "truth" / "t.json", {"images": images})
+        path = write(tmp_path / "r.json", [result() | numbered])
+        for place in (None, document):
+            found = read_predictions(path, "coco", names, images=place)
+            assert (list(found.detections), found.report.problems) == ([1], [])
+
+    @pytest.mark.parametrize(
+        ("identity", "words"),
+        [
+            (5, 'is "7.png", but image 5 of the COCO document is "7_1.png"'),
+            ("7_1.png", 'is "7.png", but image_id is "7_1.png"'),
+        ],
+    )
+    def test_a_name_that_a_number_contradicts_is_refused_with_both(
+        self, tmp_path, names, identity, words: str
+    ) -> None:
+        document = write(
+            tmp_path / "truth" / "t.json", {"images": [{"id": 5, "file_name": "7_1.png"}]}
+        )
+        path = write(tmp_path / "r.json", [result(), result(identity, file_name="7.png")])
+        found = read_predictions(path, "coco", names, images=document)
+        ((record, where, problem),) = problems(found)
+        assert (record, where, found.boxes) == ("result 1", "file_name", 1)
+        assert words in problem
+
+    @pytest.mark.parametrize("identity", [5, 5.0, "5"])
+    def test_numbers_that_are_equal_are_one_image(self, tmp_path, names, identity) -> None:
+        document = write(tmp_path / "t.json", {"images": [{"id": 5.0, "file_name": "7_1.png"}]})
+        path = write(tmp_path / "r" / "r.json", [result(identity)])
+        assert list(read_predictions(path, "coco", names, images=document).detections) == [2]
+
+    def test_a_class_that_the_file_does_not_have_is_refused_with_those_that_it_has(
+        self, tmp_path, names
+    ) -> None:
+        path = write(tmp_path / "r.json", [result(category_id=32), result(category_id=3)])
+        with pytest.raises(InputError, match="holds no class 0; its classes are 3, 32") as refused:
+            read_predictions(path, "coco", names, category=0)
+        assert refused.value.pointer == "/category"
+
+    def test_the_class_that_a_document_calls_ball_is_the_ball(self, tmp_path, names) -> None:
+        document = {
+            "images": [{"id": 5, "file_name": "7.png"}],
+            "categories": [{"id": 1, "name": "player"}, {"id": 2, "name": "sports_ball"}],
+        }
+        images = write(tmp_path / "t" / "t.json", document)
+        path = write(
+            tmp_path / "r.json", [result(5, category_id=1), result(5, category_id=2, score=1)]
+        )
+        found = read_predictions(path, "coco", names, images=images)
+        assert [item.score for item in found.detections[1]] == [1]
+        path.write_text(json.dumps([result(5, category_id=1)]))
+        with pytest.raises(InputError, match=r"no class called ball; its classes are 1 \(player\)"):
+            read_predictions(path, "coco", names, images=images)
+
+    def test_a_number_that_is_none_costs_its_own_result_alone(self, tmp_path, names) -> None:
+        text = json.dumps([result(), result(score=0.25)]).replace("0.25", "NaN")
+        found = read_predictions(write(tmp_path / "r.json", text), "coco", names)
+        assert (found.boxes, problems(found)[0][:2]) == (1, ("result 1", "score"))
+
+    def test_json_lines_are_read(self, tmp_path, names) -> None:
+        text = "\n".join(map(json.dumps, [result(), result("7_1.png")]))
+        assert read_predictions(write(tmp_path / "r.json", text), "coco", names).boxes == 2
 
 
 class TestYolo:
+    def test_the_id_of_a_track_is_no_confidence(self, tmp_path, names) -> None:
+        write(tmp_path / "7.txt", "0 0.5 0.5 0.01 0.02 1\n0 0.25 0.5 0.01 0.02 17\n")
+        found = read_predictions(tmp_path, "yolo", names)
+        assert ([item.score for item in found.detections[1]], found.without_score) == ([1, 1], 2)
+        assert "id of a track" in problems(found)[0][2]
+
+    def test_a_confidence_may_stand_before_the_id_of_a_track(self, tmp_path, names) -> None:
+        write(tmp_path / "7.txt", "0 0.5 0.5 0.01 0.02 0.75 17\n")
+        found = read_predictions(tmp_path, "yolo", names)
+        assert ([item.score for item in found.detections[1]], found.without_score) == ([0.75], 0)
+
+    def test_a_class_that_the_files_do_not_have_is_refused(self, tmp_path, names) -> None:
+        write(tmp_path / "7.txt", YOLO)
+        with pytest.raises(InputError, match="holds no class 32; its classes are 0"):
+            read_predictions(tmp_path, "yolo", names, category=32)
+
+    def test_a_size_and_a_document_are_refused(self, tmp_path, names) -> None:
+        write(tmp_path / "7.txt", YOLO)
+        with pytest.raises(InputError, match="yolo does not use a size"):
+            read_predictions(tmp_path, "auto", names, size=SIZE)
+        with pytest.raises(InputError, match="yolo does not use a COCO document"):
+            read_predictions(tmp_path, "auto", names, images=tmp_path / "x.json")
+
     def test_reads_shares_of_the_image(self, tmp_path, names) -> None:
         write(tmp_path / "labels" / "7.txt", "0 0.5 0.5 0.01 0.02 0.75\n\n0 0.25 0.5 0.01 0.02\n")
         write(tmp_path / "labels" / "7_1.txt", "")
         write(tmp_path / "classes.txt", "ball")
         found = read_predictions(tmp_path, "yolo", names)
         first, second = found.detections[1]
-        assert first.box.center == (640, 360)
+        # Half of 1280 x 720 from the corner is between the pixels 639 and 640.
+        assert first.box.center == (639.5, 359.5)
         assert (first.box.width, first.box.height) == pytest.approx((12.8, 14.4))
         assert (first.score, second.score, found.without_score) == (0.75, 1, 1)
 
@@ -242,7 +339,7 @@ class TestCsv:
             f'1,{row},1.0,1280,720,"[10.0, 20.0, 8.0, 9.0]",\n2,{row},,640,360,,\n'
         )
         found = read_predictions(write(tmp_path / "p.csv", text), "csv", names)
-        assert found.detections[1][0].box == Box(20, 40, 16, 18)
+        assert found.detections[1][0].box == Box(20.5, 40.5, 16, 18)
         assert found.detections[2][0].box == Box(10, 20, 8, 9)
         assert (found.boxes, found.without_score) == (2, 1)
 
@@ -256,13 +353,66 @@ class TestCsv:
         assert 2 in read_predictions(write(tmp_path / "p.csv", text), "csv", names).detections
 
     @pytest.mark.parametrize(
+        "text",
+        [
+            "Image,X,Y,W,H,Score\n7.png,10,20,8,9,0.5\n",
+            "image;x;y;w;h;score\n7.png;10;20;8;9;0.5\n",
+            "image;x;y;w;h;score\n7.png;10,0;20,00;8,0;9,0;0,5\n",
+            "image\tx\ty\tw\th\tconf\n7.png\t10\t20\t8\t9\t0.5\n",
+            "file name,Left,Top,Width,Height,Probability\n7.png,10,20,8,9,0.5\n",
+            "image,xmin,ymin,xmax,ymax,confidence,class,name\n7.png,10,20,18,29,0.5,32,sports ball\n",
+            "image,x1,y1,x2,y2,score\n7.png,10,20,18,29,0.5\n",
+            "image,cx,cy,w,h,score\n7.png,14,24.5,8,9,0.5\n",
+            "filename,X Center,Y Center,width,height,score\n7.png,14,24.5,8,9,0.5\n",
+            'image,bbox,score\n7.png,"[10, 20, 8, 9]",0.5\n',
+            "image,frame,x,y,w,h,score\n7.png,831,10,20,8,9,0.5\n",
+            "frame,x,y,w,h,score\n7,10,20,8,9,0.5\n",
+            "image,class,x,y,w,h,score\n7.png,person,1,2,8,9,0.5\n7.png,ball,10,20,8,9,0.5\n",
+        ],
+    )
+    def test_reads_the_columns_of_many_tools(self, tmp_path, names, text: str) -> None:
+        found = read_predictions(write(tmp_path / "p.csv", text), "auto", names)
+        ((detection,),) = found.detections.values()
+        assert (list(found.detections), detection.box) == ([1], Box(10, 20, 8, 9))
+        assert (detection.score, found.report.problems) == (0.5, [])
+
+    @pytest.mark.parametrize("ending", ["txt", "csv"])
+    def test_reads_the_files_of_mot(self, tmp_path, names, ending: str) -> None:
+        text = "7,1,10,20,8,9,0.5,-1,-1,-1\n7,2,30,20,8,9,-1,-1,-1,-1\n"
+        found = read_predictions(write(tmp_path / f"gt.{ending}", text), "auto", names)
+        assert [item.box.x for item in found.detections[1]] == [10, 30]
+        assert (found.format, found.without_score) == ("csv", 1)
+
+    @pytest.mark.parametrize(
+        ("text", "words"),
+        [
+            (
+                "Frame,Visibility,X,Y\n7,1,641,318\n",
+                'columns "frame", "visibility", "x", "y"; x and y',
+            ),
+            ("image,score\n7.png,0.5\n", 'columns "image", "score"; a table of predictions'),
+            ("x,y,w,h\n1,2,3,4\n", 'columns "x", "y", "w", "h"; a table of predictions'),
+        ],
+    )
+    def test_a_table_without_frame_or_box_is_one_sentence(
+        self, tmp_path, names, text: str, words: str
+    ) -> None:
+        with pytest.raises(DatasetFormatError, match=words) as refused:
+            read_predictions(write(tmp_path / "p.csv", text), "csv", names)
+        assert refused.value.record is None
+
+    def test_shares_of_the_image_are_no_pixels(self, tmp_path, names) -> None:
+        text = "image,x,y,w,h\n7.png,0.5,0.5,0.01,0.01\n7.png,0.5,0.5,0.1,0.1\n7.png,300,3,3,3\n"
+        with pytest.raises(InputError, match="within 2 pixels of the corner"):
+            read_predictions(write(tmp_path / "p.csv", text), "csv", names)
+
+    @pytest.mark.parametrize(
         ("text", "field", "words"),
         [
-            ("image,score\n7.png,0.5\n", "ball_bbox", "missing"),
             ("image,x,y,w,h\n7.png,1,2,a,4\n", "w", '"a"'),
             ("image,x,y,w,h\n7.png,1,2,3e9,4\n", "x, y, w, h", "wider or higher"),
             ('image,ball_bbox\n7.png,"[1, 2, 3, 4e9]"\n', "ball_bbox", "wider or higher"),
-            ("x,y,w,h\n1,2,3,4\n", "frame", "missing"),
+            ("image,x,y,w,h\n,1,2,3,4\n", "frame", "missing"),
             ('image,ball_bbox\n7.png,"[1, 2, __import__(3), 4]"\n', "ball_bbox", "not a list"),
         ],
     )
@@ -292,6 +442,12 @@ class TestPredictedCameras:
         found = read_predicted_cameras(tmp_path, names, size=ImageSize(640, 360))
         assert found.cameras[1].focal_length == pytest.approx((2000, 2000))
         assert found.cameras[1].principal_point == pytest.approx((639.5, 359.5))
+
+    def test_of_another_size_are_told(self, tmp_path, names) -> None:
+        camera = replace(camera_at(50.0), principal_point=(479.5, 269.5))
+        write(tmp_path / "camera_7.json", json.dumps(camera_to_json(camera)))
+        ((record, _, problem),) = problems(read_predicted_cameras(tmp_path, names))
+        assert (record, "--cameras-size 960x540" in problem) == ("7", True)
 
     def test_without_any_it_is_refused(self, tmp_path, names) -> None:
         with pytest.raises(InputError, match="no camera files"):

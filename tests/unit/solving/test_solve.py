@@ -315,6 +315,19 @@ class TestFindings:
         kinds = self.kinds(given_view("a", buried, BALL), given_view("b", OPPOSITE, BALL))
         assert "implausible_camera" in kinds
 
+    def test_a_camera_made_for_pictures_of_another_size_is_said_first(self):
+        size = given_view("a", MAIN, BALL).size
+        factor = 960 / size.width
+        other = MAIN.scaled(factor, factor)
+        other = replace(other, principal_point=(959 / 2, (round(size.height * factor) - 1) / 2))
+        seen = given_view("a", MAIN, BALL)
+        view = replace(seen, station=replace(seen.station, given=other))
+        found = solve(group(view, given_view("b", OPPOSITE, BALL)), PAPER)
+        finding = found.findings[0]
+        assert finding.kind == "camera_size"
+        assert f"--size 960x{round(size.height * factor)}" in finding.sentence
+        assert finding.number > finding.threshold
+
     def test_a_goal_behind_the_line_is_no_fault(self):
         goal = (53.2, 1.0, -0.5)
         assert self.kinds(given_view("a", MAIN, goal), given_view("b", OPPOSITE, goal)) == []

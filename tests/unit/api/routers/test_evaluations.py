@@ -55,7 +55,8 @@ def results(client, factor: float = 1.0, score: float = 0.9) -> list[dict[str, A
         x, y, side, _ = item["ball"]["optimized_box"]
         more = side * (factor - 1) / 2
         name = name_of(item["group"]["key"], item["view"]["key"])
-        bbox = [x - more, y - more, side * factor, side * factor]
+        # COCO counts from the corner of the first pixel.
+        bbox = [x + 0.5 - more, y + 0.5 - more, side * factor, side * factor]
         values.append({"image_id": name, "category_id": 1, "bbox": bbox, "score": score})
     return values
 

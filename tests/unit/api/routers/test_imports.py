@@ -178,6 +178,11 @@ class TestStartImport:
             ({"options": {"size": [0, 5]}}, 422),
             ({"options": {"calibration": "guess"}}, 422),
             ({"options": {"lines": {"folder": "nowhere"}}, "format": "issia"}, 404),
+            ({"options": {"size": [960, 540]}}, 400),
+            ({"options": {"calibration": "lines"}}, 400),
+            ({"options": {"flipped": [2]}}, 400),
+            ({"options": {"frame_offset": 9}, "format": "issia-3d"}, 400),
+            ({"format": "cameras", "policy": "strict"}, 400),
         ],
     )
     def test_an_impossible_import_is_refused_before_a_job_starts(

@@ -182,6 +182,16 @@ class TestScoreFiles:
         )
         assert without["jac_0.5"] > plain["jac_0.5"]
 
+    def test_cameras_that_belong_to_no_frame_are_no_score(self, lines, tmp_path):
+        (tmp_path / "cameras").mkdir()
+        run(lines, tmp_path / "out")
+        for file in (tmp_path / "out").glob("camera_*.json"):
+            file.rename(tmp_path / "cameras" / f"camera_other_{file.stem}.json")
+        with pytest.raises(
+            InputError, match="no camera belongs to a line file: cameras are called"
+        ):
+            score_files(lines, tmp_path / "cameras", size=SIZE)
+
     def test_cameras_of_others_have_no_times(self, lines, tmp_path):
         run(lines, tmp_path / "out")
         (tmp_path / "out" / "calibrate.json").unlink()

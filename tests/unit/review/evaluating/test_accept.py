@@ -32,7 +32,7 @@ def predictions(store, cleared, tmp_path):
     """Two boxes in 7.png, one in 7_1.png, a less sure one in 8.png."""
     boxes = [("7.png", 10, 0.6), ("7.png", 600, 0.9), ("7_1.png", 20, 0.8), ("8.png", 30, 0.4)]
     values = [
-        {"image_id": name, "category_id": 1, "bbox": [x, 300, 14, 14], "score": score}
+        {"image_id": name, "category_id": 1, "bbox": [x + 0.5, 300.5, 14, 14], "score": score}
         for name, x, score in boxes
     ]
     path = tmp_path / "p.json"

@@ -41,7 +41,8 @@ def predict(store, path, states, factor: float, name: str):
         for view in state.solution.views:
             box = view.ball.optimized_box
             d, (x, y) = box.width * factor, box.center
-            bbox = [x - d / 2, y - d / 2, d, d]
+            # COCO counts from the corner of the first pixel.
+            bbox = [x + 0.5 - d / 2, y + 0.5 - d / 2, d, d]
             frame = f"{MATCH}/{view.view}"
             values.append({"image_id": frame, "category_id": 1, "bbox": bbox, "score": 0.9})
     path.write_text(json.dumps(values))
@@ -145,6 +146,17 @@ class TestRunEvaluation:
                 refused(store, "demo", request)
             assert caught.value.pointer == "/careful"
             assert caught.value.message.endswith(f": {values[1]['image_id']}")
+        assert list_evaluations(store, "demo") == []
+
+    def test_predictions_of_other_frames_than_take_part_are_no_evaluation(
+        self, store, states, tmp_path
+    ) -> None:
+        train = predict(store, tmp_path / "t.json", states[:2], 1.0, "train")
+        request = EvaluationRequest(predictions=train.id, split="test")
+        with pytest.raises(
+            InputError, match='none of the 4 frames of "train" is among the 2 frames'
+        ):
+            run_evaluation(store, "demo", request, actor="ann")
         assert list_evaluations(store, "demo") == []
 
     def test_a_truth_that_was_a_prediction_is_counted_and_warned_of(

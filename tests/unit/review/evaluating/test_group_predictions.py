@@ -28,7 +28,7 @@ def add(store, ids, tmp_path):
 
     def one(name, *boxes):
         values = [
-            {"image_id": image, "category_id": 1, "bbox": [x, 300, 14, 14], "score": score}
+            {"image_id": image, "category_id": 1, "bbox": [x + 0.5, 300.5, 14, 14], "score": score}
             for image, x, score in boxes
         ]
         path = tmp_path / f"{name}.json"

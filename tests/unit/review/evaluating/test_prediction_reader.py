@@ -10,7 +10,7 @@ import pytest
 
 from app.config import Settings
 from app.datasets.file_tree import Limits
-from app.errors import DatasetFormatError, NotFoundError, OverloadedError, TooLargeError
+from app.errors import DatasetFormatError, InputError, NotFoundError, OverloadedError, TooLargeError
 from app.evaluation.frame_names import FrameNames, NamedFrame
 from app.review.evaluating import prediction_reader
 from app.review.evaluating.prediction_reader import (
@@ -93,7 +93,8 @@ class TestPredictionReader:
             reader.read(heavy, NAMES, limits)
         assert "in parts" in refused.value.hint
         empty = written(tmp_path / "empty.json", b"[]")
-        assert reader.read(empty, NAMES, limits)[0].boxes == 0
+        with pytest.raises(InputError, match=r"empty\.json holds no prediction"):
+            reader.read(empty, NAMES, limits)
 
     def test_one_more_than_may_wait_is_told_to_come_back(
         self, reader_of, tmp_path, monkeypatch

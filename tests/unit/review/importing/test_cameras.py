@@ -13,6 +13,7 @@ from app.review.editing.stations import load_station, submit_station
 from app.review.editing.submit import load, submit
 from app.review.importing.cameras import ingest_cameras
 from app.review.importing.ingest import ingest
+from app.soccer.frames import ImageSize
 
 
 def attach(store, cameras):
@@ -67,9 +68,44 @@ class TestIngestCameras:
         report = attach(store, {"7": opposite, "99": opposite})
         assert report.changed == 0
         assert report.problems == [
-            'camera "7": several views have this name',
-            'camera "99": no view has this name',
+            'camera "7": views of 2 matches have this name; call it '
+            f'"{make_group(7).match}/7", or like the other match',
+            'camera "99": no view has this name; views are called "7", "7_1"',
         ]
+
+    def test_views_of_one_match_that_are_called_alike_have_one_camera(
+        self, store, fill, make_group, opposite
+    ) -> None:
+        first = make_group(7)
+        second = replace(make_group(8), key="8", match=first.match)
+        views = [
+            replace(view, key=old.key) for view, old in zip(second.views, first.views, strict=True)
+        ]
+        ids = fill(first, replace(second, views=tuple(views)), solved=False)
+        report = attach(store, {"7": opposite})
+        assert report.changed == 2
+        assert report.problems == ['camera "7" is that of 2 views of this name']
+        assert all(load(store, each).group.view("7.png").station.given == opposite for each in ids)
+
+    def test_cameras_of_another_size_are_scaled_to_their_views(
+        self, store, state, opposite
+    ) -> None:
+        size = state.group.view("7.png").size
+        half = opposite.scaled(0.5, 0.5)
+        halved = ImageSize(size.width // 2, size.height // 2)
+        report = ingest_cameras(store, "demo", {"7": half}, source="x", actor="ann", size=halved)
+        given = load(store, state.id).group.view("7.png").station.given
+        assert report.problems == []
+        assert given.focal_length == opposite.focal_length
+        assert given.principal_point == opposite.principal_point
+
+    def test_a_camera_of_another_size_than_was_said_is_told(self, store, state, opposite) -> None:
+        size = state.group.view("7.png").size
+        half = replace(
+            opposite, principal_point=((size.width / 2 - 1) / 2, (size.height / 2 - 1) / 2)
+        )
+        (problem,) = attach(store, {"7": half}).problems
+        assert f"--size {size.width // 2}x{size.height // 2}" in problem
 
     def test_the_camera_stays_when_the_labels_are_imported_again(
         self, store, fill, make_group, opposite

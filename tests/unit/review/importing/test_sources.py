@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -10,13 +11,14 @@ from sqlalchemy import select
 
 from app.datasets.cameras_writer import write_cameras
 from app.datasets.soccernet_v3_writer import write_soccernet_v3
+from app.errors import InputError
 from app.review.datasets.dataset import dataset_id, get_dataset, list_datasets
 from app.review.editing.edit import SetBall
 from app.review.editing.recompute import solve_dataset
 from app.review.editing.submit import load, submit
 from app.review.exporting.export import export
 from app.review.importing.ingest import ingest
-from app.review.importing.sources import FORMATS, Source, import_source
+from app.review.importing.sources import FORMATS, USERS, Source, import_source
 from app.review.importing.spare import SpareFrame, ingest_spare, spare_frames
 from app.review.queue.listing import list_groups
 from app.soccer.annotation import BallAnnotation, Extras, make_lines
@@ -49,7 +51,8 @@ def hashes(store: Store, dataset: str) -> dict[str, str]:
 def there_and_back(store: Store, form: str, out: Path, **options: object) -> dict[str, Group]:
     """Export "demo" and import what was written as "again"."""
     export(store, "demo", form, out, everything=True)
-    source = Source(form, out, size=SIZE, **options)  # type: ignore[arg-type]
+    size = SIZE if form in USERS["size"] else None
+    source = Source(form, out, size=size, **options)  # type: ignore[arg-type]
     imported = import_source(store, "again", source, store.settings)
     assert imported.report.problems == []
     return groups_of(store, "again")
@@ -110,7 +113,7 @@ class TestThereAndBack:
         there_and_back(store, form, tmp_path / "first")
         solve_dataset(store, "again")
         export(store, "again", form, tmp_path / "second", everything=True)
-        again = Source(form, tmp_path / "second", size=SIZE)
+        again = Source(form, tmp_path / "second", size=SIZE if form in USERS["size"] else None)
         imported = import_source(store, "third", again, store.settings)
         assert imported.result.new == len(groups_of(store, "again"))
         assert hashes(store, "third") == hashes(store, "again")
@@ -340,3 +343,53 @@ class TestRemarks:
         (tmp_path / "a.json").write_text(json.dumps({"shapes": [], "imagePath": "a.jpg"}))
         imported = import_source(store, "x", Source("coco", tmp_path), store.settings)
         assert imported.nothing_read()[1].startswith("It looks like LabelMe")
+
+
+class TestCheck:
+    @pytest.mark.parametrize("form", FORMATS)
+    @pytest.mark.parametrize(
+        ("name", "value", "typed"),
+        [
+            ("calibration", "lines", "--calibration"),
+            ("size", SIZE, "--size"),
+            ("lines", Path("lines"), "--lines"),
+            ("frame_offset", {1: 9}, "--frame-offset"),
+            ("flipped", frozenset({2}), "--flip"),
+            ("ball_category", "ball", "--ball-category"),
+            ("frames", Path("list.json"), "--frames"),
+        ],
+    )
+    def test_an_option_that_a_format_does_not_use_is_refused(
+        self, form: str, name: str, value: object, typed: str
+    ) -> None:
+        source = replace(Source(form, Path("x")), **{name: value})  # type: ignore[arg-type]
+        if form in USERS[name]:
+            source.check()
+            return
+        with pytest.raises(InputError, match=f"^{form} does not use {typed}$") as caught:
+            source.check()
+        assert caught.value.pointer == f"/options/{name}"
+
+    @pytest.mark.parametrize("form", ["cameras", "touchline"])
+    def test_what_makes_no_dataset_takes_no_policy(self, form: str) -> None:
+        with pytest.raises(InputError, match="does not use --policy"):
+            Source(form, Path("x")).check(policy=True)
+
+    def test_the_browser_offers_the_options_that_a_format_uses(self) -> None:
+        text = Path("static/state/import_formats.js").read_text(encoding="utf-8")
+        names = {"CALIBRATION": "calibration", "SIZE": "size", "OFFSET": "frame_offset"}
+        names |= {"FLIPPED": "flipped", "CATEGORY": "ball_category"}
+        offered = re.findall(
+            r"name: '([a-z0-9-]+)', label: .*?, options: \[(.*?)\]( , lines|, lines)?", text
+        )
+        assert len(offered) > 5
+        for form, options, lines in offered:
+            found = {names[name] for name in re.findall(r"[A-Z]{4,}", options)}
+            found |= {"lines"} if lines else set()
+            assert found == {name for name in USERS if form in USERS[name]} - {"frames", "policy"}
+
+    def test_nothing_is_imported_then(self, store: Store, tmp_path: Path) -> None:
+        source = Source("coco", tmp_path, size=SIZE)
+        with pytest.raises(InputError, match="coco does not use --size"):
+            import_source(store, "new", source, store.settings)
+        assert list_datasets(store) == []

@@ -29,7 +29,7 @@ def jobs(store):
 @pytest.fixture
 def predictions(store, state, tmp_path):
     box = state.solution.views[0].ball.optimized_box
-    bbox = [box.x, box.y, box.width, box.height]
+    bbox = [box.x + 0.5, box.y + 0.5, box.width, box.height]
     value = {"image_id": "7.png", "category_id": 1, "bbox": bbox, "score": 0.9}
     (tmp_path / "p.json").write_text(json.dumps([value]))
     files = PredictionFiles(tmp_path / "p.json")

@@ -1,0 +1,73 @@
+"""What a parsed JSON document is, in words, for the error where another one was meant."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from app.datasets.camera_matrices import holds_homography, holds_matrices
+from app.finite import quoted
+from app.soccer.pitch import marking_like
+
+_KEYS = 4
+"""Keys that are named of an object that is nothing known."""
+
+
+def json_kind(value: Any) -> str:
+    """What a document is, as the end of a sentence that begins with its name.
+
+    Example:
+        >>> json_kind({"kp": {}, "lines": {}})
+        'holds keypoints that a detector predicted (kp), not annotated lines'
+    """
+    if holds_homography(value):
+        return (
+            "holds a homography: it maps the grass alone and is no camera (no focal length, no height). "
+            "Write K, R and t, or SoccerNet's camera JSON"
+        )
+    if isinstance(value, list):
+        return _kind_of_list(value)
+    if not isinstance(value, dict):
+        return f"is {quoted(value, 40) if isinstance(value, str) else value}, not an object"
+    return _kind_of_object(value)
+
+
+def is_camera(value: Any) -> bool:
+    """Whether a value looks like one camera, in any spelling that is read."""
+    if not isinstance(value, dict):
+        return False
+    return "pan_degrees" in value or "cam_params" in value or holds_matrices(value)
+
+
+def _kind_of_list(value: list[Any]) -> str:
+    first = next((item for item in value if isinstance(item, dict)), None)
+    if first is None:
+        return f"is a list of {len(value)} values"
+    if "bbox" in first and "image_id" in first:
+        return "holds COCO results, boxes that a detector predicted: evaluate them (touchline evaluate)"
+    if is_camera(first):
+        return "holds cameras: import it as cameras"
+    return f"is a list of objects with {_names(first)}"
+
+
+def _kind_of_object(value: dict[str, Any]) -> str:
+    if "images" in value and ("annotations" in value or "categories" in value):
+        return "is a COCO document: import it as coco"
+    if is_camera(value):
+        return "holds a camera: import it as cameras"
+    for name in ("kp", "keypoints", "kps"):
+        if name in value:
+            return f"holds keypoints that a detector predicted ({name}), not annotated lines"
+    if "actions" in value or "replays" in value:
+        return "holds the labels of a match: import it as soccernet-v3 or soccernet-v3d"
+    if "shapes" in value and "imagePath" in value:
+        return "is an annotation of LabelMe"
+    if any(map(is_camera, value.values())):
+        return "holds cameras: import it as cameras"
+    if any(map(marking_like, value)):
+        return "holds field lines: import it as sn-calibration"
+    return f"is an object with {_names(value)}" if value else "is an empty object"
+
+
+def _names(value: dict[str, Any]) -> str:
+    names = ", ".join(quoted(name, 30) for name in list(value)[:_KEYS])
+    return f"{names} and {len(value) - _KEYS} more" if len(value) > _KEYS else names

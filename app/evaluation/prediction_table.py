@@ -1,0 +1,207 @@
+"""Tables of predictions, read: CSV in the spellings of many tools, and MOT's text files.
+
+Delimiters are commas, semicolons or tabs; with the latter two, decimal commas are read. Names of
+columns count without capitals. Boxes are in pixels, (0, 0) the centre of the first pixel.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
+
+from app.datasets import fields
+from app.datasets.csv_text import is_missing, numbers_in, read_rows
+from app.datasets.file_tree import FileTree, Limits
+from app.errors import DatasetFormatError
+from app.evaluation.frame_names import NamedFrame
+from app.evaluation.prediction_run import FieldError, PredictionRun, in_field, noted, read_field
+from app.soccer.frames import Box, ImageSize
+
+SCORES = ("score", "confidence", "conf", "probability", "prob")
+_BOX = ("ball_bbox", "bbox")
+_CORNER_AND_SIZE = (
+    ("x", "y", "w", "h"), ("x", "y", "width", "height"), ("left", "top", "width", "height"),
+    ("bb_left", "bb_top", "bb_width", "bb_height"), ("bbox_x", "bbox_y", "bbox_w", "bbox_h"),
+    ("xmin", "ymin", "width", "height"), ("xmin", "ymin", "w", "h"),
+)  # fmt: skip
+_CORNERS = (
+    ("x1", "y1", "x2", "y2"), ("xmin", "ymin", "xmax", "ymax"), ("x_min", "y_min", "x_max", "y_max"),
+    ("left", "top", "right", "bottom"), ("xtl", "ytl", "xbr", "ybr"), ("x0", "y0", "x1", "y1"),
+    ("bbox_x1", "bbox_y1", "bbox_x2", "bbox_y2"),
+)  # fmt: skip
+_CENTERS = tuple(
+    (x, y, width, height)
+    for x, y in (
+        ("cx", "cy"), ("xc", "yc"), ("x_center", "y_center"), ("xcenter", "ycenter"),
+        ("center_x", "center_y"), ("x_c", "y_c"),
+    )
+    for width, height in (("w", "h"), ("width", "height"))
+)  # fmt: skip
+_FRAME_NUMBERS = ("frame", "frame_id", "frame_number", "frame_num", "frame_no", "frame_index")
+_NAMES = (
+    "file_name", "filename", "image", "image_name", "image_path", "img", "file", "path", "name",
+    "image_id",
+)  # fmt: skip
+_CLASSES = ("class", "category_id", "class_id", "cls", "label")
+_CLASS_NAMES = ("name", "class_name", "label_name")
+_MEANT = (
+    "a table of predictions has a frame (image, file_name or frame; or match, main_action, replay) and a box "
+    "in pixels (x, y, w, h from the upper left corner; x1, y1, x2, y2; cx, cy, w, h; or ball_bbox)"
+)
+_MOT = ("frame", "id", "bb_left", "bb_top", "bb_width", "bb_height", "conf")
+_DECIMAL_COMMA = re.compile(r"\s*[+-]?\d+,\d+(?:[eE][+-]?\d+)?\s*", re.ASCII)
+_NUMBERS_ONLY = re.compile(rb"\s*[-+.\d][-+.\deE]*(?:\s*,\s*[-+.\d][-+.\deE]*){5,}\s*", re.ASCII)
+
+
+def is_mot(content: bytes) -> bool:
+    """Whether a text is MOT's: numbers with commas between them, and no header."""
+    first = next((line for line in content[:4096].splitlines() if line.strip()), b"")
+    return bool(_NUMBERS_ONLY.fullmatch(first))
+
+
+def read_table(tree: FileTree, path: Path, run: PredictionRun, limits: Limits) -> None:
+    """Read the one table of a tree.
+
+    Raises:
+        DatasetFormatError: There is none, or several, or its columns say no frame or no box.
+    """
+    names = [name for name in tree.names() if name.lower().endswith((".csv", ".tsv"))]
+    if not names:
+        texts = [name for name in tree.names() if name.lower().endswith(".txt")]
+        names = [name for name in texts if is_mot(tree.read_bytes(name))]
+    if len(names) != 1:
+        what = "no CSV file" if not names else f"{len(names)} CSV files; one is read"
+        raise DatasetFormatError(str(path), None, None, f"holds {what}")
+    shown = tree.shown(names[0])
+    columns: list[str] | None = None
+    for line, cells in _rows(tree.read_bytes(names[0]), shown, limits):
+        if columns is None:
+            columns = list(cells)
+            if problem := _wrong_columns(columns):
+                raise DatasetFormatError(shown, None, None, problem)
+        run.found.report.read += 1
+        with noted(run.found.report, shown, f"line {line}"):
+            _add_row(run, cells)
+    if columns is None:
+        raise DatasetFormatError(shown, None, None, "holds no row: is it complete?")
+
+
+def _rows(content: bytes, shown: str, limits: Limits) -> Iterator[tuple[int, Mapping[str, str]]]:
+    """The rows with their line numbers, by the plain name of a column."""
+    if is_mot(content):
+        header = ",".join((*_MOT, "x", "y", "z")).encode()
+        for line, cells in read_rows(header + b"\n" + content, shown, (), limits):
+            boxed = {name: cells.get(name, "") for name in _MOT}
+            # MOT's ground truth and some trackers write -1 where there is no confidence.
+            if boxed["conf"].strip() in ("-1", "-1.0"):
+                boxed["conf"] = ""
+            yield line - 1, boxed
+        return
+    first = content[:65536].split(b"\n", 1)[0]
+    delimiter = max(",;\t", key=lambda sign: first.count(sign.encode()))
+    for line, cells in read_rows(content, shown, (), limits, delimiter=delimiter):
+        yield (
+            line,
+            {
+                re.sub(r"[\s.-]+", "_", name.strip().lower()): (
+                    text.replace(",", ".")
+                    if delimiter != "," and _DECIMAL_COMMA.fullmatch(text)
+                    else text
+                )
+                for name, text in cells.items()
+            },
+        )
+
+
+def _wrong_columns(columns: Iterable[str]) -> str | None:
+    """Why a table with these columns cannot be read, in words; None where it can."""
+    there = set(columns)
+    frame = there & {"main_action", *_FRAME_NUMBERS, *_NAMES}
+    boxed = there & set(_BOX) or any(
+        there.issuperset(sides) for sides in (*_CORNER_AND_SIZE, *_CORNERS, *_CENTERS)
+    )
+    if frame and boxed:
+        return None
+    listed = ", ".join(f'"{name}"' for name in list(columns)[:12] if name) or "no names"
+    more = "; x and y alone are a point without a size" if {"x", "y"} <= there and not boxed else ""
+    return f"has the columns {listed}{more}; {_MEANT}"
+
+
+def _add_row(run: PredictionRun, cells: Mapping[str, str]) -> None:
+    box, where = _row_box(cells)
+    if box is None:
+        return
+    score_name = next((name for name in SCORES if not is_missing(cells.get(name))), None)
+    score = read_field(cells, score_name, fields.number) if score_name else None
+    if not _wanted(run, cells):
+        return
+    frame = _row_frame(run, cells)
+    if frame is not None:
+        size = None
+        if not is_missing(cells.get("img_w")) and not is_missing(cells.get("img_h")):
+            size = ImageSize(
+                read_field(cells, "img_w", fields.whole), read_field(cells, "img_h", fields.whole)
+            )
+        with in_field(where):
+            run.add(frame, box, score, size)
+
+
+def _wanted(run: PredictionRun, cells: Mapping[str, str]) -> bool:
+    """Whether the class of a row is the ball's."""
+    column = next((name for name in _CLASSES if not is_missing(cells.get(name))), None)
+    if column is None:
+        return run.wants(0)
+    text = cells[column].strip()
+    named = next(
+        (cells[name].strip() for name in _CLASS_NAMES if not is_missing(cells.get(name))), ""
+    )
+    try:
+        return run.wants(fields.whole(text), named)
+    except ValueError:
+        return run.wants(text, text)
+
+
+def _row_box(cells: Mapping[str, str]) -> tuple[Box | None, str]:
+    """The box of a row, None where the row has none; and the columns that it stands in."""
+    for name in _BOX:
+        if name in cells:
+            if is_missing(cells[name]):
+                return None, name
+            return read_field(cells, name, lambda text: Box(*numbers_in(text, 4))), name
+    for layouts, made in (
+        (_CORNER_AND_SIZE, Box),
+        (_CENTERS, lambda x, y, w, h: Box(x - w / 2, y - h / 2, w, h)),
+        (_CORNERS, lambda x1, y1, x2, y2: Box(x1, y1, x2 - x1, y2 - y1)),
+    ):
+        for sides in layouts:
+            if all(side in cells for side in sides):
+                where = ", ".join(sides)
+                if all(is_missing(cells[side]) for side in sides):
+                    return None, where
+                numbers = (read_field(cells, side, fields.number) for side in sides)
+                return made(*numbers), where
+    raise FieldError("ball_bbox", "is missing, and so are x, y, w and h")
+
+
+def _row_frame(run: PredictionRun, cells: Mapping[str, str]) -> NamedFrame | None:
+    """The frame of a row; one that is none is counted."""
+    number = next((name for name in _FRAME_NUMBERS if not is_missing(cells.get(name))), None)
+    if not is_missing(cells.get("main_action")):
+        action = read_field(cells, "main_action", fields.whole)
+        replay = cells.get("replay")
+        image = f"{action}" if is_missing(replay) else f"{action}_{fields.whole(replay)}"
+        parts = [cells.get(name, "").strip() for name in ("league", "season", "match")]
+        return run.frame("/".join([part for part in parts if part] + [image]))
+    if number is not None and not is_missing(cells.get("camera")):
+        camera = (cells["camera"] or "").strip().removeprefix("cam")
+        return run.frame(f"cam{camera}/{cells[number].strip().removesuffix('.0')}")
+    # The name of a picture says more than a number, which tools count from where they like. Beside
+    # a class, "name" is that of the class.
+    named = any(name in cells for name in _CLASSES)
+    for name in _NAMES:
+        if not is_missing(cells.get(name)) and not (named and name == "name"):
+            return run.frame(cells[name].strip())
+    if number is not None:
+        return run.numbered(cells[number].strip())
+    raise FieldError("frame", "is missing, and so is every other name of the frame")
