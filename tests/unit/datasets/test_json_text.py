@@ -158,7 +158,7 @@ class TestNan:
         content = f'{{"a": {text}, "b": 1.5}}'.encode()
         report = Report()
         assert read_json(content, "f", report=report) == {"a": None, "b": 1.5}
-        assert [problem.record for problem in report.problems] == ["a"]
+        assert [problem.field for problem in report.problems] == ["a"]
         assert not math.isfinite(read_json(content, "f", nan="keep")["a"])
 
     def test_is_null_in_a_python_literal(self) -> None:

@@ -43,8 +43,10 @@ class TestReadSoccernetV3:
         line = text.index('"points": [', text.index('"lines"')) + len('"points": [')
         file.write_text(text[:line] + bad + text[text.index(",", line) :])
         assert len(_read(root, report)) == 2
-        assert len(report.problems) == 1
-        assert report.problems[0].record == "7.png"
+        # The number with its place in the file, and the line that it costs.
+        number, line = report.problems
+        assert "read as missing" in number.problem
+        assert (line.record, line.field) == ("7.png", "lines[0].points")
 
     @pytest.mark.parametrize("depth", [0, 1, 2, 3])
     def test_any_folder_down_to_the_match_will_do(
