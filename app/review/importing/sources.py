@@ -216,7 +216,8 @@ def import_source(
     source.check()
     report, limits = Report(), Limits.of(settings)
     if source.format == "cameras":
-        cameras = read_cameras(source.path, report, limits)
+        sizes: dict[str, ImageSize] = {}
+        cameras = read_cameras(source.path, report, limits, sizes)
         result = ingest_cameras(
             store,
             dataset,
@@ -224,6 +225,7 @@ def import_source(
             source=source.label,
             actor=actor,
             size=source.size,
+            sizes=sizes,
             dry_run=dry_run,
         )
         return Imported(source, report, result)
