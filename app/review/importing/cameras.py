@@ -74,7 +74,7 @@ def ingest_cameras(
     report, found = IngestReport(), get_dataset_head(store, dataset)
     with store.read() as session:
         places = _places(session, found.id)
-    known = []
+    known: list[tuple[_Place, Camera]] = []
     for name in sorted(cameras):
         fitting = _fitting(places, name)
         matches = {place.match for place in fitting}
