@@ -19,10 +19,12 @@ from app.datasets.json_text import read_json, read_json_lines
 from app.datasets.match_info import place_of, read_match_info
 from app.datasets.report import Report
 from app.datasets.sn_calibration import CAMERAS, LINES
+from app.datasets.stated_size import stated_size
 from app.datasets.synloc import camera_from_synloc, images_of, is_synloc
 from app.datasets.trees import opened_tree
 from app.errors import DatasetFormatError
 from app.geometry.camera import Camera
+from app.soccer.frames import ImageSize
 
 _FILE = re.compile(r"(?:camera_)?(.+)\.(?:json|jsonl|ndjson|npz|ya?ml)", re.ASCII | re.IGNORECASE)
 _ENDINGS = ".json, .jsonl, .npz, .yml"
@@ -55,7 +57,12 @@ _MEANT = (
 )
 
 
-def read_cameras(path: Root, report: Report, limits: Limits = DEFAULT_LIMITS) -> dict[str, Camera]:
+def read_cameras(
+    path: Root,
+    report: Report,
+    limits: Limits = DEFAULT_LIMITS,
+    sizes: dict[str, ImageSize] | None = None,
+) -> dict[str, Camera]:
     """Every camera below ``path``, by key.
 
     ``path`` is a folder or zip of ``camera_<stem>.json``, one such file, or a file with several:
@@ -64,7 +71,8 @@ def read_cameras(path: Root, report: Report, limits: Limits = DEFAULT_LIMITS) ->
     file of SynLoc. A camera is SoccerNet's object, also within PnLCalib's ``cam_params``, or matrices
     (``camera_matrices``). The key is the stem of the file or the image, with
     ``<league>/<season>/<match>/`` before it where it lies that deep. In an export as
-    sn-calibration ``match_info.json`` says where each frame came from: that is its key.
+    sn-calibration ``match_info.json`` says where each frame came from: that is its key. ``sizes``
+    takes the size of the images of each camera whose file states it.
     """
     with opened_tree(path, report, limits) as tree:
         if tree is None:
@@ -76,7 +84,7 @@ def read_cameras(path: Root, report: Report, limits: Limits = DEFAULT_LIMITS) ->
             report.note(
                 str(path), None, None, f"holds no camera files ({_ENDINGS}), but {_some(endings)}"
             )
-        cameras = cameras_of(tree, files, report, _places(tree, names), limits)
+        cameras = cameras_of(tree, files, report, _places(tree, names), limits, sizes)
     report.imported += len(cameras)
     return cameras
 
@@ -87,14 +95,16 @@ def cameras_of(
     report: Report,
     places: Mapping[str, str] | None = None,
     limits: Limits = DEFAULT_LIMITS,
+    sizes: dict[str, ImageSize] | None = None,
 ) -> dict[str, Camera]:
     """The cameras of some files of a tree, by key: that of ``places``, or made from the name."""
     cameras: dict[str, Camera] = {}
+    stated = {} if sizes is None else sizes
     known = places or {}
     stems = Counter(_key(name, deep=False) for name in names)
     for name in names:
         deep = stems[_key(name, deep=False)] > 1
-        _read_file(tree, name, known.get(name) or _key(name, deep), cameras, report, limits)
+        _read_file(tree, name, known.get(name) or _key(name, deep), cameras, stated, report, limits)
     return cameras
 
 
@@ -135,6 +145,7 @@ def _read_file(
     name: str,
     key: str,
     cameras: dict[str, Camera],
+    sizes: dict[str, ImageSize],
     report: Report,
     limits: Limits,
 ) -> None:
@@ -157,6 +168,8 @@ def _read_file(
                 problem = f'is a second camera called "{called}"; the first one is used'
                 raise DatasetFormatError(shown, record, None, problem)
             cameras[called] = camera
+            if isinstance(item, dict) and (size := stated_size(item)) is not None:
+                sizes[called] = size
         except DatasetFormatError as error:
             report.skip(error)
 

@@ -7,13 +7,13 @@ from dataclasses import dataclass
 from pathlib import PurePosixPath
 from typing import Any
 
-from app.datasets import fields
 from app.datasets.frame_names import IMAGE_SUFFIXES
 from app.datasets.json_kind import json_kind
 from app.datasets.json_text import read_json, read_json_lines
 from app.datasets.report import Report
+from app.datasets.stated_size import stated_size
 from app.errors import DatasetFormatError
-from app.soccer.frames import MAX_SIDE, ImageSize
+from app.soccer.frames import ImageSize
 from app.soccer.pitch import WITHOUT_GEOMETRY, marking_like
 
 MEANT = (
@@ -22,7 +22,6 @@ MEANT = (
 _WITHIN = ("lines", "annotations", "annotation", "markings", "field_lines")
 """Fields in which tools keep the lines beside what else they say of an image."""
 _NAMES = ("file_name", "filename", "image_name", "image", "image_id", "frame", "name")
-_SIZES = (("width", "height"), ("image_width", "image_height"), ("imageWidth", "imageHeight"))
 
 
 @dataclass(frozen=True)
@@ -105,7 +104,7 @@ def _document(value: Any) -> LineDocument | None:
         lines = _listed(inner) if isinstance(inner, list) else inner
         if isinstance(lines, dict) and any(map(_is_line, lines)):
             named = _name(value)
-            return LineDocument(lines, None if named is None else _stem(named), _size(value))
+            return LineDocument(lines, None if named is None else _stem(named), stated_size(value))
     return None
 
 
@@ -138,14 +137,3 @@ def _name(value: Any) -> str | None:
 def _stem(name: str) -> str:
     place = PurePosixPath(name.replace("\\", "/"))
     return place.stem if place.suffix.lower() in IMAGE_SUFFIXES else place.name
-
-
-def _size(value: Mapping[str, Any]) -> ImageSize | None:
-    for width, height in _SIZES:
-        try:
-            sides = fields.whole(value.get(width)), fields.whole(value.get(height))
-        except ValueError:
-            continue
-        if min(sides) >= 2 and max(sides) <= MAX_SIDE:
-            return ImageSize(*sides)
-    return None

@@ -165,7 +165,8 @@ def read_predicted_cameras(
         InputError: No camera could be read.
     """
     found = ReadPredictedCameras()
-    cameras = read_cameras(path, found.report, limits)
+    sizes: dict[str, ImageSize] = {}
+    cameras = read_cameras(path, found.report, limits, sizes)
     if not cameras:
         problem = InputError(f"{path.name} holds no camera files")
         raise found.report.problems[0] if found.report.problems else problem
@@ -177,13 +178,14 @@ def read_predicted_cameras(
             found.reasons[name] = names.why_not(name)
         for identity in ids:
             annotated = names.frames[identity].size
-            if (other := other_size(camera, size or annotated)) is not None:
+            made_for = sizes.get(name) or size
+            if (other := other_size(camera, made_for or annotated)) is not None:
                 told = (
                     f"was made for {other.width} x {other.height}: its principal point is the middle of "
                     f"that; say so (--cameras-size {other.width}x{other.height})"
                 )
                 found.report.note(path.name, name, "principal_point", told)
-            found.cameras[identity] = _sized(camera, size, annotated)
+            found.cameras[identity] = _sized(camera, made_for, annotated)
     return found
 
 

@@ -45,6 +45,7 @@ def ingest_cameras(
     source: str,
     actor: str,
     size: ImageSize | None = None,
+    sizes: Mapping[str, ImageSize] | None = None,
     dry_run: bool = False,
 ) -> IngestReport:
     """Attach given calibrations to what they name; attaching them again changes nothing.
@@ -60,6 +61,7 @@ def ingest_cameras(
         source: Where they come from, for the log.
         actor: Who imports.
         size: Size of the images that the cameras were made for; None: that of each view.
+        sizes: The same by name, where their files state it: they count before ``size``.
         dry_run: Dry run: report what would happen, change nothing.
 
     Returns:
@@ -72,7 +74,7 @@ def ingest_cameras(
     report, found = IngestReport(), get_dataset_head(store, dataset)
     with store.read() as session:
         places = _places(session, found.id)
-    known = []
+    known: list[tuple[_Place, Camera]] = []
     for name in sorted(cameras):
         fitting = _fitting(places, name)
         matches = {place.match for place in fitting}
@@ -87,9 +89,15 @@ def ingest_cameras(
             continue
         if len(fitting) > 1:
             report.problems.append(f'camera "{name}" is that of {len(fitting)} views of this name')
-        report.problems.extend(_of_other_size(name, cameras[name], fitting, size))
-        for place in fitting:
-            known.append((place, _sized(cameras[name], size, place.size)))
+        stated = (sizes or {}).get(name)
+        if stated is not None and size not in (None, stated):
+            report.problems.append(
+                f'camera "{name}": its file says {stated.width} x {stated.height}, and --size is '
+                f"{size.width}x{size.height}; that of the file counts"
+            )
+        made_for = stated or size
+        report.problems.extend(_of_other_size(name, cameras[name], fitting, made_for))
+        known.extend((place, _sized(cameras[name], made_for, place.size)) for place in fitting)
     for start in range(0, len(known), BATCH):
         with attempt(store, keep=not dry_run) as session:
             batch = known[start : start + BATCH]

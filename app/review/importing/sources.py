@@ -257,7 +257,8 @@ def import_source(
     source.check()
     report, limits = Report(), Limits.of(settings)
     if source.format == "cameras":
-        cameras = read_cameras(source.path, report, limits)
+        sizes: dict[str, ImageSize] = {}
+        cameras = read_cameras(source.path, report, limits, sizes)
         result = ingest_cameras(
             store,
             dataset,
@@ -265,6 +266,7 @@ def import_source(
             source=source.label,
             actor=actor,
             size=source.size,
+            sizes=sizes,
             dry_run=dry_run,
         )
         return Imported(source, report, result)

@@ -12,6 +12,7 @@ from app.datasets.cameras_reader import read_cameras
 from app.datasets.cameras_writer import camera_text, write_cameras
 from app.datasets.report import Report
 from app.geometry.camera import Camera
+from app.soccer.frames import ImageSize
 
 
 class TestReadCameras:
@@ -130,6 +131,23 @@ class TestReadCameras:
         assert "holds no camera files (.json, .jsonl, .npz, .yml), but .homographies" in str(
             report.problems[0]
         )
+
+    @pytest.mark.parametrize(
+        "stated",
+        [
+            {"width": 1280, "height": 720},
+            {"image_width": 1280.0, "image_height": "720"},
+            {"image_size": [1280, 720]},
+        ],
+    )
+    def test_a_size_that_a_file_states_is_handed_on(
+        self, tmp_path: Path, camera: Camera, report: Report, stated: dict[str, Any]
+    ) -> None:
+        (tmp_path / "camera_1.json").write_text(json.dumps(camera_to_json(camera) | stated))
+        (tmp_path / "camera_2.json").write_text(json.dumps(camera_to_json(camera) | {"width": 5}))
+        sizes: dict[str, ImageSize] = {}
+        assert list(read_cameras(tmp_path, report, sizes=sizes)) == ["1", "2"]
+        assert sizes == {"1": ImageSize(1280, 720)}
 
     def test_a_second_camera_of_a_name_is_named(
         self, tmp_path: Path, camera: Camera, report: Report

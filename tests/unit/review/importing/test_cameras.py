@@ -99,6 +99,20 @@ class TestIngestCameras:
         assert given.focal_length == opposite.focal_length
         assert given.principal_point == opposite.principal_point
 
+    def test_a_size_that_the_file_states_counts_before_the_option(
+        self, store, state, opposite
+    ) -> None:
+        size = state.group.view("7.png").size
+        halved = ImageSize(size.width // 2, size.height // 2)
+        half, sizes = opposite.scaled(0.5, 0.5), {"7": halved}
+        for said, told in ((None, 0), (halved, 0), (ImageSize(640, 480), 1)):
+            report = ingest_cameras(
+                store, "demo", {"7": half}, source="x", actor="ann", size=said, sizes=sizes
+            )
+            assert len(report.problems) == told
+            given = load(store, state.id).group.view("7.png").station.given
+            assert given.focal_length == opposite.focal_length
+
     def test_a_camera_of_another_size_than_was_said_is_told(self, store, state, opposite) -> None:
         size = state.group.view("7.png").size
         half = replace(
