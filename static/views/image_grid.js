@@ -7,7 +7,7 @@ import { arrangeScreen, gridArea, gridTracks, panelGrid } from '../geometry/pane
 import { useSize } from '../lib/hooks.js';
 import { sceneShown } from '../state/scene3d.js';
 import { isStatic } from '../state/timeline.js';
-import { equalViews, maximised, stripCollapsed } from '../state/workspace.js';
+import { equalViews, isSmall, maximised, stripCollapsed } from '../state/workspace.js';
 import { ImagePanel } from './image_panel.js';
 
 /** @import {Screen} from '../geometry/panel_grid.js' */
@@ -54,7 +54,7 @@ export function ReviewMain({ pictures, children }) {
 export function ImageGrid({ pictures }) {
 	const [ref, size] = useSize();
 	const shown = shownOf(pictures);
-	const grid = panelGrid(shown.map(({ view }) => view), size.width > 0 ? size : { width: 16, height: 9 }, equalViews.value);
+	const grid = panelGrid(shown.map(({ view }) => view), size.width > 0 ? size : { width: 16, height: 9 }, equalViews.value || isSmall());
 	return html`
 		<section
 			ref=${ref} class="image-grid" aria-label="Views"

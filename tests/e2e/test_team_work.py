@@ -135,7 +135,7 @@ class TestWork:
         expect(ralf.get_by_role("button", name="Return to nora…")).to_be_visible()
         ralf.keyboard.press("Shift+U")
         dialog = ralf.get_by_role("dialog", name="Return to nora")
-        expect(dialog.get_by_label("Why")).to_be_focused()
+        expect(dialog.get_by_label("Reason")).to_be_focused()
         assert serious_in_both(ralf) == []
         ralf.keyboard.type("The far goal line is missing")
         ralf.keyboard.press("Enter")
