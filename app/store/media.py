@@ -20,7 +20,7 @@ from app.errors import ImageError, NotFoundError, StorageError, TooLargeError
 from app.object_store.address import unseal
 from app.soccer.media import Media
 from app.store.archives import Archives
-from app.store.image_header import JPEG, ImageHeader, check_scans, check_size, read_header
+from app.store.image_header import JPEG, SIDEWAYS, ImageHeader, check_scans, check_size, read_header
 from app.store.object_frames import is_stored, read_object
 from app.store.video import open_video
 
@@ -28,7 +28,11 @@ JPEG_QUALITY = 88
 LINK_HINT = "Put the file itself there, or import the folder again."
 _ARCHIVES = Archives()
 _FLAGS = cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION
-"""Annotations were made on the pixels as stored, so no note about rotation counts."""
+"""Pixels as stored; ``_upright`` turns them as the header says, for OpenCV and browsers differ."""
+_CACHE_VERSION = 2
+"""Raised when the picture made of the same file is another one. 2: EXIF orientation is applied."""
+_HEADS = (16 * 1024, 1024 * 1024)
+"""Bytes in which a header is looked for; a JPEG may have a small picture and a profile before it."""
 _DECODED_BYTES = 6
 """Of a pixel while it is decoded: three channels of 16 bits at most."""
 
@@ -43,7 +47,8 @@ def read_frame(media: Media, width: int | None, flipped: bool, settings: Setting
         settings: Limits, and the folder of the cache.
 
     Returns:
-        The file's own bytes where nothing is to be done to them, else a JPEG.
+        The file's own bytes where nothing is to be done to them, else a JPEG. It is upright
+        without any EXIF, so that readers that ignore EXIF show it as it was annotated.
 
     Raises:
         NotFoundError: The file, member or video frame is not there.
@@ -52,7 +57,11 @@ def read_frame(media: Media, width: int | None, flipped: bool, settings: Setting
     """
     _require_contained(media, settings)
     if media.frame is None and width is None and not flipped:
-        return _checked(_source(media, settings), settings, frame_name(media))
+        data, name = _source(media, settings), frame_name(media)
+        if read_header(data, name).orientation == 1:
+            # They are sent once they were seen to decode.
+            _pixels(data, settings, name)
+            return data
     found = cached_frame(media, width, flipped, settings)
     if found is not None:
         return found
@@ -85,10 +94,13 @@ def read_pixels(
         picture = _video_frame(Path(media.path), media.frame, settings)
         digest = digest_of(np.ascontiguousarray(picture).tobytes())
     else:
-        data = _source(media, settings)
+        data, name = _source(media, settings), frame_name(media)
         digest = digest_of(data)
+        if read_header(data, name).orientation != 1:
+            # What was once read of the stored pixels, under the plain digest, is read again.
+            digest = digest_of(f"{digest} upright".encode())
         if digest != known:
-            picture = _pixels(data, settings, frame_name(media))
+            picture = _pixels(data, settings, name)
     if digest == known:
         return digest, None
     return digest, _as_annotated(picture, flipped)
@@ -131,6 +143,24 @@ def content_type(data: bytes) -> str:
     return read_header(data).kind
 
 
+def picture_header(media: Media) -> ImageHeader | None:
+    """Size and orientation of a frame on this disk, from the beginning of its file.
+
+    None where it lies in an object store, cannot be read, or says nothing there.
+    """
+    if is_stored(media):
+        return None
+    try:
+        if media.frame is not None:
+            return _video_header(Path(media.path))
+        for count in _HEADS:
+            with contextlib.suppress(ImageError):
+                return read_header(_head(media, count))
+    except (NotFoundError, ImageError, StorageError):
+        pass
+    return None
+
+
 def frame_name(media: Media) -> str:
     """How a complaint calls a frame: by its file and its place in it, without the folder."""
     file = Path(unseal(media.path)[0]).name
@@ -167,12 +197,6 @@ def has_member(media: Media, member: str) -> bool:
     return _ARCHIVES.has(path, member)
 
 
-def _checked(data: bytes, settings: Settings, name: str) -> bytes:
-    """The bytes unchanged, once they were seen to decode."""
-    _pixels(data, settings, name)
-    return data
-
-
 def _decode(media: Media, settings: Settings) -> Any:
     if media.frame is not None:
         return _video_frame(Path(media.path), media.frame, settings)
@@ -188,9 +212,21 @@ def _source(media: Media, settings: Settings) -> bytes:
         return _ARCHIVES.read(path, media.member, settings.max_file_bytes)
     if size > settings.max_file_bytes:
         raise TooLargeError(f"{path.name} is larger than {settings.max_file_bytes} bytes")
+    return _read_file(path, size)
+
+
+def _head(media: Media, count: int) -> bytes:
+    path = Path(media.path)
+    _stat(path)
+    if media.member is not None:
+        return _ARCHIVES.head(path, media.member, count)
+    return _read_file(path, count)
+
+
+def _read_file(path: Path, count: int) -> bytes:
     try:
         with os.fdopen(os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK), "rb") as file:
-            return file.read(size)
+            return file.read(count)
     except OSError as error:
         raise StorageError(f"{path.name} cannot be read") from error
 
@@ -246,7 +282,22 @@ def _pixels(data: bytes, settings: Settings, name: str) -> Any:
     if picture is None:
         _require_memory(header)
         raise ImageError(f"{name} is damaged")
+    picture = _upright(picture, header.orientation)
     _require_declared(picture, header, name)
+    return picture
+
+
+def _upright(picture: Any, orientation: int) -> Any:
+    """Stored pixels as people see them."""
+    if orientation in SIDEWAYS:
+        picture = cv2.transpose(picture)
+    match orientation:
+        case 2 | 6:
+            return cv2.flip(picture, 1)
+        case 3 | 7:
+            return cv2.flip(picture, -1)
+        case 4 | 8:
+            return cv2.flip(picture, 0)
     return picture
 
 
@@ -279,6 +330,18 @@ def _video_frame(path: Path, number: int, settings: Settings) -> Any:
     return picture
 
 
+def _video_header(path: Path) -> ImageHeader:
+    _stat(path)
+    with open_video(path) as video:
+        if not video.isOpened():
+            raise ImageError(f"{path.name} is no video that can be read")
+        return ImageHeader(
+            "video",
+            int(video.get(cv2.CAP_PROP_FRAME_WIDTH)),
+            int(video.get(cv2.CAP_PROP_FRAME_HEIGHT)),
+        )
+
+
 def _narrowed(picture: Any, width: int | None) -> Any:
     height, present = picture.shape[:2]
     if width is None or width >= present:
@@ -296,7 +359,7 @@ def _encode(picture: Any) -> bytes:
 
 def _place(media: Media, width: int | None, flipped: bool, settings: Settings) -> Path:
     """Where what is made of a frame is kept."""
-    key = repr((frame_stamp(media), width, flipped, JPEG_QUALITY))
+    key = repr((frame_stamp(media), width, flipped, JPEG_QUALITY, _CACHE_VERSION))
     name = hashlib.sha256(key.encode()).hexdigest()
     return settings.cache / "frames" / name[:2] / f"{name[2:34]}.jpg"
 
