@@ -26,6 +26,7 @@ from app.datasets.soccernet_v3d_reader import read_soccernet_v3d
 from app.progress import TellProgress
 from app.review.importing.cameras import ingest_cameras
 from app.review.importing.ingest import IngestReport, ingest
+from app.review.importing.picture_check import PictureCheck
 from app.review.importing.spare import SpareFrame, ingest_spare
 from app.soccer.annotation import Extras
 from app.soccer.frames import ImageSize
@@ -199,10 +200,11 @@ def import_source(
     groups = _groups(source, report, limits) if folder is None else folder.groups()
     if source.frames is not None:
         groups = read_frame_list(source.frames, settings, report, limits).placed(iter(groups))
+    check = PictureCheck(report)
     result = ingest(
         store,
         dataset,
-        groups,
+        check.watch(groups),
         source=source.label,
         actor=actor,
         progress=progress,
@@ -210,6 +212,7 @@ def import_source(
         policy=policy,
         told=report,
     )
+    result.problems += check.remarks()
     if folder is not None and not dry_run:
         ingest_spare(store, dataset, _spare(folder), source=source.label, actor=actor)
     return Imported(source, report, result)
