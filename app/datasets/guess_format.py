@@ -21,7 +21,7 @@ _NAMES: tuple[tuple[str, re.Pattern[str]], ...] = (
     ("soccernet-v3", re.compile(r"Labels-v3\.json")),
     ("gamestate", re.compile(r"Labels-GameState\.json")),
     ("issia-3d", re.compile(r"ISSIA-3D\.csv")),
-    ("issia", re.compile(r".*\.xgtf(?:\.gz)?", re.IGNORECASE)),
+    ("issia", re.compile(r"(?:.*\.xgtf|cam.*\.xml)(?:\.gz)?", re.IGNORECASE)),
     ("parquet", re.compile(r".*\.parquet", re.IGNORECASE)),
     ("coco", re.compile(r"(?:instances_|annotations|(?=.*coco)).*\.json")),
     ("sn-calibration", re.compile(r"(?:\d{1,9}|match_info)\.json")),

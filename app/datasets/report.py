@@ -10,6 +10,9 @@ from app.errors import DatasetFormatError, InputError, ReviewError
 MAX_PROBLEMS = 10_000
 """Problems kept with their sentence; beyond, they are only counted."""
 
+MAX_REMARKS = 200
+"""Sentences that are kept."""
+
 
 @dataclass
 class Report:
@@ -21,6 +24,8 @@ class Report:
         problems: One error per thing that was left out, each with file, record and field.
         counts: What else there was, by name: ``persons``, ``views without frame``.
         dropped: Problems beyond ``MAX_PROBLEMS``.
+        remarks: What was decided for the files where they leave it open, a sentence each; nothing
+            was left out by it.
     """
 
     read: int = 0
@@ -28,6 +33,7 @@ class Report:
     problems: list[DatasetFormatError] = field(default_factory=list)
     counts: Counter[str] = field(default_factory=Counter)
     dropped: int = 0
+    remarks: list[str] = field(default_factory=list)
 
     def skip(self, error: DatasetFormatError) -> None:
         """Note that something was left out; the reader goes on."""
@@ -39,6 +45,11 @@ class Report:
     def note(self, path: str, record: str | None, where: str | None, problem: str) -> None:
         """The same from its parts."""
         self.skip(DatasetFormatError(path, record, where, problem))
+
+    def remark(self, sentence: str) -> None:
+        """Say once what was decided, or what there is besides."""
+        if sentence not in self.remarks and len(self.remarks) < MAX_REMARKS:
+            self.remarks.append(sentence)
 
     def refusal(self, nothing: str) -> ReviewError:
         """Why nothing was read: the first problem, else ``nothing``, a sentence."""

@@ -14,7 +14,6 @@ from app.datasets.format_names import ImportFormat
 from app.datasets.frame_list import read_frame_list
 from app.datasets.gamestate_reader import read_gamestate
 from app.datasets.guess_format import guess_format
-from app.datasets.issia import DEFAULT_SIZE as ISSIA_SIZE
 from app.datasets.issia_3d_reader import open_issia_3d
 from app.datasets.issia_reader import IssiaFolder, IssiaOptions, open_issia
 from app.datasets.parquet_reader import read_parquet
@@ -143,7 +142,7 @@ class Imported:
                 for problem in self.report.problems
             ],
             "more_skipped": self.report.dropped,
-            "remarks": list(self.result.problems),
+            "remarks": [*map(shown, self.report.remarks), *self.result.problems],
         }
 
 
@@ -242,7 +241,7 @@ def _static(source: Source, report: Report, limits: Limits) -> IssiaFolder:
         flipped=source.flipped,
         lines=source.lines,
         calibration=source.calibration,
-        size=source.size or ISSIA_SIZE,
+        size=source.size,
     )
     read = open_issia if source.format == "issia" else open_issia_3d
     return read(source.path, options, report, limits)
