@@ -57,7 +57,10 @@ def import_(
     size: Annotated[
         ImageSize | None,
         typer.Option(
-            "--size", parser=parse_size, metavar="WxH", help="Default 960x540; ISSIA 1920x1080."
+            "--size",
+            parser=parse_size,
+            metavar="WxH",
+            help="Default 960x540; ISSIA: as its files say, else 1920x1080.",
         ),
     ] = None,
     policy: Annotated[

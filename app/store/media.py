@@ -6,6 +6,7 @@ import contextlib
 import hashlib
 import os
 import stat
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +24,7 @@ from app.store.archives import Archives
 from app.store.image_header import JPEG, SIDEWAYS, ImageHeader, check_scans, check_size, read_header
 from app.store.object_frames import is_stored, read_object
 from app.store.video import open_video
+from app.store.video_index import Times, frame_at, kept_index, make_index
 
 JPEG_QUALITY = 88
 LINK_HINT = "Put the file itself there, or import the folder again."
@@ -30,7 +32,8 @@ _ARCHIVES = Archives()
 _FLAGS = cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION
 """Pixels as stored; ``_upright`` turns them as the header says, for OpenCV and browsers differ."""
 _CACHE_VERSION = 2
-"""Raised when the picture made of the same file is another one. 2: EXIF orientation is applied."""
+"""Raised when the picture made of the same file is another one. 2: EXIF orientation is applied, and
+frames of videos are found by their times."""
 _HEADS = (16 * 1024, 1024 * 1024)
 """Bytes in which a header is looked for; a JPEG may have a small picture and a profile before it."""
 _DECODED_BYTES = 6
@@ -91,7 +94,7 @@ def read_pixels(
     """
     _require_contained(media, settings)
     if media.frame is not None:
-        picture = _video_frame(Path(media.path), media.frame, settings)
+        picture = _video_frame(media, settings)
         digest = digest_of(np.ascontiguousarray(picture).tobytes())
     else:
         data, name = _source(media, settings), frame_name(media)
@@ -169,6 +172,51 @@ def frame_name(media: Media) -> str:
     return f"frame {file}" if media.frame is None else f"frame {media.frame} of {file}"
 
 
+def video_times(media: Media, settings: Settings) -> Times:
+    """When each frame of a view's video is shown; decoded where no index is kept.
+
+    Raises:
+        NotFoundError: The video is not there.
+        ImageError: It is no video that can be read.
+        TooLargeError: It is larger than the limits, in pixels or frames.
+    """
+    _require_contained(media, settings)
+    path, stamp = Path(media.path), _video_stamp(media)
+    known = kept_index(stamp, settings)
+    if known is not None:
+        return known
+    check_size(_video_header(path), settings, path.name)
+    return make_index(path, stamp, settings)
+
+
+def video_length(media: Media) -> int:
+    """How many frames a view's video promises to have, which is a guess.
+
+    Raises:
+        NotFoundError: The video is not there.
+        ImageError: It is no video that can be read.
+    """
+    path = Path(media.path)
+    _stat(path)
+    with open_video(path) as video:
+        if not video.isOpened():
+            raise ImageError(f"{path.name} is no video that can be read")
+        return int(video.get(cv2.CAP_PROP_FRAME_COUNT))
+
+
+def has_index(media: Media, settings: Settings) -> bool:
+    """Whether the index of a view's video is kept.
+
+    Raises:
+        NotFoundError: The video is not there.
+    """
+    return kept_index(_video_stamp(media), settings) is not None
+
+
+def _video_stamp(media: Media) -> str:
+    return frame_stamp(replace(media, frame=None))
+
+
 def media_facts(media: Media) -> dict[str, int]:
     """Size in bytes, and CRC-32 where an archive knows it; empty when the file is gone.
 
@@ -199,7 +247,7 @@ def has_member(media: Media, member: str) -> bool:
 
 def _decode(media: Media, settings: Settings) -> Any:
     if media.frame is not None:
-        return _video_frame(Path(media.path), media.frame, settings)
+        return _video_frame(media, settings)
     return _pixels(_source(media, settings), settings, frame_name(media))
 
 
@@ -313,17 +361,17 @@ def _require_declared(picture: Any, header: ImageHeader, name: str) -> None:
         raise ImageError(f"{name} is not of the size that its header declares")
 
 
-def _video_frame(path: Path, number: int, settings: Settings) -> Any:
-    _stat(path)
+def _video_frame(media: Media, settings: Settings) -> Any:
+    path, number = Path(media.path), media.frame or 0
+    times = video_times(media, settings)
+    if not 0 <= number < len(times):
+        raise NotFoundError(f"{path.name} has no frame {number}; it has {len(times):,} frames")
     with open_video(path) as video:
         if not video.isOpened():
             raise ImageError(f"{path.name} is no video that can be read")
-        size = (video.get(cv2.CAP_PROP_FRAME_WIDTH), video.get(cv2.CAP_PROP_FRAME_HEIGHT))
-        check_size(ImageHeader("video", int(size[0]), int(size[1])), settings, path.name)
-        video.set(cv2.CAP_PROP_POS_FRAMES, number)
-        done, picture = video.read()
-    if number < 0 or not done:
-        raise NotFoundError(f"{path.name} has no frame {number}")
+        picture = frame_at(video, number, times)
+    if picture is None:
+        raise NotFoundError(f"frame {number} of {path.name} cannot be decoded")
     # A stream may change its size on the way.
     height, width = picture.shape[:2]
     check_size(ImageHeader("video", width, height), settings, path.name)

@@ -6,18 +6,33 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import PurePosixPath
 
+from app.config import Settings
 from app.datasets.report import Report
+from app.errors import ImageError, NotFoundError, StorageError, TooLargeError
 from app.paint.picture_scale import SHAPES_APART
 from app.soccer.frames import ImageSize
 from app.soccer.group import Group, View
 from app.soccer.media import Media
 from app.store.image_header import SIDEWAYS, ImageHeader
-from app.store.media import picture_header
+from app.store.media import picture_header, video_length, video_times
 
 OUTSIDE = 0.02
 """Of a side; annotators of public datasets clicked up to 1 % beyond the border of a picture."""
 NAMED = 5
 """Places of a kind that are named; the others are counted."""
+
+
+LONGEST = 20_000
+"""Frames that a video promises, up to which it is indexed by an import; beyond, when it is looked at."""
+
+
+@dataclass(frozen=True)
+class _Video:
+    """A video: its size, how many frames it has, and why it cannot be read."""
+
+    header: ImageHeader | None
+    frames: int | None
+    problem: str = ""
 
 
 @dataclass
@@ -29,16 +44,20 @@ class PictureCheck:
 
     Attributes:
         report: Counts pictures that EXIF turns.
+        settings: Where indices of videos are kept, which are made here.
         shapes: Views whose picture has another shape than the file declares.
         outside: Views with annotations that lie outside their picture.
+        beyond: Views whose video has no frame of their number.
     """
 
     report: Report
+    settings: Settings
     shapes: list[str] = field(default_factory=list)
     outside: list[str] = field(default_factory=list)
+    beyond: list[str] = field(default_factory=list)
     _stations: set[str] = field(default_factory=set)
     """Static cameras whose lines were looked at: every group brings them again."""
-    _videos: dict[str, ImageHeader | None] = field(default_factory=dict)
+    _videos: dict[str, _Video] = field(default_factory=dict)
 
     def watch(self, groups: Iterable[Group]) -> Iterator[Group]:
         """The groups, each compared as it passes."""
@@ -61,11 +80,16 @@ class PictureCheck:
                 f"{_counted(len(self.outside), 'view has', 'views have')} annotations outside the "
                 f"picture: {_named(self.outside)}. Check the size that the file declares."
             )
+        if self.beyond:
+            found.append(
+                f"{_counted(len(self.beyond), 'view has', 'views have')} no frame in the video: "
+                f"{_named(self.beyond)}. Check --frame-offset, and that it is the whole video."
+            )
         return found
 
     def _compare(self, group: Group, view: View) -> None:
         place = f"group {group.key}, view {view.key}"
-        header = None if view.media is None else self._header(view.media)
+        header = None if view.media is None else self._header(place, view.media)
         if header is not None:
             if header.orientation != 1:
                 self.report.counts["pictures turned by EXIF"] += 1
@@ -78,12 +102,28 @@ class PictureCheck:
                 f"{place}: {places[0]}{more}, of {view.size.width} x {view.size.height}"
             )
 
-    def _header(self, media: Media) -> ImageHeader | None:
+    def _header(self, place: str, media: Media) -> ImageHeader | None:
         if media.frame is None:
             return picture_header(media)
         if media.path not in self._videos:
-            self._videos[media.path] = picture_header(media)
-        return self._videos[media.path]
+            self._videos[media.path] = self._video(media)
+        video = self._videos[media.path]
+        if video.problem:
+            self.beyond.append(f"{place}: {video.problem}")
+        elif video.frames is not None and not 0 <= media.frame < video.frames:
+            name = PurePosixPath(media.path).name
+            self.beyond.append(f"{place}: frame {media.frame} of {video.frames:,} ({name})")
+        return video.header
+
+    def _video(self, media: Media) -> _Video:
+        """What a video is; its frames are counted here unless that takes too long."""
+        header = picture_header(media)
+        try:
+            if video_length(media) > LONGEST:
+                return _Video(header, None)
+            return _Video(header, len(video_times(media, self.settings)))
+        except (NotFoundError, ImageError, StorageError, TooLargeError) as error:
+            return _Video(header, None, error.message)
 
     def _outside(self, view: View) -> Iterator[str]:
         """Annotations of a view that are outside its picture."""

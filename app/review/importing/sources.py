@@ -199,7 +199,7 @@ def import_source(
     groups = _groups(source, report, limits) if folder is None else folder.groups()
     if source.frames is not None:
         groups = read_frame_list(source.frames, settings, report, limits).placed(iter(groups))
-    check = PictureCheck(report)
+    check = PictureCheck(report, settings)
     result = ingest(
         store,
         dataset,
