@@ -84,7 +84,7 @@ def import_(
     """Read files into a dataset; doing it again changes nothing.
 
     FORMAT is soccernet-v3, soccernet-v3d, issia, issia-3d, sn-calibration, cameras, gamestate,
-    coco, parquet or touchline; docs/formats.md says what each of them holds.
+    coco, parquet, frames (pictures alone) or touchline; docs/formats.md says what each of them holds.
     """
     server = given_server()
     if server is not None:

@@ -11,7 +11,7 @@ from typing import Any
 from app.datasets.cameras_reader import cameras_of
 from app.datasets.file_tree import DEFAULT_LIMITS, FileTree, Limits, Root
 from app.datasets.folder_tree import FolderTree
-from app.datasets.frame_names import IMAGE_SUFFIXES
+from app.datasets.frame_names import IMAGE_SUFFIXES, VIDEO_SUFFIXES
 from app.datasets.issia import CALIBRATION, DEFAULT_OFFSET, DEFAULT_SIZE, MATCH, FramePersons
 from app.datasets.report import Report
 from app.datasets.sn_calibration import LineFile
@@ -25,7 +25,6 @@ from app.soccer.group import Group, Station, View
 from app.soccer.media import Media
 from app.soccer.split import TEST_CAMERAS
 
-_VIDEO_SUFFIXES = (".mp4", ".avi", ".mpg", ".mpeg", ".mkv", ".mov")
 # "Film Role-0 ID-3 T-0 ...", "cam3", "camera_3", "ground_truth_3": what follows says nothing.
 _NUMBERED = (
     re.compile(r"\bID-(\d{1,3})\b", re.ASCII),
@@ -342,7 +341,7 @@ def _find_media(tree: FileTree, names: list[str], found: IssiaFolder) -> None:
     for name in names:
         place = PurePosixPath(name)
         suffix = place.suffix.lower()
-        if suffix in _VIDEO_SUFFIXES and _VIDEO.fullmatch(place.stem):
+        if suffix in VIDEO_SUFFIXES and _VIDEO.fullmatch(place.stem):
             camera = camera_number(place.stem)
             # A video is opened as a file of this machine.
             if camera is not None and isinstance(tree, FolderTree):

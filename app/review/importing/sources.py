@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, get_args
 
 from app.config import Settings
@@ -12,8 +13,9 @@ from app.datasets.coco_reader import read_coco
 from app.datasets.file_tree import Limits, Root
 from app.datasets.format_names import ImportFormat
 from app.datasets.frame_list import read_frame_list
+from app.datasets.frames_reader import read_frames
 from app.datasets.gamestate_reader import read_gamestate
-from app.datasets.guess_format import guess_format
+from app.datasets.guess_format import guess_format, holds_videos_alone
 from app.datasets.issia_3d_reader import open_issia_3d
 from app.datasets.issia_reader import IssiaFolder, IssiaOptions, open_issia
 from app.datasets.parquet_reader import read_parquet
@@ -22,6 +24,7 @@ from app.datasets.sn_calibration import DEFAULT_SIZE
 from app.datasets.sn_calibration_reader import read_sn_calibration
 from app.datasets.soccernet_v3_reader import read_soccernet_v3
 from app.datasets.soccernet_v3d_reader import read_soccernet_v3d
+from app.errors import DatasetFormatError
 from app.progress import TellProgress
 from app.review.importing.cameras import ingest_cameras
 from app.review.importing.ingest import IngestReport, ingest
@@ -31,10 +34,18 @@ from app.soccer.annotation import Extras
 from app.soccer.frames import ImageSize
 from app.soccer.group import Group
 from app.soccer.policy import PAPER, Policy
+from app.store.image_header import check_size, read_header
 from app.store.store import Store
 
 FORMATS: tuple[str, ...] = get_args(ImportFormat)
 STATIC = ("issia", "issia-3d")
+STILLS_HINT = (
+    "Export stills from it as PNG or JPEG, for example with ffmpeg (ffmpeg -i VIDEO -vf fps=1 "
+    "still_%05d.png) or a video player's snapshot, and import those as frames."
+)
+FRAMES_HINT = (
+    "Import them as frames: each picture becomes a group of one view, to be annotated here."
+)
 
 
 @dataclass(frozen=True)
@@ -103,6 +114,9 @@ class Imported:
         """Why nothing could be imported, naming the file, and what to do about it."""
         source, problems = self.source, self.report.problems
         name = source.shown(str(source.path))
+        if (unannotated := self._unannotated()) is not None:
+            problem, hint = unannotated
+            return f"{name} {problem}", hint
         sentence = f"nothing could be imported from {name} as {source.format}"
         if problems:
             first = source.shown(problems[0].message)
@@ -117,6 +131,23 @@ class Imported:
             f"Check that it is the right file or folder, and that it holds what {source.format} "
             "asks for (docs/formats.md)."
         )
+
+    def _unannotated(self) -> tuple[str, str] | None:
+        """What a source is that nothing was read of, where it has no annotations; what to do."""
+        if self.something:
+            return None
+        if holds_videos_alone(self.source.path):
+            return "holds a video, and recordings are not read yet", STILLS_HINT
+        if self.source.format != "frames" and guess_format(self.source.path) == "frames":
+            return "holds pictures and no annotations", FRAMES_HINT
+        return None
+
+    def _skipped(self) -> list[DatasetFormatError]:
+        """What was left out, and why: of what has no annotations that alone."""
+        unannotated = self._unannotated()
+        if unannotated is None:
+            return self.report.problems
+        return [DatasetFormatError(str(self.source.path), None, None, unannotated[0])]
 
     def values(self) -> dict[str, Any]:
         """Everything that there is to tell, as plain values."""
@@ -139,7 +170,7 @@ class Imported:
                     "field": problem.field,
                     "problem": shown(problem.problem),
                 }
-                for problem in self.report.problems
+                for problem in self._skipped()
             ],
             "more_skipped": self.report.dropped,
             "remarks": [*map(shown, self.report.remarks), *self.result.problems],
@@ -196,7 +227,7 @@ def import_source(
         )
         return Imported(source, report, result)
     folder = _static(source, report, limits) if source.format in STATIC else None
-    groups = _groups(source, report, limits) if folder is None else folder.groups()
+    groups = _groups(source, settings, report, limits) if folder is None else folder.groups()
     if source.frames is not None:
         groups = read_frame_list(source.frames, settings, report, limits).placed(iter(groups))
     check = PictureCheck(report, settings)
@@ -217,7 +248,13 @@ def import_source(
     return Imported(source, report, result)
 
 
-def _groups(source: Source, report: Report, limits: Limits) -> Iterator[Group]:
+def _size_of_picture(settings: Settings, data: bytes, name: str) -> ImageSize:
+    header = read_header(data, name)
+    check_size(header, settings, name)
+    return ImageSize(header.width, header.height)
+
+
+def _groups(source: Source, settings: Settings, report: Report, limits: Limits) -> Iterator[Group]:
     path, calibration = source.path, source.calibration
     match source.format:
         case "soccernet-v3":
@@ -230,6 +267,8 @@ def _groups(source: Source, report: Report, limits: Limits) -> Iterator[Group]:
             return read_coco(path, report, calibration=calibration, limits=limits)
         case "parquet":
             return read_parquet(path, report, limits=limits)
+        case "frames":
+            return read_frames(path, partial(_size_of_picture, settings), report, limits)
         case _:
             size = source.size or DEFAULT_SIZE
             return read_sn_calibration(path, size, report, calibration=calibration, limits=limits)
