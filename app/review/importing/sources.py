@@ -116,7 +116,7 @@ class Imported:
         name = source.shown(str(source.path))
         if (unannotated := self._unannotated()) is not None:
             problem, hint = unannotated
-            return f"{name} {problem}", hint
+            return f"nothing could be imported: {name} {problem}", hint
         sentence = f"nothing could be imported from {name} as {source.format}"
         if problems:
             first = source.shown(problems[0].message)

@@ -214,7 +214,7 @@ class TestImportSource:
             for path in (tmp_path, tmp_path / name):
                 imported = import_source(store, "demo", Source(form, path), store.settings)
                 sentence, advice = imported.nothing_read()
-                assert sentence == f"{path} {problem}", form
+                assert sentence == f"nothing could be imported: {path} {problem}", form
                 assert advice.startswith(hint)
                 (skipped,) = imported.values()["skipped"]
                 assert skipped["problem"] == problem
