@@ -6,13 +6,13 @@ import { useEffect, useRef, useState } from 'preact/hooks';
 
 import { getFolders, postUpload } from '../api/imports.js';
 import { sentenceOf } from '../api/problem.js';
-import { areVideos, chosenFiles, droppedFiles } from '../lib/dropped_files.js';
+import { areVideos, chosenFiles, droppedFiles } from '../lib/local_files.js';
 import { plural } from '../lib/format.js';
 import { useResource } from '../lib/resource.js';
-import { packFiles } from '../lib/zip_pack.js';
+import { packFiles } from '../lib/zip_packing.js';
 
 /** @import {FolderEntry, ImportSource, UploadJson} from '../api/imports.js' */
-/** @import {PathFile} from '../lib/zip_pack.js' */
+/** @import {PathFile} from '../lib/zip_packing.js' */
 
 /** @param {number} bytes */
 export function sizeText(bytes) {

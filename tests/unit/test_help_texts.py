@@ -30,7 +30,7 @@ PLAIN_WORDS = """
     comment comments talk threads mentions bells past deeds window before after
     full tall scroll stalls settling exposure ends many naming tracing local lookup css
     cluster serving hosts executors packing day browser database
-    private kept another smaller
+    private kept another smaller index
     stored tree trees safe path refusal attempt cookie fit
     compiler dialect postgresql sqlite statements transfer triggers
     attempts lived processes shared sharing short shown web

@@ -1,7 +1,7 @@
 // @ts-check
 /** Files that a person dropped or chose, those inside folders too. */
 
-/** @import {PathFile} from './zip_pack.js' */
+/** @import {PathFile} from './zip_packing.js' */
 
 const VIDEO = /\.(mp4|avi|mpe?g|mkv|mov|m4v|m?ts|m2ts|webm|wmv|flv|ogv|3gp)$/i;
 const SYSTEM = /(^|\/)(\.|__MACOSX\/|thumbs\.db$|desktop\.ini$)/i;

@@ -5,8 +5,8 @@ import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { describe, it } from 'node:test';
 
-import { areVideos, chosenFiles } from '../../static/lib/dropped_files.js';
-import { crc32, packFiles } from '../../static/lib/zip_pack.js';
+import { areVideos, chosenFiles } from '../../static/lib/local_files.js';
+import { crc32, packFiles } from '../../static/lib/zip_packing.js';
 
 const bytes = (text) => new TextEncoder().encode(text);
 const given = (path, content = 'x') => ({ path, file: new File([content], path.split('/').at(-1)) });
