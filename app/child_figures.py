@@ -13,6 +13,7 @@ KINDS = (
     "pictures",
     "readers",
     "fetchers",
+    "indexers",
     "previews",
     "large",
     "predictions",

@@ -95,7 +95,7 @@ class View:
         return self.frames.read(self)
 
     def image(self, *, resize: bool = True) -> npt.NDArray[np.uint8]:
-        """The frame, decoded: RGB, shape (height, width, 3).
+        """The frame, decoded and upright: RGB, shape (height, width, 3).
 
         Args:
             resize: To the annotated size, which all pixels here refer to. False: as it is; then
@@ -104,10 +104,13 @@ class View:
         Raises:
             DataError: It is not there, or no picture.
         """
-        image = package("PIL.Image")
+        image, operations = package("PIL.Image"), package("PIL.ImageOps")
         try:
             with image.open(io.BytesIO(self.frame())) as opened:
-                picture = opened.convert("RGB")
+                # Annotations are of the upright picture; a WebP is shown as it is stored.
+                turned = opened.format != "WEBP"
+                upright = operations.exif_transpose(opened) if turned else opened
+                picture = upright.convert("RGB")
         except (OSError, ValueError, image.DecompressionBombError) as error:
             raise DataError(f"the frame of {self.key} is no picture ({error})") from None
         if resize and picture.size != (self.width, self.height):

@@ -60,8 +60,8 @@ def import_(
             "--size",
             parser=parse_size,
             metavar="WxH",
-            help="Size of the annotated images: default 960x540, ISSIA 1920x1080; of cameras the "
-            "size that they were made for, default that of each view.",
+            help="Size of the annotated images: default 960x540, ISSIA as its files say, else "
+            "1920x1080; of cameras the size that they were made for, default that of each view.",
         ),
     ] = None,
     ball_category: Annotated[
@@ -90,7 +90,7 @@ def import_(
     """Read files into a dataset; doing it again changes nothing.
 
     FORMAT is soccernet-v3, soccernet-v3d, issia, issia-3d, sn-calibration, cameras, gamestate,
-    coco, parquet or touchline; docs/formats.md says what each of them holds.
+    coco, parquet, frames (pictures alone) or touchline; docs/formats.md says what each of them holds.
     """
     server = given_server()
     if server is not None:

@@ -70,7 +70,7 @@ def import_values(
 
 
 def _report(result: Mapping[str, Any]) -> dict[str, Any]:
-    hidden = ("dataset", "dry_run", "solve_job", "paint_job")
+    hidden = ("dataset", "dry_run", "solve_job", "paint_job", "proposals_job")
     return {name: value for name, value in result.items() if name not in hidden}
 
 

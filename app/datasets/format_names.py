@@ -14,6 +14,7 @@ ImportFormat = Literal[
     "gamestate",
     "coco",
     "parquet",
+    "frames",
     "touchline",
 ]
 """YOLO labels hold no cameras, lines or groups: they are predictions."""

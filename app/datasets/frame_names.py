@@ -11,11 +11,22 @@ from app.object_store.address import unseal
 from app.soccer.group import Group, View
 
 IMAGE_SUFFIXES = (".jpg", ".jpeg", ".png", ".webp")
+VIDEO_SUFFIXES = (
+    *(".mp4", ".avi", ".mpg", ".mpeg", ".mkv", ".mov"),
+    *(".m4v", ".ts", ".mts", ".m2ts", ".webm", ".wmv", ".flv", ".ogv", ".3gp"),
+)
 FOLDER = "Frames-v3"
 """Beside the labels of a match, where SoccerNet's readers look for loose frames."""
 UNASSIGNED = "unassigned"
 """Stands for the split of groups that are in none."""
 _UNSAFE = re.compile(r"[^A-Za-z0-9._-]+")
+
+
+def is_system_file(name: str) -> bool:
+    """Whether an operating system laid a file beside those of people, as ``Thumbs.db``."""
+    place = PurePosixPath(name)
+    hidden = any(part.startswith(".") or part == "__MACOSX" for part in place.parts)
+    return hidden or place.name.lower() in ("thumbs.db", "desktop.ini")
 
 
 FrameName = Callable[[Group, View, str, str], str]

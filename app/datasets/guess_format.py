@@ -6,8 +6,9 @@ import os
 import re
 from collections.abc import Iterable, Iterator
 from itertools import islice
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 
+from app.datasets.frame_names import IMAGE_SUFFIXES, VIDEO_SUFFIXES, is_system_file
 from app.datasets.safe_path import MAX_PART
 from app.datasets.zip_names import first_names
 from app.object_store.path import StoredPath
@@ -21,7 +22,7 @@ _NAMES: tuple[tuple[str, re.Pattern[str]], ...] = (
     ("soccernet-v3", re.compile(r"Labels-v3\.json")),
     ("gamestate", re.compile(r"Labels-GameState\.json")),
     ("issia-3d", re.compile(r"ISSIA-3D\.csv")),
-    ("issia", re.compile(r".*\.xgtf(?:\.gz)?", re.IGNORECASE)),
+    ("issia", re.compile(r"(?:.*\.xgtf|cam.*\.xml)(?:\.gz)?", re.IGNORECASE)),
     ("parquet", re.compile(r".*\.parquet", re.IGNORECASE)),
     ("coco", re.compile(r"(?:instances_|annotations|(?=.*coco)).*\.json")),
     ("sn-calibration", re.compile(r"(?:\d{1,9}|match_info)\.json")),
@@ -37,12 +38,23 @@ def guess_format(path: Path | StoredPath) -> str | None:
 
 def guess_of_names(found: Iterable[str]) -> str | None:
     """The same of names of files."""
-    parts = (name.rpartition("/")[2] for name in found)
-    names = [part for part in parts if len(part) <= MAX_PART]
+    parts = (name.rpartition("/")[2] for name in found if not is_system_file(name))
+    names = [part for part in parts if 0 < len(part) <= MAX_PART]
     for name, pattern in _NAMES:
         if any(map(pattern.fullmatch, names)):
             return name
-    return None
+    return "frames" if names and _suffixes(names) <= set(IMAGE_SUFFIXES) else None
+
+
+def holds_videos_alone(path: Path | StoredPath) -> bool:
+    """Whether a folder, a zip or a file is a video, or holds nothing but videos and pictures."""
+    names = [name for name in islice(_names(path), MAX_NAMES) if not is_system_file(name)]
+    suffixes = _suffixes(name for name in names if not name.endswith("/"))
+    return bool(suffixes & set(VIDEO_SUFFIXES)) and suffixes <= {*VIDEO_SUFFIXES, *IMAGE_SUFFIXES}
+
+
+def _suffixes(names: Iterable[str]) -> set[str]:
+    return {PurePosixPath(name).suffix.lower() for name in names}
 
 
 def _names(path: Path | StoredPath) -> Iterable[str]:

@@ -15,6 +15,7 @@ from app.datasets.report import Report
 from app.datasets.trees import opened_tree
 from app.datasets.viper_reader import ViperTrack
 from app.errors import DatasetFormatError
+from app.soccer.frames import ImagePoint
 
 _AXES = re.compile(r"x_cam(\d{1,3})", re.ASCII)
 _AXIS = re.compile(r"([xy])_cam(\d{1,3})", re.ASCII)
@@ -110,8 +111,8 @@ def _read_row(
             track.balls.setdefault(frame, []).append(point)
 
 
-def _point(cells: Mapping[str, str], camera: str) -> tuple[float, float] | None:
+def _point(cells: Mapping[str, str], camera: str) -> ImagePoint | None:
     x, y = cells.get(f"x_cam{camera}"), cells.get(f"y_cam{camera}")
     if x is None or y is None or (is_missing(x) and is_missing(y)):
         return None
-    return fields.pixel(x), fields.pixel(y)
+    return ImagePoint(fields.pixel(x), fields.pixel(y))

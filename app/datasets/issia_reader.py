@@ -11,27 +11,28 @@ from typing import Any
 from app.datasets.cameras_reader import cameras_of
 from app.datasets.file_tree import DEFAULT_LIMITS, FileTree, Limits, Root
 from app.datasets.folder_tree import FolderTree
-from app.datasets.frame_names import IMAGE_SUFFIXES
+from app.datasets.frame_names import IMAGE_SUFFIXES, VIDEO_SUFFIXES
 from app.datasets.issia import CALIBRATION, DEFAULT_OFFSET, DEFAULT_SIZE, MATCH, FramePersons
 from app.datasets.report import Report
 from app.datasets.sn_calibration import LineFile
 from app.datasets.sn_calibration_reader import line_files_of, read_line_files
 from app.datasets.trees import opened_tree
-from app.datasets.viper_reader import ViperTrack, read_viper
+from app.datasets.viper_reader import ViperTrack, is_viper, read_viper
 from app.geometry.camera import Camera
 from app.soccer.annotation import BallAnnotation, Extras
-from app.soccer.frames import ImagePoint, ImageSize
+from app.soccer.frames import Box, ImageSize
 from app.soccer.group import Group, Station, View
 from app.soccer.media import Media
 from app.soccer.split import TEST_CAMERAS
 
-_VIDEO_SUFFIXES = (".mp4", ".avi", ".mpg", ".mpeg", ".mkv", ".mov")
 # "Film Role-0 ID-3 T-0 ...", "cam3", "camera_3", "ground_truth_3": what follows says nothing.
 _NUMBERED = (
     re.compile(r"\bID-(\d{1,3})\b", re.ASCII),
     re.compile(r"cam(?:era)?[ _-]?(\d{1,3})(?!\d)", re.ASCII | re.IGNORECASE),
     re.compile(r"(\d{1,3})(?!.*\d)", re.ASCII),
 )
+_XGTF = re.compile(r"\.xgtf(\.gz)?$", re.IGNORECASE)
+_XML = re.compile(r"\.xml(\.gz)?$", re.IGNORECASE)
 _VIDEO = re.compile(r"(?:cam(?:era)?[ _-]?\d{1,3}|Film Role.*\bID-\d{1,3}\b.*)", re.IGNORECASE)
 _OWN_LINES = re.compile(r"lines/cam\d{1,3}\.json", re.ASCII)
 _FRAME = re.compile(r"(?:frame[ _-]?)?(\d{1,9})", re.ASCII | re.IGNORECASE)
@@ -47,14 +48,18 @@ class IssiaOptions:
         flipped: Cameras whose frames are mirrored; annotations and calibration are not.
         lines: Folder (or zip) of ``cam1.json`` .. with the field lines of the static cameras.
         calibration: What counts for a camera that has both: ``given`` or ``lines``.
-        size: Size of the annotated images.
+        size: Size of the annotated images; None: as the XGTF file says, else ISSIA's.
     """
 
     frame_offset: int | Mapping[int, int] = DEFAULT_OFFSET
     flipped: frozenset[int] = frozenset()
     lines: Root | None = None
     calibration: str = "given"
-    size: ImageSize = DEFAULT_SIZE
+    size: ImageSize | None = None
+
+    def size_of(self, track: ViperTrack) -> ImageSize:
+        """Size of the images of a camera."""
+        return self.size or track.size or DEFAULT_SIZE
 
     def offset(self, camera: int) -> int:
         """Offset of one camera."""
@@ -99,7 +104,10 @@ class IssiaFolder:
 
     def _view(self, camera: int, frame: int) -> View:
         track = self.tracks[camera]
-        balls = tuple(BallAnnotation(point=ImagePoint(x, y)) for x, y in track.balls[frame])
+        balls = tuple(
+            BallAnnotation(box=ball) if isinstance(ball, Box) else BallAnnotation(point=ball)
+            for ball in track.balls[frame]
+        )
         notes = track.ball_notes.get(frame)
         extras = Extras(_person_boxes(track, frame), (), {"ball": notes} if notes else {})
         media = self.frames.get((camera, frame))
@@ -132,8 +140,8 @@ def open_issia(
 ) -> IssiaFolder:
     """Read a folder (or zip) once, for its groups and its persons.
 
-    XGTF files (plain or .gz) may lie anywhere below it; the camera's number comes from the
-    file's name. ``issia_calibration.json`` gives the cameras. Line files are those of
+    XGTF files (plain or .gz, ``.xgtf`` or ``.xml``) may lie anywhere below it; the camera's number
+    comes from the file's name, or from those of its sources where it has several. ``issia_calibration.json`` gives the cameras. Line files are those of
     ``options.lines``, else ``lines/cam1.json`` .. of the folder itself.
     """
     found = IssiaFolder()
@@ -158,13 +166,22 @@ def complete(
     """Give each camera that has a track its station and its media."""
     given = _read_given(tree, names, report)
     _find_media(tree, names, found)
-    if options.lines is None:
-        lines = _own_lines(tree, names, options.size, report)
-    else:
-        lines = _read_lines(options.lines, options.size, report, limits)
-    for camera in found.tracks:
-        found.stations[camera] = _station(camera, given.get(camera), lines.get(camera), options)
-    _tell_unused(found, {"camera": list(given), "line file": list(lines)}, report)
+    sizes = {camera: options.size_of(track) for camera, track in found.tracks.items()}
+    lines: dict[int, LineFile] = {}
+    drawn = set[int]()
+    for index, size in enumerate(dict.fromkeys(sizes.values())):
+        # Each file is read for the size of its own camera; what is wrong with it is told once.
+        told = Report() if index else report
+        if options.lines is None:
+            read = _own_lines(tree, names, size, told)
+        else:
+            read = _read_lines(options.lines, size, told, limits)
+        drawn |= read.keys()
+        lines |= {camera: file for camera, file in read.items() if sizes.get(camera) == size}
+    for camera, size in sizes.items():
+        station = _station(camera, given.get(camera), lines.get(camera), options, size)
+        found.stations[camera] = station
+    _tell_unused(found, {"camera": list(given), "line file": list(drawn)}, report)
 
 
 def _tell_unused(found: IssiaFolder, brought: Mapping[str, Sequence[int]], report: Report) -> None:
@@ -176,14 +193,14 @@ def _tell_unused(found: IssiaFolder, brought: Mapping[str, Sequence[int]], repor
             report.remark(f"{what} of {names} not used: there is no ground truth of that camera")
 
 
-def camera_number(name: str) -> int | None:
-    """Number of the camera that a file's name speaks of.
+def camera_number(name: str, *, strict: bool = False) -> int | None:
+    """Number of the camera that a file's name speaks of; ``strict``: not any last number.
 
     Example:
         >>> camera_number("Film Role-0 ID-3 T-0 m00s00-026.xgtf"), camera_number("ground_truth_5")
         (3, 5)
     """
-    for pattern in _NUMBERED:
+    for pattern in _NUMBERED[: -1 if strict else None]:
         found = pattern.search(name)
         if found:
             return int(found[1])
@@ -198,19 +215,63 @@ def _read_tracks(
     report: Report,
     limits: Limits,
 ) -> None:
-    files = [name for name in names if name.lower().endswith((".xgtf", ".xgtf.gz"))]
+    files = [name for name in names if _XGTF.search(name)]
+    for name in (name for name in names if _XML.search(name)):
+        if is_viper(tree, name):
+            files.append(name)
+        else:
+            report.note(tree.shown(name), None, None, "is XML of another kind than XGTF; left out")
     if not files:
         report.note(str(tree.path), None, None, "holds no XGTF file")
     for name in files:
-        stem = re.sub(r"(?i)\.xgtf(\.gz)?$", "", PurePosixPath(name).name)
-        camera = camera_number(stem)
-        if camera is None:
-            report.note(tree.shown(name), None, None, "has no camera number in its name")
-        elif camera in found.tracks:
-            report.note(tree.shown(name), None, None, f"is a second file of camera {camera}")
-        else:
-            track = read_viper(tree, name, report, limits)
-            found.tracks[camera] = _shifted(track, options.offset(camera))
+        shown, stem = tree.shown(name), re.sub(r"(?i)\.\w+(\.gz)?$", "", PurePosixPath(name).name)
+        for camera, track in _cameras(stem, read_viper(tree, name, report, limits), shown, report):
+            if camera is None:
+                report.note(shown, None, None, "has no camera number in its name")
+            elif camera in found.tracks:
+                report.note(shown, None, None, f"is a second file of camera {camera}")
+            else:
+                found.tracks[camera] = _shifted(track, options.offset(camera))
+                _compare_sizes(camera, track, shown, options, report)
+
+
+def _cameras(
+    stem: str, tracks: list[ViperTrack], shown: str, report: Report
+) -> Iterator[tuple[int | None, ViperTrack]]:
+    """Each source of a file with the number of its camera.
+
+    One source is that of the file. Of several each must name its own camera; where they do not,
+    the first is that of the file, and the others are reported.
+    """
+    named = [camera_number(_stem(track.source), strict=True) for track in tracks]
+    if len(tracks) > 1 and None not in named and len(set(named)) == len(named):
+        yield from zip(named, tracks, strict=True)
+        return
+    yield camera_number(stem), tracks[0]
+    for number, track in enumerate(tracks[1:], 2):
+        report.note(
+            shown,
+            f"source {number} ({track.source})",
+            None,
+            f"is left out with {track.ball_points} balls and {track.person_boxes} persons: no name "
+            "of a camera in it tells it from the first source",
+        )
+
+
+def _stem(name: str) -> str:
+    return PurePosixPath(name.replace("\\", "/")).stem
+
+
+def _compare_sizes(
+    camera: int, track: ViperTrack, shown: str, options: IssiaOptions, report: Report
+) -> None:
+    """Say which size counts where file and options differ."""
+    size = options.size_of(track)
+    if track.size is not None and track.size != size:
+        report.remark(
+            f"{shown}: the file says {track.size.width} x {track.size.height} for camera {camera}, "
+            f"and {size.width} x {size.height} was asked for (--size), which is used."
+        )
 
 
 def _shifted(track: ViperTrack, offset: int) -> ViperTrack:
@@ -218,6 +279,8 @@ def _shifted(track: ViperTrack, offset: int) -> ViperTrack:
         {frame - offset: points for frame, points in track.balls.items()},
         {frame - offset: boxes for frame, boxes in track.persons.items()},
         {frame - offset: notes for frame, notes in track.ball_notes.items()},
+        track.source,
+        track.size,
     )
 
 
@@ -270,11 +333,15 @@ def _by_camera(files: Iterator[LineFile], side: Report, report: Report) -> dict[
 
 
 def _station(
-    camera: int, given: Camera | None, lines: LineFile | None, options: IssiaOptions
+    camera: int,
+    given: Camera | None,
+    lines: LineFile | None,
+    options: IssiaOptions,
+    size: ImageSize,
 ) -> Station:
     return Station(
         key=f"cam{camera}",
-        size=options.size,
+        size=size,
         shared=True,
         lines=lines.lines if lines else {},
         given=given,
@@ -293,7 +360,7 @@ def _find_media(tree: FileTree, names: list[str], found: IssiaFolder) -> None:
     for name in names:
         place = PurePosixPath(name)
         suffix = place.suffix.lower()
-        if suffix in _VIDEO_SUFFIXES and _VIDEO.fullmatch(place.stem):
+        if suffix in VIDEO_SUFFIXES and _VIDEO.fullmatch(place.stem):
             camera = camera_number(place.stem)
             # A video is opened as a file of this machine.
             if camera is not None and isinstance(tree, FolderTree):

@@ -9,7 +9,7 @@ from itertools import islice
 from pathlib import PurePosixPath
 
 from app.datasets.file_tree import BROKEN, FileTree, Root
-from app.datasets.frame_names import IMAGE_SUFFIXES
+from app.datasets.frame_names import IMAGE_SUFFIXES, VIDEO_SUFFIXES
 from app.datasets.guess_format import guess_format
 from app.datasets.report import Report
 from app.datasets.trees import opened_tree
@@ -18,7 +18,6 @@ from app.errors import ReviewError
 MAX_FILES = 40
 """Files of which the beginning is read."""
 HEAD_BYTES = 64 * 1024
-VIDEO_SUFFIXES = (".mp4", ".mkv", ".avi", ".mov", ".mpg", ".mpeg", ".ts", ".webm")
 CONVERT = "Touchline does not import that; export it as COCO from your tool and import that"
 YOLO = (
     "they hold no cameras and no groups; export COCO from your tool, or give predictions to "

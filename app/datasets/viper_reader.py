@@ -1,4 +1,4 @@
-"""ViPER XGTF ground truth: the ball's centre and boxes of people, per frame of one camera."""
+"""ViPER XGTF ground truth: the ball and boxes of people, per frame of one camera."""
 
 from __future__ import annotations
 
@@ -6,7 +6,9 @@ import gzip
 import re
 import zipfile
 import zlib
-from dataclasses import dataclass, field
+from collections import Counter
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from typing import IO, Any
 from xml.etree.ElementTree import Element, ParseError
 
@@ -18,6 +20,7 @@ from app.datasets.file_tree import DEFAULT_LIMITS, FileTree, Limits
 from app.datasets.report import Report
 from app.errors import DatasetFormatError
 from app.finite import quoted
+from app.soccer.frames import Box, ImagePoint, ImageSize
 
 MAX_SPAN = 10_000
 """Most frames that one framespan may cover; ISSIA's longest covers its 3,029 frames."""
@@ -32,30 +35,39 @@ MAX_QUIET = 1_000_000
 """Most bytes between two elements; an entry has a hundred."""
 
 _SPAN = re.compile(r"(\d{1,9}):(\d{1,9})", re.ASCII)
-_DATA = "{http://lamp.cfar.umd.edu/viperdata#}"
-_VIPER = "{http://lamp.cfar.umd.edu/viper#}"
+_BALLS = frozenset({"ball", "football", "soccerball", "sportsball", "matchball"})
+"""Names of objects that are the ball, by their letters alone: BALL, Soccer-Ball, ball_1."""
+_PERSONS = frozenset({"person"})
+_SHAPES = "balls are read as point, bbox or circle, people as bbox of an object Person"
+_SIZES = ("H-FRAME-SIZE", "V-FRAME-SIZE")
+_MAX_SIDE = 65_535
+_MAX_KINDS = 100
+"""Kinds of entries left out that are named each for itself."""
+_HEAD = 64 * 1024
 _BROKEN = (EOFError, zlib.error, zipfile.BadZipFile, RuntimeError, OSError)
 
 
 @dataclass
 class ViperTrack:
-    """What one XGTF file says, by its own frame numbers.
+    """What one source (video) of an XGTF file says, by its own frame numbers.
 
     Attributes:
-        balls: Centres of the ball per frame, pixels.
+        balls: Balls per frame, pixels: centres, or boxes where boxes or circles were drawn.
         persons: Per frame: (id, x, y, width, height) of each person, pixels.
         ball_notes: Per frame: the ball's other attributes, as text.
-        entries: Number of entries read, one for each frame of a framespan.
+        source: Name of the video, as the file has it.
+        size: Of its frames, where the file says it.
     """
 
-    balls: dict[int, list[tuple[float, float]]] = field(default_factory=dict)
+    balls: dict[int, list[ImagePoint | Box]] = field(default_factory=dict)
     persons: dict[int, list[tuple[str, float, float, float, float]]] = field(default_factory=dict)
     ball_notes: dict[int, dict[str, str]] = field(default_factory=dict)
-    entries: int = 0
+    source: str = ""
+    size: ImageSize | None = None
 
     @property
     def ball_points(self) -> int:
-        """Number of annotated ball points."""
+        """Number of annotated balls."""
         return sum(map(len, self.balls.values()))
 
     @property
@@ -64,37 +76,46 @@ class ViperTrack:
         return sum(map(len, self.persons.values()))
 
 
+def is_viper(tree: FileTree, name: str) -> bool:
+    """Whether a file begins as XGTF does, whatever its ending."""
+    try:
+        with tree.open(name) as stream:
+            packed = name.lower().endswith(".gz")
+            head = (gzip.GzipFile(fileobj=stream) if packed else stream).read(_HEAD)
+    except (DatasetFormatError, *_BROKEN):
+        return False
+    return re.search(rb"<([\w.-]+:)?viper[\s>]", head) is not None
+
+
 def read_viper(
     tree: FileTree, name: str, report: Report, limits: Limits = DEFAULT_LIMITS
-) -> ViperTrack:
-    """The annotations of one XGTF file, plain or ``.gz``.
+) -> list[ViperTrack]:
+    """The annotations of one XGTF file, plain or ``.gz``: one track for each source, at least one.
 
     A DTD, and with it every entity, is refused. A damaged file keeps what was read before the
-    damage, and says so. Numbers that are blank or wrong lose their own entry alone.
+    damage, and says so. Numbers that are blank or wrong lose their own entry alone. Objects and
+    shapes that are not read are counted and named. Elements count by their names alone, under
+    whatever namespace.
     """
     shown = tree.shown(name)
-    track = ViperTrack()
+    reader = _Reader(shown, report)
     try:
         with tree.open(name) as stream:
             packed = name.lower().endswith(".gz")
             opened = gzip.GzipFile(fileobj=stream) if packed else stream
-            _read_objects(_Capped(opened, limits.file_bytes, shown), track, shown, report)
+            reader.read(_Capped(opened, limits.file_bytes, shown))
     except DatasetFormatError as error:
         report.skip(error)
     except DefusedXmlException:
         report.note(shown, None, None, "holds a DTD or an entity, which is refused")
     except ParseError as error:
         place = f"line {error.position[0]}"
-        report.note(shown, None, place, f"is not sound XML from here on; {_so_far(track)}")
+        report.note(shown, None, place, f"is not sound XML from here on; {reader.so_far}")
     except (LookupError, ValueError) as error:
         report.note(shown, None, None, f"is in an encoding that cannot be read ({error})")
     except _BROKEN:
-        report.note(shown, None, None, f"is damaged or cut off; {_so_far(track)}")
-    return track
-
-
-def _so_far(track: ViperTrack) -> str:
-    return f"{track.ball_points} ball points and {track.person_boxes} persons before it are kept"
+        report.note(shown, None, None, f"is damaged or cut off; {reader.so_far}")
+    return reader.finish()
 
 
 class _Capped:
@@ -121,64 +142,174 @@ class _Capped:
         return content
 
 
-def _read_objects(stream: _Capped, track: ViperTrack, shown: str, report: Report) -> None:
-    open_elements: list[Element] = []
-    for event, element in iterparse(stream, events=("start", "end"), forbid_dtd=True):
-        stream.quiet = 0
-        if event == "start":
-            open_elements.append(element)
-            continue
-        open_elements.pop()
-        if element.tag.startswith(_DATA):
-            _read_entry(element, open_elements, track, shown, report)
-        if open_elements:
-            # What was read is let go, or a long file would stay in memory.
-            del open_elements[-1][:]
+class _Reader:
+    """One file on its way to tracks."""
 
+    def __init__(self, shown: str, report: Report):
+        self.tracks = [ViperTrack()]
+        self._shown, self._report = shown, report
+        self._sources = self._entries = self._frames = 0
+        self._left_out: Counter[tuple[str, str]] = Counter()
 
-def _read_entry(
-    item: Element, inside: list[Element], track: ViperTrack, shown: str, report: Report
-) -> None:
-    """One ``data:...`` element of an attribute of an object."""
-    if len(inside) < 2 or inside[-2].tag != _VIPER + "object":
-        return
-    thing, attribute = inside[-2], inside[-1].get("name", "")
-    kind, identity = thing.get("name", "").strip().upper(), thing.get("id", "?")[:20]
-    if kind not in ("BALL", "PERSON"):
-        return
-    try:
-        frames = _frames(item.get("framespan"))
-        track.entries += len(frames)
-        if track.entries > MAX_ENTRIES:
-            raise DatasetFormatError(shown, None, None, f"holds more than {MAX_ENTRIES:,} entries")
-        _read_item(kind, attribute, item, frames, identity, track)
-    except ValueError as error:
-        where = f"framespan {item.get('framespan', '')[:40]}"
-        report.note(shown, f"{kind.title()} {identity}", where, str(error))
+    @property
+    def so_far(self) -> str:
+        """What is kept of a file that goes no further, in words."""
+        balls = sum(track.ball_points for track in self.tracks)
+        persons = sum(track.person_boxes for track in self.tracks)
+        return f"{balls} ball points and {persons} persons before it are kept"
 
+    def read(self, stream: _Capped) -> None:
+        """Element by element."""
+        open_elements: list[Element] = []
+        for event, element in iterparse(stream, events=("start", "end"), forbid_dtd=True):
+            stream.quiet = 0
+            if event == "start":
+                if _local(element) == "sourcefile":
+                    self._begin_source(element.get("filename", "")[:200])
+                open_elements.append(element)
+                continue
+            open_elements.pop()
+            if len(open_elements) > 1 and _local(open_elements[-1]) == "attribute":
+                self._read_entry(element, open_elements[-1], open_elements[-2])
+            if open_elements:
+                # What was read is let go, or a long file would stay in memory.
+                del open_elements[-1][:]
 
-def _read_item(
-    kind: str, attribute: str, item: Element, frames: list[int], identity: str, track: ViperTrack
-) -> None:
-    if kind == "BALL" and item.tag == _DATA + "point":
-        point = (_pixel(item, "x"), _pixel(item, "y"))
-        if len(track.balls) + len(frames) > MAX_FRAMES:
-            fresh = sum(frame not in track.balls for frame in frames)
-            if len(track.balls) + fresh > MAX_FRAMES:
-                raise ValueError(f"is beyond {MAX_FRAMES:,} frames with a ball")
+    def finish(self) -> list[ViperTrack]:
+        """The tracks; reports what was not read, a line for each kind of object and shape."""
+        for (name, what), count in self._left_out.items():
+            entries = "1 entry is" if count == 1 else f"{count:,} entries are"
+            self._report.note(self._shown, f"object {name}", what, f"{entries} left out: {_SHAPES}")
+
+        for track in self.tracks:
+            if track.size is not None and not track.size.width * track.size.height:
+                track.size = None
+        return self.tracks
+
+    def _begin_source(self, name: str) -> None:
+        self._sources += 1
+        if self._sources > 1:
+            self.tracks.append(ViperTrack())
+        self.tracks[-1].source = name
+
+    def _read_entry(self, item: Element, attribute: Element, owner: Element) -> None:
+        """One ``data:...`` element of an attribute of an object, or of the file itself."""
+        name = attribute.get("name", "")
+        if _local(owner) == "file" and name in _SIZES:
+            self._read_side(name, item)
+        if _local(owner) != "object":
+            return
+        kind, identity = owner.get("name", "").strip()[:80], owner.get("id", "?")[:20]
+        letters = _letters(kind)
+        is_ball, shape = letters in _BALLS, _local(item)
+        # What has no framespan of its own holds as long as its object does.
+        span = item.get("framespan", owner.get("framespan"))
+        try:
+            if is_ball and shape in ("point", "bbox", "circle"):
+                self._add_ball(_ball(item, shape), self._counted(span))
+            elif is_ball and "value" in item.attrib:
+                for frame in self._counted(span):
+                    notes = self.tracks[-1].ball_notes.setdefault(frame, {})
+                    notes[name[:80]] = item.get("value", "")[:200]
+            elif letters in _PERSONS and shape == "bbox":
+                box, frames = _box(item), self._counted(span)
+                for frame in frames:
+                    self.tracks[-1].persons.setdefault(frame, []).append((identity, *box))
+            else:
+                self._leave_out(kind, f"{name[:80]}, {shape[:20]}")
+        except ValueError as error:
+            where = f"framespan {(span or '')[:40]}"
+            self._report.note(self._shown, f"{kind.title()} {identity}", where, str(error))
+
+    def _leave_out(self, kind: str, what: str) -> None:
+        key = (kind, what)
+        if key not in self._left_out and len(self._left_out) >= _MAX_KINDS:
+            key = ("of other names", "")
+        self._left_out[key] += 1
+
+    def _counted(self, span: str | None) -> list[int]:
+        """Frames of a framespan, counted against the limit of a file."""
+        frames = _frames(span)
+        self._entries += len(frames)
+        if self._entries > MAX_ENTRIES:
+            problem = f"holds more than {MAX_ENTRIES:,} entries"
+            raise DatasetFormatError(self._shown, None, None, problem)
+        return frames
+
+    def _add_ball(self, ball: ImagePoint | Box, frames: list[int]) -> None:
+        balls = self.tracks[-1].balls
+        fresh = sum(frame not in balls for frame in frames)
+        if self._frames + fresh > MAX_FRAMES:
+            raise ValueError(f"is beyond {MAX_FRAMES:,} frames with a ball")
+        self._frames += fresh
         for frame in frames:
-            points = track.balls.setdefault(frame, [])
-            if point not in points:
-                points.append(point)
-    elif kind == "PERSON" and item.tag == _DATA + "bbox":
-        x, y, width, height = (_pixel(item, name) for name in ("x", "y", "width", "height"))
-        if width < 0 or height < 0:
-            raise ValueError("has a negative width or height")
-        for frame in frames:
-            track.persons.setdefault(frame, []).append((identity, x, y, width, height))
-    elif kind == "BALL" and "value" in item.attrib:
-        for frame in frames:
-            track.ball_notes.setdefault(frame, {})[attribute[:80]] = item.get("value", "")[:200]
+            _put_ball(balls.setdefault(frame, []), ball)
+
+    def _read_side(self, name: str, item: Element) -> None:
+        text = item.get("value", "").strip()
+        if not text:
+            return
+        try:
+            side = fields.whole(text)
+        except ValueError:
+            side = 0
+        if not 1 <= side <= _MAX_SIDE:
+            self._report.note(
+                self._shown, name, "value", f"{quoted(text, 40)} is no size; left out"
+            )
+            return
+        size = self.tracks[-1].size or ImageSize(0, 0)
+        is_width = name == _SIZES[0]
+        self.tracks[-1].size = replace(size, **{"width" if is_width else "height": side})
+
+
+def _local(element: Element) -> str:
+    """Name of an element without its namespace."""
+    return element.tag.rpartition("}")[2]
+
+
+@lru_cache(maxsize=100)
+def _letters(name: str) -> str:
+    return re.sub(r"[^a-z]", "", name.lower())
+
+
+def _put_ball(balls: list[ImagePoint | Box], ball: ImagePoint | Box) -> None:
+    """Add a ball to those of its frame, unless it is there: a centre inside a box is that ball's,
+    and says where it is more exactly."""
+    for index, known in enumerate(balls):
+        if known == ball or (isinstance(ball, Box) and _is_inside(known, ball)):
+            return
+        if _is_inside(ball, known):
+            balls[index] = ball
+            return
+    balls.append(ball)
+
+
+def _is_inside(point: ImagePoint | Box, box: ImagePoint | Box) -> bool:
+    if isinstance(point, Box) or not isinstance(box, Box):
+        return False
+    return 0 <= point.x - box.x <= box.width and 0 <= point.y - box.y <= box.height
+
+
+def _ball(item: Element, shape: str) -> ImagePoint | Box:
+    if shape == "bbox":
+        box = Box(*_box(item))
+        # A box without area is the ball's centre alone.
+        return box if box.width > 0 and box.height > 0 else box.center
+    point = ImagePoint(_pixel(item, "x"), _pixel(item, "y"))
+    if shape == "point":
+        return point
+    radius = _pixel(item, "radius")
+    if radius < 0:
+        raise ValueError("has a negative radius")
+    return Box.square(point, 2 * radius) if radius > 0 else point
+
+
+def _box(item: Element) -> tuple[float, float, float, float]:
+    x, y, width, height = (_pixel(item, name) for name in ("x", "y", "width", "height"))
+    if width < 0 or height < 0:
+        raise ValueError("has a negative width or height")
+    return x, y, width, height
 
 
 def _pixel(item: Element, name: str) -> float:

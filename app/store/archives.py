@@ -40,20 +40,24 @@ class Archives:
             TooLargeError: The member is larger than ``limit`` bytes, whatever it declares.
             ImageError: The archive or the member is damaged.
         """
+        data = self.head(path, member, limit + 1)
+        if len(data) > limit:
+            raise TooLargeError(f"{path.name}/{member} is larger than {limit} bytes")
+        return data
+
+    def head(self, path: _Place, member: str, count: int) -> bytes:
+        """The first bytes of a member, so many at most; raises NotFoundError and ImageError."""
         archive, name = self._find(path, member)
         try:
             # ZipFile locks its own file.
             with archive.open(name) as file:
-                data = file.read(limit + 1)
+                return file.read(count)
         except KeyError as error:
             raise NotFoundError(f"{path.name} has no member {member}") from error
         except (zipfile.BadZipFile, EOFError, OSError, ValueError, RuntimeError) as error:
             raise ImageError(f"{path.name}/{member} cannot be read: {error}") from error
         except NotImplementedError as error:
             raise ImageError(f"{path.name}/{member} is compressed in an unknown way") from error
-        if len(data) > limit:
-            raise TooLargeError(f"{path.name}/{member} is larger than {limit} bytes")
-        return data
 
     def facts(self, path: Path, member: str) -> tuple[int, int]:
         """Size and CRC-32 of a member, as the archive's directory says."""

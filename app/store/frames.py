@@ -9,7 +9,7 @@ from __future__ import annotations
 import threading
 from collections import OrderedDict
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from math import inf
 from time import monotonic
@@ -23,7 +23,15 @@ from app.config import Settings
 from app.errors import ImageError, OverloadedError, ReviewError, StorageError, TooLargeError
 from app.soccer.media import Media
 from app.store.image_header import JPEG
-from app.store.media import cached_frame, content_type, frame_name, frame_stamp, read_frame
+from app.store.media import (
+    cached_frame,
+    content_type,
+    frame_name,
+    frame_stamp,
+    has_index,
+    read_frame,
+    video_times,
+)
 from app.store.neighbours import neighbours
 from app.store.object_frames import fetch_frame, is_kept, is_stored
 
@@ -37,6 +45,9 @@ FETCHING = Allowance(memory=1024 * 2**20, processor=20.0, silence=120.0)
 """For one frame of an object store; the time that a store may take is a setting of it."""
 FETCHERS = 2
 """Frames that are fetched from stores at once; apart, so that a slow store delays no other frame."""
+INDEXING = Allowance(memory=1024 * 2**20, processor=3600.0, silence=3600.0)
+"""For decoding a whole video once, so that its frames are found: 1080p takes 4 ms a frame."""
+INDEXERS = 1
 WAITING = 64
 """Pictures that may wait; one more is told to come back."""
 REMEMBERED = 256
@@ -76,6 +87,7 @@ class Frames:
         )
         self._readers = ChildPool(READING, READERS, WAITING, "pictures", FIGURES["readers"])
         self._fetchers = ChildPool(FETCHING, FETCHERS, WAITING, "pictures", FIGURES["fetchers"])
+        self._indexers = ChildPool(INDEXING, INDEXERS, WAITING, "videos", FIGURES["indexers"])
         self._refused: OrderedDict[str, tuple[ReviewError, float]] = OrderedDict()
         self._lock = threading.Lock()
 
@@ -95,9 +107,10 @@ class Frames:
         return None if data is None else SentPicture.of(JPEG, data)
 
     def ask_fetch(self, media: Media) -> PoolTask | None:
-        """Have a frame brought to this disk; None where it is there, and lies in no store.
+        """Have a frame made ready; None where it is: one of a store is brought to this disk, and
+        the video of one is indexed.
 
-        Its future may have the errors of ``fetch_frame``.
+        Its future may have the errors of ``fetch_frame`` and ``video_times``.
 
         Raises:
             OverloadedError: Too many wait.
@@ -131,13 +144,14 @@ class Frames:
         Raises:
             OverloadedError: Too many wait.
         """
-        return self._pool.submit(neighbours, media, group, static)
+        return self._pool.submit(neighbours, media, group, static, self._settings)
 
     def close(self) -> None:
         """End the processes."""
         self._pool.close()
         self._readers.close()
         self._fetchers.close()
+        self._indexers.close()
 
     def ask_of(
         self, media: Media, flipped: bool, work: Callable[..., Any], *arguments: Any
@@ -169,6 +183,8 @@ class Frames:
         return self._readers.submit(work, *arguments, self._settings)
 
     def _fetch(self, media: Media, *, bounded: bool) -> PoolTask | None:
+        if media.frame is not None:
+            return self._index(media, bounded=bounded)
         if not is_stored(media) or is_kept(media, self._settings):
             return None
 
@@ -177,6 +193,17 @@ class Frames:
 
         return self._fetchers.submit(
             fetch_frame, media, self._settings, explain=explain, bounded=bounded
+        )
+
+    def _index(self, media: Media, *, bounded: bool) -> PoolTask | None:
+        if has_index(media, self._settings):
+            return None
+
+        def explain(error: ChildEnded) -> ReviewError:
+            return refused_picture(frame_name(replace(media, frame=None)), error)
+
+        return self._indexers.submit(
+            index_video, media, self._settings, explain=explain, bounded=bounded
         )
 
     def _submit(self, media: Media, width: int | None, flipped: bool, *, bounded: bool) -> PoolTask:
@@ -225,6 +252,12 @@ def make_picture(media: Media, width: int | None, flipped: bool, settings: Setti
     """A picture, made in this process."""
     data = read_frame(media, width, flipped, settings)
     return SentPicture.of(content_type(data), data)
+
+
+def index_video(media: Media, settings: Settings) -> bool:
+    """Make the index of a video, in this process."""
+    video_times(media, settings)
+    return True
 
 
 def ready() -> None:

@@ -1,4 +1,5 @@
-"""What an image says of itself, read before anything is decoded: its size, and how often it is drawn.
+"""What an image says of itself, read before anything is decoded: its size and orientation, and how
+often it is drawn.
 
 A small file can declare a picture that takes gigabytes or minutes to decode, so this decides first.
 """
@@ -22,6 +23,10 @@ _KINDS = {"JPEG": JPEG, "MPO": JPEG, "PNG": PNG, "WEBP": WEBP}
 """By Pillow's names; a JPEG with further pictures behind it is one of MPO."""
 _BROKEN = (OSError, SyntaxError, ValueError, IndexError, KeyError, EOFError, struct.error)
 """What Pillow raises over a damaged header."""
+SIDEWAYS = (5, 6, 7, 8)
+"""Orientations whose stored pixels lie on their side."""
+_ORIENTATION = (0x0112, 3, 1)
+"""Tag, type (a short) and count of the entry."""
 MAX_SCANS = 100
 """Of a JPEG; each goes through the whole picture, and a progressive one has about ten."""
 _SCAN, _END = b"\xda", b"\xd9"
@@ -35,15 +40,25 @@ Image.MAX_IMAGE_PIXELS = None
 
 @dataclass(frozen=True)
 class ImageHeader:
-    """Kind (media type) and declared size in pixels."""
+    """What an image declares.
+
+    Attributes:
+        kind: Media type.
+        width, height: Size in pixels as people see the picture, upright.
+        orientation: Of the stored pixels, as EXIF counts (1 to 8); 1: they are stored upright.
+    """
 
     kind: str
     width: int
     height: int
+    orientation: int = 1
 
 
 def read_header(data: bytes, name: str = "the image") -> ImageHeader:
-    """Kind and size of an image; nothing is decoded.
+    """Kind, size and orientation of an image; nothing is decoded.
+
+    Orientation counts where browsers apply it: in a JPEG, and in a PNG before its pixels. They
+    show a WebP as it is stored.
 
     Args:
         data: Its bytes.
@@ -54,11 +69,34 @@ def read_header(data: bytes, name: str = "the image") -> ImageHeader:
     """
     try:
         with Image.open(BytesIO(data), formats=("JPEG", "PNG", "WEBP")) as image:
-            return ImageHeader(_KINDS[image.format or ""], *image.size)
+            kind, (width, height) = _KINDS[image.format or ""], image.size
+            exif = b"" if kind == WEBP else image.info.get("exif", b"")
     except _BROKEN as error:
         known = data.startswith((b"\xff\xd8\xff", b"\x89PNG", b"RIFF"))
         problem = "is damaged in its header" if known else "is no JPEG, PNG or WebP image"
         raise ImageError(f"{name} {problem}") from error
+    orientation = _orientation(exif)
+    if orientation in SIDEWAYS:
+        width, height = height, width
+    return ImageHeader(kind, width, height, orientation)
+
+
+def _orientation(exif: bytes) -> int:
+    """The orientation that a block of EXIF declares; 1 where it declares none that counts."""
+    tiff = exif.removeprefix(b"Exif\0\0")
+    order = {b"II*\0": "<", b"MM\0*": ">"}.get(tiff[:4])
+    if order is None:
+        return 1
+    try:
+        (first,) = struct.unpack_from(f"{order}I", tiff, 4)
+        (count,) = struct.unpack_from(f"{order}H", tiff, first)
+        for number in range(count):
+            entry = struct.unpack_from(f"{order}HHIH", tiff, first + 2 + 12 * number)
+            if entry[:3] == _ORIENTATION:
+                return entry[3] if 1 <= entry[3] <= 8 else 1
+    except struct.error:
+        pass
+    return 1
 
 
 def check_size(header: ImageHeader, settings: Settings, name: str = "the image") -> None:

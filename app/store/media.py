@@ -6,6 +6,7 @@ import contextlib
 import hashlib
 import os
 import stat
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -20,15 +21,21 @@ from app.errors import ImageError, NotFoundError, StorageError, TooLargeError
 from app.object_store.address import unseal
 from app.soccer.media import Media
 from app.store.archives import Archives
-from app.store.image_header import JPEG, ImageHeader, check_scans, check_size, read_header
+from app.store.image_header import JPEG, SIDEWAYS, ImageHeader, check_scans, check_size, read_header
 from app.store.object_frames import is_stored, read_object
 from app.store.video import open_video
+from app.store.video_index import Times, frame_at, kept_index, make_index
 
 JPEG_QUALITY = 88
 LINK_HINT = "Put the file itself there, or import the folder again."
 _ARCHIVES = Archives()
 _FLAGS = cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION
-"""Annotations were made on the pixels as stored, so no note about rotation counts."""
+"""Pixels as stored; ``_upright`` turns them as the header says, for OpenCV and browsers differ."""
+_CACHE_VERSION = 2
+"""Raised when the picture made of the same file is another one. 2: EXIF orientation is applied, and
+frames of videos are found by their times."""
+_HEADS = (16 * 1024, 1024 * 1024)
+"""Bytes in which a header is looked for; a JPEG may have a small picture and a profile before it."""
 _DECODED_BYTES = 6
 """Of a pixel while it is decoded: three channels of 16 bits at most."""
 
@@ -43,7 +50,8 @@ def read_frame(media: Media, width: int | None, flipped: bool, settings: Setting
         settings: Limits, and the folder of the cache.
 
     Returns:
-        The file's own bytes where nothing is to be done to them, else a JPEG.
+        The file's own bytes where nothing is to be done to them, else a JPEG. It is upright
+        without any EXIF, so that readers that ignore EXIF show it as it was annotated.
 
     Raises:
         NotFoundError: The file, member or video frame is not there.
@@ -52,7 +60,11 @@ def read_frame(media: Media, width: int | None, flipped: bool, settings: Setting
     """
     _require_contained(media, settings)
     if media.frame is None and width is None and not flipped:
-        return _checked(_source(media, settings), settings, frame_name(media))
+        data, name = _source(media, settings), frame_name(media)
+        if read_header(data, name).orientation == 1:
+            # They are sent once they were seen to decode.
+            _pixels(data, settings, name)
+            return data
     found = cached_frame(media, width, flipped, settings)
     if found is not None:
         return found
@@ -82,13 +94,16 @@ def read_pixels(
     """
     _require_contained(media, settings)
     if media.frame is not None:
-        picture = _video_frame(Path(media.path), media.frame, settings)
+        picture = _video_frame(media, settings)
         digest = digest_of(np.ascontiguousarray(picture).tobytes())
     else:
-        data = _source(media, settings)
+        data, name = _source(media, settings), frame_name(media)
         digest = digest_of(data)
+        if read_header(data, name).orientation != 1:
+            # What was once read of the stored pixels, under the plain digest, is read again.
+            digest = digest_of(f"{digest} upright".encode())
         if digest != known:
-            picture = _pixels(data, settings, frame_name(media))
+            picture = _pixels(data, settings, name)
     if digest == known:
         return digest, None
     return digest, _as_annotated(picture, flipped)
@@ -131,12 +146,75 @@ def content_type(data: bytes) -> str:
     return read_header(data).kind
 
 
+def picture_header(media: Media) -> ImageHeader | None:
+    """Size and orientation of a frame on this disk, from the beginning of its file.
+
+    None where it lies in an object store, cannot be read, or says nothing there.
+    """
+    if is_stored(media):
+        return None
+    try:
+        if media.frame is not None:
+            return _video_header(Path(media.path))
+        for count in _HEADS:
+            with contextlib.suppress(ImageError):
+                return read_header(_head(media, count))
+    except (NotFoundError, ImageError, StorageError):
+        pass
+    return None
+
+
 def frame_name(media: Media) -> str:
     """How a complaint calls a frame: by its file and its place in it, without the folder."""
     file = Path(unseal(media.path)[0]).name
     if media.member is not None:
         return f"frame {media.member} of {file}"
     return f"frame {file}" if media.frame is None else f"frame {media.frame} of {file}"
+
+
+def video_times(media: Media, settings: Settings) -> Times:
+    """When each frame of a view's video is shown; decoded where no index is kept.
+
+    Raises:
+        NotFoundError: The video is not there.
+        ImageError: It is no video that can be read.
+        TooLargeError: It is larger than the limits, in pixels or frames.
+    """
+    _require_contained(media, settings)
+    path, stamp = Path(media.path), _video_stamp(media)
+    known = kept_index(stamp, settings)
+    if known is not None:
+        return known
+    check_size(_video_header(path), settings, path.name)
+    return make_index(path, stamp, settings)
+
+
+def video_length(media: Media) -> int:
+    """How many frames a view's video promises to have, which is a guess.
+
+    Raises:
+        NotFoundError: The video is not there.
+        ImageError: It is no video that can be read.
+    """
+    path = Path(media.path)
+    _stat(path)
+    with open_video(path) as video:
+        if not video.isOpened():
+            raise ImageError(f"{path.name} is no video that can be read")
+        return int(video.get(cv2.CAP_PROP_FRAME_COUNT))
+
+
+def has_index(media: Media, settings: Settings) -> bool:
+    """Whether the index of a view's video is kept.
+
+    Raises:
+        NotFoundError: The video is not there.
+    """
+    return kept_index(_video_stamp(media), settings) is not None
+
+
+def _video_stamp(media: Media) -> str:
+    return frame_stamp(replace(media, frame=None))
 
 
 def media_facts(media: Media) -> dict[str, int]:
@@ -167,15 +245,9 @@ def has_member(media: Media, member: str) -> bool:
     return _ARCHIVES.has(path, member)
 
 
-def _checked(data: bytes, settings: Settings, name: str) -> bytes:
-    """The bytes unchanged, once they were seen to decode."""
-    _pixels(data, settings, name)
-    return data
-
-
 def _decode(media: Media, settings: Settings) -> Any:
     if media.frame is not None:
-        return _video_frame(Path(media.path), media.frame, settings)
+        return _video_frame(media, settings)
     return _pixels(_source(media, settings), settings, frame_name(media))
 
 
@@ -188,9 +260,21 @@ def _source(media: Media, settings: Settings) -> bytes:
         return _ARCHIVES.read(path, media.member, settings.max_file_bytes)
     if size > settings.max_file_bytes:
         raise TooLargeError(f"{path.name} is larger than {settings.max_file_bytes} bytes")
+    return _read_file(path, size)
+
+
+def _head(media: Media, count: int) -> bytes:
+    path = Path(media.path)
+    _stat(path)
+    if media.member is not None:
+        return _ARCHIVES.head(path, media.member, count)
+    return _read_file(path, count)
+
+
+def _read_file(path: Path, count: int) -> bytes:
     try:
         with os.fdopen(os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK), "rb") as file:
-            return file.read(size)
+            return file.read(count)
     except OSError as error:
         raise StorageError(f"{path.name} cannot be read") from error
 
@@ -246,7 +330,22 @@ def _pixels(data: bytes, settings: Settings, name: str) -> Any:
     if picture is None:
         _require_memory(header)
         raise ImageError(f"{name} is damaged")
+    picture = _upright(picture, header.orientation)
     _require_declared(picture, header, name)
+    return picture
+
+
+def _upright(picture: Any, orientation: int) -> Any:
+    """Stored pixels as people see them."""
+    if orientation in SIDEWAYS:
+        picture = cv2.transpose(picture)
+    match orientation:
+        case 2 | 6:
+            return cv2.flip(picture, 1)
+        case 3 | 7:
+            return cv2.flip(picture, -1)
+        case 4 | 8:
+            return cv2.flip(picture, 0)
     return picture
 
 
@@ -262,21 +361,33 @@ def _require_declared(picture: Any, header: ImageHeader, name: str) -> None:
         raise ImageError(f"{name} is not of the size that its header declares")
 
 
-def _video_frame(path: Path, number: int, settings: Settings) -> Any:
-    _stat(path)
+def _video_frame(media: Media, settings: Settings) -> Any:
+    path, number = Path(media.path), media.frame or 0
+    times = video_times(media, settings)
+    if not 0 <= number < len(times):
+        raise NotFoundError(f"{path.name} has no frame {number}; it has {len(times):,} frames")
     with open_video(path) as video:
         if not video.isOpened():
             raise ImageError(f"{path.name} is no video that can be read")
-        size = (video.get(cv2.CAP_PROP_FRAME_WIDTH), video.get(cv2.CAP_PROP_FRAME_HEIGHT))
-        check_size(ImageHeader("video", int(size[0]), int(size[1])), settings, path.name)
-        video.set(cv2.CAP_PROP_POS_FRAMES, number)
-        done, picture = video.read()
-    if number < 0 or not done:
-        raise NotFoundError(f"{path.name} has no frame {number}")
+        picture = frame_at(video, number, times)
+    if picture is None:
+        raise NotFoundError(f"frame {number} of {path.name} cannot be decoded")
     # A stream may change its size on the way.
     height, width = picture.shape[:2]
     check_size(ImageHeader("video", width, height), settings, path.name)
     return picture
+
+
+def _video_header(path: Path) -> ImageHeader:
+    _stat(path)
+    with open_video(path) as video:
+        if not video.isOpened():
+            raise ImageError(f"{path.name} is no video that can be read")
+        return ImageHeader(
+            "video",
+            int(video.get(cv2.CAP_PROP_FRAME_WIDTH)),
+            int(video.get(cv2.CAP_PROP_FRAME_HEIGHT)),
+        )
 
 
 def _narrowed(picture: Any, width: int | None) -> Any:
@@ -296,7 +407,7 @@ def _encode(picture: Any) -> bytes:
 
 def _place(media: Media, width: int | None, flipped: bool, settings: Settings) -> Path:
     """Where what is made of a frame is kept."""
-    key = repr((frame_stamp(media), width, flipped, JPEG_QUALITY))
+    key = repr((frame_stamp(media), width, flipped, JPEG_QUALITY, _CACHE_VERSION))
     name = hashlib.sha256(key.encode()).hexdigest()
     return settings.cache / "frames" / name[:2] / f"{name[2:34]}.jpg"
 

@@ -6,23 +6,22 @@ from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
-import cv2
-
-from app.errors import ImageError, NotFoundError, StorageError
+from app.config import Settings
+from app.errors import ImageError, NotFoundError, StorageError, TooLargeError
 from app.soccer.frame_number import FARTHEST, numbered
 from app.soccer.media import Media
-from app.store.media import has_member
+from app.store.media import has_member, video_times
 from app.store.object_frames import is_stored
-from app.store.video import open_video
 
 
-def neighbours(media: Media, group: str, static: bool) -> dict[int, Media]:
+def neighbours(media: Media, group: str, static: bool, settings: Settings) -> dict[int, Media]:
     """Frames of the same camera up to ``FARTHEST`` before and after, by how many frames later.
 
     Args:
         media: Where the view's own frame lies.
         group: Key of the view's group, which is the number of its frame for static cameras.
         static: Whether the camera stands still, so that its files are numbered by frames.
+        settings: Where indices of videos are kept.
 
     None of a frame in an object store, which would have to be asked for each.
     """
@@ -30,9 +29,9 @@ def neighbours(media: Media, group: str, static: bool) -> dict[int, Media]:
         return {}
     try:
         if media.frame is not None:
-            return dict(_of_video(media, media.frame))
+            return dict(_of_video(media, media.frame, len(video_times(media, settings))))
         return dict(_of_files(media, group, static))
-    except (NotFoundError, ImageError, StorageError):
+    except (NotFoundError, ImageError, StorageError, TooLargeError):
         return {}
 
 
@@ -40,18 +39,10 @@ def _offsets() -> Iterator[int]:
     return (offset for offset in range(-FARTHEST, FARTHEST + 1) if offset)
 
 
-def _of_video(media: Media, frame: int) -> Iterator[tuple[int, Media]]:
-    count = _video_length(Path(media.path))
+def _of_video(media: Media, frame: int, count: int) -> Iterator[tuple[int, Media]]:
     for offset in _offsets():
         if 0 <= frame + offset < count:
             yield offset, replace(media, frame=frame + offset)
-
-
-def _video_length(path: Path) -> int:
-    if not path.is_file():
-        raise NotFoundError(f"the file {path.name} is not where it was imported from")
-    with open_video(path) as video:
-        return int(video.get(cv2.CAP_PROP_FRAME_COUNT)) if video.isOpened() else 0
 
 
 def _of_files(media: Media, group: str, static: bool) -> Iterator[tuple[int, Media]]:

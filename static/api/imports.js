@@ -24,6 +24,7 @@ import { idempotencyKey, queryText, request, upload } from './client.js';
  * @property {number} [more_skipped]
  * @property {any[]} [remarks]
  * @property {number | null} [paint_job] reads the paint of what is new
+ * @property {number | null} [proposals_job] proposes cameras for pictures alone
  */
 
 /** @typedef {{name: string, path: string, folder: boolean}} FolderEntry */

@@ -26,6 +26,7 @@ export const IMPORT_FORMATS = [
 	{ name: 'gamestate', label: 'sn-gamestate', note: 'Labels-GameState.json', options: [CALIBRATION] },
 	{ name: 'coco', label: 'COCO', note: 'as Touchline, CVAT, Label Studio, Roboflow or FiftyOne export it', options: [CALIBRATION, CATEGORY] },
 	{ name: 'parquet', label: 'Parquet', note: 'as Touchline exports it', options: [] },
+	{ name: 'frames', label: 'Pictures', note: 'without annotations: each becomes a group, cameras are proposed', options: [] },
 ];
 
 /**

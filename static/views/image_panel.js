@@ -180,7 +180,7 @@ export function ImagePanel({ picture, area, sizes }) {
 			<div class="image-panel__stage" data-ready=${Boolean(frame.image)} data-frame=${frame.image ? view.id : undefined} data-offset=${instant?.offset} ref=${ref}></div>
 			${view.image ? null : html`<p class="image-panel__missing">No frame<span class="image-panel__rest"> · lines and ball can be edited</span></p>`}
 			${frame.error ? html`<p class="image-panel__missing">The frame of this view cannot be read.</p>` : null}
-			<${PanelCaption} picture=${picture} />
+			<${PanelCaption} picture=${picture} frame=${frame.image} />
 			<${PanelTools} picture=${picture} sizes=${sizes} />
 			<${DrawingCross} view=${view.key} viewport=${viewport} />
 			<${DrawingChip} view=${view.key} />

@@ -6,18 +6,20 @@ import { html } from 'htm/preact';
 import { GLYPHS } from '../geometry/residual.js';
 import { pixels } from '../lib/format.js';
 import { overlaysHidden } from '../state/workspace.js';
+import { otherShape } from './frame.js';
 import { errorOf, gradeOfView, jacOf } from './view_state.js';
 import { Letter } from './letter.js';
 
 /** @import {ViewPicture} from '../overlays/scene.js' */
 
-/** @param {{picture: ViewPicture}} props */
-export function PanelCaption({ picture }) {
+/** @param {{picture: ViewPicture, frame?: ImageBitmap | null}} props */
+export function PanelCaption({ picture, frame }) {
 	const { view, solved } = picture;
 	const error = errorOf(picture);
 	const { grade, sentence } = gradeOfView(picture);
 	// Of a view that is left out nothing counts but why.
 	const jac = view.included ? jacOf(solved) : null;
+	const shape = otherShape(frame, view);
 	// With the overlays goes what may stand on a clock that is burnt into the picture.
 	if (overlaysHidden.value) return html`<figcaption class="caption caption--bare"><${Letter} letter=${view.letter} /></figcaption>`;
 	return html`
@@ -29,6 +31,7 @@ export function PanelCaption({ picture }) {
 				${jac !== null ? html`<span data-number="jac">${sentence ? ' · ' : ''}JaC ${jac.toFixed(2)}</span>` : null}
 				${error.px === null ? null : html`<span data-number="error"> · ball ${pixels(error.px)} px</span>`}
 			</span>
+			${shape ? html`<span class="caption__state" data-grade="warn" title=${shape}>! other shape</span>` : null}
 		</figcaption>
 	`;
 }

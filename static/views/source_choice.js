@@ -6,9 +6,13 @@ import { useEffect, useRef, useState } from 'preact/hooks';
 
 import { getFolders, postUpload } from '../api/imports.js';
 import { sentenceOf } from '../api/problem.js';
+import { areVideos, chosenFiles, droppedFiles } from '../lib/local_files.js';
+import { plural } from '../lib/format.js';
 import { useResource } from '../lib/resource.js';
+import { packFiles } from '../lib/zip_packing.js';
 
 /** @import {FolderEntry, ImportSource, UploadJson} from '../api/imports.js' */
+/** @import {PathFile} from '../lib/zip_packing.js' */
 
 /** @param {number} bytes */
 export function sizeText(bytes) {
@@ -17,38 +21,128 @@ export function sizeText(bytes) {
 	return `${(bytes / 1000 ** power).toFixed(power === 0 ? 0 : 1)} ${units[power]}`;
 }
 
-/** Sends a file at once and says how far it is. @param {{id: string, label: string, accept?: string, hint?: string, onUploaded: (sent: UploadJson | null) => void}} props */
-export function UploadField({ id, label, accept, hint = '', onUploaded }) {
+const STILLS = 'Recordings are not read yet. Export stills from it as PNG or JPEG, for example with ffmpeg (ffmpeg -i VIDEO -vf fps=1 still_%05d.png) or the snapshot of a video player, and drop those here: each becomes a group.';
+
+/** One file to send: the only one as it is, several in a zip. @param {PathFile[]} files @param {AbortSignal} signal */
+async function toSend(files, signal) {
+	if (files.length === 1) return files[0].file;
+	const top = files[0].path.split('/')[0];
+	const folder = files.every(({ path }) => path.startsWith(`${top}/`)) ? top : 'files';
+	return packFiles(files, `${folder}.zip`, signal);
+}
+
+/** Sends files at once, and says how far they are. @param {(sent: UploadJson | null) => void} onUploaded */
+function useUpload(onUploaded) {
 	const [state, setState] = useState({ share: 0, name: '', error: '', done: false });
 	const sending = useRef(/** @type {AbortController | null} */ (null));
-	/** @param {Event} event */
-	async function choose(event) {
-		const file = /** @type {HTMLInputElement} */ (event.target).files?.[0];
+	/** @param {PathFile[] | Promise<PathFile[]>} given */
+	async function send(given) {
 		sending.current?.abort();
-		onUploaded(null);
-		setState({ share: 0, name: file?.name ?? '', error: '', done: false });
-		if (!file) return;
 		const controller = new AbortController();
 		sending.current = controller;
+		onUploaded(null);
+		setState({ share: 0, name: '', error: '', done: false });
 		try {
+			const files = await given;
+			if (files.length === 0) return;
+			if (areVideos(files)) {
+				const [{ path }] = files;
+				setState({ share: 0, name: '', error: `${files.length === 1 ? `${path} is a video.` : `${path} and ${plural(files.length - 1, 'other file')} are videos.`} ${STILLS}`, done: false });
+				return;
+			}
+			const name = files.length === 1 ? files[0].path : plural(files.length, 'file');
+			setState({ share: 0, name, error: '', done: false });
+			const file = await toSend(files, controller.signal);
 			const sent = await postUpload(file, (share) => setState((before) => ({ ...before, share })), controller.signal);
-			setState({ share: 1, name: `${sent.name}, ${sizeText(sent.bytes)}`, error: '', done: true });
+			setState({ share: 1, name: `${files.length === 1 ? sent.name : name}, ${sizeText(sent.bytes)}`, error: '', done: true });
 			onUploaded(sent);
 		} catch (error) {
 			if (!controller.signal.aborted) setState({ share: 0, name: '', error: sentenceOf(error), done: false });
 		}
 	}
+	return { state, send };
+}
+
+/** Takes what is dropped anywhere on the page. @param {boolean} listens @param {(files: Promise<PathFile[]>) => void} take @returns {boolean} whether something is held over it */
+function useDrop(listens, take) {
+	const [over, setOver] = useState(false);
+	const latest = useRef(take);
+	latest.current = take;
+	useEffect(() => {
+		if (!listens) return undefined;
+		/** @param {DragEvent} event */
+		const holds = (event) => event.dataTransfer?.types.includes('Files');
+		/** @param {DragEvent} event */
+		function drag(event) {
+			if (!holds(event)) return;
+			event.preventDefault();
+			setOver(true);
+		}
+		/** @param {DragEvent} event */
+		function leave(event) {
+			if (!event.relatedTarget) setOver(false);
+		}
+		/** @param {DragEvent} event */
+		function drop(event) {
+			setOver(false);
+			if (!holds(event) || !event.dataTransfer) return;
+			event.preventDefault();
+			latest.current(droppedFiles(event.dataTransfer));
+		}
+		addEventListener('dragover', drag);
+		addEventListener('dragleave', leave);
+		addEventListener('drop', drop);
+		return () => {
+			removeEventListener('dragover', drag);
+			removeEventListener('dragleave', leave);
+			removeEventListener('drop', drop);
+		};
+	}, [listens]);
+	return over;
+}
+
+/** @param {{state: {share: number, name: string, error: string, done: boolean}}} props */
+function UploadState({ state }) {
 	const percent = Math.round(100 * state.share);
+	return html`
+		${state.name && !state.done ? html`<div class="meter" role="progressbar" aria-label=${`Upload of ${state.name}`} aria-valuenow=${percent}><span style=${{ width: `${percent}%` }}></span></div>` : null}
+		${state.done ? html`<p class="note" role="status">✓ ${state.name} ${/^\d+ files/.test(state.name) ? 'are' : 'is'} uploaded</p>` : null}
+		${state.error ? html`<p class="form__error" role="alert">${state.error}</p>` : null}
+	`;
+}
+
+/** @param {{id: string, label: string, accept?: string, hint?: string, onUploaded: (sent: UploadJson | null) => void}} props */
+export function UploadField({ id, label, accept, hint = '', onUploaded }) {
+	const { state, send } = useUpload(onUploaded);
 	return html`
 		<div class="form__row">
 			<label for=${id}>${label}</label>
-			<input class="field" id=${id} type="file" accept=${accept} onChange=${choose} />
+			<input class="field" id=${id} type="file" accept=${accept} onChange=${(/** @type {Event} */ event) => send(filesOf(event))} />
 			${hint ? html`<small>${hint}</small>` : null}
-			${state.name && !state.done ? html`<div class="meter" role="progressbar" aria-label=${`Upload of ${state.name}`} aria-valuenow=${percent}><span style=${{ width: `${percent}%` }}></span></div>` : null}
-			${state.done ? html`<p class="note" role="status">✓ ${state.name} is uploaded</p>` : null}
-			${state.error ? html`<p class="form__error" role="alert">${state.error}</p>` : null}
+			<${UploadState} state=${state} />
 		</div>
 	`;
+}
+
+/** Any number of files or a folder, chosen or dropped anywhere on the page. @param {{onUploaded: (sent: UploadJson | null) => void}} props */
+function DropField({ onUploaded }) {
+	const { state, send } = useUpload(onUploaded);
+	const over = useDrop(true, send);
+	return html`
+		<div class="form__row import__drop" data-over=${over}>
+			<label for="import-file">File</label>
+			<input class="field" id="import-file" type="file" multiple onChange=${(/** @type {Event} */ event) => send(filesOf(event))} />
+			<label for="import-folder">or a whole folder</label>
+			<input class="field" id="import-folder" type="file" webkitdirectory onChange=${(/** @type {Event} */ event) => send(filesOf(event))} />
+			<small>Or drop files, pictures or a folder anywhere on this page.</small>
+			<${UploadState} state=${state} />
+		</div>
+	`;
+}
+
+/** @param {Event} event */
+function filesOf(event) {
+	return chosenFiles(/** @type {HTMLInputElement} */ (event.target).files ?? []);
 }
 
 /** @param {{chosen: string, choose: (path: string) => void, guess: (format: string) => void}} props */
@@ -99,11 +193,11 @@ export function SourceChoice({ onSource, guess }) {
 	return html`
 		<fieldset class="choice import__choice">
 			<legend>Source</legend>
-			<label><input type="radio" name="source" checked=${kind === 'upload'} onChange=${() => change('upload')} /><span>A file on this computer<small>zip, JSON or CSV</small></span></label>
+			<label><input type="radio" name="source" checked=${kind === 'upload'} onChange=${() => change('upload')} /><span>Files on this computer<small>zip, JSON, CSV or pictures</small></span></label>
 			<label><input type="radio" name="source" checked=${kind === 'folder'} onChange=${() => change('folder')} /><span>A folder on the server<small>or in an object store; frames stay there</small></span></label>
 		</fieldset>
 		${kind === 'upload'
-			? html`<${UploadField} id="import-file" label="File" onUploaded=${(/** @type {UploadJson | null} */ sent) => {
+			? html`<${DropField} onUploaded=${(/** @type {UploadJson | null} */ sent) => {
 				onSource(sent && { upload: sent.id });
 				if (sent?.format) guess(sent.format);
 			}} />`

@@ -8,6 +8,7 @@ from pathlib import Path
 from zipfile import ZipFile
 
 import pytest
+from PIL import Image
 from playwright.sync_api import Page, expect
 
 from tests.e2e.screen import until
@@ -53,6 +54,87 @@ def blind(labels_file: Path, tmp_path: Path, server: str) -> Iterator[Path]:
         archive.writestr("broken/Labels-v3.json", "{")
     yield target
     delete_dataset(server, "blind")
+
+
+DROP = """files => {
+    const held = new DataTransfer();
+    for (const [name, bytes] of files) held.items.add(new File([Uint8Array.from(bytes)], name));
+    const told = { dataTransfer: held, bubbles: true, cancelable: true };
+    document.body.dispatchEvent(new DragEvent('dragover', told));
+    return !document.body.dispatchEvent(new DragEvent('drop', told));
+}"""
+
+
+def drop(page: Page, *files: Path) -> None:
+    """Drop files on the page, beside every field."""
+    assert page.evaluate(DROP, [[path.name, list(path.read_bytes())] for path in files])
+
+
+@pytest.fixture
+def stills(tmp_path: Path, server: str) -> Iterator[Path]:
+    """A folder of two pictures; ask for it before the page."""
+    root = tmp_path / "stills"
+    (root / "second half").mkdir(parents=True)
+    Image.new("RGB", (320, 180), (40, 120, 40)).save(root / "1.png")
+    Image.new("RGB", (640, 360), (40, 120, 40)).save(root / "second half" / "2.jpg")
+    yield root
+    delete_dataset(server, "stills")
+
+
+class TestPictures:
+    def test_that_are_dropped_become_groups_and_cameras_are_sought(
+        self, stills: Path, open_page: OpenPage
+    ) -> None:
+        page = open_page("/import")
+        page.get_by_label("Dataset", exact=True).fill("stills")
+        drop(page, stills / "1.png", stills / "second half" / "2.jpg")
+        expect(page.get_by_text("2 files, ")).to_contain_text("are uploaded")
+        expect(page.get_by_role("radio", name="Pictures without")).to_be_checked()
+        page.get_by_role("button", name="Import", exact=True).click()
+        report = page.get_by_role("region", name="What happened")
+        expect(report).to_contain_text("No record was left out")
+        expect(report.get_by_role("link", name="cameras are proposed")).to_be_visible()
+        assert serious_in_both(page) == []
+        groups = page.request.get("/api/v1/groups?dataset=stills").json()["items"]
+        assert [(group["key"], group["views"]) for group in groups] == [("1.png", 1), ("2.jpg", 1)]
+        page.goto("/jobs")
+        expect(page.locator("main")).to_contain_text("Propose cameras for views of stills")
+
+    def test_of_a_folder_that_is_chosen_keep_its_folders(
+        self, stills: Path, open_page: OpenPage
+    ) -> None:
+        page = open_page("/import")
+        page.get_by_label("Dataset", exact=True).fill("stills")
+        page.set_input_files("#import-folder", stills)
+        expect(page.get_by_text("2 files, ")).to_contain_text("are uploaded")
+        page.get_by_role("button", name="Import", exact=True).click()
+        expect(page.get_by_role("region", name="What happened")).to_be_visible()
+        groups = page.request.get("/api/v1/groups?dataset=stills").json()["items"]
+        assert [group["key"] for group in groups] == [
+            "stills/1.png",
+            "stills/second half/2.jpg",
+        ]
+
+    def test_of_a_video_are_asked_for(self, open_page: OpenPage, tmp_path: Path) -> None:
+        (video := tmp_path / "match.mp4").write_bytes(b"any bytes")
+        page = open_page("/import")
+        page.get_by_label("Dataset", exact=True).fill("film")
+        drop(page, video)
+        told = page.get_by_role("alert")
+        expect(told).to_contain_text("match.mp4 is a video. Recordings are not read yet. Export")
+        expect(page.get_by_role("button", name="Import", exact=True)).to_have_attribute(
+            "title", "Choose a file or folder first"
+        )
+        assert serious_in_both(page) == []
+        # The same of one inside a zip, which the server alone sees.
+        with ZipFile(tmp_path / "film.zip", "w") as archive:
+            archive.write(video, "match.mp4")
+        bring_in(page, tmp_path / "film.zip", "film")
+        card = page.get_by_role("region", name="Progress")
+        expect(card).to_contain_text("Nothing could be imported: film.zip holds a video")
+        expect(card).to_contain_text("Export stills from it")
+        expect(card).not_to_contain_text("Labels-v3.json")
+        expect(card).not_to_contain_text("docs/")
 
 
 class TestImportOfNothing:

@@ -145,14 +145,14 @@ class Readers:
         json_text(done.values()).encode()
         done.nothing_read()
         if whole and kind not in ("cameras", "touchline"):
-            _use(list(islice(_groups_of(source), GROUPS)))
+            _use(list(islice(_groups_of(source, self.settings), GROUPS)))
 
 
-def _groups_of(source: Source) -> Iterator[Group]:
+def _groups_of(source: Source, settings: Settings) -> Iterator[Group]:
     report = Report()
     if source.format in STATIC:
         return _static(source, report, LIMITS).groups()
-    return _groups(source, report, LIMITS)
+    return _groups(source, settings, report, LIMITS)
 
 
 def _use(groups: list[Group]) -> None:

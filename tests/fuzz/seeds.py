@@ -11,6 +11,7 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+from PIL import Image
 
 from app.config import Settings
 from app.datasets.camera_json import camera_to_json
@@ -67,6 +68,8 @@ def seeds() -> Iterator[Case]:
     for ending in ("png", "jpg", "webp"):
         data = cv2.imencode(f".{ending}", picture)[1].tobytes()
         yield Case("image", {f"7.{ending}": data}, f"7.{ending}")
+        yield Case("frames", {f"a/7.{ending}": data})
+    yield Case("image", {"7.jpg": _turned(picture)}, "7.jpg")
     yield Case("video", {"cam3.mp4": _video(picture)}, "cam3.mp4")
 
 
@@ -169,6 +172,14 @@ def _files(root: Path) -> Files:
         for path in sorted(root.rglob("*"))
         if path.is_file() and path.name != "manifest.json"
     }
+
+
+def _turned(picture: np.ndarray) -> bytes:
+    """A JPEG that EXIF turns."""
+    exif, data = Image.Exif(), io.BytesIO()
+    exif[0x0112] = 6
+    Image.fromarray(picture).save(data, "JPEG", exif=exif.tobytes())
+    return data.getvalue()
 
 
 def _video(picture: np.ndarray) -> bytes:

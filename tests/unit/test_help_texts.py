@@ -30,7 +30,7 @@ PLAIN_WORDS = """
     comment comments talk threads mentions bells past deeds window before after
     full tall scroll stalls settling exposure ends many naming tracing local lookup css
     cluster serving hosts executors packing day browser database
-    private kept another smaller
+    private kept another smaller index
     stored tree trees safe path refusal attempt cookie fit
     categories corner finder ids like
     compiler dialect postgresql sqlite statements transfer triggers
@@ -41,7 +41,7 @@ PLAIN_WORDS = """
     proof provider identities sign
     access account join links login logins passwords roles team tokens
     bearer codes devices me remote rules tries users
-    characters corner null
+    characters null kind matrices stated
     adopt aliases asked concealment needs ownership rights sight
     actors
     candidate drawn proposal propose scoring search straight

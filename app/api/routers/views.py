@@ -216,10 +216,14 @@ async def _neighbours(request: Request, frames: Frames, view: FoundView) -> dict
     """
     if view.media is None:
         return {}
-    task = frames.ask_neighbours(view.media, view.group_key, view.static)
     try:
+        if view.media.frame is not None:
+            indexing = await to_thread.run_sync(frames.ask_fetch, view.media)
+            if indexing is not None and not await while_wanted(request, indexing):
+                return None
+        task = frames.ask_neighbours(view.media, view.group_key, view.static)
         found: dict[int, Media] | None = await while_wanted(request, task)
-    except ChildEnded:
+    except (ChildEnded, NotFoundError, ImageError, TooLargeError, StorageError):
         return {}
     return found
 

@@ -5,9 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-import cv2
-import numpy as np
-
 from app.config import Settings
 from app.datasets.corner_origin import box_from_corner
 from app.errors import ImageError, InputError, NotFoundError, StorageError, TooLargeError
@@ -24,7 +21,7 @@ from app.review.evaluating.predictions import (
 )
 from app.review.queue.query import parse_query
 from app.soccer.frames import Box
-from app.store.media import read_frame
+from app.store.media import decode_frame
 from app.store.predictions import PredictionSet
 from app.store.session import Session
 from app.store.store import Store
@@ -117,13 +114,7 @@ def _views(session: Session, dataset_id: int, request: DetectRequest) -> list[St
 def _picture(row: StoredView, settings: Settings) -> Any:
     if row.media is None:
         raise NotFoundError("this view has no frame that could be read")
-    data = read_frame(row.media, None, row.flipped, settings)
-    picture = cv2.imdecode(
-        np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION
-    )
-    if picture is None:
-        raise ImageError("the frame is damaged")
-    return picture
+    return decode_frame(row.media, row.flipped, settings)[:, :, ::-1]
 
 
 def _in_annotated(

@@ -13,7 +13,7 @@ from app.object_store.address import is_address, unseal
 from app.soccer.group import Group, View
 from app.soccer.media import Media
 from app.store.frames import SentPicture
-from app.store.media import media_facts
+from app.store.media import media_facts, picture_header
 
 ReadPicture = Callable[[Media, int | None, bool], SentPicture]
 """From where a frame lies, its width (None: as it is) and whether it is mirrored."""
@@ -87,14 +87,19 @@ class ExportImages:
 
     def _place(self, group: Group, view: View, media: Media) -> None:
         is_file = media.member is None and media.frame is None and not is_address(media.path)
-        # A mirrored picture is turned right: a link would show it as it lies.
-        if self._images == "link" and is_file and not view.station.flipped:
+        if self._images == "link" and is_file and self._is_upright(view, media):
             target = self._target(group, view, PurePosixPath(media.path).suffix.lower())
             target.symlink_to(media.path)
             return
         picture = self._read(media, None, view.station.flipped)
         target = self._target(group, view, _SUFFIXES[picture.kind])
         target.write_bytes(picture.data)
+
+    def _is_upright(self, view: View, media: Media) -> bool:
+        """Whether a link to its file shows a frame as it was annotated: a mirrored picture is
+        turned right, and one that EXIF turns would lie on its side where EXIF is not read."""
+        header = picture_header(media)
+        return not view.station.flipped and (header is None or header.orientation == 1)
 
     def _target(self, group: Group, view: View, suffix: str) -> Path:
         """Where a frame goes, in folders that are there."""

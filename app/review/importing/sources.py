@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any, get_args
 
 from app.config import Settings
@@ -13,8 +14,9 @@ from app.datasets.coco_reader import read_coco
 from app.datasets.file_tree import Limits, Root
 from app.datasets.format_names import ImportFormat
 from app.datasets.frame_list import read_frame_list
+from app.datasets.frames_reader import read_frames
 from app.datasets.gamestate_reader import read_gamestate
-from app.datasets.issia import DEFAULT_SIZE as ISSIA_SIZE
+from app.datasets.guess_format import guess_format, holds_videos_alone
 from app.datasets.issia_3d_reader import open_issia_3d
 from app.datasets.issia_reader import IssiaFolder, IssiaOptions, open_issia
 from app.datasets.looks_like import looks_like
@@ -24,15 +26,17 @@ from app.datasets.sn_calibration import DEFAULT_SIZE
 from app.datasets.sn_calibration_reader import read_sn_calibration
 from app.datasets.soccernet_v3_reader import read_soccernet_v3
 from app.datasets.soccernet_v3d_reader import read_soccernet_v3d
-from app.errors import InputError
+from app.errors import DatasetFormatError, InputError
 from app.progress import TellProgress
 from app.review.importing.cameras import ingest_cameras
 from app.review.importing.ingest import IngestReport, ingest
+from app.review.importing.picture_check import PictureCheck
 from app.review.importing.spare import SpareFrame, ingest_spare
 from app.soccer.annotation import Extras
 from app.soccer.frames import ImageSize
 from app.soccer.group import Group
 from app.soccer.policy import PAPER, Policy
+from app.store.image_header import check_size, read_header
 from app.store.store import Store
 
 FORMATS: tuple[str, ...] = get_args(ImportFormat)
@@ -87,6 +91,15 @@ class BallTally:
         )
         boxes = f"; its boxes are of {most}" if most else ""
         return f"no ball was read from any of {self.groups:,} groups{boxes}"
+
+
+STILLS_HINT = (
+    "Export stills from it as PNG or JPEG, for example with ffmpeg (ffmpeg -i VIDEO -vf fps=1 "
+    "still_%05d.png) or a video player's snapshot, and import those as frames."
+)
+FRAMES_HINT = (
+    "Import them as frames: each picture becomes a group of one view, to be annotated here."
+)
 
 
 @dataclass(frozen=True)
@@ -182,6 +195,9 @@ class Imported:
         source = self.source
         problems = [problem.message for problem in self.report.problems] + self.result.problems
         name = source.shown(str(source.path))
+        if (unannotated := self._unannotated()) is not None:
+            problem, hint = unannotated
+            return f"nothing could be imported: {name} {problem}", hint
         sentence = f"nothing could be imported from {name} as {source.format}"
         if problems:
             first = source.shown(problems[0])
@@ -196,6 +212,23 @@ class Imported:
             f"Check that it is the right file or folder, and that it holds what {source.format} "
             "asks for (docs/formats.md)."
         )
+
+    def _unannotated(self) -> tuple[str, str] | None:
+        """What a source is that nothing was read of, where it has no annotations; what to do."""
+        if self.something:
+            return None
+        if holds_videos_alone(self.source.path):
+            return "holds a video, and recordings are not read yet", STILLS_HINT
+        if self.source.format != "frames" and guess_format(self.source.path) == "frames":
+            return "holds pictures and no annotations", FRAMES_HINT
+        return None
+
+    def _skipped(self) -> list[DatasetFormatError]:
+        """What was left out, and why: of what has no annotations that alone."""
+        unannotated = self._unannotated()
+        if unannotated is None:
+            return self.report.problems
+        return [DatasetFormatError(str(self.source.path), None, None, unannotated[0])]
 
     def values(self) -> dict[str, Any]:
         """Everything that there is to tell, as plain values."""
@@ -218,7 +251,7 @@ class Imported:
                     "field": problem.field,
                     "problem": shown(problem.problem),
                 }
-                for problem in self.report.problems
+                for problem in self._skipped()
             ],
             "more_skipped": self.report.dropped,
             "remarks": [*map(shown, self.report.remarks), *self.result.problems],
@@ -287,14 +320,14 @@ def import_source(
         )
         return Imported(source, report, result)
     folder = _static(source, report, limits) if source.format in STATIC else None
-    groups = _groups(source, report, limits) if folder is None else folder.groups()
+    groups = _groups(source, settings, report, limits) if folder is None else folder.groups()
     if source.frames is not None:
         groups = read_frame_list(source.frames, settings, report, limits).placed(iter(groups))
-    tally = BallTally()
+    tally, check = BallTally(), PictureCheck(report, settings)
     result = ingest(
         store,
         dataset,
-        tally.watch(groups),
+        tally.watch(check.watch(groups)),
         source=source.label,
         actor=actor,
         progress=progress,
@@ -302,6 +335,7 @@ def import_source(
         policy=policy,
         told=report,
     )
+    result.problems += check.remarks()
     if folder is not None and not dry_run:
         ingest_spare(store, dataset, _spare(folder), source=source.label, actor=actor)
     if source.format not in BALLS_ELSEWHERE and (sentence := tally.without_ball()):
@@ -309,7 +343,13 @@ def import_source(
     return Imported(source, report, result)
 
 
-def _groups(source: Source, report: Report, limits: Limits) -> Iterator[Group]:
+def _size_of_picture(settings: Settings, data: bytes, name: str) -> ImageSize:
+    header = read_header(data, name)
+    check_size(header, settings, name)
+    return ImageSize(header.width, header.height)
+
+
+def _groups(source: Source, settings: Settings, report: Report, limits: Limits) -> Iterator[Group]:
     path, calibration = source.path, source.calibration
     match source.format:
         case "soccernet-v3":
@@ -328,6 +368,8 @@ def _groups(source: Source, report: Report, limits: Limits) -> Iterator[Group]:
             )
         case "parquet":
             return read_parquet(path, report, limits=limits)
+        case "frames":
+            return read_frames(path, partial(_size_of_picture, settings), report, limits)
         case _:
             size = source.size or DEFAULT_SIZE
             return read_sn_calibration(path, size, report, calibration=calibration, limits=limits)
@@ -339,7 +381,7 @@ def _static(source: Source, report: Report, limits: Limits) -> IssiaFolder:
         flipped=source.flipped,
         lines=source.lines,
         calibration=source.calibration,
-        size=source.size or ISSIA_SIZE,
+        size=source.size,
     )
     read = open_issia if source.format == "issia" else open_issia_3d
     return read(source.path, options, report, limits)

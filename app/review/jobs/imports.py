@@ -20,6 +20,7 @@ from app.review.importing.sources import FORMATS, Source
 from app.review.jobs.child import left_to_the_next
 from app.review.jobs.jobs import Jobs
 from app.review.jobs.paint import PAINT
+from app.review.jobs.proposals import PROPOSALS
 from app.review.jobs.run import FailedWithReportError, JobProgress, Work
 from app.review.jobs.solve import request_solve
 from app.soccer.frames import ImageSize
@@ -151,19 +152,24 @@ def import_work(
             raise FailedWithReportError(*outcome.nothing, _result(outcome, request))
         if request.dry_run or not outcome.fresh:
             return _result(outcome, request)
-        return _result(outcome, request, **_following(jobs, store, request.dataset, actor))
+        return _result(outcome, request, **_following(jobs, store, request, actor))
 
     return work
 
 
-def _following(jobs: Jobs, store: Store, dataset: str, actor: str) -> dict[str, int | None]:
+def _following(
+    jobs: Jobs, store: Store, request: ImportRequest, actor: str
+) -> dict[str, int | None]:
     """Ids of the jobs that compute what is new.
 
     The clicks are solved first, for that takes seconds; reading the pictures is asked for next, and
-    solves once more what it changes.
+    solves once more what it changes. For frames that nobody has annotated cameras are sought last.
     """
-    found = get_dataset_head(store, dataset)
+    found = get_dataset_head(store, request.dataset)
     solve, paint = request_solve(jobs, store, found.id, actor=actor), None
+    if request.format == "frames":
+        proposals = PROPOSALS.request(jobs, store, found.id, None, actor=actor)
+        return {"solve_job": solve.id, "proposals_job": proposals.id}
     if found.policy.calibration.source == "paint" and has_pictures(store, found.id):
         paint = PAINT.request(jobs, store, found.id, None, actor=actor).id
     return {"solve_job": solve.id, "paint_job": paint}
@@ -182,8 +188,10 @@ def _result(
     *,
     solve_job: int | None = None,
     paint_job: int | None = None,
+    proposals_job: int | None = None,
 ) -> Json:
-    """The report; with the jobs that solve what is new and read its paint, where there are any."""
+    """The report; with the jobs that solve what is new, read its paint and propose its cameras,
+    where there are any."""
     values = outcome.values
     hidden = max(len(values["skipped"]) - SHOWN, 0)
     return {
@@ -192,6 +200,7 @@ def _result(
         "dry_run": request.dry_run,
         "solve_job": solve_job,
         "paint_job": paint_job,
+        "proposals_job": proposals_job,
         "skipped": values["skipped"][:SHOWN],
         "more_skipped": values["more_skipped"] + hidden,
     }

@@ -112,7 +112,7 @@ export function EditorImage({ picture, before }) {
 		<figure class="image-panel editor__panel" data-view=${view.letter} data-focused="true" tabindex="0" aria-label=${`View ${view.letter}, ${view.label}`}>
 			<div class="image-panel__stage" data-ready=${Boolean(image)} data-mode=${mode.value} ref=${ref}></div>
 			${view.image ? null : html`<p class="image-panel__missing">No frame · the lines can be edited</p>`}
-			<${PanelCaption} picture=${picture} />
+			<${PanelCaption} picture=${picture} frame=${image} />
 			<${PaintChip} />
 			${picture.proposal && !paintShown.value ? html`<${ProposalChip} item=${picture.proposal.item} />` : null}
 			${drawing ? html`<p class="editor__hint" role="status">Click to set points on <strong>${chosen.marking}</strong> · Esc when done</p>` : null}

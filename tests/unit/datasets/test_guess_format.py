@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from app.datasets import guess_format as module
-from app.datasets.guess_format import guess_format
+from app.datasets.guess_format import guess_format, holds_videos_alone
 
 CASES = [
     ("soccernet-v3", "l/s/m/Labels-v3.json"),
@@ -21,6 +21,10 @@ CASES = [
     ("coco", "annotations/instances_train.json"),
     ("coco", "my-coco-file.json"),
     ("parquet", "views.parquet"),
+    ("issia", "cam1.xml"),
+    ("frames", "still_00001.PNG"),
+    ("frames", "day 1/DSC_0001.jpeg"),
+    (None, "match.mp4"),
     (None, "notes.txt"),
     (None, "coco.json.txt"),
 ]
@@ -37,6 +41,34 @@ class TestGuessFormat:
         assert guess_format(tmp_path / "in") == form
         assert guess_format(path) == form
         assert guess_format(make_zip({name: "x"})) == form
+
+    def test_pictures_beside_files_of_the_system_are_frames_and_beside_others_are_not(
+        self, make_zip: Callable[..., Path]
+    ) -> None:
+        pictures = {"a/1.jpg": "x", "a/2.webp": "x"}
+        system = {"__MACOSX/a/._1.jpg": "x", "a/Thumbs.db": "x", ".DS_Store": "x"}
+        assert guess_format(make_zip(pictures | system)) == "frames"
+        assert guess_format(make_zip(pictures | {"labels/1.txt": "x"})) is None
+
+    @pytest.mark.parametrize(
+        ("names", "is_one"),
+        [
+            (("match.MP4",), True),
+            (("a/match.mov", "a/1.jpg", ".DS_Store"), True),
+            (("match.mp4", "Labels-v3.json"), False),
+            (("1.jpg",), False),
+            ((".DS_Store",), False),
+        ],
+    )
+    def test_videos_without_labels_are_known(
+        self, make_zip: Callable[..., Path], tmp_path: Path, names: tuple[str, ...], is_one: bool
+    ) -> None:
+        assert holds_videos_alone(make_zip(dict.fromkeys(names, "x"))) is is_one
+        for name in names:
+            path = tmp_path / "in" / name
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text("x")
+        assert holds_videos_alone(tmp_path / "in") is is_one
 
     def test_labels_count_more_than_the_cameras_beside_them(self, tmp_path: Path) -> None:
         for name in ("camera_00002.json", "00002.json", "manifest.json"):

@@ -207,3 +207,91 @@ class TestCameraNumber:
     )
     def test_the_number_that_a_name_speaks_of(self, name: str, number: int | None) -> None:
         assert camera_number(name) == number
+
+
+def _sized(text: str, width: int, height: int) -> str:
+    return text.replace(
+        "<sourcefile>",
+        '<sourcefile><file id="0"><attribute name="H-FRAME-SIZE">'
+        f'<data:dvalue value="{width}"/></attribute><attribute name="V-FRAME-SIZE">'
+        f'<data:dvalue value="{height}"/></attribute></file>',
+    )
+
+
+class TestSizeOfTheFile:
+    @pytest.fixture
+    def sized(self, folder: Path) -> Path:
+        path = folder / "truth" / "ground_truth_3.xgtf"
+        path.write_text(_sized(path.read_text(), 1280, 720))
+        return folder
+
+    def test_counts_for_its_camera_where_no_size_is_asked_for(
+        self, sized: Path, report: Report
+    ) -> None:
+        first = _groups(sized, report)[0]
+        assert [view.size for view in first.views] == [ImageSize(1280, 720), ImageSize(1920, 1080)]
+        assert report.problems == [] and report.remarks == []
+
+    def test_a_size_that_is_asked_for_counts_and_the_difference_is_told(
+        self, sized: Path, report: Report
+    ) -> None:
+        first = _groups(sized, report, IssiaOptions(size=ImageSize(960, 540)))[0]
+        assert {view.size for view in first.views} == {ImageSize(960, 540)}
+        (remark,) = report.remarks
+        assert remark.endswith(
+            "ground_truth_3.xgtf: the file says 1280 x 720 for camera 3, and 960 x 540 was asked "
+            "for (--size), which is used."
+        )
+
+    def test_lines_are_read_for_the_size_of_their_camera(
+        self, sized: Path, report: Report, tmp_path: Path
+    ) -> None:
+        lines = tmp_path / "unit"
+        lines.mkdir()
+        for camera in (3, 4):
+            points = [{"x": 0.0, "y": 0.0}, {"x": 1.0, "y": 1.0}]
+            (lines / f"cam{camera}.json").write_text(json.dumps({"Middle line": points}))
+        views = _groups(sized, report, IssiaOptions(lines=lines))[0].views
+        ends = [view.station.lines["Middle line"][1] for view in views]
+        assert ends == [(1279.0, 719.0), (1919.0, 1079.0)]
+
+
+class TestFilesOfOtherNames:
+    def test_xml_that_is_xgtf_is_read_and_other_xml_is_reported(
+        self, folder: Path, report: Report
+    ) -> None:
+        path = folder / "truth" / "ground_truth_3.xgtf"
+        path.rename(path.with_suffix(".xml"))
+        (folder / "annotations.xml").write_text("<annotations/>")
+        assert [view.key for view in _groups(folder, report)[0].views] == ["cam3", "cam4"]
+        (problem,) = report.problems
+        assert problem.problem == "is XML of another kind than XGTF; left out"
+
+
+class TestSeveralSources:
+    def _write(self, folder: Path, name: str, *sources: str) -> None:
+        first = _xgtf({18: (1, 2)}, {})
+        more = "".join(
+            f'<sourcefile filename="{source}">'
+            + _xgtf({18: (3, 4)}, {18: 2}).partition("<sourcefile>")[2].partition("</data>")[0]
+            for source in sources[1:]
+        )
+        text = first.replace("<sourcefile>", f'<sourcefile filename="{sources[0]}">')
+        (folder / "truth" / name).write_text(text.replace("</data>", f"{more}</data>"))
+
+    def test_sources_that_name_their_cameras_are_those_cameras(
+        self, folder: Path, report: Report
+    ) -> None:
+        self._write(folder, "both.xgtf", "cam1.avi", "C:\\videos\\camera_2.avi")
+        keys = [view.key for view in _groups(folder, report)[0].views]
+        assert keys == ["cam1", "cam2", "cam3", "cam4"]
+        assert report.problems == []
+
+    @pytest.mark.parametrize("second", ["part2.avi", "cam1.avi", ""])
+    def test_others_are_left_out_and_named(self, folder: Path, report: Report, second: str) -> None:
+        self._write(folder, "cam1.xgtf", "cam1.avi", second)
+        (view, *_) = _groups(folder, report)[0].views
+        assert (view.key, view.balls[0].point) == ("cam1", ImagePoint(1.0, 2.0))
+        (problem,) = report.problems
+        assert problem.record == f"source 2 ({second})"
+        assert problem.problem.startswith("is left out with 1 balls and 2 persons")

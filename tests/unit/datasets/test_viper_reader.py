@@ -11,7 +11,8 @@ from app.datasets import viper_reader
 from app.datasets.file_tree import Limits
 from app.datasets.report import Report
 from app.datasets.trees import open_tree
-from app.datasets.viper_reader import ViperTrack, read_viper
+from app.datasets.viper_reader import ViperTrack, is_viper, read_viper
+from app.soccer.frames import Box, ImagePoint, ImageSize
 
 HEAD = (
     '<?xml version="1.0" encoding="UTF-8"?>\n'
@@ -43,7 +44,8 @@ def _read(tmp_path: Path, content: str | bytes, report: Report, name: str = "1.x
     (tmp_path / name).write_bytes(content)
     tree = open_tree(tmp_path, report)
     assert tree is not None
-    return read_viper(tree, name, report, Limits(file_bytes=1_000_000))
+    (track,) = read_viper(tree, name, report, Limits(file_bytes=1_000_000))
+    return track
 
 
 ENDLESS = {
@@ -67,7 +69,7 @@ class TestReadViper:
         (tmp_path / "2.xgtf.gz").write_bytes(content)
         tree = open_tree(tmp_path, report)
         assert tree is not None
-        track = read_viper(tree, "2.xgtf.gz", report)
+        (track,) = read_viper(tree, "2.xgtf.gz", report)
         assert track.ball_points == 1
         (problem,) = report.problems
         assert problem.problem == "holds more than 1,000,000 bytes without an element"
@@ -218,3 +220,181 @@ class TestReadViper:
     def test_something_else_is_reported(self, tmp_path: Path, report: Report) -> None:
         _read(tmp_path, b"\x89PNG\r\n", report)
         assert "not sound XML" in str(report.problems[0])
+
+
+def ball_as(entry: str, name: str = "BALL") -> str:
+    return (
+        HEAD + f'<object name="{name}" id="0" framespan="9:9"><attribute name="LOCATION">{entry}'
+        f"</attribute></object>" + TAIL
+    )
+
+
+class TestShapes:
+    @pytest.mark.parametrize(
+        ("entry", "balls"),
+        [
+            ('<data:point framespan="9:9" x="641" y="318"/>', [ImagePoint(641, 318)]),
+            (
+                '<data:bbox framespan="9:9" x="637" y="314" width="8" height="8"/>',
+                [Box(637, 314, 8, 8)],
+            ),
+            ('<data:circle framespan="9:9" x="641" y="318" radius="4"/>', [Box(637, 314, 8, 8)]),
+            (
+                '<data:bbox framespan="9:9" x="637" y="314" width="0" height="8"/>',
+                [ImagePoint(637, 318)],
+            ),
+            ('<data:circle framespan="9:9" x="641" y="318" radius="0"/>', [ImagePoint(641, 318)]),
+            # The entry holds as long as its object.
+            ('<data:point x="641" y="318"/>', [ImagePoint(641, 318)]),
+        ],
+    )
+    def test_a_ball_may_be_a_point_a_box_or_a_circle(
+        self, tmp_path: Path, report: Report, entry: str, balls: list[ImagePoint | Box]
+    ) -> None:
+        assert _read(tmp_path, ball_as(entry), report).balls == {9: balls}
+        assert report.problems == []
+
+    @pytest.mark.parametrize("boxed_first", [False, True])
+    def test_a_centre_inside_a_box_is_the_same_ball(
+        self, tmp_path: Path, report: Report, boxed_first: bool
+    ) -> None:
+        entries = [
+            '<data:point framespan="9:9" x="640" y="319"/>',
+            '<data:bbox framespan="9:9" x="637" y="314" width="8" height="8"/>',
+        ]
+        text = ball_as("".join(reversed(entries) if boxed_first else entries))
+        assert _read(tmp_path, text, report).balls == {9: [ImagePoint(640, 319)]}
+
+    @pytest.mark.parametrize("name", ["BALL", "Football", "soccer ball", "Soccer-Ball", "ball_1"])
+    def test_a_ball_has_several_names(self, tmp_path: Path, report: Report, name: str) -> None:
+        text = ball_as('<data:point framespan="9:9" x="1" y="2"/>', name)
+        assert _read(tmp_path, text, report).ball_points == 1
+
+    @pytest.mark.parametrize(
+        ("name", "entry", "what"),
+        [
+            ("PLAYER", f"<data:bbox {BOX}/>", "bbox"),
+            ("BALL", f'<data:obox {BOX} rotation="3"/>', "obox"),
+            ("BALL", f"<data:ellipse {BOX}/>", "ellipse"),
+            ("Person", '<data:point x="1" y="2"/>', "point"),
+            ("Ballboy", '<data:point x="1" y="2"/>', "point"),
+            ("FRAME", '<data:bvalue value="true"/>', "bvalue"),
+        ],
+    )
+    def test_what_is_left_out_is_named_with_object_and_shape(
+        self, tmp_path: Path, report: Report, name: str, entry: str, what: str
+    ) -> None:
+        track = _read(tmp_path, ball_as(entry * 3, name), report)
+        assert (track.ball_points, track.person_boxes) == (0, 0)
+        (problem,) = report.problems
+        assert (problem.record, problem.field) == (f"object {name}", f"LOCATION, {what}")
+        assert problem.problem.startswith("3 entries are left out: balls are read as point, bbox")
+
+    def test_a_file_of_endless_kinds_of_objects_names_a_hundred(
+        self, tmp_path: Path, report: Report
+    ) -> None:
+        objects = "".join(
+            f'<object name="thing {number}"><attribute name="A"><data:bvalue value="true"/>'
+            "</attribute></object>"
+            for number in range(300)
+        )
+        _read(tmp_path, HEAD + objects + TAIL, report)
+        assert len(report.problems) == 101
+        assert "200 entries are left out" in report.problems[-1].problem
+
+
+class TestNamespaces:
+    @pytest.mark.parametrize(
+        ("head", "prefix"),
+        [
+            (HEAD, "data"),
+            (HEAD.replace("viper#", "viper").replace("viperdata#", "viperdata"), "data"),
+            (HEAD.replace("xmlns:data", "xmlns:d"), "d"),
+            (HEAD.replace(' xmlns="http://lamp.cfar.umd.edu/viper#"', ""), "data"),
+        ],
+    )
+    def test_elements_count_under_any_namespace(
+        self, tmp_path: Path, report: Report, head: str, prefix: str
+    ) -> None:
+        text = head + ball(f'<{prefix}:point framespan="9:9" x="1" y="2"/>') + TAIL
+        assert _read(tmp_path, text, report).balls == {9: [(1.0, 2.0)]}
+        assert report.problems == []
+
+    def test_all_elements_may_have_a_prefix(self, tmp_path: Path, report: Report) -> None:
+        text = (
+            '<v:viper xmlns:v="http://lamp.cfar.umd.edu/viper#" xmlns:d="urn:d"><v:data>'
+            '<v:sourcefile filename="a.avi"><v:object name="BALL" id="0">'
+            '<v:attribute name="P"><d:point framespan="9:9" x="1" y="2"/></v:attribute>'
+            "</v:object></v:sourcefile></v:data></v:viper>"
+        )
+        assert _read(tmp_path, text, report).balls == {9: [(1.0, 2.0)]}
+
+
+def sized(width: str, height: str) -> str:
+    sides = zip(("H-FRAME-SIZE", "V-FRAME-SIZE"), (width, height), strict=True)
+    values = "".join(
+        f'<attribute name="{name}"><data:dvalue value="{value}"/></attribute>'
+        for name, value in sides
+    )
+    return HEAD.replace('<attribute name="H-FRAME-SIZE"/>', values)
+
+
+class TestSize:
+    def test_the_size_of_the_frames_is_read(self, tmp_path: Path, report: Report) -> None:
+        assert _read(tmp_path, sized("1280", "720") + TAIL, report).size == ImageSize(1280, 720)
+
+    @pytest.mark.parametrize(("width", "height"), [("", ""), ("1280", "")])
+    def test_a_blank_side_is_no_size(
+        self, tmp_path: Path, report: Report, width: str, height: str
+    ) -> None:
+        assert _read(tmp_path, sized(width, height) + TAIL, report).size is None
+        assert report.problems == []
+
+    @pytest.mark.parametrize("side", ["0", "-720", "huge", "1e9", "7.5"])
+    def test_an_impossible_side_is_reported(
+        self, tmp_path: Path, report: Report, side: str
+    ) -> None:
+        assert _read(tmp_path, sized("1280", side) + TAIL, report).size is None
+        (problem,) = report.problems
+        assert (problem.record, problem.field) == ("V-FRAME-SIZE", "value")
+
+
+class TestSources:
+    def test_each_source_is_a_track(self, tmp_path: Path, report: Report) -> None:
+        point = ball('<data:point framespan="9:9" x="1" y="2"/>')
+        text = (
+            HEAD
+            + point
+            + TAIL.replace(
+                "</sourcefile>",
+                f'</sourcefile><sourcefile filename="b.avi">{point * 2}</sourcefile>',
+            )
+        )
+        (tmp_path / "1.xgtf").write_text(text)
+        tree = open_tree(tmp_path, report)
+        assert tree is not None
+        tracks = read_viper(tree, "1.xgtf", report)
+        assert [(track.source, track.ball_points) for track in tracks] == [
+            ("cam.mpg", 1),
+            ("b.avi", 1),
+        ]
+
+
+class TestIsViper:
+    @pytest.mark.parametrize(
+        ("content", "is_one"),
+        [
+            (HEAD, True),
+            (HEAD.replace("<viper", "<v:viper"), True),
+            ("<annotations><viperish/></annotations>", False),
+            ("", False),
+        ],
+    )
+    def test_is_told_by_the_root(
+        self, tmp_path: Path, report: Report, content: str, is_one: bool
+    ) -> None:
+        (tmp_path / "1.xml").write_text(content)
+        (tmp_path / "2.xml.gz").write_bytes(gzip.compress(content.encode()))
+        tree = open_tree(tmp_path, report)
+        assert tree is not None
+        assert [is_viper(tree, name) for name in ("1.xml", "2.xml.gz")] == [is_one, is_one]

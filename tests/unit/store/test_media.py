@@ -218,15 +218,17 @@ class TestReadFrame:
             def get(self, _: int) -> float:
                 return 16.0
 
-            def set(self, *_: float) -> None: ...
+            def grab(self) -> bool:
+                return True
 
-            def read(self) -> tuple[bool, np.ndarray]:
+            def retrieve(self) -> tuple[bool, np.ndarray]:
                 return True, np.empty((8000, 8000, 3), np.uint8)
 
         path = tmp_path / "cam1.mp4"
         path.write_bytes(b"")
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr(media_module, "open_video", lambda _: nullcontext(Growing()))
+            patch.setattr(media_module, "video_times", lambda *_: np.arange(2.0))
             with pytest.raises(TooLargeError, match="8000 x 8000"):
                 read_frame(Media(str(path), frame=1), None, False, settings)
 

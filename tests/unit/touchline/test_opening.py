@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 
 import touchline
 from app.datasets.export_record import ExportRecord
@@ -103,6 +104,23 @@ class TestFrames:
         object.__setattr__(view, "file_name", "../secret.png")
         with pytest.raises(DataError, match="no frame"):
             view.frame()
+
+    @pytest.mark.parametrize("orientation", [3, 6])
+    def test_a_frame_that_exif_turns_is_decoded_upright(
+        self, records: list[ExportRecord], tmp_path: Path, orientation: int
+    ) -> None:
+        view = touchline.open(write_export(tmp_path / "bare", records, images=False)).views[0]
+        upright = np.zeros((view.height, view.width, 3), np.uint8)
+        upright[:60, :60] = 200
+        # A decoder turns stored pixels clockwise: by 180 degrees, or by 90.
+        stored = np.rot90(upright, 2 if orientation == 3 else 1)
+        exif = Image.Exif()
+        exif[0x0112] = orientation
+        target = tmp_path / "frames" / view.file_name
+        target.parent.mkdir(parents=True)
+        Image.fromarray(stored).save(target, exif=exif.tobytes())
+        found = touchline.open(tmp_path / "bare", frames=tmp_path / "frames").views[0]
+        assert np.abs(found.image(resize=False).astype(int) - upright).max() < 30
 
     def test_a_larger_frame_is_shown_at_the_annotated_size(self, export: Path) -> None:
         view = touchline.open(export).views[1]

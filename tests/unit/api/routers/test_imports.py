@@ -100,6 +100,19 @@ class TestStartImport:
         assert read.result["without_picture"] == 0 < read.result["read"]
         assert finished(app, api.post(API, json=body())).result["paint_job"] is None
 
+    def test_for_pictures_alone_cameras_are_proposed(self, app, api, tree) -> None:
+        for path in tree.rglob("*.json"):
+            path.unlink()
+        for name in ("a.png", "b.png"):
+            cv2.imwrite(str(tree / name), np.full((360, 640, 3), 127, np.uint8))
+        result = finished(app, api.post(API, json=body(format="frames"))).result
+        assert (result["outcome"], result["new"], result["paint_job"]) == ("complete", 2, None)
+        services = app.state.services
+        sought = services.jobs.wait(result["proposals_job"], SECONDS)
+        assert (sought.kind, sought.result["views"]) == ("proposals", 2)
+        again = finished(app, api.post(API, json=body(format="frames"))).result
+        assert (again["unchanged"], again["proposals_job"]) == (2, None)
+
     def test_the_policy_that_is_named_judges_what_is_made_and_nothing_else(
         self, app, api, tree, group
     ) -> None:

@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from PIL import Image
 from sqlalchemy import select
 
 from app.datasets.cameras_writer import write_cameras
@@ -193,6 +194,47 @@ class TestImportSource:
             assert len(imported.report.problems) == 1, form
             assert not imported.something
         assert list_datasets(store) == []
+
+    @pytest.mark.parametrize(
+        ("name", "problem", "hint"),
+        [
+            (
+                "match.mp4",
+                "holds a video, and recordings are not read yet",
+                "Export stills from it",
+            ),
+            ("still.jpg", "holds pictures and no annotations", "Import them as frames"),
+        ],
+    )
+    def test_pictures_and_videos_are_told_in_a_sentence_of_their_own(
+        self, store, tmp_path, name, problem, hint
+    ) -> None:
+        (tmp_path / name).write_bytes(b"x")
+        for form in FORMATS:
+            # Cameras are brought to a dataset that is there.
+            if form == "cameras" or (form == "frames" and name == "still.jpg"):
+                continue
+            for path in (tmp_path, tmp_path / name):
+                imported = import_source(store, "demo", Source(form, path), store.settings)
+                sentence, advice = imported.nothing_read()
+                assert sentence == f"nothing could be imported: {path} {problem}", form
+                assert advice.startswith(hint)
+                (skipped,) = imported.values()["skipped"]
+                assert skipped["problem"] == problem
+        assert list_datasets(store) == []
+
+    def test_pictures_become_groups_of_one_view(self, store, tmp_path) -> None:
+        for name in ("a.jpg", "b.jpg"):
+            Image.new("RGB", (128, 72)).save(tmp_path / name)
+        imported = import_source(store, "demo", Source("frames", tmp_path), store.settings)
+        assert (imported.complete, imported.result.new) == (True, 2)
+        found = groups_of(store, "demo")
+        assert {key: group.views[0].size for key, group in found.items()} == {
+            "a.jpg": ImageSize(128, 72),
+            "b.jpg": ImageSize(128, 72),
+        }
+        again = import_source(store, "demo", Source("frames", tmp_path), store.settings)
+        assert (again.result.new, again.result.unchanged) == (0, 2)
 
     def test_an_import_that_was_killed_ends_in_the_same_state(
         self, store, make_group, tmp_path, monkeypatch

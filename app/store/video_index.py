@@ -1,0 +1,122 @@
+"""Video index: when each frame of a video is shown, by which any of them is found again exactly.
+
+A frame's number is the ordinal in which decoding from the start returns it. Never is a number divided
+by a frame rate: with a variable rate, a start after zero or frames that are dropped that is a guess.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from contextlib import suppress
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from app.config import Settings
+from app.durable import replace_file
+from app.errors import ImageError, TooLargeError
+from app.store.video import open_video
+
+MAX_FRAMES = 2_000_000
+"""Frames of one video; eleven hours at 50 a second."""
+_VERSION = 1
+_MARGINS = (32, 256)
+"""Frames before the one that is sought from which decoding starts: behind a jump some decoders return
+frames whose references they have not seen."""
+
+Times = npt.NDArray[np.float64]
+"""Presentation time of each frame as the decoder returns them, milliseconds, shape (N,)."""
+
+
+def make_index(path: Path, stamp: str, settings: Settings) -> Times:
+    """When each frame of a video is shown: decodes it all, and keeps the index in the cache.
+
+    Args:
+        path: The video.
+        stamp: Name of its content: another video under the same path has another one.
+        settings: The folder of the cache.
+
+    Raises:
+        ImageError: It is no video that can be read.
+        TooLargeError: It has more frames than ``MAX_FRAMES``.
+    """
+    times = _decode_times(path)
+    content = BytesIO()
+    np.save(content, times, allow_pickle=False)
+    place = _place(stamp, settings)
+    # A full disk costs the cache and no frame.
+    with suppress(OSError):
+        place.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+        replace_file(place, content.getvalue())
+    return times
+
+
+def kept_index(stamp: str, settings: Settings) -> Times | None:
+    """The index of a video that was decoded before; None where there is none."""
+    with suppress(OSError, ValueError, EOFError):
+        times: Times = np.load(_place(stamp, settings), allow_pickle=False)
+        if times.dtype == np.float64 and times.ndim == 1:
+            return times
+    return None
+
+
+def frame_at(video: cv2.VideoCapture, number: int, times: Times) -> Any:
+    """The frame of that number, or None where it cannot be decoded.
+
+    Args:
+        video: Just opened.
+        number: From 0, below ``len(times)``.
+        times: Index of the video.
+    """
+    for margin in _MARGINS:
+        if number > margin and _jump(video, number - margin, number, times):
+            return _retrieved(video)
+    if number > _MARGINS[0]:
+        video.set(cv2.CAP_PROP_POS_FRAMES, 0)
+    for _ in range(number + 1):
+        if not video.grab():
+            return None
+    return _retrieved(video)
+
+
+def _jump(video: cv2.VideoCapture, start: int, number: int, times: Times) -> bool:
+    """Go to a frame from about another one; whether every frame on the way came when it should."""
+    video.set(cv2.CAP_PROP_POS_MSEC, times[start])
+    if not video.grab():
+        return False
+    places = np.flatnonzero(times == video.get(cv2.CAP_PROP_POS_MSEC))
+    # Where the jump led too far, or two frames have one time, nothing says which one this is.
+    if len(places) != 1 or places[0] > number - _MARGINS[0] // 2:
+        return False
+    for expected in times[places[0] + 1 : number + 1]:
+        if not video.grab() or video.get(cv2.CAP_PROP_POS_MSEC) != expected:
+            return False
+    return True
+
+
+def _retrieved(video: cv2.VideoCapture) -> Any:
+    done, picture = video.retrieve()
+    return picture if done else None
+
+
+def _decode_times(path: Path) -> Times:
+    times: list[float] = []
+    with open_video(path) as video:
+        if not video.isOpened():
+            raise ImageError(f"{path.name} is no video that can be read")
+        while video.grab():
+            times.append(video.get(cv2.CAP_PROP_POS_MSEC))
+            if len(times) > MAX_FRAMES:
+                raise TooLargeError(f"{path.name} has more than {MAX_FRAMES:,} frames")
+    return np.array(times)
+
+
+def _place(stamp: str, settings: Settings) -> Path:
+    """Where the index of a video is kept."""
+    # Another decoder may return other frames.
+    key = repr((stamp, _VERSION, cv2.__version__))
+    return settings.cache / "videos" / f"{hashlib.sha256(key.encode()).hexdigest()[:32]}.npy"

@@ -1,0 +1,175 @@
+from __future__ import annotations
+
+import random
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from app.config import Settings
+from app.errors import ImageError, NotFoundError, TooLargeError
+from app.soccer.media import Media
+from app.store import media as media_module
+from app.store import video_index
+from app.store.frames import Frames
+from app.store.media import decode_frame, has_index, read_frame, video_times
+from app.store.neighbours import neighbours
+from app.store.video import open_video
+from app.store.video_index import frame_at
+from tests.videos import delay_start, number_of, vary_times, write_video
+
+TICK = 512
+COUNT = 200
+"""Beyond a margin, so that most frames are jumped to."""
+_DICE = random.Random(1)
+RATES = {
+    "three times as long every third frame": [TICK * (1 if n % 3 else 3) for n in range(COUNT)],
+    "any duration": [_DICE.randint(100, 1500) for _ in range(COUNT)],
+    "slow later": [TICK] * 100 + [4 * TICK] * 100,
+    "slow first": [4 * TICK] * 100 + [TICK] * 100,
+    "two frames almost at once": [1 if n % 2 else 2 * TICK - 1 for n in range(COUNT)],
+    "two frames at one time": [0 if n % 5 == 0 else TICK for n in range(COUNT)],
+}
+CODECS = [
+    ("mp4", "mp4v"),
+    ("mp4", "MPG2"),
+    ("avi", "MJPG"),
+    ("avi", "XVID"),
+    ("avi", "MPG2"),
+    ("webm", "VP80"),
+    ("mkv", "MPG2"),
+    # They begin after zero; the last frame of an MPEG program stream has no time at all.
+    ("ts", "MPG2"),
+    ("mpg", "MPG2"),
+]
+
+
+def wrong(path: Path, settings: Settings, step: int = 7) -> list[tuple[int, int]]:
+    """Frames that show another number than theirs."""
+    times = video_times(Media(str(path), frame=0), settings)
+    assert len(times) == COUNT
+    found = []
+    for number in [*range(0, COUNT, step), COUNT - 1]:
+        shown = number_of(decode_frame(Media(str(path), frame=number), False, settings))
+        found += [] if shown == number else [(number, shown)]
+    return found
+
+
+class TestFrameAt:
+    @pytest.mark.parametrize(("suffix", "codec"), CODECS)
+    def test_every_frame_of_a_constant_rate_shows_its_number(
+        self, suffix: str, codec: str, tmp_path: Path, settings: Settings
+    ) -> None:
+        assert wrong(write_video(tmp_path / f"cam1.{suffix}", codec), settings) == []
+
+    @pytest.mark.parametrize("codec", ["mp4v", "MPG2"])
+    @pytest.mark.parametrize("rate", RATES)
+    def test_so_does_every_frame_of_a_variable_one(
+        self, rate: str, codec: str, tmp_path: Path, settings: Settings
+    ) -> None:
+        path = vary_times(write_video(tmp_path / "cam1.mp4", codec), RATES[rate])
+        assert wrong(path, settings) == []
+
+    @pytest.mark.parametrize("codec", ["mp4v", "MPG2"])
+    def test_and_of_one_that_begins_later(
+        self, codec: str, tmp_path: Path, settings: Settings
+    ) -> None:
+        path = vary_times(write_video(tmp_path / "cam1.mp4", codec), RATES["any duration"])
+        assert wrong(delay_start(path, 1700), settings) == []
+
+    def test_a_jump_that_leads_elsewhere_is_not_believed(
+        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        class Astray:
+            """Jumps too far, and then to where nothing says which frame it is."""
+
+            def __init__(self, video: cv2.VideoCapture):
+                self._video, self.jumps = video, 0
+
+            def set(self, what: int, value: float) -> bool:
+                if what == cv2.CAP_PROP_POS_MSEC:
+                    self.jumps += 1
+                    value += 1000.0
+                return bool(self._video.set(what, value))
+
+            def __getattr__(self, name: str) -> object:
+                return getattr(self._video, name)
+
+        path = write_video(tmp_path / "cam1.mp4", "mp4v", 100)
+        with open_video(path) as video:
+            astray = Astray(video)
+            picture = frame_at(astray, 60, np.arange(100) * 40.0)
+        assert astray.jumps == 1
+        assert number_of(picture) == 60
+
+
+class TestVideoTimes:
+    def test_a_video_is_decoded_once(
+        self, tmp_path: Path, settings: Settings, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        media = Media(str(write_video(tmp_path / "cam1.mp4", "mp4v", 20)), frame=5)
+        assert not has_index(media, settings)
+        times = video_times(media, settings)
+        assert times.tolist() == pytest.approx([40.0 * number for number in range(20)])
+        assert has_index(media, settings)
+        monkeypatch.setattr(media_module, "make_index", lambda *_: pytest.fail("decoded again"))
+        assert (video_times(media, settings) == times).all()
+
+    def test_another_video_in_its_place_is_decoded_again(
+        self, tmp_path: Path, settings: Settings
+    ) -> None:
+        media = Media(str(write_video(tmp_path / "cam1.mp4", "mp4v", 20)), frame=5)
+        video_times(media, settings)
+        write_video(tmp_path / "cam1.mp4", "mp4v", 9)
+        assert len(video_times(media, settings)) == 9
+
+    def test_a_damaged_index_is_made_again(self, tmp_path: Path, settings: Settings) -> None:
+        media = Media(str(write_video(tmp_path / "cam1.mp4", "mp4v", 20)), frame=5)
+        video_times(media, settings)
+        (kept,) = (settings.cache / "videos").iterdir()
+        for content in (b"", b"no array", kept.read_bytes()[:90]):
+            kept.write_bytes(content)
+            assert len(video_times(media, settings)) == 20
+
+    def test_a_frame_behind_the_last_is_refused_with_their_number(
+        self, tmp_path: Path, settings: Settings
+    ) -> None:
+        path = write_video(tmp_path / "cam1.mp4", "mp4v", 20)
+        for number in (-1, 20):
+            with pytest.raises(NotFoundError, match=f"no frame {number}; it has 20 frames"):
+                read_frame(Media(str(path), frame=number), None, False, settings)
+
+    def test_a_video_without_end_is_refused(
+        self, tmp_path: Path, settings: Settings, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(video_index, "MAX_FRAMES", 19)
+        media = Media(str(write_video(tmp_path / "cam1.mp4", "mp4v", 20)), frame=5)
+        with pytest.raises(TooLargeError, match="more than 19 frames"):
+            video_times(media, settings)
+
+    def test_what_is_no_video_is_refused(self, tmp_path: Path, settings: Settings) -> None:
+        (tmp_path / "cam1.mp4").write_bytes(b"no video")
+        with pytest.raises(ImageError, match="no video that can be read"):
+            video_times(Media(str(tmp_path / "cam1.mp4"), frame=0), settings)
+
+
+class TestFramesOfTheServer:
+    def test_a_video_is_indexed_before_its_first_frame_is_made(
+        self, tmp_path: Path, settings: Settings
+    ) -> None:
+        path = vary_times(write_video(tmp_path / "cam1.mp4", "MPG2"), RATES["any duration"])
+        media, frames = Media(str(path), frame=55), Frames(settings)
+        try:
+            indexing = frames.ask_fetch(media)
+            assert indexing is not None and indexing.future.result(60)
+            assert frames.ask_fetch(media) is None
+            data = np.frombuffer(frames.read(media, None, False).data, np.uint8)
+            assert number_of(cv2.imdecode(data, cv2.IMREAD_COLOR)) == 55
+        finally:
+            frames.close()
+
+    def test_neighbours_end_with_the_last_frame(self, tmp_path: Path, settings: Settings) -> None:
+        path = write_video(tmp_path / "cam1.mp4", "mp4v", 20)
+        found = neighbours(Media(str(path), frame=18), "18", True, settings)
+        assert max(found) == 1
