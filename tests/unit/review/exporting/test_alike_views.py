@@ -124,7 +124,7 @@ def coco_records(out: Path) -> Iterator[tuple[int, Path]]:
     found = json.loads(path.read_text())
     boxes = {item["image_id"]: item["bbox"] for item in found["annotations"]}
     for image in found["images"]:
-        yield round((boxes[image["id"]][0] - 200) // 10), out / image["file_name"]
+        yield int((boxes[image["id"]][0] - 200) // 10), out / image["file_name"]
 
 
 def gamestate_records(out: Path) -> Iterator[tuple[int, Path]]:
@@ -148,7 +148,7 @@ def yolo_records(out: Path) -> Iterator[tuple[int, Path]]:
         for row in csv.DictReader(file):
             label = re.sub("^images", "labels", row["image"]).rsplit(".", 1)[0] + ".txt"
             x = float((out / label).read_text().split()[1]) * SIZE.width
-            yield round((x - 207) // 10), out / row["image"]
+            yield int((x - 207) // 10), out / row["image"]
 
 
 RECORDS: dict[str, Callable[[Path], Iterator[tuple[int, Path]]]] = {
