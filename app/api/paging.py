@@ -55,14 +55,18 @@ def paged(default: int | None = None) -> Callable[[Callable[P, Answer]], Callabl
             waiting: Callable[..., Awaitable[Any]] = route
 
             @wraps(route)
-            async def page(*, limit: int | None, cursor: str | None, **asked: Any) -> Any:
-                return cut(await waiting(**asked), limit, cursor, asked)
+            async def page(
+                *args: Any, limit: int | None = None, cursor: str | None = None, **asked: Any
+            ) -> Any:
+                return cut(await waiting(*args, **asked), limit, cursor, asked)
         else:
             direct: Callable[..., Any] = route
 
             @wraps(route)
-            def page(*, limit: int | None, cursor: str | None, **asked: Any) -> Any:
-                return cut(direct(**asked), limit, cursor, asked)
+            def page(
+                *args: Any, limit: int | None = None, cursor: str | None = None, **asked: Any
+            ) -> Any:
+                return cut(direct(*args, **asked), limit, cursor, asked)
 
         page.__signature__ = _with_page(route, default)  # type: ignore[attr-defined]
         return page  # type: ignore[return-value]
