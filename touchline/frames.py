@@ -59,11 +59,13 @@ class FileFrames:
     def __init__(self, path: Path):
         self._files = Files(path)
         self._archives: dict[str, Files] = {}
+        self._owners: dict[str, str] = {}
 
     def read(self, view: View) -> bytes:
         """The file's content; DataError where it is not there."""
         for name in _places(view.file_name):
             if self._files.holds(name):
+                self._require_one(name, view.file_name)
                 return self._files.read(name)
         match, _, name = view.file_name.partition(f"/{FOLDER}/")
         archive = self._archive(match)
@@ -71,6 +73,15 @@ class FileFrames:
             if archive is not None and archive.holds(folder + name):
                 return archive.read(folder + name)
         raise DataError(f"{self._files.path} has no frame {view.file_name}")
+
+    def _require_one(self, name: str, wanted: str) -> None:
+        """Refuse a file that is called so briefly that it would be the frame of two views."""
+        other = self._owners.setdefault(name, wanted)
+        if other != wanted:
+            raise DataError(
+                f"{name} of {self._files.path} fits two frames ({other} and {wanted})",
+                "Lay the frames into the folders that the export names.",
+            )
 
     def _archive(self, match: str) -> Files | None:
         """The zip of a match's frames, opened once; those inside a zip are not looked into."""

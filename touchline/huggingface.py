@@ -19,7 +19,8 @@ def to_datasets(version: Dataset, *, images: bool = True) -> Any:
 
     Columns: those of ``touchline.samples``; ``image`` is a feature of its own, with the bytes of
     the frame as they are, so ``with_format("torch")`` and the viewer show it. What is not there is
-    null.
+    null. Boxes are ours, (0, 0) the centre of the first pixel: one that is cropped from pixel edges,
+    as COCO's are, begins half a pixel further right and down.
 
     Args:
         version: Opened.

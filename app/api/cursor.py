@@ -21,6 +21,19 @@ def parse_cursor(cursor: str | None) -> int | None:
     return int(cursor)
 
 
+def first_below(cursor: str | None, before: int | None) -> int | None:
+    """The number below which a page of a list that goes down begins; None for the first page.
+
+    Args:
+        cursor: As every list takes it.
+        before: As these lists took it before; the cursor counts where both are there.
+
+    Raises:
+        InputError: No list gave the cursor.
+    """
+    return before if cursor is None else parse_cursor(cursor)
+
+
 def foreign_cursor() -> InputError:
     """What to raise for a cursor that no list gave."""
     return InputError(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 from fastapi import FastAPI
@@ -9,8 +10,13 @@ from fastapi.openapi.utils import get_openapi
 from pydantic import BaseModel
 
 from app.api.idempotency import UNKEPT
+from app.api.openapi_examples import example_of
+from app.api.property_words import PARAMETERS, PROPERTIES
 from app.api.schemas.event import EVENTS
 from app.api.schemas.problem import Problem
+from app.api.security.rules import OPEN, RULES
+from app.api.team import NAME
+from app.review.people.roles import Action
 
 DESCRIPTION = """
 Everything that the browser does goes through these addresses.
@@ -25,8 +31,8 @@ Everything that the browser does goes through these addresses.
   `Authorization: Bearer tl_...`, and neither cookie nor `Origin`. 401: there is none that is valid;
   403: the role does not suffice, or the token lacks a scope.
 * **Problems.** Every answer that is not a success is `application/problem+json` (RFC 9457).
-* **Pages.** Lists take `limit` and `cursor`; `next` is the cursor of the next page, `total` says
-  how many match.
+* **Pages.** Every list takes `limit` and `cursor` and answers `items` and `next`: the cursor of the
+  next page, null on the last one. Some answer `total`, too: how many there are.
 * **Units.** Pixels of the annotated image size, (0, 0) the centre of the first pixel; metres in
   the pitch frame, z down; degrees.
 """.strip()
@@ -94,15 +100,59 @@ def _document(app: FastAPI) -> dict[str, Any]:
         described = model.model_json_schema(ref_template=REFERENCE)
         schemas.update(described.pop("$defs", {}))
         schemas[model.__name__] = described
+    _describe_schemas(schemas)
+    _secure(document)
+    _give_examples(document)
     return document
+
+
+def _describe_schemas(schemas: dict[str, Any]) -> None:
+    """Say what each property means, and that lists always have ``next``."""
+    for name, schema in schemas.items():
+        properties = schema.get("properties", {})
+        for key, one in properties.items():
+            if "description" not in one:
+                words = PROPERTIES.get(f"{name}.{key}", PROPERTIES.get(key))
+                one |= {} if words is None else {"description": words}
+        if {"items", "next"} <= set(properties):
+            schema["required"] = sorted(
+                {*schema.get("required", ()), "next"}, key=[*properties].index
+            )
+
+
+def _secure(document: dict[str, Any]) -> None:
+    """Say with what one may ask: on a server that one person runs alone, with nothing."""
+    document["components"]["securitySchemes"] = SCHEMES
+    document["security"] = [*({name: []} for name in SCHEMES), {}]
+    for path, operations in document["paths"].items():
+        for method, operation in operations.items():
+            if RULES.get(f"{method.upper()} {path}", Action.READ) is OPEN:
+                operation["security"] = []
+
+
+def _give_examples(document: dict[str, Any]) -> None:
+    """Give every answer in JSON an example."""
+    schemas = document["components"]["schemas"]
+    for operations in document["paths"].values():
+        for operation in operations.values():
+            for status, answer in operation["responses"].items():
+                for kind, content in answer.get("content", {}).items():
+                    is_given = {"example", "examples"} & set(content)
+                    if status.startswith("2") and kind == "application/json" and not is_given:
+                        content["example"] = example_of(content.get("schema", {}), schemas)
 
 
 def _mend_operations(document: dict[str, Any]) -> None:
     """Say what the framework cannot know, and not what belongs to a newer OpenAPI."""
     for path, operations in document["paths"].items():
         for method, operation in operations.items():
+            # What the framework makes of a function's name may be that of another one, too.
+            operation["summary"] = _words(operation["operationId"])
             parameters = operation.setdefault("parameters", [])
             for parameter in parameters:
+                if not parameter.get("description"):
+                    words = PARAMETERS.get(parameter["name"])
+                    parameter |= {} if words is None else {"description": words}
                 # Asked for by our own code, which answers 428 where it is missing.
                 if parameter["name"] == "If-Match":
                     parameter |= {"required": True, "schema": {"type": "string"}}
@@ -114,6 +164,29 @@ def _mend_operations(document: dict[str, Any]) -> None:
                 answer.get("content", {}).get("text/event-stream", {}).pop("itemSchema", None)
 
 
+def _words(name: str) -> str:
+    """``listSavedViews`` as a person writes it: *List saved views*."""
+    words = re.sub("([A-Z])", lambda found: f" {found[1].lower()}", name)
+    return words[:1].upper() + words[1:]
+
+
+SCHEMES: dict[str, Any] = {
+    "session": {
+        "type": "apiKey",
+        "in": "cookie",
+        "name": NAME,
+        "description": "The session of a person who has logged in on a server of a team, set by"
+        " `POST /api/v1/session`; `__Host-` stands before its name where people come by TLS. A"
+        " change carries an `Origin` of the server, too.",
+    },
+    "token": {
+        "type": "http",
+        "scheme": "bearer",
+        "bearerFormat": "tl_...",
+        "description": "A token of `POST /api/v1/tokens`, with which scripts ask in the name of a"
+        " person, within its scopes.",
+    },
+}
 KEY_PARAMETER: dict[str, Any] = {
     "name": "Idempotency-Key",
     "in": "header",

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Hashable, Iterable, Mapping
 from pathlib import Path, PurePosixPath
 
 from app.datasets.camera_json import camera_to_json
+from app.datasets.export_names import folded, frame_claims
 from app.datasets.export_record import ExportRecord
 from app.datasets.frame_names import view_place
 from app.datasets.view_files import PutText, put_on_disk, write_below
 from app.errors import InputError
 from app.finite import json_text
 from app.geometry.camera import Camera
+from app.soccer.group import Group, View
 
 
 def camera_text(camera: Camera) -> str:
@@ -54,39 +56,41 @@ def write_camera_files(
         Counts: ``groups`` and ``cameras``.
 
     Raises:
+        InputError: The files of two frames would have one name.
         UnsafePathError: A key would leave ``root``.
     """
     counts = {"groups": 0, "cameras": 0}
-    written: dict[str, int] = {}
+    written: dict[str, tuple[str, ...]] = {}
     put = put or put_on_disk(root)
     for record in records:
         counts["groups"] += 1
-        counts["cameras"] += put_view_cameras(put, record, written)
+        for view in record.group.views:
+            name, camera = _file_of(record.group, record.named(view)), record.camera(view)
+            if camera is None:
+                continue
+            owner = camera_owner(record.group, view)
+            first = written.setdefault(folded(name), owner)
+            if first != owner:
+                raise InputError(
+                    f"the cameras of two frames ({', '.join(first)} and {', '.join(owner)})"
+                    f" would both be called {name}"
+                )
+            if len(written) > counts["cameras"]:
+                put(name, camera_text(camera))
+                counts["cameras"] = len(written)
     return counts
 
 
-def put_once(put: PutText, name: str, text: str, written: dict[str, int]) -> None:
-    """Write a file unless it is written, which ``written`` keeps by name.
-
-    Raises:
-        InputError: What has that name says something else.
-    """
-    if name not in written:
-        put(name, text)
-    if written.setdefault(name, hash(text)) != hash(text):
-        raise InputError(f"the files of two frames would both be called {name}")
+def camera_owner(group: Group, view: View) -> tuple[str, ...]:
+    """Whose camera a view has: the static camera's, or that of the view alone."""
+    return (view.station.key,) if view.station.shared else (group.key, view.key)
 
 
-def put_view_cameras(put: PutText, record: ExportRecord, written: dict[str, int]) -> int:
-    """Write the cameras of a group that are not written yet; how many that were.
+def camera_claims(group: Group, view: View, split: str) -> Mapping[str, Hashable]:
+    """The names of a view in an export, and whose each would be (``export_names.Claims``)."""
+    camera = {_file_of(group, view): camera_owner(group, view)}
+    return {**camera, **frame_claims(group, view, split)}
 
-    Raises:
-        InputError: Those of two frames would have one name.
-    """
-    before = len(written)
-    for view in record.group.views:
-        place, camera = view_place(record.group, view), record.camera(view)
-        if camera is None or (view.station.shared and camera_name(place) in written):
-            continue
-        put_once(put, camera_name(place), camera_text(camera), written)
-    return len(written) - before
+
+def _file_of(group: Group, view: View) -> str:
+    return camera_name(view_place(group, view))

@@ -9,10 +9,11 @@ from pathlib import PurePosixPath
 from typing import Any
 
 from app.datasets.camera_json import camera_from_json
-from app.datasets.coco import CAMERA, OUTSIDE, PREFIX, STATE
+from app.datasets.coco import CAMERA, CORNER, ORIGIN, OUTSIDE, PREFIX, STATE
 from app.datasets.coco_annotation import NoPlaceError, ball_of, box_of
 from app.datasets.coco_categories import Categories, Category
 from app.datasets.coco_frames import Frame, FrameFile, groups_of, split_of_folders
+from app.datasets.corner_origin import box_from_corner
 from app.datasets.file_tree import DEFAULT_LIMITS, FileTree, Limits, Root
 from app.datasets.frame_names import UNASSIGNED
 from app.datasets.json_text import read_json
@@ -247,19 +248,29 @@ class _File:
     def _ours(self, image: StateReader) -> PlacedView:
         state = StateReader(image.value[STATE], self.path, image.record)
         view = state.view(image.size(), Extras())
-        changed = self._changed(image, view)
+        changed = self._changed(image, view, state.value.get(ORIGIN) == CORNER)
         media = self._media(image.text("file_name", ""))
         view = replace(view, balls=changed, media=media)
         return PlacedView(state.head(), state.count("position"), view)
 
-    def _changed(self, image: StateReader, view: View) -> tuple[BallAnnotation, ...]:
-        """The balls, with the boxes that somebody changed after they were written."""
+    def _changed(
+        self, image: StateReader, view: View, from_corner: bool
+    ) -> tuple[BallAnnotation, ...]:
+        """The balls, with the boxes that somebody changed after they were written.
+
+        Args:
+            image: Its annotations are looked at.
+            view: As it was when it was written.
+            from_corner: Whether boxes are measured from the corner of the first pixel; those of
+                our files of before are in our own frame.
+        """
         if len(view.balls) != 1:
             return view.balls
         for item in self._annotations(image):
             if item.get("bbox") != item.get("written_bbox", item.get("bbox")):
                 box = self._box(item, image.record)
                 if box is not None:
+                    box = box_from_corner(box) if from_corner else box
                     return (replace(view.balls[0], box=box, point=None),)
         return view.balls
 

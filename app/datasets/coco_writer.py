@@ -1,6 +1,8 @@
 """COCO: ``annotations/instances_<split>.json``, one category ``ball``, and 3D in extra fields.
 
-Views from which no detector should learn lie in ``outside_<split>.json`` beside it.
+Views from which no detector should learn lie in ``outside_<split>.json`` beside it. Boxes are
+measured from the corner of the first pixel, as in every COCO file; ``touchline``, which holds what
+was annotated, and ``camera`` are in our own pixel frame.
 """
 
 from __future__ import annotations
@@ -11,7 +13,8 @@ from pathlib import Path
 from typing import IO, Any
 
 from app.datasets.camera_json import camera_to_json
-from app.datasets.coco import CAMERA, OUTSIDE, PREFIX, STATE
+from app.datasets.coco import CAMERA, CORNER, ORIGIN, OUTSIDE, PREFIX, STATE
+from app.datasets.corner_origin import box_to_corner
 from app.datasets.export_record import ExportRecord, chosen_box, frame_name
 from app.datasets.frame_names import UNASSIGNED
 from app.datasets.view_state import head_to_json, view_to_json
@@ -90,7 +93,7 @@ class _Instances:
         self._annotations: IO[str] = self._beside.open("w", encoding="utf-8", newline="\n")
         self._counts = [0, 0]
         categories = [{"id": CATEGORY_ID, "name": CATEGORY, "supercategory": "sports"}]
-        head = {"info": dict(info), "licenses": [], "categories": categories}
+        head = {"info": {**info, ORIGIN: CORNER}, "licenses": [], "categories": categories}
         self._images.write(json_text(head)[:-1] + ', "images": [')
 
     def __enter__(self) -> _Instances:
@@ -138,6 +141,7 @@ def _image(record: ExportRecord, view: View, identity: int, everything: bool) ->
             **head_to_json(record.group),
             "position": record.group.views.index(view),
             **view_to_json(view),
+            ORIGIN: CORNER,
         },
     }
 
@@ -181,4 +185,5 @@ def _fit_fields(record: ExportRecord, fit: BallFit | None) -> Iterator[tuple[str
 
 
 def _bbox(box: Box) -> list[float]:
+    box = box_to_corner(box)
     return [*map(float, (box.x, box.y, box.width, box.height))]

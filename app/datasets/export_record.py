@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
+from app.datasets.export_names import named
 from app.datasets.frame_names import likely_suffix, match_frame
 from app.geometry.camera import Camera
 from app.soccer.ball_boxes import ball_boxes, ball_fit, has_ball_3d
@@ -28,6 +29,7 @@ class ExportRecord:
         override: The gate against which it was accepted, or None.
         splits: Split by view, where views of one group are split.
         frames: Where the frame of each view was placed in the export, by view key; relative.
+        names: Keys by which the files of views are called, where not by their own (``ExportNames``).
     """
 
     group: Group
@@ -37,10 +39,15 @@ class ExportRecord:
     override: str | None = None
     splits: Mapping[str, str] = field(default_factory=dict)
     frames: Mapping[str, str] = field(default_factory=dict)
+    names: Mapping[str, str] = field(default_factory=dict)
 
     def split(self, view: View) -> str:
         """``train``, ``test``, ``valid`` or empty: that of the view, or else of its group."""
         return self.splits.get(view.key, self.group.split)
+
+    def named(self, view: View) -> View:
+        """A view with the key by which its files are called."""
+        return named(view, self.names.get(view.key))
 
     def view_solution(self, view: View) -> ViewSolution | None:
         """What was computed for one view."""
@@ -101,5 +108,5 @@ def chosen_box(record: ExportRecord, view: View, kind: str) -> Box | None:
 
 def frame_name(record: ExportRecord, view: View) -> str:
     """Where the frame of a view is in the export, or would be."""
-    placed = record.frames.get(view.key)
-    return placed or match_frame(record.group, view, record.split(view), likely_suffix(view))
+    placed, called = record.frames.get(view.key), record.named(view)
+    return placed or match_frame(record.group, called, record.split(view), likely_suffix(view))

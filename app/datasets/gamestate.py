@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Hashable, Mapping
 from pathlib import PurePosixPath
 from typing import Any
 
@@ -41,6 +41,16 @@ def file_name(group: Group, view: View) -> str:
     if view.station.shared:
         stem = f"{group.key}_{stem}"
     return f"{PurePosixPath(stem).name}{PurePosixPath(view.key).suffix or '.jpg'}"
+
+
+def sequence_claims(group: Group, view: View, split: str) -> Mapping[str, Hashable]:
+    """The name of a view in an export, and whose it is (``export_names.Claims``).
+
+    Files of one sequence in several splits are one sequence to who reads them, and images are
+    known by their name without its ending.
+    """
+    stem = PurePosixPath(file_name(group, view)).stem
+    return {f"{sequence_folder(group.match, '')}/{stem}": (group.key, view.key)}
 
 
 def kept_of(view: View) -> Mapping[str, Any]:

@@ -8,13 +8,14 @@ from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 from itertools import groupby
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import Any
 
 import numpy as np
 
 from app.datasets import fields
 from app.datasets.camera_json import camera_to_json
+from app.datasets.export_names import folded
 from app.datasets.export_record import ExportRecord
 from app.datasets.gamestate import (
     BALL_ID,
@@ -123,7 +124,8 @@ def write_gamestate(root: Path, records: Iterable[ExportRecord]) -> dict[str, in
         UnsafePathError: A key would leave ``root``.
     """
     counts = {"groups": 0, "images": 0, "annotated_balls": 0}
-    files, matches = dict[Path, _File](), dict[Path, str]()
+    files, matches = dict[Path, _File](), dict[str, str]()
+    names: dict[tuple[str, str], str] = {}
     for match, run in groupby(records, key=lambda record: record.group.match):
         touched: dict[str, Path] = {}
         for record in run:
@@ -132,7 +134,8 @@ def write_gamestate(root: Path, records: Iterable[ExportRecord]) -> dict[str, in
                 split = record.split(view)
                 if split not in touched:
                     path = resolve_inside(root, f"{sequence_folder(match, split)}/{LABELS}")
-                    other = matches.setdefault(path, match)
+                    # Whatever its split, a sequence is known by the name of its folder.
+                    other = matches.setdefault(folded(path.parent.name), match)
                     if other != match:
                         raise InputError(f"the matches {other} and {match} would be one sequence")
                     if path in files:
@@ -140,10 +143,20 @@ def write_gamestate(root: Path, records: Iterable[ExportRecord]) -> dict[str, in
                     else:
                         files[path] = _File(path.parent.name, len(files) + 1, split)
                     touched[split] = path
+                _require_free(names, record, view)
                 _add(files[touched[split]], record, view, counts)
         for path in sorted(touched.values()):
             _write(files[path], path)
     return counts
+
+
+def _require_free(names: dict[tuple[str, str], str], record: ExportRecord, view: View) -> None:
+    """Keep the name of an image; raises InputError where another one of its sequence has it."""
+    name = file_name(record.group, record.named(view))
+    whose = f"{record.group.key}, {view.key}"
+    first = names.setdefault((record.group.match, folded(PurePosixPath(name).stem)), whose)
+    if first != whose:
+        raise InputError(f"the images of two frames ({first} and {whose}) would be called {name}")
 
 
 def _write(file: _File, path: Path) -> None:
@@ -168,7 +181,7 @@ def _add(file: _File, record: ExportRecord, view: View, counts: dict[str, int]) 
     file.kept = file.kept or kept
     camera = record.camera(view)
     people = _people(file, record.group, view, camera)
-    image = _image(file, record.group, view, camera, people)
+    image = _image(file, record, view, camera, people)
     file.images.append(_text(image))
     identity = str(image.get("image_id", image.get("id")))
     annotations = [*people, *_balls(file, record, view), *_rest(view, camera)]
@@ -183,15 +196,19 @@ def _add(file: _File, record: ExportRecord, view: View, counts: dict[str, int]) 
 
 
 def _image(
-    file: _File, group: Group, view: View, camera: Camera | None, people: list[dict[str, Any]]
+    file: _File,
+    record: ExportRecord,
+    view: View,
+    camera: Camera | None,
+    people: list[dict[str, Any]],
 ) -> dict[str, Any]:
-    kept = kept_of(view).get("image")
+    kept, name = kept_of(view).get("image"), file_name(record.group, record.named(view))
     if isinstance(kept, dict):
-        return dict(kept)
+        return kept | ({"file_name": name} if view.key in record.names else {})
     return {
         "is_labeled": True,
         "image_id": file.image_id(),
-        "file_name": file_name(group, view),
+        "file_name": name,
         "height": view.size.height,
         "width": view.size.width,
         # An evaluation asks for the place of everybody; somebody without one would end it.

@@ -57,6 +57,51 @@ def frame_number(group: Group) -> int:
     return int(group.key)
 
 
+class FrameGroups:
+    """Keeps whose the numbers of frames and cameras are, of which ISSIA's files have one each."""
+
+    def __init__(self) -> None:
+        self._groups: dict[int, str] = {}
+        self._cameras: dict[int, tuple[str, object]] = {}
+
+    def frame(self, group: Group) -> int:
+        """Number of the frame of a group.
+
+        Raises:
+            InputError: It is not from ISSIA, or another group has its number.
+        """
+        number = frame_number(group)
+        first = self._groups.setdefault(number, group.key)
+        if first != group.key:
+            raise InputError(
+                f"the groups {first} and {group.key} would both be frame {number} of ISSIA's files",
+                hint="Export them as coco, parquet or cameras instead.",
+            )
+        return number
+
+    def camera(self, group: Group, view: View, said: object) -> int:
+        """Number of the camera of a view.
+
+        Args:
+            group: The group of the view.
+            view: The view.
+            said: What the files hold of the camera, which stands still.
+
+        Raises:
+            InputError: It is not from ISSIA, or a view has its number that says otherwise.
+        """
+        number, whose = view_camera(group, view), f"{group.key}, {view.key}"
+        station = view.station.key if view.station.shared else said
+        first, known = self._cameras.setdefault(number, (whose, station))
+        if known != station:
+            raise InputError(
+                f"two frames ({first} and {whose}) have different cameras called cam{number}, and"
+                " ISSIA's files have one of each number",
+                hint="Export them as coco, parquet or cameras instead.",
+            )
+        return number
+
+
 def _not_issia(group: Group, view: str) -> InputError:
     return InputError(
         f"group {group.key}, view {view} is not from ISSIA (frame, cam1 to cam6)",

@@ -9,7 +9,7 @@ from pathlib import Path
 from app.datasets.camera_json import camera_to_json
 from app.datasets.csv_text import CsvTable, Value, cell, plain_list
 from app.datasets.export_record import ExportRecord
-from app.datasets.issia import CALIBRATION, TABLE_3D, frame_number, view_camera
+from app.datasets.issia import CALIBRATION, TABLE_3D, FrameGroups, frame_number, view_camera
 from app.datasets.spill import Spill, open_spill
 from app.finite import json_text
 from app.geometry.camera import Camera
@@ -43,18 +43,19 @@ def write_issia_3d(
         it holds, as in every format).
 
     Raises:
-        InputError: A group is not from ISSIA.
+        InputError: A group is not from ISSIA, or two have one frame or differ in a camera.
     """
     counts = {"groups": 0, "points": 0, "balls": 0}
-    cameras: dict[int, Camera] = {}
+    cameras, known = dict[int, Camera](), FrameGroups()
     with open_spill() as spill:
         for record in records:
             annotating = _annotating(record)
-            _collect_cameras(record, cameras)
+            frame = known.frame(record.group)
+            _collect_cameras(record, cameras, known)
             if annotating:
                 verdict = (record.verdict_text,) if everything else ()
                 cells = [cell(value) for value in (*_row(record, annotating), *verdict)]
-                spill.add((frame_number(record.group), 0, "", 0), json_text(cells))
+                spill.add((frame, 0, "", 0), json_text(cells))
                 counts["groups"] += 1
                 counts["points"] += record.point is not None
                 counts["balls"] += sum(map(record.has_ball_3d, annotating.values()))
@@ -80,11 +81,11 @@ def _annotating(record: ExportRecord) -> dict[int, View]:
     }
 
 
-def _collect_cameras(record: ExportRecord, cameras: dict[int, Camera]) -> None:
+def _collect_cameras(record: ExportRecord, cameras: dict[int, Camera], known: FrameGroups) -> None:
     for view in record.group.views:
         camera = record.camera(view)
         if camera is not None:
-            cameras.setdefault(view_camera(record.group, view), camera)
+            cameras.setdefault(known.camera(record.group, view, camera), camera)
 
 
 def _row(record: ExportRecord, annotating: dict[int, View]) -> Iterator[Value]:

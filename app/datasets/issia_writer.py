@@ -11,7 +11,7 @@ from xml.sax.saxutils import quoteattr
 
 from app.datasets import fields
 from app.datasets.camera_json import camera_to_json
-from app.datasets.issia import CALIBRATION, DEFAULT_OFFSET, FramePersons, frame_number, view_camera
+from app.datasets.issia import CALIBRATION, DEFAULT_OFFSET, FrameGroups, FramePersons
 from app.datasets.safe_path import resolve_inside
 from app.datasets.sn_calibration_writer import line_file_text
 from app.datasets.spill import Key, Spill, open_spill
@@ -62,16 +62,17 @@ def write_issia(
         Counts: ``groups``, ``annotated_balls``, ``persons``, ``cameras`` (files).
 
     Raises:
-        InputError: A group is not from ISSIA.
+        InputError: A group is not from ISSIA, or two have one frame or differ in a camera.
     """
     counts = {"groups": 0, "annotated_balls": 0, "persons": 0, "cameras": 0}
-    stations: dict[int, Station] = {}
+    stations, known = dict[int, Station](), FrameGroups()
     with open_spill() as spill:
         for group in groups:
             counts["groups"] += 1
-            frame = frame_number(group) + DEFAULT_OFFSET
+            frame = known.frame(group) + DEFAULT_OFFSET
             for view in group.views:
-                camera = view_camera(group, view)
+                station = view.station
+                camera = known.camera(group, view, (station.given, station.lines))
                 stations.setdefault(camera, view.station)
                 _add_balls(spill, camera, frame, view, counts)
                 _add_persons(spill, camera, frame, view.extras.boxes, counts)

@@ -8,11 +8,12 @@ from __future__ import annotations
 
 import hashlib
 import re
-from collections.abc import Mapping
+from collections.abc import Hashable, Mapping
 from dataclasses import dataclass
 from pathlib import PurePosixPath
 from typing import Any
 
+from app.datasets.export_names import frame_claims
 from app.datasets.frame_names import UNASSIGNED, match_frame, view_place
 from app.datasets.soccernet_v3 import SPLITS
 from app.soccer.annotation import Lines
@@ -92,6 +93,20 @@ def flat_name(place: str, split: str) -> str:
     digest = hashlib.sha256(place.encode()).hexdigest()[:12]
     stem = "-".join(_PLAIN.findall(whole.name)) or "frame"
     return f"{digest}_{stem}"
+
+
+def line_claims(group: Group, view: View, split: str) -> Mapping[str, Hashable]:
+    """The names of a view in an export, and whose each would be (``export_names.Claims``).
+
+    The place of a frame is a name, too: what is read again has it for a key. A static camera has
+    one file of lines for all its views.
+    """
+    place = view_place(group, view)
+    name = f"{split_folder_of(split, view.size)}/{flat_name(place, split)}"
+    if not view.station.shared:
+        return dict.fromkeys((place.encode().hex(), name), (group.key, view.key))
+    own = dict.fromkeys((place.encode().hex(), name), view.station.key)
+    return {**own, **frame_claims(group, view, split)}
 
 
 def line_frame(group: Group, view: View, split: str, suffix: str) -> str:

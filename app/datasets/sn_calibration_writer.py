@@ -7,8 +7,9 @@ from pathlib import Path
 from typing import Any
 
 from app.datasets import fields
-from app.datasets.cameras_writer import camera_name, camera_text, put_once
+from app.datasets.cameras_writer import camera_name, camera_owner, camera_text
 from app.datasets.exact import exact_inverse
+from app.datasets.export_names import folded
 from app.datasets.export_record import ExportRecord
 from app.datasets.frame_names import view_place
 from app.datasets.match_info import PLACE, MatchInfoWriter, record_of
@@ -124,28 +125,25 @@ def write_sn_calibration(
     """
     counts = {"groups": 0, "frames": 0, "cameras": 0}
     names, with_camera = _Names(), set[str]()
-    written: dict[str, int] = {}
     put = put or put_on_disk(root)
     with MatchInfoWriter(root) as info:
         for record in records:
             counts["groups"] += 1
             for view in record.group.views:
-                place, camera = view_place(record.group, view), record.camera(view)
+                place = view_place(record.group, record.named(view))
+                camera = record.camera(view)
                 # A static camera that many groups share is written once.
                 known = place in names.of_place
-                name = names.of(place, record.split(view), view.size)
-                shared = view.station.shared
-                if not (known and shared):
-                    lines, others = view.station.lines, view.extras.lines
-                    text = line_file_text(lines, view.size, others)
-                    put_once(put, f"{LINES}/{name}.json", text, written)
+                owner = camera_owner(record.group, view)
+                name = names.of(place, record.split(view), view.size, owner)
                 if not known:
+                    lines, others = view.station.lines, view.extras.lines
+                    put(f"{LINES}/{name}.json", line_file_text(lines, view.size, others))
                     said = {**record_of(record.group, view), PLACE: place}
                     info.add(f"{LINES}/{name}.jpg", said)
                     counts["frames"] += 1
-                if camera is not None and not (shared and name in with_camera):
-                    file = camera_name(f"{CAMERAS}/{name}")
-                    put_once(put, file, camera_text(camera), written)
+                if camera is not None and name not in with_camera:
+                    put(camera_name(f"{CAMERAS}/{name}"), camera_text(camera))
                     with_camera.add(name)
     return counts | {"cameras": len(with_camera)}
 
@@ -156,13 +154,22 @@ class _Names:
     def __init__(self) -> None:
         self.of_place: dict[str, str] = {}
         self._place_of: dict[str, str] = {}
+        self._owners: dict[str, tuple[str, ...]] = {}
 
-    def of(self, place: str, split: str, size: ImageSize) -> str:
-        """The name of a frame; that of a static camera stays what it was at first."""
+    def of(self, place: str, split: str, size: ImageSize, owner: tuple[str, ...]) -> str:
+        """The name of a frame; that of a static camera stays what it was at first.
+
+        Raises:
+            InputError: Another frame has its place or its name.
+        """
+        first = self._owners.setdefault(place, owner)
+        if first != owner:
+            whose = f"{', '.join(first)} and {', '.join(owner)}"
+            raise InputError(f"two frames ({whose}) would both be called {place}")
         if place in self.of_place:
             return self.of_place[place]
         name = f"{split_folder_of(split, size)}/{flat_name(place, split)}"
-        other = self._place_of.setdefault(name, place)
+        other = self._place_of.setdefault(folded(name), place)
         if other != place:
             raise InputError(f"the frames {other} and {place} would both be called {name}")
         self.of_place[place] = name

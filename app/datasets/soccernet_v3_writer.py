@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable
+from dataclasses import replace
 from itertools import groupby
 from pathlib import Path
 from typing import Any
 
+from app.datasets.export_names import folded
+from app.datasets.frame_names import match_frame
 from app.datasets.safe_path import resolve_inside
 from app.datasets.soccernet_record import GAME, REST, record_to_json
 from app.datasets.soccernet_v3 import JOINED_LISTS, LABELS, MATCH_DEPTH, image_numbers
 from app.errors import InputError
 from app.finite import json_text
-from app.soccer.group import Group
+from app.soccer.group import Group, View
 
 
 def split_key(group: Group) -> tuple[str, str, str]:
@@ -33,6 +36,14 @@ def split_key(group: Group) -> tuple[str, str, str]:
     return parts[0], parts[1], parts[2]
 
 
+def labels_frame(group: Group, view: View, split: str, suffix: str) -> str:
+    """Where the frame of a view lies in an export: beside the labels of the group's match."""
+    beside = replace(group, match="/".join(split_key(group)))
+    return match_frame(
+        beside, replace(view, station=replace(view.station, shared=False)), split, suffix
+    )
+
+
 def write_soccernet_v3(root: Path, groups: Iterable[Group]) -> list[Path]:
     """Write ``<league>/<season>/<match>/Labels-v3.json`` for the groups, match by match.
 
@@ -46,12 +57,14 @@ def write_soccernet_v3(root: Path, groups: Iterable[Group]) -> list[Path]:
         The files written.
 
     Raises:
-        InputError: A group is not from SoccerNet.
+        InputError: A group is not from SoccerNet, or two of its match have one image.
         UnsafePathError: A key would leave ``root``.
     """
     writer = LabelsWriter(root, LABELS)
-    for match, members in groupby(groups, key=lambda group: "/".join(split_key(group))):
-        writer.write(match, labels_to_json(match, list(members)))
+    for match, run in groupby(groups, key=lambda group: "/".join(split_key(group))):
+        members = list(run)
+        writer.require_free(match, members)
+        writer.write(match, labels_to_json(match, members))
     return list(writer.written)
 
 
@@ -61,6 +74,28 @@ class LabelsWriter:
     def __init__(self, root: Path, name: str):
         self._root, self._name = root, name
         self.written: dict[Path, None] = {}
+        self._matches: dict[str, str] = {}
+        self._images: dict[tuple[str, object], str] = {}
+
+    def require_free(self, match: str, groups: Iterable[Group]) -> None:
+        """Keep the images of groups of a match, of which the format has one by each number.
+
+        Raises:
+            InputError: An image of another group, or another match, has the same name.
+        """
+        other = self._matches.setdefault(folded(match), match)
+        if other != match:
+            raise InputError(f"the matches {other} and {match} differ in case only; rename one")
+        for group in groups:
+            for view in group.views:
+                whose = f"{group.key}, {view.key}"
+                first = self._images.setdefault((match, image_numbers(view.key)), whose)
+                if first != whose:
+                    raise InputError(
+                        f"the images of two frames ({first} and {whose}) would have one name in"
+                        f" match {match}, and SoccerNet's files know one frame by each",
+                        hint="Export as coco, parquet, cameras or sn-calibration instead.",
+                    )
 
     def write(self, match: str, labels: dict[str, Any]) -> None:
         """Write (or add to) the file of a match."""

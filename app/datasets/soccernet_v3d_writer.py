@@ -68,7 +68,7 @@ def write_soccernet_v3d(
         Counts: ``groups``, ``views``, ``balls`` (views in which the 3D ball holds).
 
     Raises:
-        InputError: A group is not from SoccerNet.
+        InputError: A group is not from SoccerNet, or two of its match have one image.
         UnsafePathError: A key would leave ``root``.
     """
     counts = {"groups": 0, "views": 0, "balls": 0}
@@ -85,6 +85,7 @@ def write_soccernet_v3d(
             for record in members:
                 _add_rows(table, lists, record, everything, counts)
             name = "/".join(match)
+            labels.require_free(name, (record.group for record in members))
             labels.write(name, _labels(name, members, everything, boxes))
     return counts
 

@@ -8,6 +8,7 @@ from contextlib import ExitStack
 from pathlib import Path, PurePosixPath
 from typing import Any
 
+from app.datasets.corner_origin import box_to_corner
 from app.datasets.csv_text import CsvTable
 from app.datasets.export_record import ExportRecord, chosen_box
 from app.datasets.frame_names import flat_frame, likely_suffix, split_folder
@@ -83,7 +84,7 @@ def _add(
     image = record.frames.get(view.key) or flat_frame(group, view, split, likely_suffix(view))
     label = PurePosixPath("labels", *PurePosixPath(image).parts[1:]).with_suffix(".txt")
     box = chosen_box(record, view, boxes) if view.ball else None
-    line = None if box is None else label_line(box, view.size)
+    line = None if box is None else label_line(box_to_corner(box), view.size)
     put(str(label), "" if line is None else f"{line}\n")
     cells: tuple[Any, ...] = (image, present, group.key, view.key, split)
     table.add((*cells, view.size.width, view.size.height, record.verdict_text))
@@ -96,6 +97,10 @@ def _add(
 
 def label_line(box: Box, size: ImageSize) -> str | None:
     """``0 cx cy w h`` in parts of the image; None where the box lies outside.
+
+    Args:
+        box: Measured from the corner of the first pixel, as this format does.
+        size: Of the image.
 
     Example:
         >>> label_line(Box(192.0, 54.0, 96.0, 54.0), ImageSize(960, 540))

@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 
+from app.datasets.export_names import key_in_group, named
 from app.datasets.frame_names import flat_frame, match_frame
 from app.datasets.gamestate import sequence_frame
 from app.datasets.sn_calibration import line_frame
@@ -199,10 +200,14 @@ def _exported(frame: NamedFrame) -> Iterator[str]:
     station = Station(frame.station or frame.view, frame.size, shared=bool(frame.station))
     view = View(frame.view, station)
     group = Group(frame.group, (view,), match=frame.match)
-    yield _bare(match_frame(group, view, "", ".jpg"))
-    yield _bare(sequence_frame(group, view, "", ".jpg").split("/", 1)[-1])
+    in_group, flat = (named(view, key_in_group(group, view, glue)) for glue in "/_")
+    for called in (view, in_group):
+        yield _bare(match_frame(group, called, "", ".jpg"))
+    for called in (view, flat):
+        yield _bare(sequence_frame(group, called, "", ".jpg").split("/", 1)[-1])
     yield _bare(flat_frame(group, view, "", ".jpg").rsplit("/", 1)[-1])
-    lines = _bare(line_frame(group, view, "", ".jpg").rsplit("/", 1)[-1])
-    # A plain number tells no match, and a static camera has one file of lines.
-    if not frame.station and lines != _bare(frame.view).rsplit("/", 1)[-1]:
-        yield lines
+    for called in (view, in_group):
+        lines = _bare(line_frame(group, called, "", ".jpg").rsplit("/", 1)[-1])
+        # A plain number tells no match, and a static camera has one file of lines.
+        if not frame.station and lines != _bare(frame.view).rsplit("/", 1)[-1]:
+            yield lines

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -82,6 +82,50 @@ def dataset_views(
     if without_ball:
         where.append(ViewModel.balls == "[]")
     return _views(session, *where)
+
+
+@dataclass(frozen=True)
+class NamedView:
+    """What names the files of a view in an export."""
+
+    group_id: int
+    group: str
+    match: str
+    split: str
+    key: str
+    station: str
+    shared: bool
+    width: int
+    height: int
+    flipped: bool
+    media_path: str | None
+    media_member: str | None
+    media_frame: int | None
+
+    @property
+    def media(self) -> Media | None:
+        """Its frame, where it has one."""
+        if self.media_path is None:
+            return None
+        return Media(self.media_path, self.media_member, self.media_frame)
+
+
+def named_views(session: Session, dataset_id: int) -> Iterator[NamedView]:
+    """The views of a dataset in its order, streamed."""
+    view, group, station = ViewModel, GroupModel, StationModel
+    statement = (
+        select(
+            group.id, group.key, group.match, group.split, view.key, station.key,
+            station.shared, station.width, station.height, station.flipped, view.media_path,
+            view.media_member, view.media_frame,
+        )
+        .join(group, group.id == view.group_id)
+        .join(station, station.id == view.station_id)
+        .where(group.dataset_id == dataset_id)
+        .order_by(group.number, view.position)
+    )  # fmt: skip
+    rows: Iterable[Any] = session.execute(statement)
+    return (NamedView(*row) for row in rows)
 
 
 def frame_files(session: Session, dataset_id: int) -> list[str]:

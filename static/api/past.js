@@ -20,8 +20,8 @@ export const getHistory = (group, signal) => request(`/groups/${group}/history`,
 /** @param {number} group @param {number} entry @param {AbortSignal} [signal] @returns {Promise<StepJson>} */
 export const getStep = (group, entry, signal) => request(`/groups/${group}/history/${entry}`, { signal });
 
-/** @param {AuditFilter} filter @param {number | null} before @param {AbortSignal} [signal] @returns {Promise<{items: AuditEntryJson[], next: number | null}>} */
-export const getAudit = (filter, before, signal) => request(`/audit${queryText({ ...filter, before })}`, { signal });
+/** @param {AuditFilter} filter @param {string | null} cursor @param {AbortSignal} [signal] @returns {Promise<{items: AuditEntryJson[], next: string | null}>} */
+export const getAudit = (filter, cursor, signal) => request(`/audit${queryText({ ...filter, cursor })}`, { signal });
 
 /** Where the same is as a file. @param {AuditFilter} filter @param {'csv' | 'jsonl'} ending */
 export const auditFile = (filter, ending) => `/api/v1/audit/export.${ending}${queryText(filter)}`;

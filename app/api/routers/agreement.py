@@ -7,6 +7,7 @@ from typing import Annotated
 from fastapi import APIRouter, Query, Response
 
 from app.api.deps import Actor, AppServices, AppStore, DatasetPath, Id
+from app.api.paging import paged
 from app.api.problem import responses
 from app.api.reply import AskedUnder, Reply, document, nothing
 from app.api.routers.groups import ETAG, group_answer
@@ -98,6 +99,7 @@ def put_limits(
 @router.get(
     "/datasets/{dataset}/adjudications", operation_id="listWaitingGroups", responses=responses(404)
 )
+@paged()
 def list_waiting(dataset: DatasetPath, store: AppStore) -> WaitingList:
     """Groups whose annotations disagree and wait for a decision, the worst first."""
     return WaitingList.model_validate({"items": adjudicate.list_waiting(store, dataset)})

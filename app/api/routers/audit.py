@@ -10,7 +10,9 @@ from fastapi import APIRouter, Depends, Query, Request
 from fastapi.responses import StreamingResponse
 from starlette.responses import Response
 
+from app.api.cursor import first_below
 from app.api.deps import AppStore
+from app.api.paging import Before, Cursor
 from app.api.problem import responses
 from app.api.schemas.audit import AuditDocument, AuditEntryDocument
 from app.api.security.access import login_of
@@ -88,16 +90,17 @@ def get_audit(
     asked: Asked,
     search: Search = "",
     limit: Annotated[int, Query(ge=1, le=500)] = 100,
-    before: Annotated[
-        int | None, Query(ge=1, le=MAX_ID, description="`next` of the page before.")
-    ] = None,
+    cursor: Cursor = None,
+    before: Before = None,
 ) -> AuditPage:
     """Who said and did what, the newest first; of all datasets that one leads, or of one.
 
     A search looks through 20,000 entries at a time: a page may hold fewer than asked for, or none,
     and have a `next` all the same.
     """
-    return audit.read_audit(store, asked, led, search=search, before=before, limit=limit)
+    return audit.read_audit(
+        store, asked, led, search=search, before=first_below(cursor, before), limit=limit
+    )
 
 
 @router.get(

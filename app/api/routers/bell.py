@@ -6,31 +6,36 @@ from typing import Annotated
 
 from fastapi import APIRouter, Query, Response
 
+from app.api.cursor import first_below
 from app.api.deps import AppStore
+from app.api.paging import Before, Cursor
 from app.api.problem import responses
 from app.api.reply import AskedUnder, Reply, document
 from app.api.routers.sessions import Me
 from app.api.schemas.bell import BellDocument, BellRead
 from app.api.team import AppTeam
-from app.finite import MAX_ID
 from app.review.people import bell
 from app.review.people.bell import Bell
 
 router = APIRouter(prefix="/bell", tags=["comments"])
 
 
-@router.get("", operation_id="getBell", response_model=BellDocument, responses=responses(401, 409))
+@router.get("", operation_id="getBell", responses=responses(401, 409))
 def get_bell(
     store: AppStore,
     _team: AppTeam,
     me: Me,
     limit: Annotated[int, Query(ge=1, le=200)] = 50,
-    before: Annotated[
-        int | None, Query(ge=1, le=MAX_ID, description="Only what came before this id.")
-    ] = None,
-) -> Bell:
+    cursor: Cursor = None,
+    before: Before = None,
+) -> BellDocument:
     """What one was told in the last 90 days, of what one sees now, the newest first."""
-    return bell.read_bell(store, me, limit, before)
+    found = bell.read_bell(store, me, limit + 1, first_below(cursor, before))
+    document = BellDocument.model_validate(found)
+    if len(document.items) > limit:
+        document.items = document.items[:limit]
+        document.next = str(document.items[-1].id)
+    return document
 
 
 @router.post(

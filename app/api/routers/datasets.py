@@ -7,6 +7,7 @@ from typing import Annotated
 from fastapi import APIRouter, Query, Response
 
 from app.api.deps import Actor, AppServices, AppStore, DatasetPath, QueryText, Sees
+from app.api.paging import paged
 from app.api.problem import responses
 from app.api.reply import AskedUnder, Reply, document
 from app.api.schemas.dataset import (
@@ -25,6 +26,7 @@ router = APIRouter(prefix="/datasets", tags=["datasets"])
 
 
 @router.get("", operation_id="listDatasets", responses=responses())
+@paged()
 def list_datasets(store: AppStore, sight: Sees) -> DatasetList:
     """Every dataset that one sees, with its progress."""
     return DatasetList(items=review.list_datasets(store, sight))

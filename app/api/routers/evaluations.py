@@ -11,6 +11,7 @@ from pydantic import BaseModel
 from app.api.cursor import parse_cursor
 from app.api.deps import Actor, AppServices, AppStore, DatasetPath, Id
 from app.api.jobs import by_job, job_answer
+from app.api.paging import paged
 from app.api.problem import Responses, responses
 from app.api.reply import AskedUnder, Reply, nothing
 from app.api.schemas.evaluation import (
@@ -68,6 +69,7 @@ TABLE_FILES = _files(
 @router.get(
     "/datasets/{dataset}/evaluations", operation_id="listEvaluations", responses=responses(404)
 )
+@paged()
 def list_evaluations(dataset: DatasetPath, store: AppStore) -> EvaluationList:
     """The evaluations of a dataset, the newest first."""
     found = review.list_evaluations(store, dataset)

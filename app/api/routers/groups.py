@@ -20,6 +20,7 @@ from app.api.deps import (
     QueryText,
     etag_matches,
 )
+from app.api.paging import paged
 from app.api.problem import Responses, responses
 from app.api.reply import AskedUnder, KeyedRequest, Reply, document
 from app.api.schemas.group import GroupDocument
@@ -186,6 +187,7 @@ def get_neighbours(group: Id, store: AppStore, query: QueryText = "") -> queue.N
 
 
 @router.get("/{group}/history", operation_id="getHistory", responses=responses(404))
+@paged()
 def get_history(group: Id, store: AppStore) -> History:
     """Everything that was said about the group and changed of its static cameras, oldest first."""
     return History(items=[LogEntryDocument.of(entry) for entry in history(store, group)])

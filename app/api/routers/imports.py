@@ -8,6 +8,7 @@ from fastapi import APIRouter, Query, Response
 
 from app.api.deps import Actor, AppServices, DryRun
 from app.api.jobs import by_job, job_answer
+from app.api.paging import paged
 from app.api.problem import responses
 from app.api.reply import AskedUnder, Reply
 from app.api.schemas.imports import FolderDocument, ImportBody
@@ -27,6 +28,7 @@ FolderPath = Annotated[
     response_model=FolderDocument,
     responses=responses(404),
 )
+@paged()
 def get_folders(services: AppServices, path: FolderPath = "") -> FolderListing:
     """What may be imported from: the operator names folders in TOUCHLINE_IMPORT_FOLDERS."""
     return list_folder(services.settings, path)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from fastapi import APIRouter
 
 from app.api.deps import AppStore, Id
+from app.api.paging import paged
 from app.api.problem import responses
 from app.api.schemas.insight import Influences, Remedies
 from app.review.editing import submit
@@ -16,6 +17,7 @@ router = APIRouter(tags=["insight"])
 
 
 @router.get("/groups/{group}/remedies", operation_id="getRemedies", responses=responses(404))
+@paged()
 def get_remedies(group: Id, store: AppStore) -> Remedies:
     """Small edits with which a group that fails would pass, each tried out; saves nothing."""
     state = submit.load_solved(store, group)
@@ -26,6 +28,7 @@ def get_remedies(group: Id, store: AppStore) -> Remedies:
 
 
 @router.get("/views/{view}/influence", operation_id="getInfluence", responses=responses(404))
+@paged()
 def get_influence(view: Id, store: AppStore) -> Influences:
     """What the camera of a view would be without each of its markings; saves nothing."""
     found = find_view(store, view)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from fastapi import APIRouter
 
 from app.api.deps import AppStore, DatasetPath, Id
+from app.api.paging import paged
 from app.api.problem import responses
 from app.api.routers.sessions import Me
 from app.api.schemas.people import MemberDocument, MemberEdit, MemberList
@@ -15,6 +16,7 @@ router = APIRouter(prefix="/datasets/{dataset}/members", tags=["users"])
 
 
 @router.get("", operation_id="listMembers", responses=responses(401, 404, 409))
+@paged()
 def list_members(dataset: DatasetPath, store: AppStore, _team: AppTeam, _me: Me) -> MemberList:
     """Everybody who can log in, and what they are in the dataset."""
     return MemberList(items=members.list_members(store, dataset))

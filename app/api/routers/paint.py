@@ -6,6 +6,7 @@ from fastapi import APIRouter, Response
 
 from app.api.deps import Actor, AppServices, AppStore, DatasetPath
 from app.api.jobs import by_job, job_answer
+from app.api.paging import paged
 from app.api.problem import responses
 from app.api.reply import AskedUnder, Reply
 from app.api.schemas.paint import DatasetPaintDocument, DatasetPaintRequest
@@ -16,6 +17,7 @@ router = APIRouter(prefix="/datasets/{dataset}/paint", tags=["datasets"])
 
 
 @router.get("", operation_id="listDatasetPaint", responses=responses(404))
+@paged()
 def list_paint(dataset: DatasetPath, store: AppStore) -> DatasetPaintDocument:
     """How many pictures of each match were read for their paint, and what came of it."""
     return DatasetPaintDocument.model_validate(get_paint(store, dataset))

@@ -8,6 +8,7 @@ import structlog
 from fastapi import APIRouter, Request, Response
 
 from app.api.deps import AppStore, Id
+from app.api.paging import paged
 from app.api.problem import responses
 from app.api.routers.sessions import Me, session_of
 from app.api.schemas.passkey import (
@@ -29,6 +30,7 @@ log = structlog.get_logger("touchline.access")
 
 
 @router.get(OWN, operation_id="listPasskeys", responses=responses(401, 409))
+@paged()
 def list_passkeys(request: Request, team: AppTeam, me: Me) -> PasskeyList:
     """One's own passkeys, and whether there can be any at this address."""
     try:

@@ -6,6 +6,7 @@ from fastapi import APIRouter, Response
 
 from app.api.deps import Actor, AppServices, AppStore, DatasetPath
 from app.api.jobs import by_job, job_answer
+from app.api.paging import paged
 from app.api.problem import responses
 from app.api.reply import AskedUnder, Reply
 from app.api.schemas.pictures import (
@@ -20,6 +21,7 @@ router = APIRouter(prefix="/datasets/{dataset}/pictures", tags=["datasets"])
 
 
 @router.get("", operation_id="listMatchPictures", responses=responses(404))
+@paged()
 def list_match_pictures(dataset: DatasetPath, store: AppStore) -> MatchPicturesDocument:
     """What the pictures of each match's main camera are taken to be: stretched, cropped or neither."""
     return MatchPicturesDocument.model_validate({"items": read_pictures(store, dataset)})

@@ -7,6 +7,7 @@ from fastapi import APIRouter, Response
 from app.api.conflicts import current_state
 from app.api.deps import Actor, AppServices, AppStore, DatasetPath, IfMatch
 from app.api.jobs import job_address
+from app.api.paging import paged
 from app.api.problem import Responses, responses
 from app.api.reply import AskedUnder, Reply, document
 from app.api.schemas.job import JobDocument
@@ -28,6 +29,7 @@ CHANGED: Responses = {
 
 
 @router.get("", operation_id="listPitches", responses={**responses(404), 200: {"headers": TAGGED}})
+@paged()
 def list_pitches(dataset: DatasetPath, store: AppStore, response: Response) -> PitchesDocument:
     """How large the pitch of each match is taken to be, and how large its lines show it.
 

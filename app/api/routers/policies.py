@@ -7,6 +7,7 @@ from fastapi import APIRouter, Response
 from app.api.conflicts import current_state
 from app.api.deps import Actor, AppServices, AppStore, DatasetPath, IfMatch
 from app.api.jobs import job_address
+from app.api.paging import paged
 from app.api.problem import Responses, responses
 from app.api.reply import AskedUnder, Reply, document
 from app.api.schemas.job import JobDocument
@@ -35,6 +36,7 @@ CHANGED: Responses = {
 
 
 @router.get("/policies", operation_id="listPolicies", responses=responses())
+@paged()
 def list_policies() -> PolicyCatalogue:
     """The policies that come with the software, and what can be set in one."""
     return PolicyCatalogue(

@@ -8,6 +8,7 @@ from fastapi import APIRouter, Query, Response
 
 from app.api.deps import Actor, AppServices, AppStore, DatasetPath
 from app.api.jobs import by_job, job_answer
+from app.api.paging import paged
 from app.api.problem import responses
 from app.api.reply import AskedUnder, Reply
 from app.api.schemas.positions import PositionsRequest, SharedPositionsDocument
@@ -18,6 +19,7 @@ router = APIRouter(prefix="/datasets/{dataset}/positions", tags=["datasets"])
 
 
 @router.get("", operation_id="listPositions", responses=responses(404))
+@paged()
 def list_positions(dataset: DatasetPath, store: AppStore) -> SharedPositionsDocument:
     """Where each match's main camera stands, as far as that is shared with its pictures."""
     return SharedPositionsDocument.model_validate(get_positions(store, dataset))

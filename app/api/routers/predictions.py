@@ -9,6 +9,7 @@ from fastapi import APIRouter, Query, Response
 
 from app.api.deps import Actor, AppServices, AppStore, DatasetPath, DryRun, Id, IfMatch
 from app.api.jobs import ACCEPTED, job_answer
+from app.api.paging import paged
 from app.api.problem import responses
 from app.api.reply import AskedUnder, Reply, document, nothing
 from app.api.routers.groups import CHANGED, CONFLICTS, change_group, load_document_of_view
@@ -41,6 +42,7 @@ LOCATION = {"Location": {"description": "Of the set.", "schema": {"type": "strin
 @router.get(
     "/datasets/{dataset}/predictions", operation_id="listPredictions", responses=responses(404)
 )
+@paged()
 def list_predictions(dataset: DatasetPath, store: AppStore) -> PredictionSetList:
     """The sets of predictions of a dataset, the newest first."""
     found = review.list_predictions(store, dataset)
@@ -153,6 +155,7 @@ def delete_predictions(
 @router.get(
     "/views/{view}/predictions", operation_id="getViewPredictions", responses=responses(404)
 )
+@paged()
 def get_view_predictions(view: Id, store: AppStore) -> ViewPredictions:
     """What was predicted for a view."""
     find_view(store, view)
@@ -165,6 +168,7 @@ def get_view_predictions(view: Id, store: AppStore) -> ViewPredictions:
 @router.get(
     "/groups/{group}/predictions", operation_id="getGroupPredictions", responses=responses(404)
 )
+@paged()
 def get_group_predictions(group: Id, store: AppStore) -> GroupPredictionsDocument:
     """What was predicted for all views of a group, and where its accepted balls come from."""
     return GroupPredictionsDocument.of(group_predictions(store, group))

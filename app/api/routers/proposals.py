@@ -6,6 +6,7 @@ from fastapi import APIRouter, Response
 
 from app.api.deps import Actor, AppServices, AppStore, DatasetPath, DryRun, Id
 from app.api.jobs import ACCEPTED, job_answer
+from app.api.paging import paged
 from app.api.problem import responses
 from app.api.reply import AskedUnder, Reply, document
 from app.api.schemas.job import JobDocument
@@ -26,6 +27,7 @@ router = APIRouter(tags=["datasets"])
 @router.get(
     "/datasets/{dataset}/proposals", operation_id="listDatasetProposals", responses=responses(404)
 )
+@paged()
 def list_proposals(dataset: DatasetPath, store: AppStore) -> DatasetProposalsDocument:
     """For how many views of each match something is proposed; nothing of it counts."""
     return DatasetProposalsDocument.model_validate(get_proposals(store, dataset))
@@ -92,6 +94,7 @@ def forget(dataset: DatasetPath, services: AppServices, asked: AskedUnder) -> Re
     tags=["groups"],
     responses=responses(404),
 )
+@paged()
 def group_proposals(group: Id, store: AppStore) -> GroupProposals:
     """What was proposed for the views of a group, with its lines and scores."""
     found = get_group_proposals(store, group)

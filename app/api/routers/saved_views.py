@@ -5,6 +5,7 @@ from __future__ import annotations
 from fastapi import APIRouter, Response
 
 from app.api.deps import Actor, AppStore, DatasetPath, Id
+from app.api.paging import paged
 from app.api.problem import responses
 from app.api.reply import AskedUnder, Reply, document
 from app.api.schemas.saved_view import (
@@ -24,6 +25,7 @@ router = APIRouter(tags=["queue"])
 @router.get(
     "/datasets/{dataset}/saved-views", operation_id="listSavedViews", responses=responses(404)
 )
+@paged()
 def list_saved_views(dataset: DatasetPath, store: AppStore) -> SavedViewList:
     """Queries under names, each with the number of groups that match it now."""
     found = saved_views.list_saved_views(store, dataset_id(store, dataset))
@@ -83,6 +85,7 @@ def delete_saved_view(view: Id, store: AppStore, asked: AskedUnder) -> Response:
 
 
 @router.get("/datasets/{dataset}/reviewers", operation_id="listReviewers", responses=responses(404))
+@paged()
 def list_reviewers(dataset: DatasetPath, store: AppStore) -> ReviewerList:
     """Who has judged how many groups."""
     found = reviewers.list_reviewers(store, dataset_id(store, dataset))

@@ -8,6 +8,7 @@ import structlog
 from fastapi import APIRouter, Depends, Request, Response
 
 from app.api.deps import AppServices, AppStore, Id
+from app.api.paging import paged
 from app.api.problem import responses
 from app.api.schemas.people import (
     LinkLook,
@@ -178,6 +179,7 @@ def change_password(
 
 
 @router.get("/sessions", operation_id="listSessions", responses=responses(401, 409))
+@paged()
 def list_sessions(team: AppTeam, me: Me) -> OpenSessionList:
     """One's own sessions, in this browser and others."""
     items = [

@@ -6,6 +6,7 @@ from fastapi import APIRouter, Request, Response
 from starlette.background import BackgroundTask
 
 from app.api.deps import Actor, AppServices, AppStore, DatasetPath, Id
+from app.api.paging import paged
 from app.api.problem import responses
 from app.api.reply import AskedUnder, Reply, document
 from app.api.routers.groups import ETAG, group_answer
@@ -22,6 +23,7 @@ router = APIRouter(tags=["takes"])
 
 
 @router.get("/datasets/{dataset}/takes", operation_id="listTakes", responses=responses(404))
+@paged()
 def list_takes(dataset: DatasetPath, store: AppStore, request: Request, actor: Actor) -> TakeList:
     """Own annotations of a dataset's groups: for a lead everybody's, else those of whoever asks."""
     login = login_of(request.scope)

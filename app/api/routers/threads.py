@@ -7,6 +7,7 @@ from functools import partial
 from fastapi import APIRouter, Response
 
 from app.api.deps import Actor, AppStore, Id
+from app.api.paging import paged
 from app.api.problem import responses
 from app.api.reply import AskedUnder, Reply, document, nothing
 from app.api.schemas.thread import (
@@ -29,6 +30,7 @@ def list_people(group: Id, store: AppStore) -> PeopleOfGroup:
 
 
 @router.get("/threads", operation_id="listThreads", responses=responses(404))
+@paged()
 def list_threads(group: Id, store: AppStore, actor: Actor) -> ThreadList:
     """What people say to each other about the group, the oldest thread first."""
     found = comments.list_threads(store, group)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from fastapi import APIRouter
 
 from app.api.deps import AppStore, Id
+from app.api.paging import paged
 from app.api.problem import responses
 from app.api.routers.sessions import Me
 from app.api.schemas.access_token import (
@@ -20,6 +21,7 @@ router = APIRouter(prefix="/tokens", tags=["tokens"])
 
 
 @router.get("", operation_id="listTokens", responses=responses(401, 409))
+@paged()
 def list_tokens(team: AppTeam, me: Me) -> AccessTokenList:
     """One's own tokens, those that have expired too."""
     return AccessTokenList(items=team.tokens.of_person(me.person_id))

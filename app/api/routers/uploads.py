@@ -13,6 +13,7 @@ from fastapi import APIRouter, Path, Query, Request, Response
 from starlette.requests import ClientDisconnect
 
 from app.api.deps import Actor, AppServices, Sees
+from app.api.paging import paged
 from app.api.problem import responses
 from app.api.reply import AskedUnder, Reply, nothing
 from app.api.schemas.upload import UploadDocument, UploadList
@@ -125,7 +126,8 @@ async def _on_disk(work: Callable[..., T], *arguments: Any) -> T:
     return await to_thread.run_sync(work, *arguments, limiter=threads)
 
 
-@router.get("", operation_id="listUploads")
+@router.get("", operation_id="listUploads", responses=responses())
+@paged()
 def get_uploads(services: AppServices, sight: Sees) -> UploadList:
     """Every file of one's own that is still here; an admin is shown everybody's."""
     settings = services.settings

@@ -5,6 +5,7 @@ from __future__ import annotations
 from fastapi import APIRouter, Request
 
 from app.api.deps import AppStore, Id
+from app.api.paging import paged
 from app.api.problem import responses
 from app.api.routers.sessions import Me
 from app.api.schemas.access_token import AccessTokenList
@@ -24,6 +25,7 @@ def _with_link(team: Team, request: Request, person: Person, link: Link) -> User
 
 
 @router.get("", operation_id="listUsers", responses=responses(401, 409))
+@paged()
 def list_users(store: AppStore, _team: AppTeam, _me: Me) -> UserList:
     """Everybody with an account, disabled ones too."""
     return UserList(items=people.list_people(store), adopted_by=adopted_by(store))
@@ -88,6 +90,7 @@ def adopt_work(user: Id, store: AppStore, _team: AppTeam, me: Me) -> UserList:
 
 
 @router.get("/{user}/tokens", operation_id="listTokensOfUser", responses=responses(401, 404, 409))
+@paged()
 def list_tokens(user: Id, store: AppStore, team: AppTeam, _me: Me) -> AccessTokenList:
     """The tokens with which somebody's scripts ask."""
     person = people.get_person(store, user)

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import Annotated
 
-from fastapi import APIRouter, Query, Response
+from fastapi import APIRouter, Response
 from starlette.background import BackgroundTasks
 
 from app.api.deps import Actor, AppServices, AppStore, DatasetPath, DryRun, Id, IfMatch
+from app.api.paging import paged
 from app.api.problem import responses
 from app.api.reply import AskedUnder, Reply, document
 from app.api.routers.groups import CHANGED, CONFLICTS, change_group, load_document
@@ -105,11 +105,10 @@ def post_verdicts(
     operation_id="listVerdictBatches",
     responses=responses(404),
 )
-def list_batches(
-    dataset: DatasetPath, store: AppStore, limit: Annotated[int, Query(ge=1, le=100)] = 20
-) -> BatchList:
+@paged(default=20)
+def list_batches(dataset: DatasetPath, store: AppStore) -> BatchList:
     """The newest bulk verdicts of a dataset."""
-    batches = bulk.list_batches(store, dataset_id(store, dataset), limit)
+    batches = bulk.list_batches(store, dataset_id(store, dataset), bulk.ALL_BATCHES)
     return BatchList(items=batches)
 
 

@@ -8,6 +8,7 @@ from fastapi import APIRouter, Depends, Path, Query, Response
 
 from app.api.deps import Actor, AppServices, AppStore, DatasetPath, DryRun
 from app.api.jobs import ACCEPTED, by_job, job_answer
+from app.api.paging import paged
 from app.api.problem import responses
 from app.api.reply import AskedUnder, Reply, document
 from app.api.schemas.job import JobDocument
@@ -50,6 +51,7 @@ VersionId = Annotated[int, Depends(called)]
 
 
 @router.get("/datasets/{dataset}/versions", operation_id="listVersions", responses=responses(404))
+@paged()
 def list_versions(dataset: DatasetPath, store: AppStore) -> VersionList:
     """The frozen versions of a dataset, newest first."""
     found = versions.list_versions(store, dataset)

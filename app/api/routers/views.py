@@ -12,6 +12,7 @@ from anyio import to_thread
 from fastapi import APIRouter, Body, Query, Request, Response
 
 from app.api.deps import Actor, AppServices, Id, IfMatch, etag_matches
+from app.api.paging import paged
 from app.api.pool_answer import while_wanted
 from app.api.problem import Responses, responses
 from app.api.reply import AskedUnder, KeyedRequest
@@ -194,6 +195,7 @@ async def get_image(
     response_model=NeighbourList,
     responses=responses(404, 503),
 )
+@paged()
 async def get_neighbours(
     view: Id, services: AppServices, request: Request
 ) -> NeighbourList | Response:

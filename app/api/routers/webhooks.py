@@ -6,7 +6,9 @@ from typing import Annotated
 
 from fastapi import APIRouter, Query
 
+from app.api.cursor import first_below
 from app.api.deps import Actor, AppStore, DatasetPath, Id
+from app.api.paging import Before, Cursor, paged
 from app.api.problem import responses
 from app.api.schemas.webhook import (
     DeliveryDocument,
@@ -17,7 +19,6 @@ from app.api.schemas.webhook import (
     WebhookList,
     WebhookWithSecret,
 )
-from app.finite import MAX_ID
 from app.review.webhooks import webhooks
 from app.review.webhooks.messages import CHOSEN
 from app.review.webhooks.webhooks import Delivery, Webhook
@@ -31,6 +32,7 @@ def _with_secret(made: tuple[Webhook, str]) -> WebhookWithSecret:
 
 
 @router.get("", operation_id="listWebhooks", responses=responses(404))
+@paged()
 def list_webhooks(dataset: DatasetPath, store: AppStore) -> WebhookList:
     """Who is told what happens in a dataset."""
     items = webhooks.list_webhooks(store, dataset)
@@ -99,13 +101,14 @@ def list_deliveries(
     webhook: Id,
     store: AppStore,
     limit: Annotated[int, Query(ge=1, le=200)] = 50,
-    before: Annotated[
-        int | None, Query(ge=1, le=MAX_ID, description="Only what came before this id.")
-    ] = None,
+    cursor: Cursor = None,
+    before: Before = None,
 ) -> DeliveryList:
     """What a webhook was told in the last 30 days, newest first."""
-    found = webhooks.list_deliveries(store, dataset, webhook, before=before, most=limit)
-    return DeliveryList(items=found)
+    start = first_below(cursor, before)
+    found = webhooks.list_deliveries(store, dataset, webhook, before=start, most=limit + 1)
+    more = str(found[limit - 1].id) if len(found) > limit else None
+    return DeliveryList(items=found[:limit], next=more)
 
 
 @router.post(

@@ -9,6 +9,7 @@ from fastapi import APIRouter, Depends, Request, Response
 from starlette.background import BackgroundTask
 
 from app.api.deps import Actor, AppServices, AppStore, DatasetPath, Id, Sees
+from app.api.paging import paged
 from app.api.problem import responses
 from app.api.reply import AskedUnder, Reply, document, nothing
 from app.api.schemas.take import HandBack
@@ -75,12 +76,14 @@ def _told(services: Services, lease: Lease, reply: Reply[Lease] | None = None) -
 
 
 @router.get("/work", operation_id="getMyWork", responses=responses())
+@paged()
 def my_work(store: AppStore, sight: Sees, asks: Asks) -> MyWork:
     """Open batches of whoever asks; on a server without accounts all of them."""
     return MyWork.model_validate({"items": progress.my_work(store, asks.here, sight)})
 
 
 @router.get("/datasets/{dataset}/batches", operation_id="listBatches", responses=responses(404))
+@paged()
 def list_batches(dataset: DatasetPath, store: AppStore) -> WorkBatchList:
     """The batches of a dataset."""
     return WorkBatchList.model_validate({"items": own.seen_batches(store, dataset)})
@@ -118,6 +121,7 @@ def _made(batch: Batch) -> Response:
 
 
 @router.get("/datasets/{dataset}/team-work", operation_id="getTeamWork", responses=responses(404))
+@paged()
 def team_work(dataset: DatasetPath, store: AppStore) -> TeamWork:
     """Every batch of a dataset: who has done what, how fast, and which batch has stalled."""
     items = [
@@ -167,6 +171,7 @@ def delete_batch(batch: Id, store: AppStore, actor: Actor, asked: AskedUnder) ->
 
 
 @router.get("/batches/{batch}/groups", operation_id="listBatchGroups", responses=responses(404))
+@paged()
 def list_batch_groups(batch: Id, store: AppStore) -> BatchGroupList:
     """The groups of a batch in order, with who has them open."""
     return BatchGroupList.model_validate({"items": batches.list_batch_groups(store, batch)})

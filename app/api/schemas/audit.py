@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from datetime import datetime
+from typing import Annotated
 
 from pydantic import Field
 
@@ -25,4 +26,6 @@ class AuditEntryDocument(Document, shows=AuditEntry):
 class AuditDocument(ListDocument[AuditEntryDocument]):
     """Entries, the newest first."""
 
-    next: int | None = Field(description="`before` of the page after this one; null at the end.")
+    next: Annotated[str, Field(coerce_numbers_to_str=True)] | None = Field(
+        description="`cursor` of the next page; null on the last one."
+    )

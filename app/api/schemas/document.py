@@ -6,7 +6,7 @@ from dataclasses import fields
 from inspect import get_annotations
 from typing import Any, Generic, TypeVar, get_type_hints
 
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel, ConfigDict, Field
 
 Item = TypeVar("Item")
 
@@ -31,4 +31,7 @@ class Document(BaseModel):
 class ListDocument(Document, Generic[Item]):
     """An answer of several things, in an order that its own words tell."""
 
-    items: list[Item]
+    items: list[Item] = Field(description="The things, of one page where a limit was asked for.")
+    next: str | None = Field(
+        default=None, description="`cursor` of the next page; null on the last one."
+    )

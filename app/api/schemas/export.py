@@ -118,5 +118,3 @@ class ExportDocument(BaseModel):
 
 class ExportPage(ListDocument[ExportDocument]):
     """Exports, the newest first; ``next`` is the cursor of the next page."""
-
-    next: str | None

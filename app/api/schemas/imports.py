@@ -6,7 +6,7 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field, StrictBool, model_validator
 
-from app.api.schemas.document import Document
+from app.api.schemas.document import Document, ListDocument
 from app.datasets.format_names import ImportFormat
 from app.review.importing.folders import FolderItem
 from app.review.jobs.imports import ImportRequest
@@ -123,10 +123,9 @@ class FolderEntry(Document, shows=FolderItem):
     """A folder or a file that an import can name."""
 
 
-class FolderDocument(Document):
+class FolderDocument(ListDocument[FolderEntry]):
     """What is in a folder that the operator allows; without a path, the folders themselves."""
 
     path: str
     format: str | None = Field(description="Format that its files most likely have.")
-    items: list[FolderEntry]
     more: bool = Field(description="Whether there is more than is listed.")

@@ -57,5 +57,3 @@ class JobDocument(Document):
 
 class JobPage(ListDocument[JobDocument]):
     """Jobs, the newest first; ``next`` is the cursor of the next page."""
-
-    next: str | None

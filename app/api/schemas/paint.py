@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from app.api.schemas.document import Document
+from app.api.schemas.document import Document, ListDocument
 
 
 class MatchPaintDocument(Document):
@@ -30,11 +30,10 @@ class MatchPaintDocument(Document):
     sentence: str = Field(description="All that in words.")
 
 
-class DatasetPaintDocument(Document):
+class DatasetPaintDocument(ListDocument[MatchPaintDocument]):
     """What was read of the paint in a dataset's pictures, by name of the match."""
 
     used: bool = Field(description="Whether the policy uses it: `calibration.source`.")
-    items: list[MatchPaintDocument]
 
 
 class DatasetPaintRequest(BaseModel):

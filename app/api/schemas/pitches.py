@@ -6,7 +6,7 @@ from typing import Annotated
 
 from pydantic import AliasPath, BaseModel, ConfigDict, Field
 
-from app.api.schemas.document import Document
+from app.api.schemas.document import Document, ListDocument
 from app.api.schemas.group import PitchSize
 from app.soccer.pitch import LENGTH_RANGE, WIDTH_RANGE
 
@@ -39,11 +39,10 @@ class MatchPitchDocument(Document):
     previous: PitchSize | None = Field(description="The size before it was changed last.")
 
 
-class PitchesDocument(Document):
+class PitchesDocument(ListDocument[MatchPitchDocument]):
     """The pitches of a dataset's matches, by name of the match."""
 
     etag: str = Field(description="What a change of them builds on.")
-    items: list[MatchPitchDocument]
 
 
 class PitchChange(BaseModel):

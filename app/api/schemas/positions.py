@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from app.api.schemas.document import Document
+from app.api.schemas.document import Document, ListDocument
 
 
 class MatchPositionDocument(Document):
@@ -26,11 +26,10 @@ class MatchPositionDocument(Document):
     sentence: str = Field(description="All that in words.")
 
 
-class SharedPositionsDocument(Document):
+class SharedPositionsDocument(ListDocument[MatchPositionDocument]):
     """The shared positions of a dataset's matches, by name of the match."""
 
     used: bool = Field(description="Whether the policy uses them: `calibration.share_position`.")
-    items: list[MatchPositionDocument]
 
 
 class PositionsRequest(BaseModel):

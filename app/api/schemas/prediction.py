@@ -184,11 +184,10 @@ class AcceptedPrediction(Document):
     at: datetime | None
 
 
-class GroupPredictionsDocument(Document):
+class GroupPredictionsDocument(ListDocument[GroupPrediction]):
     """What was predicted for a group: by view, the newest set first, the surest box first."""
 
     sets: int = Field(description="Sets that the dataset has; 0: no group has predictions.")
-    items: list[GroupPrediction]
     accepted: list[AcceptedPrediction]
 
     @staticmethod

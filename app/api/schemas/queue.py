@@ -122,7 +122,6 @@ _SAME = tuple(
 class GroupPage(ListDocument[GroupRow]):
     """Groups that match, in order; `next` is the cursor of the page after this one."""
 
-    next: str | None
     total: int = Field(description="How many match in all.")
 
 
@@ -169,7 +168,6 @@ class FindingRow(Document):
 class FindingList(ListDocument[FindingRow]):
     """Findings of a dataset, by number of the group."""
 
-    next: str | None
     total: int = Field(description="How many groups have findings.")
 
 

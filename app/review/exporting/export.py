@@ -11,6 +11,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import get_args
 
+from app.datasets.export_names import ExportNames, Outline
 from app.datasets.export_record import ExportRecord
 from app.datasets.file_tree import Root
 from app.datasets.issia import FramePersons
@@ -28,6 +29,7 @@ from app.review.exporting.formats import (
     FORMATS,
     WriteOptions,
     box_settings,
+    export_names,
     frame_layout,
     missing_sentence,
     view_settings,
@@ -58,7 +60,8 @@ class ExportReport:
 
     Attributes:
         groups: How many groups were to be written.
-        counts: As the format counts: groups, views, balls, cameras ...
+        counts: As the format counts: groups, views, balls, cameras ...; with images also
+            ``pictures``, the files of frames that are there.
         left_out: Accepted groups that are not in it, by reason: ``stale`` (changed after the
             verdict), ``failing`` (a gate, and nobody overrode it), ``unsolved``.
         missing_images: Frames that could not be copied, with the reason.
@@ -156,13 +159,16 @@ def export(
         source = _source(session, store, dataset, everything, version)
         with output_anywhere(out, store.settings.exports, beside, progress) as root:
             frames = ExportImages(root, images, read or _here(store), frame_layout(format))
-            run = _Run(source, options, frames, progress)
+            names = export_names(format, source.outlines())
+            run = _Run(source, options, frames, names, progress)
             # A version is the same every time; spare frames are the dataset's as it is.
             if format == "issia" and isinstance(source, LiveSource):
                 run.spare = spare_persons(session, dataset)
             with _view_files(root, out) as put:
                 counts = run.write(root, put)
             _require_content(source.dataset, format, counts)
+            if images != "none" and "images_missing" not in counts:
+                counts["pictures"] = frames.present
             write_manifest(root, run.manifest(counts), progress)
     left_out = source.left_out if isinstance(source, LiveSource) else {}
     return ExportReport(out, format, source.count, counts, left_out, tuple(frames.missing))
@@ -208,7 +214,8 @@ def require_possible(
         options = _Options(format, everything, boxes, images, views)
         frames = ExportImages(Path(folder), "none", _here(store), frame_layout(format))
         with ViewFiles(Path(folder)) as small:
-            counts = _Run(source, options, frames, None).write(Path(folder), small.put)
+            names = export_names(format, source.outlines())
+            counts = _Run(source, options, frames, names, None).write(Path(folder), small.put)
         if images != "none" and not frames.media:
             files = [] if source.is_all else frame_files(session, whole.dataset_id)
             _require_frames(whole.dataset, files)
@@ -260,6 +267,10 @@ class _First:
         """As many as are tried."""
         return islice(self._source.items(), self.count)
 
+    def outlines(self) -> Iterator[Outline]:
+        """The same groups with what names their files."""
+        return islice(self._source.outlines(), self.count)
+
 
 def _here(store: Store) -> ReadPicture:
     return lambda media, width, flipped: make_picture(media, width, flipped, store.settings)
@@ -285,10 +296,11 @@ class _Run:
         source: ExportSource,
         options: _Options,
         images: ExportImages,
+        names: ExportNames,
         progress: TellProgress | None,
     ):
         self._source, self._options = source, options
-        self._images, self._progress = images, progress
+        self._images, self._names, self._progress = images, names, progress
         self._licences: set[str] = set()
         self._verdicts: Counter[str] = Counter()
         self._overrides: list[dict[str, str | None]] = []
@@ -346,9 +358,10 @@ class _Run:
             record = found.for_training() if chosen else found
             if record.group.views:
                 self._licences.add(licence_of(record.group.match))
-                self._images.add(record.group, facts, record.splits)
+                names = self._names.of(record.group, record.splits)
+                self._images.add(record.group, facts, record.splits, names)
                 self._note(record)
-                yield replace(record, frames=self._images.placed)
+                yield replace(record, frames=self._images.placed, names=names)
             if self._progress is not None:
                 self._progress(place, self._source.count)
 

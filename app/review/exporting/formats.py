@@ -7,21 +7,22 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import get_args
 
-from app.datasets.cameras_writer import write_camera_files
+from app.datasets.cameras_writer import camera_claims, write_camera_files
 from app.datasets.coco_writer import write_coco
+from app.datasets.export_names import Claims, ExportNames, Outline, frame_claims
 from app.datasets.export_record import ExportRecord
 from app.datasets.format_names import ExportFormat
 from app.datasets.frame_names import FrameName, flat_frame, match_frame
-from app.datasets.gamestate import sequence_frame
+from app.datasets.gamestate import sequence_claims, sequence_frame
 from app.datasets.gamestate_writer import write_gamestate
 from app.datasets.issia import FramePersons
 from app.datasets.issia_3d_writer import write_issia_3d
 from app.datasets.issia_writer import write_issia
 from app.datasets.manifest import SOFTWARE, software_version
 from app.datasets.parquet_writer import write_parquet
-from app.datasets.sn_calibration import line_frame
+from app.datasets.sn_calibration import line_claims, line_frame
 from app.datasets.sn_calibration_writer import write_sn_calibration
-from app.datasets.soccernet_v3_writer import write_soccernet_v3
+from app.datasets.soccernet_v3_writer import labels_frame, write_soccernet_v3
 from app.datasets.soccernet_v3d_writer import write_soccernet_v3d
 from app.datasets.view_files import PutText
 from app.datasets.yolo_writer import write_yolo
@@ -44,9 +45,19 @@ WITHOUT_LENSES = ("soccernet-v3d", "issia", "issia-3d", "sn-calibration")
 LAYOUTS: Mapping[str, FrameName] = {
     "gamestate": sequence_frame,
     "sn-calibration": line_frame,
+    "soccernet-v3": labels_frame,
+    "soccernet-v3d": labels_frame,
     "yolo": flat_frame,
 }
 """Where a format looks for the frames of its views, unless beside the labels of a match."""
+CLAIMS: Mapping[str, Claims] = {
+    "cameras": camera_claims,
+    "gamestate": sequence_claims,
+    "sn-calibration": line_claims,
+}
+"""The names that a format makes of a view, unless that of its frame alone."""
+PRESCRIBED = ("soccernet-v3", "soccernet-v3d", "yolo")
+"""Formats that prescribe the names, or whose names hold that of the group: no view has another."""
 WITH_BOXES = ("soccernet-v3d", "coco", "yolo", "parquet")
 """Formats that hold the ball box that was chosen; all others have no place for it."""
 
@@ -159,6 +170,14 @@ def _with_plain_lenses(
 def frame_layout(format: str) -> FrameName:  # noqa: A002
     """Where a format looks for the frames of its views."""
     return LAYOUTS.get(format, match_frame)
+
+
+def export_names(format: str, outlines: Iterable[Outline]) -> ExportNames:  # noqa: A002
+    """By which keys a format calls the files of the views that will be exported."""
+    if format in PRESCRIBED:
+        return ExportNames(lambda group, view, split: {})
+    glue = "_" if format == "gamestate" else "/"
+    return ExportNames(CLAIMS.get(format, frame_claims), outlines, glue)
 
 
 def box_settings(format: str, boxes: str) -> dict[str, str]:  # noqa: A002

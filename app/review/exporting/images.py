@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Hashable, Mapping
+from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import Any
 
+from app.datasets.export_names import folded, frame_of, named
 from app.datasets.frame_names import FrameName, match_frame
 from app.datasets.safe_path import resolve_inside
-from app.errors import ImageError, NotFoundError, StorageError, TooLargeError
+from app.errors import ImageError, InputError, NotFoundError, StorageError, TooLargeError
 from app.object_store.address import is_address, unseal
 from app.soccer.group import Group, View
 from app.soccer.media import Media
@@ -18,6 +20,15 @@ from app.store.media import media_facts, picture_header
 ReadPicture = Callable[[Media, int | None, bool], SentPicture]
 """From where a frame lies, its width (None: as it is) and whether it is mirrored."""
 _SUFFIXES = {"image/jpeg": ".jpg", "image/png": ".png", "image/webp": ".webp"}
+
+
+@dataclass(frozen=True)
+class _Written:
+    """A picture that was placed: its path in the export, its frame, its group and view."""
+
+    path: str
+    frame: Hashable
+    whose: str
 
 
 class ExportImages:
@@ -36,12 +47,15 @@ class ExportImages:
         self._root, self._images, self._read = root, images, read
         self._layout = layout
         self._splits: Mapping[str, str] = {}
+        self._names: Mapping[str, str] = {}
+        self._written: dict[str, _Written] = {}
 
     def add(
         self,
         group: Group,
         frozen: Mapping[str, Mapping[str, int]] | None = None,
         splits: Mapping[str, str] | None = None,
+        names: Mapping[str, str] | None = None,
     ) -> None:
         """Note the frames of a group, and place them when images are asked for.
 
@@ -50,8 +64,9 @@ class ExportImages:
             frozen: What was known of its frames when it was frozen, by view; another frame than
                 that is missing.
             splits: Split by view, where views of one group are split.
+            names: Keys by which views are called, where not by their own (``ExportNames``).
         """
-        self.placed, self._splits = {}, splits or {}
+        self.placed, self._splits, self._names = {}, splits or {}, names or {}
         for view in group.views:
             if view.media is None:
                 self._miss(group, view, "no picture came with it")
@@ -80,6 +95,11 @@ class ExportImages:
         except (NotFoundError, ImageError, TooLargeError, StorageError) as error:
             self._miss(group, view, error.message)
 
+    @property
+    def present(self) -> int:
+        """How many pictures lie in the export, looked up there."""
+        return sum((self._root / item.path).is_file() for item in self._written.values())
+
     def _miss(self, group: Group, view: View, why: str) -> None:
         """Name a frame that was wanted and cannot be had."""
         if self._images != "none":
@@ -88,12 +108,16 @@ class ExportImages:
     def _place(self, group: Group, view: View, media: Media) -> None:
         is_file = media.member is None and media.frame is None and not is_address(media.path)
         if self._images == "link" and is_file and self._is_upright(view, media):
+            if not Path(media.path).is_file():
+                raise NotFoundError(f"{PurePosixPath(media.path).name} is not there")
             target = self._target(group, view, PurePosixPath(media.path).suffix.lower())
-            target.symlink_to(media.path)
+            if target is not None:
+                target.symlink_to(media.path)
             return
         picture = self._read(media, None, view.station.flipped)
         target = self._target(group, view, _SUFFIXES[picture.kind])
-        target.write_bytes(picture.data)
+        if target is not None:
+            target.write_bytes(picture.data)
 
     def _is_upright(self, view: View, media: Media) -> bool:
         """Whether a link to its file shows a frame as it was annotated: a mirrored picture is
@@ -101,10 +125,25 @@ class ExportImages:
         header = picture_header(media)
         return not view.station.flipped and (header is None or header.orientation == 1)
 
-    def _target(self, group: Group, view: View, suffix: str) -> Path:
-        """Where a frame goes, in folders that are there."""
-        path = self._layout(group, view, self._splits.get(view.key, group.split), suffix)
-        target = resolve_inside(self._root, path)
-        target.parent.mkdir(parents=True, exist_ok=True)
+    def _target(self, group: Group, view: View, suffix: str) -> Path | None:
+        """Where a frame goes, in folders that are there; None where it lies there already.
+
+        Raises:
+            InputError: Another frame has its name.
+        """
+        called = named(view, self._names.get(view.key))
+        path = self._layout(group, called, self._splits.get(view.key, group.split), suffix)
+        whose = f"{group.key}, {view.key}"
+        first = self._written.get(folded(path))
+        if first is not None and (first.frame, first.path) != (frame_of(group, view), path):
+            raise InputError(
+                f"the pictures of two frames ({first.whose} and {whose}) would both be called {path}",
+                hint="Export without pictures, or rename one of the views in the source.",
+            )
         self.placed[view.key] = path
+        if first is not None:
+            return None
+        target = resolve_inside(self._root, path)
+        self._written[folded(path)] = _Written(path, frame_of(group, view), whose)
+        target.parent.mkdir(parents=True, exist_ok=True)
         return target

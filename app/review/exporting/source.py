@@ -4,19 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
+from itertools import groupby, islice
 from typing import Any, Protocol
 
+from app.datasets.export_names import Outline
 from app.datasets.export_record import ExportRecord
 from app.errors import InputError
 from app.review.datasets.dataset import DatasetHead
 from app.review.editing.state import GroupState, VerdictState, read_states
 from app.review.versions.manifest import policy_settings, version_settings, version_stamp
-from app.review.versions.version import FrozenGroup, Version, thaw
+from app.review.versions.version import FrozenGroup, Version, thaw, thaw_groups
+from app.soccer.frames import ImageSize
+from app.soccer.group import Group, Station, View
 from app.soccer.solution import SOLVER_VERSION
 from app.store.exports import exported_groups, left_out_groups, newest_word
 from app.store.session import Session
 from app.store.stored_json import Json
 from app.store.versions import BATCH, VersionGroup, read_rows
+from app.store.views import NamedView, named_views
 
 Facts = Mapping[str, Mapping[str, int]]
 """Size and checksum of frames by view, as they were when a version was frozen."""
@@ -56,6 +61,9 @@ class ExportSource(Protocol):
     def items(self) -> Iterator[Item]:
         """Its groups, streamed."""
 
+    def outlines(self) -> Iterator[Outline]:
+        """The same groups with what names their files."""
+
 
 class LiveSource:
     """The accepted groups of a dataset, or all of them, in a session's snapshot."""
@@ -91,6 +99,15 @@ class LiveSource:
             for state in read_states(self._session, ids, markings=False):
                 yield _live_record(state), None
 
+    def outlines(self) -> Iterator[Outline]:
+        """The same groups with what names their files."""
+        wanted = set(self._ids)
+        views = (
+            view for view in named_views(self._session, self.dataset_id) if view.group_id in wanted
+        )
+        for _, run in groupby(views, key=lambda view: view.group_id):
+            yield _outline(list(run)), {}
+
     def require_some(self) -> None:
         """Raise InputError where there is nothing to export."""
         if not self.count:
@@ -125,6 +142,14 @@ class VersionSource:
                 batch = []
         yield from self._thawed(batch)
 
+    def outlines(self) -> Iterator[Outline]:
+        """The same groups with what names their files."""
+        rows = read_rows(self._session, self._version.id, members=True)
+        while batch := list(islice(rows, BATCH)):
+            groups = thaw_groups(self._session, self._version, batch)
+            for row, group in zip(batch, groups, strict=True):
+                yield replace(group, split=row.split), row.splits or {}
+
     def _thawed(self, rows: list[VersionGroup]) -> Iterator[Item]:
         for item in thaw(self._session, self._version, rows):
             frames = item.row.frames or {}
@@ -148,6 +173,20 @@ def frozen_record(item: FrozenGroup) -> ExportRecord:
         override=verdict.get("override"),
         splits=item.row.splits or {},
     )
+
+
+def _outline(views: list[NamedView]) -> Group:
+    """A group of views without lines and balls."""
+    first = views[0]
+    return Group(
+        first.group, tuple(_bare_view(item) for item in views), first.match, split=first.split
+    )
+
+
+def _bare_view(item: NamedView) -> View:
+    size = ImageSize(item.width, item.height)
+    station = Station(item.station, size, shared=item.shared, flipped=item.flipped)
+    return View(item.key, station, media=item.media)
 
 
 def _live_record(state: GroupState) -> ExportRecord:

@@ -51,8 +51,8 @@ def ingest_cameras(
     """Attach given calibrations to what they name; attaching them again changes nothing.
 
     A name is the key of a static camera (``cam3``), the stem of a view (``7_1``, ``00002``), or
-    ``<match>/<stem>`` where a stem alone means views of several matches. Views of one match that
-    are called alike are one camera of a rig, and all of them get it.
+    ``<match>/<stem>`` or ``<group>/<stem>`` where a stem alone means views of several matches. Views
+    of one match that are called alike are one camera of a rig, and all of them get it.
 
     Args:
         store: The database.
@@ -109,7 +109,13 @@ def _places(session: Session, dataset_id: int) -> dict[str, list[_Place]]:
     places: dict[str, list[_Place]] = {}
     for row in dataset_views(session, dataset_id):
         stem = str(PurePosixPath(row.key).with_suffix(""))
-        names = {row.station} if row.shared else {stem, f"{row.match}/{stem}"}
+        own = row.group.removeprefix(f"{row.match}/") if row.match else row.group
+        names = (
+            {row.station}
+            if row.shared
+            # An export of views that several groups have puts the group before each.
+            else {stem, f"{row.match}/{stem}", f"{row.group}/{stem}", f"{row.match}/{own}/{stem}"}
+        )
         size = ImageSize(row.width, row.height)
         place = _Place(row.station_id, None if row.shared else row.group_id, row.match, size)
         for name in names:

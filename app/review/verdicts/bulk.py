@@ -211,6 +211,10 @@ def _require_expected(found: SortedOut, expected: int | None) -> None:
         )
 
 
+ALL_BATCHES = 1_000_000
+"""More bulk verdicts than a dataset ever has."""
+
+
 def list_batches(store: Store, dataset_id: int, limit: int = 20) -> list[StoredBulkVerdict]:
     """The newest bulk verdicts of a dataset, the newest first.
 

@@ -175,25 +175,36 @@ def thaw(session: Session, version: Version, rows: Sequence[VersionGroup]) -> li
     Raises:
         StorageError: Content is missing.
     """
-    keys = {key for row in rows for key in (row.said, row.solution) if key}
-    bodies = read_frozen(session, version.dataset_id, keys)
-    require_frozen(keys, bodies)
-    said = {row.key: json_of(bodies[row.said or ""]) for row in rows}
-    solved = {row.key: json_of(bodies[row.solution or ""]) for row in rows}
-    shared = {key for value in said.values() for key in named_texts(value)}
-    names = {name for value in solved.values() for name in calibration_names(value)}
-    more = read_frozen(session, version.dataset_id, shared | names)
-    require_frozen(shared | names, more)
-    stations = {key: json_of(more[key]) for key in shared}
+    bodies = _frozen(session, version, {row.solution or "" for row in rows})
+    solved = [json_of(bodies[row.solution or ""]) for row in rows]
+    names = {name for value in solved for name in calibration_names(value)}
+    more = _frozen(session, version, names)
     calibrations = {name.removeprefix(CALIBRATION): decode_camera(more[name]) for name in names}
+    groups = thaw_groups(session, version, rows)
     return [
-        FrozenGroup(
-            row,
-            thaw_group(said[row.key], stations, row.frames),
-            decode_solution(solved[row.key], calibrations),
-        )
-        for row in rows
+        FrozenGroup(row, group, decode_solution(value, calibrations))
+        for row, group, value in zip(rows, groups, solved, strict=True)
     ]
+
+
+def thaw_groups(session: Session, version: Version, rows: Sequence[VersionGroup]) -> list[Group]:
+    """Members of a version as they were annotated; at most a few hundred.
+
+    Raises:
+        StorageError: Content is missing.
+    """
+    bodies = _frozen(session, version, {row.said or "" for row in rows})
+    said = [json_of(bodies[row.said or ""]) for row in rows]
+    shared = {key for value in said for key in named_texts(value)}
+    more = _frozen(session, version, shared)
+    texts = {key: json_of(more[key]) for key in shared}
+    return [thaw_group(value, texts, row.frames) for row, value in zip(rows, said, strict=True)]
+
+
+def _frozen(session: Session, version: Version, keys: set[str]) -> Mapping[str, bytes]:
+    found = read_frozen(session, version.dataset_id, keys)
+    require_frozen(keys, found)
+    return found
 
 
 def calibration_names(solved: Json) -> set[str]:

@@ -34,17 +34,17 @@ function asked() {
 
 /** Entries, a page at a time. @param {AuditFilter} filter @param {string} key */
 function useAudit(filter, key) {
-	const [found, setFound] = useState(/** @type {{items: AuditEntryJson[], next: number | null} | null} */ (null));
+	const [found, setFound] = useState(/** @type {{items: AuditEntryJson[], next: string | null} | null} */ (null));
 	const [error, setError] = useState(/** @type {ApiError | null} */ (null));
 	const [waiting, setWaiting] = useState(true);
 	const asking = useRef(new AbortController());
-	/** @param {number | null} before */
-	async function read(before) {
+	/** @param {string | null} cursor */
+	async function read(cursor) {
 		const { signal } = asking.current;
 		setWaiting(true);
 		try {
-			const more = await getAudit(filter, before, signal);
-			setFound((known) => ({ items: before === null ? more.items : [...(known?.items ?? []), ...more.items], next: more.next }));
+			const more = await getAudit(filter, cursor, signal);
+			setFound((known) => ({ items: cursor === null ? more.items : [...(known?.items ?? []), ...more.items], next: more.next }));
 			setError(null);
 		} catch (problem) {
 			if (signal.aborted) return;

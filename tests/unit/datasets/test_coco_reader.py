@@ -12,6 +12,7 @@ from app.datasets.coco_reader import read_coco
 from app.datasets.coco_writer import write_coco
 from app.datasets.export_record import ExportRecord
 from app.datasets.report import Report
+from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import Box, ImageSize
 from app.soccer.group import Group
 from tests.unit.datasets.foreign_coco import ball, coco, image, write
@@ -77,7 +78,39 @@ class TestReadCoco:
         path.write_text(json.dumps(value))
         (group,) = read_coco(tmp_path, report)
         assert group.views[0].balls[0].box == Box(610.0, 300.0, 12.0, 11.0)
+        assert group.views[1].balls[0].box == Box(599.5, 300.5, 20.0, 21.0)
+
+    def test_an_export_of_ours_that_says_no_origin_has_its_boxes_in_our_frame(
+        self, tmp_path: Path, solved: Solved, soccer_group: Make, report: Report
+    ) -> None:
+        write_coco(tmp_path, [solved(soccer_group())], boxes="annotated")
+        path = tmp_path / "annotations/instances_train.json"
+        value = json.loads(path.read_text())
+        del value["info"]["bbox_origin"]
+        for older, item in zip(value["images"], value["annotations"], strict=True):
+            del older["touchline"]["bbox_origin"]
+            item["bbox"] = item["written_bbox"] = [610.0, 300.0, 12.0, 11.0]
+        value["annotations"][1]["bbox"] = [600, 301, 20, 21]
+        path.write_text(json.dumps(value))
+        (group,) = read_coco(tmp_path, report)
+        assert group.views[0].balls[0].box == Box(610.0, 300.0, 12.0, 11.0)
         assert group.views[1].balls[0].box == Box(600.0, 301.0, 20.0, 21.0)
+        assert report.problems == []
+
+    @pytest.mark.parametrize("x", [0.1, 1 / 3, -0.3, 1e-9, 610.0000000001, 959.7])
+    def test_import_export_import_changes_no_digit_of_a_box(
+        self, tmp_path: Path, solved: Solved, soccer_group: Make, report: Report, x: float
+    ) -> None:
+        group = soccer_group(replays=0)
+        ball = BallAnnotation(box=Box(x, x / 7, 12.1, 11.3))
+        group = replace(group, views=(replace(group.views[0], balls=(ball,)),))
+        for out in ("first", "second"):
+            (tmp_path / out).mkdir()
+            write_coco(tmp_path / out, [solved(group, ball=False)], every_view=True)
+            (group,) = read_coco(tmp_path / out, report)
+            assert group.views[0].balls == (ball,)
+        texts = {path.read_text() for path in tmp_path.rglob("instances_*.json")}
+        assert len(texts) == 1
 
     def test_a_group_whose_views_are_in_two_files_is_one(
         self, tmp_path: Path, solved: Solved, issia_group: Make, report: Report

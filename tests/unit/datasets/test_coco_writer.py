@@ -58,7 +58,7 @@ class TestWriteCoco:
         coco = COCO(str(tmp_path / "annotations/instances_train.json"))
         assert [item["name"] for item in coco.loadCats(coco.getCatIds())] == ["ball"]
         annotation = coco.loadAnns(coco.getAnnIds(imgIds=[1]))[0]
-        assert annotation["bbox"] == [610.75, 300.25, 10.5, 10.5]
+        assert annotation["bbox"] == [611.25, 300.75, 10.5, 10.5]
         assert annotation["area"] == 10.5 * 10.5
 
     def test_an_image_says_which_view_it_is_and_what_its_camera_was(
@@ -113,9 +113,20 @@ class TestWriteCoco:
     ) -> None:
         write_coco(tmp_path, [solved(soccer_group())], boxes=boxes)
         item = instances(tmp_path, "train")["annotations"][0]
-        wanted = {"annotated": [610.0, 300.0, 12.0, 11.0], "exact": [610.5, 300.0, 10.6, 10.4]}
-        assert item["bbox"] == wanted[boxes]
-        assert item["annotated_bbox"] == [610.0, 300.0, 12.0, 11.0]
+        wanted = {"annotated": [610.5, 300.5, 12.0, 11.0], "exact": [611.0, 300.5, 10.6, 10.4]}
+        assert item["bbox"] == item["written_bbox"] == wanted[boxes]
+        assert item["annotated_bbox"] == [610.5, 300.5, 12.0, 11.0]
+
+    def test_boxes_are_measured_from_the_corner_and_the_file_says_so(
+        self, tmp_path: Path, solved: Solved, soccer_group: Make
+    ) -> None:
+        write_coco(tmp_path, [solved(soccer_group())], info={"description": "demo"})
+        value = instances(tmp_path, "train")
+        assert value["info"] == {"description": "demo", "bbox_origin": "corner"}
+        state = value["images"][0]["touchline"]
+        assert state["bbox_origin"] == "corner"
+        # What was annotated stays in our own frame.
+        assert state["balls"][0]["box"] == [610.0, 300.0, 12.0, 11.0]
 
     def test_a_centre_without_a_box_has_no_annotation(
         self, tmp_path: Path, solved: Solved, soccer_group: Make

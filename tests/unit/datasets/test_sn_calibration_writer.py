@@ -101,15 +101,9 @@ class TestWriteSnCalibration:
         self, tmp_path: Path, solved: Solved, soccer_group: Make
     ) -> None:
         view = soccer_group(replays=0).views[0]
-        other = replace(view, station=replace(view.station, lines={}))
-        first, same = (Group(key, (replace(view, key=key),)) for key in ("a/7.png", "a/7.jpg"))
-        second = Group("a/7.webp", (replace(other, key="a/7.webp"),))
-        for name in ("same", "other"):
-            (tmp_path / name).mkdir()
-        counts = write_sn_calibration(tmp_path / "same", map(solved, (first, same)))
-        assert (counts["groups"], counts["frames"]) == (2, 1)
-        with pytest.raises(InputError, match="two frames would both be called lines/"):
-            write_sn_calibration(tmp_path / "other", map(solved, (first, second)))
+        groups = [Group(key, (replace(view, key=key),)) for key in ("a/7.png", "a/7.jpg")]
+        with pytest.raises(InputError, match=r"two frames .*a/7\.png and a/7\.jpg"):
+            write_sn_calibration(tmp_path, map(solved, groups))
 
     def test_the_layout_of_before_is_read_all_the_same(
         self, tmp_path: Path, soccer_group: Make, camera: Camera, report: Report

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import shutil
 import zipfile
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,7 @@ import touchline
 from app.datasets.export_record import ExportRecord
 from tests.unit.touchline.conftest import HASH, write_export, zipped
 from touchline.errors import DataError, HashError
+from touchline.frames import FileFrames
 
 
 @pytest.fixture
@@ -97,6 +99,19 @@ class TestFrames:
         (tmp_path / "empty").mkdir()
         with pytest.raises(DataError, match="has no frame"):
             touchline.open(bare, frames=tmp_path / "empty").views[0].frame()
+
+    def test_a_file_that_would_be_the_frame_of_two_views_is_refused(
+        self, records: list[ExportRecord], tmp_path: Path
+    ) -> None:
+        bare = write_export(tmp_path / "bare", records, images=False)
+        view = touchline.open(bare).views[0]
+        (tmp_path / "flat").mkdir()
+        (tmp_path / "flat" / Path(view.file_name).name).write_bytes(b"x")
+        frames = FileFrames(tmp_path / "flat")
+        other = replace(view, file_name=view.file_name.replace("/Frames-v3/", "/Frames-v3/a/"))
+        assert frames.read(view) == frames.read(view) == b"x"
+        with pytest.raises(DataError, match="fits two frames"):
+            frames.read(other)
 
     def test_no_name_leads_out_of_the_folder(self, copy: Path) -> None:
         (copy.parent / "secret.png").write_bytes(b"somebody else's")

@@ -61,7 +61,7 @@ class TestMakeExport:
         with zipfile.ZipFile(io.BytesIO(content.content)) as archive:
             assert "manifest.json" in archive.namelist()
         document = api.get(f"{API}/{job['id']}").json()
-        assert (document["status"], document["counts"]["cameras"]) == ("ready", 2)
+        assert (document["status"], document["counts"]["cameras"]) == ("ready", 6)
         assert document["state"] == "done"
         assert document["bytes"] == len(content.content)
         done = api.get(f"/api/v1/jobs/{job['id']}").json()

@@ -229,6 +229,7 @@ class TestListImportFolders:
             "format": None,
             "items": [{"path": "data", "name": "data", "folder": True}],
             "more": False,
+            "next": None,
         }
         inside = api.get(f"{API}/folders", params={"path": "data"}).json()
         assert [item["path"] for item in inside["items"]] == ["data/league"]

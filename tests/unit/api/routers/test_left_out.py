@@ -106,6 +106,7 @@ class TestNeighbours:
         none = api.get(f"{API}/views/{second['id']}/neighbours").json()
         assert none == {
             "items": [],
+            "next": None,
             "sentence": "This dataset has no frames before or after this one.",
         }
 

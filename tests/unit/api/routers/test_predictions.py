@@ -109,7 +109,12 @@ class TestGroupPredictions:
         assert [item["id"] for item in alone] == [item["id"] for item in predicted[:2]]
 
     def test_a_dataset_without_prediction_sets_says_so(self, api, emptied) -> None:
-        assert asked(api, emptied) == {"sets": 0, "items": [], "accepted": []}
+        assert asked(api, emptied) == {
+            "sets": 0,
+            "items": [],
+            "accepted": [],
+            "next": None,
+        }
 
     def test_an_accepted_ball_says_where_it_is_from(self, api, emptied, predicted) -> None:
         assert accept(api, emptied, predicted[0]).status_code == 200

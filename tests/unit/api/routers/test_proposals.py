@@ -80,7 +80,7 @@ def test_it_is_counted_looked_for_accepted_and_forgotten(app, api, group_id: int
     assert set(edits[-1]["body"]["edit"]["source"].values()) == {"proposed"}
     assert api.get(PROPOSALS).json()["items"][0]["accepted"] == 1
     assert api.delete(PROPOSALS).json() == {"forgotten": 1}
-    assert api.get(f"{API}/groups/{group_id}/proposals").json() == {"items": []}
+    assert api.get(f"{API}/groups/{group_id}/proposals").json() == {"items": [], "next": None}
 
 
 def test_lines_that_were_not_proposed_have_no_source(api, group_id: int) -> None:

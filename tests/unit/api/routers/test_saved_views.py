@@ -19,11 +19,11 @@ class TestSavedViews:
             3,
         )
         assert api.get(answer.headers["location"]).json() == saved
-        assert api.get(f"{DATASET}/saved-views").json() == {"items": [saved]}
+        assert api.get(f"{DATASET}/saved-views").json() == {"items": [saved], "next": None}
         assert api.post(f"{DATASET}/saved-views", json=body).status_code == 409
         assert api.delete(answer.headers["location"]).json() == saved
         assert api.delete(answer.headers["location"]).status_code == 404
-        assert api.get(f"{DATASET}/saved-views").json() == {"items": []}
+        assert api.get(f"{DATASET}/saved-views").json() == {"items": [], "next": None}
 
     @pytest.mark.parametrize(
         ("body", "status"),
@@ -35,7 +35,7 @@ class TestSavedViews:
 
 class TestListReviewers:
     def test_tells_who_judged_how_much(self, api) -> None:
-        assert api.get(f"{DATASET}/reviewers").json() == {"items": []}
+        assert api.get(f"{DATASET}/reviewers").json() == {"items": [], "next": None}
         api.post(f"{DATASET}/verdicts", json={"state": "deferred"})
         (item,) = api.get(f"{DATASET}/reviewers").json()["items"]
         assert (item["name"], item["deferred"], item["today"]) == ("local", 3, 3)
