@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import json
+import math
 import time
 from typing import Any
 
@@ -8,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from app.datasets.json_text import MAX_DEPTH, parse_literal, read_json
+from app.datasets.json_text import MAX_DEPTH, MAX_NAMED, parse_literal, read_json
 from app.datasets.report import Report
 from app.errors import DatasetFormatError
 
@@ -52,6 +53,16 @@ class TestReadJson:
         (problem,) = report.problems
         assert str(problem).startswith(place)
         assert str(problem).endswith("read as missing")
+
+    def test_of_many_bad_numbers_the_first_are_named_and_the_rest_are_counted(self) -> None:
+        report = Report()
+        text = json.dumps({"annotations": [{"area": math.nan}] * 150})
+        value = read_json(text.encode(), "f", report=report)
+        assert value == {"annotations": [{"area": None}] * 150}
+        assert len(report.problems) == MAX_NAMED + 1
+        assert str(report.problems[-1]) == (
+            "f: 50 more numbers are not finite: area (50); read as missing"
+        )
 
     def test_a_python_literal_with_nan_is_read_alike(self) -> None:
         report = Report()
