@@ -32,7 +32,7 @@ PLAIN_WORDS = """
     cluster serving hosts executors packing day browser database
     private kept another smaller index
     stored tree trees safe path refusal attempt cookie fit
-    categories corner finder ids like
+    categories corner finder ids joins like
     compiler dialect postgresql sqlite statements transfer triggers
     attempts lived processes shared sharing short shown web
     addresses messages sender signing

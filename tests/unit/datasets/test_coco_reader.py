@@ -337,6 +337,15 @@ class TestJoins:
         assert (problem.record, problem.field) == ("images[1]", "id")
         assert "no annotation joins this image" in problem.problem
 
+    def test_an_image_that_is_left_out_says_how_many_annotations_go_with_it(
+        self, read: Callable[[Any], list[Group]], report: Report
+    ) -> None:
+        images = [image(width=None), image("b.jpg", 2)]
+        read(coco(images, [ball(), ball(identity=2), ball(2, 3)]))
+        (problem,) = report.problems
+        assert (problem.record, problem.field) == ("images[0]", "width")
+        assert problem.problem.endswith("left out with 2 annotations")
+
     def test_annotations_without_an_image_are_counted(
         self, read: Callable[[Any], list[Group]], report: Report
     ) -> None:
