@@ -101,12 +101,10 @@ class LiveSource:
 
     def outlines(self) -> Iterator[Outline]:
         """The same groups with what names their files."""
-        wanted = set(self._ids)
-        views = (
-            view for view in named_views(self._session, self.dataset_id) if view.group_id in wanted
-        )
-        for _, run in groupby(views, key=lambda view: view.group_id):
-            yield _outline(list(run)), {}
+        for start in range(0, self.count, BATCH):
+            views = named_views(self._session, self._ids[start : start + BATCH])
+            for _, run in groupby(views, key=lambda view: view.group_id):
+                yield _outline(list(run)), {}
 
     def require_some(self) -> None:
         """Raise InputError where there is nothing to export."""
