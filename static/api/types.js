@@ -204,6 +204,7 @@
  * @property {FixJson | null} fix
  * @property {OfferJson[]} offers edits that mend it
  * @property {GuideJson | null} guide where no edit does
+ * @property {boolean} unusable_ball whether nobody can use the ball: accepting needs a note
  */
 
 /**

@@ -4,7 +4,7 @@
 import { computed, effect, signal, untracked } from '@preact/signals';
 
 import { plural } from '../lib/format.js';
-import { findingTitle } from './advice.js';
+import { findingTitle, isGrave } from './advice.js';
 import { placeExpected } from './drawing.js';
 import { editOf } from './edits.js';
 import { group, groupDocument, solution } from './group.js';
@@ -157,10 +157,18 @@ export const isHeld = computed(() => {
 /** The one that the card shows and Enter carries out. */
 export const mend = computed(() => (isHeld.value ? null : mends.value[mendIndex.value] ?? null));
 
-/** The finding that the card speaks about; null where it speaks of something else. */
+/** The finding that the card speaks about: the worst, whatever else could be mended, else that of the mend; null where it speaks of something else. */
 export const toldFinding = computed(() => {
 	const meant = mend.value;
-	return (meant?.title ? meant.finding : solution.value?.findings[0]) ?? null;
+	const first = solution.value?.findings[0];
+	if (first && isGrave(first, solution.value)) return first;
+	return (meant?.title ? meant.finding : first) ?? null;
+});
+
+/** Whether the card's title is that of the mend that it offers. */
+export const isMendTold = computed(() => {
+	const meant = mend.value;
+	return Boolean(meant?.title) && (meant?.finding ?? null) === toldFinding.value;
 });
 
 /** Show another one. @param {number} step */
