@@ -84,8 +84,10 @@ def find(
     return tuple(sorted(found, key=_weight))
 
 
-def _weight(finding: Finding) -> tuple[bool, int]:
-    return not finding.is_unusable_ball, _BY_WEIGHT.index(finding.kind)
+def _weight(finding: Finding) -> tuple[bool, int, float]:
+    """What comes first; of views that disagree the one that is farther off."""
+    far = (finding.number or 0.0) if finding.kind == "view_disagrees" else 0.0
+    return not finding.is_unusable_ball, _BY_WEIGHT.index(finding.kind), -far
 
 
 def _swaps(

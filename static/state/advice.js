@@ -74,6 +74,12 @@ export function isGrave(finding, solution) {
 	return finding.unusable_ball || Boolean(solution?.passes && saysApart(finding));
 }
 
+/** What is wrong, without what to do about it. @param {string} text */
+function firstSentence(text) {
+	const [first] = text.split('. ');
+	return first.charAt(0).toLowerCase() + first.slice(1);
+}
+
 /**
  * Why a group should not be accepted without a second thought; null when nothing speaks against it.
  *
@@ -81,7 +87,7 @@ export function isGrave(finding, solution) {
  */
 export function doubt(solution) {
 	const unusable = solution?.findings.find(({ unusable_ball: no }) => no);
-	if (unusable) return `the ball cannot be used: ${unusable.sentence}`;
+	if (unusable) return `the ball cannot be used: ${firstSentence(unusable.sentence)}`;
 	const swapped = solution?.passes ? solution.findings.find(({ kind }) => kind === 'sides_swapped') : undefined;
 	return swapped ? `left and right seem to be swapped: ${swapped.sentence}` : null;
 }

@@ -9,7 +9,7 @@ import { placeExpected } from './drawing.js';
 import { editOf } from './edits.js';
 import { group, groupDocument, solution } from './group.js';
 import { remedies } from './insight.js';
-import { openProposals, scoreWords, settledState, stateOf, waitingViews } from './proposal_lines.js';
+import { lookedAt, openProposals, scoreWords, settledState, stateOf, waitingViews, waitsForLines } from './proposal_lines.js';
 import { fitPanel, returnLent } from './viewports.js';
 import { focused } from './workspace.js';
 
@@ -78,6 +78,18 @@ function missingBalls(shown, solved) {
 	});
 }
 
+/** To look for lines in the picture of a view that nobody has looked at. @param {GroupDocument} shown @param {SolutionJson | null} solved @param {ViewJson} view @returns {Mend} */
+function lookForLines(shown, solved, view) {
+	const finding = solved?.findings.find((one) => one.kind === 'under_constrained' && one.view === view.key);
+	return {
+		view: view.key, caption: '', passes: false, finding,
+		label: lookedAt.value.has(view.id) ? 'Looking…' : 'Propose lines',
+		title: finding ? findingTitle(shown, finding) : `View ${view.letter} has no lines`,
+		sentence: finding?.sentence ?? 'Its picture may show them.',
+		run: (at) => import('./proposals.js').then(({ proposeNow }) => proposeNow(at)),
+	};
+}
+
 /** Lines that are proposed for views without a camera. @param {GroupDocument} shown @param {ReadonlyMap<string, ViewProposalJson>} proposed @returns {Mend[]} */
 function proposedLines(shown, proposed) {
 	return shown.views.flatMap((view) => {
@@ -127,7 +139,8 @@ function isSame(a, b) {
 function mendsOf(shown, solved, helping, proposed) {
 	// Without its camera a view says nothing of the ball: that comes before everything else.
 	const lines = proposedLines(shown, proposed);
-	if (!solved) return lines;
+	const looks = shown.views.filter((view) => waitsForLines(view, solved) && !proposed.has(view.key)).map((view) => lookForLines(shown, solved, view));
+	if (!solved) return [...lines, ...looks];
 	const missing = missingBalls(shown, solved);
 	const short = solved.first_failing?.gate === 'ball';
 	const tried = helping.flatMap(ofRemedy);
@@ -135,7 +148,7 @@ function mendsOf(shown, solved, helping, proposed) {
 		.map((mend) => ({ ...mend, passes: tried.some((remedy) => remedy.passes && isSame(remedy, mend)) }));
 	const known = short ? [...missing, ...found] : [...found, ...missing];
 	const more = tried.filter((remedy) => !known.some((mend) => isSame(remedy, mend)));
-	return [...lines, ...known, ...more];
+	return solved.passes ? [...lines, ...known, ...looks, ...more] : [...lines, ...looks, ...known, ...more];
 }
 
 /** Everything that would mend the group on screen. */

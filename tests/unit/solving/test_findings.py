@@ -132,7 +132,7 @@ class TestMissesBall:
 
     def test_a_view_that_counts_and_that_the_ball_misses_by_more_than_tau_is_named(self) -> None:
         views = [off("a", 37.7), off("b", 2.3), off("c", 61.1)]
-        one, other = found(made("abc"), pairs=TestViewDisagrees.PAIRS, views=views)
+        other, one = found(made("abc"), pairs=TestViewDisagrees.PAIRS, views=views)
         assert (one.kind, one.view, one.number) == ("view_disagrees", "a", 37.7)
         assert (other.view, other.number) == ("c", 61.1)
         assert other.threshold == pytest.approx(TAU)
