@@ -159,7 +159,11 @@ def _swap_sides(view: View, _fix: Fix, _point: ImagePoint | None) -> Edit | None
     changes: dict[str, tuple[ImagePoint, ...] | None] = dict.fromkeys(lines)
     for marking, points in lines.items():
         changes[twin_marking(marking)] = tuple(points)
-    return SetLines(view.key, changes) if changes else None
+    # What is not visible is the other end of the pitch, too.
+    unseen = tuple(map(twin_marking, view.station.not_visible))
+    for marking in (*view.station.not_visible, *unseen):
+        changes.setdefault(marking, None)
+    return SetLines(view.key, changes, not_visible=unseen) if changes else None
 
 
 def _free_picture(view: View, _fix: Fix, _point: ImagePoint | None) -> Edit | None:

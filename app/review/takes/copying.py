@@ -126,7 +126,7 @@ def _imported(session: Session, stored: StoredGroup) -> Group:
 def _stripped(view: View, *, bare: bool) -> View:
     station = view.station
     if bare and not station.shared:
-        station = replace(station, lines={}, proposed=())
+        station = replace(station, lines={}, proposed=(), not_visible=())
     return replace(view, station=station, balls=(), included=True, left_out=None, noise=1.0)
 
 
