@@ -259,9 +259,8 @@ def _views_contradict(item: Contradiction, group: Group, ball: Ball3D | None) ->
     one = "The two views do" if len(found.views) == 2 else "The views do"
     degrees = "degree" if found.freedom == 1 else "degrees"
     sentences = [
-        f"{one} not show one ball within their noise: χ² is {found.value:,.1f} with "
-        f"{found.freedom} {degrees} of freedom, which chance alone makes in "
-        f"{chance(found.p_value)}."
+        f"{one} not show one ball within their noise (χ² {found.value:,.1f}, {found.freedom} "
+        f"{degrees} of freedom; chance alone: {chance(found.p_value)})."
     ]
     if ball is not None and item.widening > 1:
         sentences.append(
@@ -269,18 +268,19 @@ def _views_contradict(item: Contradiction, group: Group, ball: Ball3D | None) ->
         )
     if not item.is_known:
         sentences.append(
-            "Nobody says how exact the given cameras are: if most groups contradict themselves, "
-            "estimate that under Statistics, “Noise of the clicks”."
+            "Nobody says how exact the given cameras are: “Noise of the clicks” under Statistics "
+            "estimates it."
         )
     if item.view is not None:
         sentences.append("Without this view the others agree.")
     if item.gap_m is not None and item.is_motion and not _one_clock(group):
         sentences.append(_another_instant(item.gap_m, item.moved_m))
-    sentences.append(
-        "If its ball is drawn on the ball, leave the view out."
-        if item.view is not None
-        else "If each ball is drawn on the ball, a camera is wrong or the instants differ."
-    )
+    if item.view is not None:
+        sentences.append("If its ball is drawn on the ball, leave the view out.")
+    elif item.is_known:
+        sentences.append(
+            "If each ball is drawn on the ball, a camera is wrong or the instants differ."
+        )
     return Finding(
         "views_contradict",
         " ".join(sentences),

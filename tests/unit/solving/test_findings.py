@@ -208,7 +208,10 @@ class TestViewsContradict:
         wide = replace(GOOD, sigma_m=0.94)
         test = ChiSquare(350.0, 1, 4e-78, ("a", "b"))
         (item, _) = found(made("ab"), torn=Contradiction(test, None, None), ball=wide)
-        assert "χ² is 350.0 with 1 degree of freedom" in item.sentence
+        assert (
+            "(χ² 350.0, 1 degree of freedom; chance alone: less than 1 of a million"
+            in item.sentence
+        )
         assert "Sigma is widened 18.7 times for it, to 0.94 m" in item.sentence
 
     def test_where_nobody_knows_the_cameras_the_way_to_their_noise_is_told(self) -> None:
