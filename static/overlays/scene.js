@@ -25,6 +25,7 @@ import { pinsOf } from '../lib/pins.js';
  * @typedef {object} ViewPaint   its code is loaded with it
  * @property {Draw} draw whiskers from the markings to their paint
  * @property {(marking: string) => ImagePoint[]} places of the paint of a marking
+ * @property {import('../api/paint.js').PaintJson} found what was read, and how the camera agrees with it
  */
 /** @typedef {{item: import('../api/proposals.js').ViewProposalJson, draw: Draw}} ViewProposal   its code is loaded with it */
 /**

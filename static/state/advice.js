@@ -52,7 +52,8 @@ const OF_GATE = /** @type {Record<string, string>} */ ({
  */
 export function suggestedReason(solution) {
 	const failing = solution?.first_failing;
-	if (!solution || !failing) return null;
+	// A view alone fails for want of another one, whatever is drawn in it.
+	if (!solution || !failing || solution.views.length < 2) return null;
 	const telling = solution.findings.find(({ kind }) => OF_FINDING[kind]);
 	return (telling && OF_FINDING[telling.kind]) ?? OF_GATE[failing.gate] ?? null;
 }

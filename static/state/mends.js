@@ -67,13 +67,15 @@ function missingBalls(shown, solved) {
 		const place = solved.views.find((one) => one.view === view.key)?.expected?.place;
 		// Where there is no 3D ball yet, another view's ball may bring it.
 		if (solved.ball ? !(place && inPicture(view, place)) : solved.passes) return [];
+		const seen = shown.views.some((other) => other !== view && other.balls.length > 0 && solved.views.some((one) => one.view === other.key && one.calibration.camera));
+		const where = seen ? 'The dotted line is the ray of another view: the ball lies on it.' : 'No other view shows where it is.';
 		const why = NEEDS_A_PAIR.has(solved.first_failing?.gate ?? '') ? ` With it ${view.letter} may make the pair that is missing.` : '';
 		return [{
 			view: view.key, caption: '',
 			...(place ? { label: 'Place it there', run: placeExpected } : { label: 'Draw it', guide: { ball: true } }),
 			title: `No ball is drawn in ${view.letter}`, passes: false,
 			sentence: (place ? 'A green cross marks where the other views see it. If it is not visible there, press O.'
-				: 'The dotted line is the ray of another view: the ball lies on it. If it is not visible, press O.') + why,
+				: `${where} If it is not visible, press O.`) + why,
 		}];
 	});
 }

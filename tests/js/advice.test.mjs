@@ -4,7 +4,7 @@ import { describe, it } from 'node:test';
 import { doubt, isGrave, suggestedReason } from '../../static/state/advice.js';
 
 const failing = (gate, ...kinds) => ({
-	passes: false, first_failing: { gate }, findings: kinds.map((kind) => ({ kind, sentence: kind })),
+	passes: false, views: [{}, {}], first_failing: { gate }, findings: kinds.map((kind) => ({ kind, sentence: kind })),
 });
 
 describe('suggestedReason', () => {
@@ -25,6 +25,10 @@ describe('suggestedReason', () => {
 			assert.equal(suggestedReason(failing('sigma', 'ball_size', kind)), reason);
 		});
 	}
+
+	it('is none for a view alone, which no reason to reject is true of', () => {
+		assert.equal(suggestedReason({ ...failing('two_views'), views: [{}] }), null);
+	});
 
 	it('is none for a group that passes, or was never solved', () => {
 		assert.equal(suggestedReason({ passes: true, first_failing: null, findings: [] }), null);

@@ -29,6 +29,12 @@ describe('paintOf', () => {
 		assert.equal(paintOf(null), null);
 	});
 
+	it('says what was read of the picture of a camera without lines, while the group is shown', () => {
+		const given = picture().solved;
+		assert.equal(paintOf(given), null);
+		assert.deepEqual(paintOf(given, { ...fit, points: {} }), { supported: '87 %', explained: '4.1 %', reason: '' });
+	});
+
 	it('says why the camera is that of the clicks, and a dash where nothing was measured', () => {
 		const unseen = { ...fit, supported: null, explained: null, reason: 'no_frame' };
 		assert.deepEqual(found(unseen), { supported: '–', explained: '–', reason: 'no picture' });
