@@ -40,7 +40,7 @@ class Fix:
     """What a finding or a remedy proposes to do.
 
     ``action`` is ``relabel``, ``move_point``, ``drop_point``, ``drop_marking``, ``swap_sides``,
-    ``include_view``, ``exclude_view``, ``free_picture`` or ``pick_ball``: edits. ``draw_marking`` and ``look_ball``
+    ``include_view``, ``exclude_view``, ``free_picture``, ``hide_marking`` or ``pick_ball``: edits. ``draw_marking`` and ``look_ball``
     say where a person should look and draw: what was computed there is no evidence for itself.
     ``read_paint`` asks for its picture to be read, which is no edit either.
     """

@@ -185,6 +185,12 @@ def _drop_marking(view: View, fix: Fix, _point: ImagePoint | None) -> Edit | Non
     return SetLines(view.key, {fix.marking: None})
 
 
+def _hide_marking(view: View, fix: Fix, _point: ImagePoint | None) -> Edit | None:
+    if fix.marking is None or fix.marking in view.station.lines:
+        return None
+    return SetLines(view.key, {fix.marking: None}, not_visible=(fix.marking,))
+
+
 def _move_point(view: View, fix: Fix, point: ImagePoint | None) -> Edit | None:
     return None if point is None else _with_point(view, fix, (point,))
 
@@ -252,6 +258,13 @@ _ACTIONS = {
         "the ball of {letter} was really {px:.1f} px away, on the ray of the other view",
         "Show the place",
         "is the ball here?",
+    ),
+    "hide_marking": _Action(
+        2,
+        "{marking} in {letter}, which is {px:.0f} px long there, was marked as not visible",
+        "Mark as not visible",
+        "{marking}: not visible?",
+        _hide_marking,
     ),
     "draw_marking": _Action(2, label="Draw it"),
     READ_PAINT: _Action(1, label="Read its paint"),
