@@ -31,12 +31,17 @@ FINDING_KINDS = (
 """Every kind of finding."""
 
 
+UNUSABLE_SIGMA_M = 2.0
+"""A ball that is less certain is of no use: it is more than the 2 m off that evaluations allow in
+one of three groups."""
+
+
 @dataclass(frozen=True)
 class Fix:
     """What a finding or a remedy proposes to do.
 
     ``action`` is ``relabel``, ``move_point``, ``drop_point``, ``drop_marking``, ``swap_sides``,
-    ``include_view``, ``exclude_view``, ``free_picture`` or ``pick_ball``: edits. ``draw_marking`` and ``look_ball``
+    ``include_view``, ``exclude_view``, ``free_picture``, ``hide_marking`` or ``pick_ball``: edits. ``draw_marking`` and ``look_ball``
     say where a person should look and draw: what was computed there is no evidence for itself.
     ``read_paint`` asks for its picture to be read, which is no edit either.
     """
@@ -61,3 +66,16 @@ class Finding:
     threshold: float | None = None
     confidence: float | None = None
     fix: Fix | None = None
+
+    @property
+    def is_unusable_ball(self) -> bool:
+        """Whether nobody can use the ball of which it is said: accepting it needs a reason."""
+        return makes_unusable(self.kind, self.number)
+
+
+def makes_unusable(kind: str, number: float | None) -> bool:
+    """Whether a finding of that kind and number says that the ball cannot be used."""
+    if kind == "high_uncertainty":
+        # An infinite sigma is null in a table.
+        return number is None or number > UNUSABLE_SIGMA_M
+    return kind == "implausible_ball"

@@ -31,6 +31,7 @@ const STATES = [
 const REFUSALS = /** @type {{[reason: string]: string}} */ ({
 	unsolved: 'they are not solved yet',
 	needs_note: 'they fail a gate, and accepting that needs a note',
+	unusable_ball: 'their ball cannot be used (below the grass, or known to metres only), and accepting that needs a note',
 	no_picture: 'no view of them has a picture, and accepting that needs a note',
 });
 

@@ -79,7 +79,7 @@ def post_verdicts(
     """Judge every group that the query matches, as each of them is when its turn comes.
 
     Accepting a group that fails a gate needs a note; without one such groups are refused and
-    counted, as are groups that nobody has solved. Groups that have this very verdict already
+    counted, as are groups whose ball cannot be used and groups that nobody has solved. Groups that have this very verdict already
     stay as they are.
     """
     found = dataset_id(store, dataset)

@@ -324,6 +324,9 @@ class FindingDocument(Document, shows=Finding):
     """Something that a person should look at."""
 
     fix: FixDocument | None
+    unusable_ball: bool = Field(
+        description="Whether nobody can use the ball: accepting the group needs a note then."
+    )
     offers: list[OfferDocument] = Field(
         description="Edits that mend it, as its fix proposes or without one: none when only a person "
         "can, several to choose from."
@@ -339,7 +342,7 @@ class FindingDocument(Document, shows=Finding):
         group: Any = info.context
         if isinstance(value, Finding):
             found = {"offers": offers_of_finding(group, value), "guide": guide_of_finding(value)}
-            return {**vars(value), **found}
+            return {**vars(value), **found, "unusable_ball": value.is_unusable_ball}
         return value
 
 

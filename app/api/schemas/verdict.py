@@ -14,7 +14,7 @@ class VerdictEdit(BaseModel):
     """Accept, reject with a reason, defer, or take a verdict back.
 
     A rejection needs a reason; `other` needs a note, and so does accepting a group that fails a
-    gate.
+    gate, or whose ball cannot be used.
     """
 
     model_config = ConfigDict(

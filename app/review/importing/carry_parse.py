@@ -222,7 +222,7 @@ def _checked(station: Station) -> Station:
     if station.calibration not in CALIBRATIONS:
         raise InputError("has a calibration that Touchline does not know")
     _require_truth_values("a station", station.flipped, station.shared)
-    for marking in station.lines:
+    for marking in station.said_lines:
         if canonical_marking(marking) != marking:
             raise InputError(f"has {marking}, which is not a pitch marking")
     if (count := points_of(station.lines)) > MAX_POINTS:

@@ -60,7 +60,10 @@ class TestHash:
         sharing = replace(PAPER, calibration=CalibrationPolicy(share_position=True))
         assert sharing.hash != PAPER.hash
         assert sharing.calibration_hash != PAPER.calibration_hash
-        painted = replace(PAPER, calibration=CalibrationPolicy(source="paint"))
+        short = replace(PAPER, calibration=CalibrationPolicy(shortest_marking_px=5.0))
+        assert short.hash != PAPER.hash and short.calibration_hash != PAPER.calibration_hash
+        asked = CalibrationPolicy(source="paint", shortest_marking_px=5.0)
+        painted = replace(PAPER, calibration=asked)
         assert painted.hash == TOUCHLINE.hash != PAPER.hash
         assert painted.calibration_hash != PAPER.calibration_hash
 
