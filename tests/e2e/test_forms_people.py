@@ -106,7 +106,7 @@ PEOPLE = [
         "asks a second factor of everybody",
         [tick("Require a second factor: people without one set it up at their next login")],
         {"PUT /team": {"require_second_factor": True}},
-        {".people__rule:has(input:checked)": "Everybody needs a second factor"},
+        {".people__rule:has(input:checked)": "Require a second factor"},
     ),
     Row(
         "asks it of nobody any more",
@@ -117,7 +117,7 @@ PEOPLE = [
             )
         ],
         {"PUT /team": {"require_second_factor": False}},
-        {".people__rule:not(:has(input:checked))": "Everybody needs a second factor"},
+        {".people__rule:not(:has(input:checked))": "Require a second factor"},
     ),
     Row(
         "gives a role in one dataset",
@@ -166,7 +166,7 @@ class TestPeople:
     ) -> None:
         console.expect("503")
         page = open_as(open_page, crew.log_in("ada"), "/people")
-        rule = page.get_by_label("Everybody needs a second factor")
+        rule = page.get_by_label("Require a second factor")
         expect(rule).not_to_be_checked()
         page.route("**/api/v1/team", lambda route: route.fulfill(status=503), times=1)
         rule.click()
