@@ -153,7 +153,7 @@ export function submit(edit) {
 	const shown = pending.value.reduce(applyEdit, at);
 	batch(() => {
 		draft.value = null;
-		did({ kind: 'edit', group: at.id, number: at.number, times: 1 });
+		did({ kind: 'edit', dataset: at.dataset.name, group: at.id, number: at.number, times: 1 });
 		enqueue({
 			method: 'PATCH', ...requestOf(at, edit), group: at.id, station: stationOf(at, edit), edit,
 			verdict: null, base: baseOf(shown, edit.view),
