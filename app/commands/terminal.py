@@ -156,6 +156,11 @@ def print_export(values: Mapping[str, Any], as_json: bool) -> None:
     print_values(values, as_json)
     if as_json:
         return
+    from app.review.exporting.formats import lacking
+
+    lacks = lacking(values["format"], values["counts"])
+    if lacks is not None:
+        say(f"Not complete: {lacks}. --images copy puts them there.")
     missing = values["missing_images"]
     for line in missing[:MAX_MISSING]:
         say(f"  {line}")

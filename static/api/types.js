@@ -340,6 +340,7 @@
  * @property {string} status
  * @property {string | null} content
  * @property {Counts | null} counts
+ * @property {string | null} [incomplete] what the files lack before they can be used
  * @property {string | null} [error]
  */
 

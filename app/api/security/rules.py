@@ -74,6 +74,7 @@ _ROWS: Mapping[Action | None, tuple[str, ...]] = {
         "GET /api/v1/findings",
         "GET /api/v1/groups/{group}/remedies",
         "GET /api/v1/views/{view}/influence",
+        "GET /api/v1/datasets/{dataset}/export-formats",
         "GET /api/v1/exports",
         "GET /api/v1/exports/{export}",
         "GET /api/v1/exports/{export}/content",
