@@ -191,6 +191,7 @@ _ROWS: Mapping[Action | None, tuple[str, ...]] = {
         "DELETE /api/v1/uploads/{upload}",
         "GET /api/v1/imports/folders",
         "POST /api/v1/imports",
+        "POST /api/v1/datasets/{dataset}/pitches",
         "PATCH /api/v1/datasets/{dataset}/pitches",
         "POST /api/v1/datasets/{dataset}/pictures",
         "PATCH /api/v1/datasets/{dataset}/pictures",

@@ -47,6 +47,7 @@ KEPT: dict[str, Made] = {
     "deletePredictions": dataset_requests.no_predictions,
     "deleteSavedView": dataset_requests.no_saved_view,
     "estimateMatchPictures": dataset_requests.estimate,
+    "estimatePitches": dataset_requests.pitch_estimates,
     "forgetDatasetProposals": dataset_requests.no_proposals,
     "freezeVersion": dataset_requests.freeze,
     "handBackAdjudicated": group_requests.adjudication_back,
