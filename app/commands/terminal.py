@@ -79,7 +79,7 @@ def _telling_lines(what: str) -> TellProgress:
         last = time.monotonic()
         place = f"{done:,}" if total is None else f"{done:,} of {total:,}"
         stage = f"{sentence.rstrip('.')} ({place})" if sentence else place
-        print(harmless(f"{what}: {stage}"), file=sys.stderr, flush=True)
+        complain(f"{what}: {stage}")
 
     return progress
 
@@ -179,7 +179,7 @@ def print_export(values: Mapping[str, Any], as_json: bool) -> None:
         return
     from app.review.exporting.formats import lacking
 
-    lacks = lacking(values["format"], values["counts"])
+    lacks = lacking(values.get("format", ""), values["counts"])
     if lacks is not None:
         say(f"Not complete: {lacks}. --images copy puts them there.")
     missing = values["missing_images"]
