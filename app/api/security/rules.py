@@ -162,6 +162,7 @@ _ROWS: Mapping[Action | None, tuple[str, ...]] = {
         "POST /api/v1/groups/{group}/adjudication/hand-back",
         "POST /api/v1/batches/{batch}/groups/{group}/hand-back",
         "PUT /api/v1/groups/{group}/verdict",
+        "PUT /api/v1/groups/{group}/dismissal",
         "POST /api/v1/datasets/{dataset}/verdicts",
         "POST /api/v1/verdict-batches/{batch}/redo",
         "POST /api/v1/verdict-batches/{batch}/undo",

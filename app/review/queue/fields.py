@@ -77,7 +77,11 @@ def _flag(name: str, meaning: str) -> QueryField:
 
 _ASKED = (
     QueryField("status", "choice", "verdict", values=STATUSES, also=("state",)),
-    QueryField("finding", "choice", "what was noticed", values=(*WHETHER, *FINDING_KINDS)),
+    QueryField("finding", "choice", "what was noticed and nobody has dismissed", values=(*WHETHER, *FINDING_KINDS)),
+    QueryField(
+        "dismissed", "choice", "findings that somebody has checked and dismissed",
+        values=(*WHETHER, *FINDING_KINDS),
+    ),
     QueryField(
         "gate", "choice", "first failing gate; none: it passes", values=("none", "unsolved", *GATES),
         also=("first_failing",),

@@ -79,7 +79,7 @@ def own_total(session: Session, batch: Batch, person: str) -> int | None:
         return None
     name = person_of(person)
     takes = takes_of_batch(session, batch.id, batch.dataset_id)
-    done = sum(row.person == name and row.handed_in is not None for row in takes)
+    done = len([row for row in takes if row.person == name and row.handed_in is not None])
     return done + count_left(session, batch.id, batch.dataset_id, name, batch.verdicts)
 
 

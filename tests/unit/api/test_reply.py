@@ -46,6 +46,7 @@ KEPT: dict[str, Made] = {
     "deleteExport": dataset_requests.no_export,
     "deletePredictions": dataset_requests.no_predictions,
     "deleteSavedView": dataset_requests.no_saved_view,
+    "dismissFinding": group_requests.dismissal,
     "estimateMatchPictures": dataset_requests.estimate,
     "estimatePitches": dataset_requests.pitch_estimates,
     "forgetDatasetProposals": dataset_requests.no_proposals,
