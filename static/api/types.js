@@ -204,6 +204,7 @@
  * @property {FixJson | null} fix
  * @property {OfferJson[]} offers edits that mend it
  * @property {GuideJson | null} guide where no edit does
+ * @property {{by: string, at: string, note: string | null} | null} [dismissed] who has checked it and found it fine
  */
 
 /**

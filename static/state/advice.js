@@ -2,6 +2,7 @@
 /** What to make of a solution: its findings in a few words, and the reason for which a group would be rejected. */
 
 import { capital, words } from '../lib/format.js';
+import { openFindings } from './open_findings.js';
 
 /** @import {FindingJson, GroupDocument, SolutionJson} from '../api/types.js' */
 
@@ -53,7 +54,7 @@ const OF_GATE = /** @type {Record<string, string>} */ ({
 export function suggestedReason(solution) {
 	const failing = solution?.first_failing;
 	if (!solution || !failing) return null;
-	const telling = solution.findings.find(({ kind }) => OF_FINDING[kind]);
+	const telling = openFindings(solution).find(({ kind }) => OF_FINDING[kind]);
 	return (telling && OF_FINDING[telling.kind]) ?? OF_GATE[failing.gate] ?? null;
 }
 
@@ -63,6 +64,6 @@ export function suggestedReason(solution) {
  * @param {SolutionJson | null} solution @returns {string | null}
  */
 export function doubt(solution) {
-	const swapped = solution?.passes ? solution.findings.find(({ kind }) => kind === 'sides_swapped') : undefined;
+	const swapped = solution?.passes ? openFindings(solution).find(({ kind }) => kind === 'sides_swapped') : undefined;
 	return swapped ? `left and right seem to be swapped: ${swapped.sentence}` : null;
 }

@@ -7,7 +7,9 @@ import { stored } from '../lib/storage.js';
 /** @typedef {{kind: 'edit', dataset: string, group: number, number: number, times: number}} EditDone   `times` in a row */
 /** @typedef {{kind: 'verdict', dataset: string, group: number, number: number, given: Said, before: Said}} VerdictDone */
 /** @typedef {{kind: 'batch', dataset: string, batch: number, text: string}} BatchDone */
-/** @typedef {EditDone | VerdictDone | BatchDone} Action */
+/** @typedef {{kind: string, view: string | null, marking: string | null, suggested: string | null, number: number | null}} FindingName */
+/** @typedef {{kind: 'dismissal', dataset: string, group: number, number: number, finding: FindingName, dismissed: boolean}} DismissalDone */
+/** @typedef {EditDone | VerdictDone | BatchDone | DismissalDone} Action */
 
 const KEPT = 100;
 

@@ -9,6 +9,7 @@ import { placeExpected } from './drawing.js';
 import { editOf } from './edits.js';
 import { group, groupDocument, solution } from './group.js';
 import { remedies } from './insight.js';
+import { openFindings } from './open_findings.js';
 import { openProposals, scoreWords, settledState, stateOf, waitingViews } from './proposal_lines.js';
 import { fitPanel, returnLent } from './viewports.js';
 import { focused } from './workspace.js';
@@ -131,7 +132,7 @@ function mendsOf(shown, solved, helping, proposed) {
 	const missing = missingBalls(shown, solved);
 	const short = solved.first_failing?.gate === 'ball';
 	const tried = helping.flatMap(ofRemedy);
-	const found = solved.findings.flatMap((finding) => ofFinding(shown, finding))
+	const found = openFindings(solved).flatMap((finding) => ofFinding(shown, finding))
 		.map((mend) => ({ ...mend, passes: tried.some((remedy) => remedy.passes && isSame(remedy, mend)) }));
 	const known = short ? [...missing, ...found] : [...found, ...missing];
 	const more = tried.filter((remedy) => !known.some((mend) => isSame(remedy, mend)));
@@ -160,7 +161,7 @@ export const mend = computed(() => (isHeld.value ? null : mends.value[mendIndex.
 /** The finding that the card speaks about; null where it speaks of something else. */
 export const toldFinding = computed(() => {
 	const meant = mend.value;
-	return (meant?.title ? meant.finding : solution.value?.findings[0]) ?? null;
+	return (meant?.title ? meant.finding : openFindings(solution.value)[0]) ?? null;
 });
 
 /** Show another one. @param {number} step */

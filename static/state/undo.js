@@ -38,6 +38,7 @@ export const undoable = computed(() => {
 	if (action === 'here') return 'Undo the last edit of this group';
 	if (action.kind === 'batch') return `Take back: ${action.text}`;
 	if (action.kind === 'edit') return `Go back to group ${action.number} and undo its last edit`;
+	if (action.kind === 'dismissal') return `${action.dismissed ? 'Open the finding again' : 'Dismiss the finding again'} in group ${action.number}`;
 	return `Take back the verdict on group ${action.number}`;
 });
 const canRedoHere = computed(() => Boolean(groupDocument.value?.can_redo) || ownStation.value !== null);
@@ -47,6 +48,7 @@ export const redoable = computed(() => {
 	if (!action) return canRedoHere.value ? 'Make the undone edit of this group again' : null;
 	if (action.kind === 'batch') return `Give again: ${action.text}`;
 	if (action.kind === 'edit') return `Make the undone edit of group ${action.number} again`;
+	if (action.kind === 'dismissal') return `${action.dismissed ? 'Dismiss the finding again' : 'Open the finding again'} in group ${action.number}`;
 	return `Give the verdict on group ${action.number} again`;
 });
 
@@ -66,6 +68,11 @@ async function undoOne() {
 	else if (action === 'here') undoHere();
 	else if (action.kind === 'verdict') await takeVerdictBack(action);
 	else if (action.kind === 'edit') await undoThere(action);
+	else if (action.kind === 'dismissal') {
+		// Findings are the review's: the queue opens without them.
+		const { takeDismissalBack } = await import('./dismissals.js');
+		await takeDismissalBack(action);
+	}
 	else {
 		// Bulk verdicts are the queue's: the review screen opens without them.
 		const { takeBatchBack } = await import('./queue_batches.js');
@@ -100,6 +107,10 @@ export function redo() {
 async function redoOne() {
 	const action = nextAgain(undone.value, here.value);
 	if (action?.kind === 'verdict') await giveVerdictAgain(action);
+	else if (action?.kind === 'dismissal') {
+		const { dismissAgain } = await import('./dismissals.js');
+		await dismissAgain(action);
+	}
 	else if (action?.kind === 'batch') {
 		const { giveBatchAgain } = await import('./queue_batches.js');
 		await giveBatchAgain(action);

@@ -6,7 +6,9 @@ import { html } from 'htm/preact';
 import { ballOf } from '../geometry/preview.js';
 import { capital, words } from '../lib/format.js';
 import { findingTitle } from '../state/advice.js';
+import { dismissTold } from '../state/dismissals.js';
 import { mend, toldFinding } from '../state/mends.js';
+import { openFindings } from '../state/open_findings.js';
 import { REASONS } from '../state/reasons.js';
 import { isBlind } from '../state/verdicts.js';
 import { GATE_TITLES, gateLabel } from './gate_names.js';
@@ -40,7 +42,7 @@ function headline(group, solution, offered) {
 	}
 	const used = solution.ball?.views.length ?? 0;
 	const all = group.views.length;
-	const [first] = solution.findings;
+	const [first] = openFindings(solution);
 	const told = offered?.title ? offered : first && { title: findingTitle(group, first), sentence: first.sentence };
 	if (!solution.passes) {
 		const failing = solution.first_failing;
@@ -49,7 +51,7 @@ function headline(group, solution, offered) {
 		if (!told) return { tone: 'bad', over: 'Does not pass', title: gate, text: measured };
 		return { tone: 'bad', over: `Does not pass: ${lower(gate)}`, title: told.title ?? gate, text: told.sentence };
 	}
-	const odd = solution.findings.some(({ kind, view }) => view !== null && ODD.has(kind));
+	const odd = openFindings(solution).some(({ kind, view }) => view !== null && ODD.has(kind));
 	if (odd || used < all) {
 		return {
 			tone: 'warn', over: `Passes with ${used} of ${all} views`, title: told?.title ?? `${used} of ${all} views agree`,
@@ -113,6 +115,7 @@ export function VerdictCard({ group, solution, live }) {
 			<p class="verdict-card__text">${text}${sure === null ? '' : html` <span class="verdict-card__sure">${Math.round(sure * 100)} % sure.</span>`}</p>
 			${solution?.findings.some(({ kind, sentence }) => kind === 'pitch_size' && sentence === text) ? html`<${PitchLink} dataset=${group.dataset.name} />` : null}
 			<${MendBox} group=${group} solution=${solution} />
+			${toldFinding.value ? html`<p class="verdict-card__checked"><button class="button button--small" type="button" data-needs="review" title="This finding was checked and is fine; Ctrl Z opens it again" onClick=${dismissTold}>Checked, fine <kbd>⇧S</kbd></button></p>` : null}
 			${isBlind(group) ? html`<p><span class="pill" data-status="no-picture">no picture</span> <span data-grade="warn">No view of this group has a picture to look at.</span></p>` : null}
 			${verdict.state === 'unreviewed' && !verdict.note ? null : html`
 				<p class="verdict-card__verdict">
