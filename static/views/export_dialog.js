@@ -74,7 +74,7 @@ function Result({ made }) {
 	return html`
 		<p class="export__result" role="status">
 			${made.incomplete ? 'Written, but not complete' : 'Ready'}${counts.length ? `: ${counts.join(', ')}` : ''}.
-			${made.incomplete ? html`<strong data-grade="warn">${made.incomplete}.</strong>${' '}` : null}
+			${made.incomplete ? html`${' '}<strong data-grade="warn">${made.incomplete}.</strong>${' '}` : null}
 			<a href=${made.content} download>Download again</a>
 		</p>
 	`;
@@ -145,6 +145,7 @@ export function ExportDialog({ one, version = null, onClose }) {
 				${state.job ? html`<${JobProgress} job=${state.job} />` : null}
 				${state.error ? html`<p class="export__error" role="alert">${state.error}</p>` : null}
 				${state.made ? html`<${Result} made=${state.made} />` : null}
+				${none ? html`<p class="note">${none}: accept groups, or export all.</p>` : null}
 				<p class="dialog__buttons">
 					<button class="button button--primary" type="submit" aria-disabled=${why !== ''} title=${why}>${state.busy ? 'Exporting…' : 'Export'}</button>
 				</p>

@@ -83,7 +83,7 @@ EXPORTS = [
                 "version": None,
             }
         },
-        {".export__result": "Ready"},
+        {".export__result": "Written, but not complete"},
     ),
 ]
 
