@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, cast
 
-from sqlalchemy import Table, insert
+from sqlalchemy import Table, insert, select
 
 from app.soccer.finding import Dismissal, Finding
 from app.store.aliases import shown_actor
@@ -64,16 +64,42 @@ def standing(rows: Iterable[Any]) -> dict[int, GroupDismissals]:
     return found
 
 
+CARRIED = tuple(column.name for column in _TABLE.columns if column.name not in ("id", "group_id"))
+"""What is carried of a row to another installation."""
+
+
+def carried_dismissals(session: Session, ids: Iterable[int]) -> dict[int, list[dict[str, Any]]]:
+    """What is carried of the dismissals of groups, by group, oldest first."""
+    columns = [_TABLE.c[name] for name in CARRIED]
+    statement = select(_TABLE.c.group_id, *columns).where(_TABLE.c.group_id.in_(list(ids)))
+    found: dict[int, list[dict[str, Any]]] = {}
+    for group_id, *values in session.execute(statement.order_by(_TABLE.c.id)):
+        found.setdefault(group_id, []).append(dict(zip(CARRIED, values, strict=True)))
+    return found
+
+
 def insert_dismissal(
-    session: Session, dataset_id: int, group_id: int, said: Dismissal, *, dismissed: bool
+    session: Session,
+    dataset_id: int,
+    group_id: int,
+    said: Dismissal,
+    *,
+    dismissed: bool,
+    brought: tuple[str, str] | None = None,
 ) -> int:
-    """Insert that a finding was dismissed, or opened again, and log it; returns the row's id."""
+    """Insert that a finding was dismissed, or opened again, and log it; returns the row's id.
+
+    ``brought`` is who brought it from another installation, and when; the log has it under them.
+    """
     identity = next_id(session, DismissalModel)
     body = {name: value for name, value in vars(said).items() if name not in ("actor", "at")}
     body |= {"dismissed": dismissed}
     row = {"id": identity, "group_id": group_id, "actor": said.actor, "at": said.at, **body}
     session.execute(insert(_TABLE), [row])
-    append(session, [Entry(DISMISSAL, said.actor, said.at, body, dataset_id, group_id)])
+    actor, at = brought or (said.actor, said.at)
+    if brought is not None:
+        body |= {"actor": said.actor, "at": said.at}
+    append(session, [Entry(DISMISSAL, actor, at, body, dataset_id, group_id)])
     return identity
 
 
