@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 PITCH_SIZE = "pitch_size"
@@ -79,3 +80,42 @@ def makes_unusable(kind: str, number: float | None) -> bool:
         # An infinite sigma is null in a table.
         return number is None or number > UNUSABLE_SIGMA_M
     return kind == "implausible_ball"
+
+
+SAME_SHARE = 0.05
+"""A finding whose number has moved by no more than this share of it is still the same."""
+
+
+@dataclass(frozen=True)
+class Dismissal:
+    """A finding that a person has checked and found to be fine, as it was then.
+
+    Attributes:
+        kind, view, marking, suggested, number, sentence: Of the finding.
+        actor: Who dismissed it.
+        at: When.
+        note: Why; None: nobody said.
+    """
+
+    kind: str
+    view: str | None
+    marking: str | None
+    suggested: str | None
+    number: float | None
+    sentence: str
+    actor: str
+    at: str
+    note: str | None = None
+
+    def covers(self, finding: Finding | Dismissal) -> bool:
+        """Whether a finding (or what somebody said of one) still says what was dismissed.
+
+        It names the same, and its number is about the same; one without a number has the same
+        sentence.
+        """
+        names = (finding.kind, finding.view, finding.marking, finding.suggested)
+        if names != (self.kind, self.view, self.marking, self.suggested):
+            return False
+        if finding.number is None or self.number is None:
+            return finding.number is self.number and finding.sentence == self.sentence
+        return math.isclose(finding.number, self.number, rel_tol=SAME_SHARE, abs_tol=1e-9)

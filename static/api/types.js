@@ -206,6 +206,7 @@
  * @property {OfferJson[]} offers edits that mend it
  * @property {GuideJson | null} guide where no edit does
  * @property {boolean} unusable_ball whether nobody can use the ball: accepting needs a note
+ * @property {{by: string, at: string, note: string | null} | null} [dismissed] who has checked it and found it fine
  */
 
 /**
@@ -342,6 +343,7 @@
  * @property {string} status
  * @property {string | null} content
  * @property {Counts | null} counts
+ * @property {string | null} [incomplete] what the files lack before they can be used
  * @property {string | null} [error]
  */
 

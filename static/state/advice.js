@@ -2,6 +2,7 @@
 /** What to make of a solution: its findings in a few words, and the reason for which a group would be rejected. */
 
 import { capital, words } from '../lib/format.js';
+import { openFindings } from './open_findings.js';
 
 /** @import {FindingJson, GroupDocument, SolutionJson} from '../api/types.js' */
 
@@ -55,7 +56,7 @@ export function suggestedReason(solution) {
 	const failing = solution?.first_failing;
 	// A view alone fails for want of another one, whatever is drawn in it.
 	if (!solution || !failing || solution.views.length < 2) return null;
-	const telling = solution.findings.find(({ kind }) => OF_FINDING[kind]);
+	const telling = openFindings(solution).find(({ kind }) => OF_FINDING[kind]);
 	return (telling && OF_FINDING[telling.kind]) ?? OF_GATE[failing.gate] ?? null;
 }
 
@@ -90,6 +91,6 @@ function firstSentence(text) {
 export function doubt(solution) {
 	const unusable = solution?.findings.find(({ unusable_ball: no }) => no);
 	if (unusable) return `the ball cannot be used: ${firstSentence(unusable.sentence)}`;
-	const swapped = solution?.passes ? solution.findings.find(({ kind }) => kind === 'sides_swapped') : undefined;
+	const swapped = solution?.passes ? openFindings(solution).find(({ kind }) => kind === 'sides_swapped') : undefined;
 	return swapped ? `left and right seem to be swapped: ${swapped.sentence}` : null;
 }

@@ -9,6 +9,7 @@ import { placeExpected } from './drawing.js';
 import { editOf } from './edits.js';
 import { group, groupDocument, solution } from './group.js';
 import { remedies } from './insight.js';
+import { openFindings } from './open_findings.js';
 import { lookedAt, openProposals, scoreWords, settledState, stateOf, waitingViews, waitsForLines } from './proposal_lines.js';
 import { fitPanel, returnLent } from './viewports.js';
 import { focused } from './workspace.js';
@@ -146,7 +147,7 @@ function mendsOf(shown, solved, helping, proposed) {
 	const missing = missingBalls(shown, solved);
 	const short = solved.first_failing?.gate === 'ball';
 	const tried = helping.flatMap(ofRemedy);
-	const found = solved.findings.flatMap((finding) => ofFinding(shown, finding))
+	const found = openFindings(solved).flatMap((finding) => ofFinding(shown, finding))
 		.map((mend) => ({ ...mend, passes: tried.some((remedy) => remedy.passes && isSame(remedy, mend)) }));
 	const known = short ? [...missing, ...found] : [...found, ...missing];
 	const more = tried.filter((remedy) => !known.some((mend) => isSame(remedy, mend)));
@@ -175,7 +176,7 @@ export const mend = computed(() => (isHeld.value ? null : mends.value[mendIndex.
 /** The finding that the card speaks about: the worst, whatever else could be mended, else that of the mend; null where it speaks of something else. */
 export const toldFinding = computed(() => {
 	const meant = mend.value;
-	const first = solution.value?.findings[0];
+	const first = openFindings(solution.value)[0];
 	if (first && isGrave(first, solution.value)) return first;
 	return (meant?.title ? meant.finding : first) ?? null;
 });

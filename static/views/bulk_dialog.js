@@ -121,7 +121,7 @@ export function BulkDialog({ dataset, q, total, ticked, onClose }) {
 		if (why) return;
 		setState({ busy: 'Deciding…', error: '' });
 		try {
-			tellBatch(await postVerdicts(dataset.id, { q: asked, ...ask, expected: would }), verdict);
+			tellBatch(await postVerdicts(dataset.id, { q: asked, ...ask, expected: would }), verdict, dataset.name);
 			onClose();
 			if (chosen) clearTicks();
 			readAgain();

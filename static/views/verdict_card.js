@@ -6,7 +6,9 @@ import { html } from 'htm/preact';
 import { ballOf } from '../geometry/preview.js';
 import { capital, words } from '../lib/format.js';
 import { findingTitle, saysApart } from '../state/advice.js';
+import { dismissTold } from '../state/dismissals.js';
 import { mend, toldFinding } from '../state/mends.js';
+import { openFindings } from '../state/open_findings.js';
 import { REASONS } from '../state/reasons.js';
 import { isBlind } from '../state/verdicts.js';
 import { GATE_TITLES, gateLabel } from './gate_names.js';
@@ -47,7 +49,7 @@ function headline(group, solution, offered) {
 		return { tone: 'bad', over: `Does not pass: ${lower(gate)}`, title: told.title ?? gate, text: told.sentence };
 	}
 	if (first?.unusable_ball) return { tone: 'bad', over: 'Passes, but the ball cannot be used', title: told?.title ?? '', text: told?.sentence ?? '' };
-	if (used === all && (solution.findings.some(saysApart) || misses(group, solution))) {
+	if (used === all && (openFindings(solution).some(saysApart) || misses(group, solution))) {
 		return { tone: 'warn', over: 'Passes, but its views disagree', title: told?.title ?? 'The views disagree', text: told?.sentence ?? '' };
 	}
 	if (used < all) {
@@ -118,6 +120,7 @@ export function VerdictCard({ group, solution, live }) {
 			<p class="verdict-card__text">${text}${sure === null ? '' : html` <span class="verdict-card__sure">${Math.round(sure * 100)} % sure.</span>`}</p>
 			${solution?.findings.some(({ kind, sentence }) => kind === 'pitch_size' && sentence === text) ? html`<${PitchLink} dataset=${group.dataset.name} />` : null}
 			<${MendBox} group=${group} solution=${solution} />
+			${toldFinding.value ? html`<p class="verdict-card__checked"><button class="button button--small" type="button" data-needs="review" title="This finding was checked and is fine; Ctrl Z opens it again" onClick=${dismissTold}>Checked, fine <kbd>⇧S</kbd></button></p>` : null}
 			${isBlind(group) ? html`<p><span class="pill" data-status="no-picture">no picture</span> <span data-grade="warn">No view of this group has a picture to look at.</span></p>` : null}
 			${verdict.state === 'unreviewed' && !verdict.note ? null : html`
 				<p class="verdict-card__verdict">

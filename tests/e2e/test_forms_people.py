@@ -56,6 +56,12 @@ PEOPLE = [
     ),
     Row("has seen the link", [press("Done")], {}, hides="#people-link"),
     Row(
+        "invites somebody else with the role that is proposed, once more",
+        [fill("Name", "olga", INVITE), press("Make a link", INVITE)],
+        {"POST /users": {"name": "olga", "role": "reviewer"}},
+        {f"{EVERYBODY} tr:has-text('olga')": "invited by anna"},
+    ),
+    Row(
         "looks at somebody's tokens",
         [press("Tokens of finn")],
         {"GET /users/{finn}/tokens": None},

@@ -83,7 +83,7 @@ EXPORTS = [
                 "version": None,
             }
         },
-        {".export__result": "Ready"},
+        {".export__result": "Written, but not complete"},
     ),
 ]
 
@@ -125,7 +125,9 @@ class TestExports:
             expect(cells.nth(0)).to_contain_text(what)
             for why, n in one["left_out"].items():
                 expect(cells.nth(0)).to_contain_text(f"{n} {why.replace('_', ' ')}")
-            expect(cells.nth(1)).to_have_text(one["status"])
+            expect(cells.nth(1)).to_have_text(
+                one["status"] if one["incomplete"] is None else "incomplete"
+            )
             expect(cells.nth(2)).to_have_text(size_text(one["bytes"]))
             expect(cells.nth(3).locator("time")).to_have_attribute("datetime", one["created"])
             expect(line.get_by_role("link")).to_have_attribute("href", one["content"])

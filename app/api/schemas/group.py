@@ -151,7 +151,9 @@ class GroupDocument(Document):
                     zip(group.views, view_labels(group), strict=True)
                 )
             ],
-            solution=None if state.solution is None else SolutionDocument.of(state.solution, group),
+            solution=None
+            if state.solution is None
+            else SolutionDocument.of(state.solution, group, state.dismissed),
         )
 
 
