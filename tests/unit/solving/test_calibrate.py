@@ -6,7 +6,7 @@ import pytest
 from app.soccer.annotation import make_lines
 from app.soccer.group import Station
 from app.soccer.pitch import Pitch
-from app.soccer.policy import PAPER, STRICT, TOUCHLINE, CalibrationPolicy
+from app.soccer.policy import POLICIES, CalibrationPolicy
 from app.solving.calibrate import calibrate, calibrate_station, calibration_key
 from tests.cameras import SIZE, looking
 from tests.unit.solving.conftest import BEHIND_GOAL, BEND, MAIN, OPPOSITE, PITCH, click
@@ -203,9 +203,9 @@ class TestNotMissing:
         ]
         assert jacs[0] == jacs[1] < 1.0 == jacs[2]
 
-    def test_the_paper_counts_every_stub_as_the_public_evaluator_does(self):
-        assert PAPER.calibration.shortest_marking_px == STRICT.calibration.shortest_marking_px == 0
-        assert TOUCHLINE.calibration.shortest_marking_px == 5.0
+    @pytest.mark.parametrize("policy", POLICIES.values(), ids=POLICIES.keys())
+    def test_every_policy_begins_as_the_public_evaluator_counts(self, policy):
+        assert policy.calibration.shortest_marking_px == 0.0
 
     def test_the_key_knows_both_and_is_as_ever_without(self):
         plain = station_of(click(MAIN))
