@@ -184,7 +184,7 @@ class TestJobs:
         runs = page.get_by_role("region", name=f"Job {ids['runs']}: Evaluate for long")
         expect(runs.get_by_role("progressbar")).to_have_attribute("aria-valuenow", "33")
         expect(runs).to_contain_text("3 of 9")
-        expect(runs).to_contain_text("evaluate · sample · dora · begun")
+        expect(runs).to_contain_text("evaluate · sample · dora · started")
         expect(runs.locator("time")).to_have_attribute("datetime", BEGUN)
         failed = page.get_by_role("region", name=f"Job {ids['failed']}: Solve in vain")
         expect(failed.locator(".pill")).to_have_text("failed")
