@@ -41,7 +41,7 @@ PLAIN_WORDS = """
     proof provider identities sign
     access account join links login logins passwords roles team tokens
     bearer codes devices me remote rules tries users
-    characters null kind matrices stated examples property paging
+    characters null examples property paging endings dismiss dismissals
     adopt aliases asked concealment needs ownership rights sight
     actors
     candidate drawn proposal propose scoring search straight

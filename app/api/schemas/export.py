@@ -52,7 +52,7 @@ class FormatDocument(Document):
     """Whether a dataset can be exported in a format."""
 
     format: ExportFormat
-    possible: bool
+    possible: bool = Field(description="Whether it holds what the dataset has.")
     reason: str | None = Field(description="Why it cannot; null: it can.")
     hint: str | None = Field(description="What to do instead, where there is anything.")
 
