@@ -213,6 +213,8 @@ class _File:
             from_corner: Whether boxes are measured from the corner of the first pixel; those of
                 our files of before are in our own frame.
         """
+        if not view.balls:
+            return self._drawn(image, from_corner)
         if len(view.balls) != 1:
             return view.balls
         for item in self._annotations(image):
@@ -222,6 +224,18 @@ class _File:
                     box = box_from_corner(box) if from_corner else box
                     return (replace(view.balls[0], box=box, point=None),)
         return view.balls
+
+    def _drawn(self, image: StateReader, from_corner: bool) -> tuple[BallAnnotation, ...]:
+        """A ball that somebody has drawn since on a view that had none when it was written."""
+        boxes = [
+            self._box(item, image.record)
+            for item in self._annotations(image)
+            if "written_bbox" not in item
+        ]
+        found = [box for box in boxes if box is not None]
+        return tuple(
+            BallAnnotation(box=box_from_corner(box) if from_corner else box) for box in found
+        )
 
     def _annotations(self, image: StateReader) -> list[Mapping[str, Any]]:
         return self._joined.of_id(image.value.get("id"))

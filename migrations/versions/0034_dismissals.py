@@ -30,5 +30,9 @@ def upgrade() -> None:
         sa.PrimaryKeyConstraint("id"),
     )
     op.create_index("dismissal_group", "dismissal", ["group_id", "id"])
+    op.execute(
+        "CREATE TRIGGER dismissal_refuses_update BEFORE UPDATE ON dismissal "
+        "BEGIN SELECT RAISE(ABORT, 'dismissals are never changed'); END"
+    )
     dismissed = sa.Column("dismissed", sa.String(), server_default="", nullable=False)
     op.add_column("queue", dismissed)
