@@ -12,6 +12,7 @@ from starlette.responses import FileResponse
 from app.api.cursor import parse_cursor
 from app.api.deps import Actor, AppServices, AppStore, DatasetPath, SeesWhole
 from app.api.jobs import ACCEPTED, job_address
+from app.api.paging import paged
 from app.api.problem import Responses, responses
 from app.api.reply import AskedUnder, Reply, document, nothing
 from app.api.routers.jobs import Cursor, DatasetFilter, Limit
@@ -51,6 +52,7 @@ ZIP: Responses = {
     operation_id="listExportFormats",
     responses=responses(400, 404),
 )
+@paged()
 def list_formats(
     dataset: DatasetPath,
     store: AppStore,

@@ -64,11 +64,12 @@ def set_dismissal(
         record, solution = read_solved(store, group_id)
         stored, what = record.stored, f"group {record.stored.group.key}"
         before = record.state(solution)
-        finding = _found(() if before.solution is None else before.solution.findings, named)
         with store.write() as session:
             policy_hash = require_unchanged(session, group_id, if_match, what)
             require_said(session, group_id, record.said, if_match, what)
             require_open(session, stored.dataset_id, group_id)
+            # After the ETag: a person who saw another state is told so first.
+            finding = _found(() if before.solution is None else before.solution.findings, named)
             # Under another policy other things may be found.
             if policy_hash == stored.policy.hash:
                 said = _said(finding, actor, note)
