@@ -7,6 +7,7 @@ import os
 import re
 from collections.abc import Iterator
 from contextlib import suppress
+from threading import Lock
 from typing import Any
 
 from fastapi import FastAPI, Request
@@ -143,15 +144,17 @@ class SharedNumbers:
         self._gauges: dict[str, Gauge] = {}
         self._counters: dict[str, Counter] = {}
         self._counted: dict[tuple[str, tuple[str, ...]], float] = {}
+        self._lock = Lock()
 
     def refresh(self) -> None:
-        """Write down every number of this moment."""
-        for family in self._own.collect():
-            for sample in family.samples:
-                if family.type == "gauge":
-                    self._gauge(family, sample)
-                else:
-                    self._count(family, sample)
+        """Write down every number of this moment; any thread may ask, and each counts once."""
+        with self._lock:
+            for family in self._own.collect():
+                for sample in family.samples:
+                    if family.type == "gauge":
+                        self._gauge(family, sample)
+                    else:
+                        self._count(family, sample)
 
     async def keep_fresh(self) -> None:
         """Refresh every second, without an end."""

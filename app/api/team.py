@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from datetime import timedelta
 from ipaddress import ip_address
 from typing import Annotated, Any
 from urllib.parse import urlsplit
@@ -16,6 +15,7 @@ from app.config import Settings
 from app.errors import ConflictError, NotLoggedInError
 from app.review.people.access_tokens import AccessTokens
 from app.review.people.challenges import LASTS as CHALLENGE_LASTS
+from app.review.people.devices import LASTS as DEVICE_LASTS
 from app.review.people.devices import Devices
 from app.review.people.logins import LASTS, Login, Logins, Way
 from app.review.people.passkeys import Passkeys, PasskeySite
@@ -32,8 +32,6 @@ BEGUN = "touchline_sign_on"
 """The cookie that says which browser was sent to the provider of single sign-on."""
 DEVICE = "touchline_device"
 """The cookie by which a browser is known in which somebody has logged in before."""
-DEVICE_LASTS = timedelta(days=400)
-"""Browsers keep no cookie for longer."""
 LANDING = "/login"
 """The page to which the provider sends people back."""
 
@@ -117,13 +115,17 @@ class Team:
             TooManyTriesError: There were too many.
         """
         device = None
-        if name is not None and (token := cookie_of(request.scope, self._cookie_name(DEVICE))):
+        if name is not None and (token := cookie_of(request.scope, self._device_cookie(name))):
             device = self.devices.recognise(name, token)
         self.tries.count(self.address(request), name, device)
 
     def device_values(self, name: str) -> dict[str, Any]:
         """How a browser is told that it is a known one of a person, who has just logged in there."""
-        return self._values(DEVICE, self.devices.make(name), int(DEVICE_LASTS.total_seconds()))
+        values = self._values(DEVICE, self.devices.make(name), int(DEVICE_LASTS.total_seconds()))
+        return {**values, "key": self._device_cookie(name)}
+
+    def _device_cookie(self, name: str) -> str:
+        return f"{self._cookie_name(DEVICE)}_{self.devices.cookie_of(name)}"
 
     def begun(self, request: Request) -> str:
         """What a browser alone knows that was sent to the provider; empty: it was not."""

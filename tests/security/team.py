@@ -19,6 +19,7 @@ from tests.security.table import Row, rows
 
 API = "/api/v1"
 SECRET = "three plain words"
+DEVICE = "touchline_device"
 BYTES = "application/octet-stream"
 HIDDEN = "/api/v1/hidden"
 """A route that nobody has thought of."""
@@ -100,7 +101,7 @@ def cookie_in(answer: Answer, name: str = "") -> str:
     set_ = [line.partition(";")[0] for line in answer.headers["set-cookie"].split("\n")]
     if not name and len(set_) == 1:
         return set_[0]
-    return next(one for one in set_ if f"{name or 'touchline_session'}=" in one)
+    return next(one for one in set_ if f"{name or 'touchline_session'}" in one.partition("=")[0])
 
 
 def asked(team: Team, row: Row, role: str | None, **headers: str) -> Answer:

@@ -41,6 +41,13 @@ def _with_port(host: str, scheme: str) -> str:
     return host if host.rpartition(":")[2].isdigit() and not host.endswith("]") else host + default
 
 
+def _without_default_port(url: str) -> str:
+    """An address as browsers write it in Origin: without ``:443`` of https and ``:80`` of http."""
+    scheme, _, host = url.partition("://")
+    default = {"http": ":80", "https": ":443"}.get(scheme, "")
+    return f"{scheme}://{host.removesuffix(default) if default else host}"
+
+
 class KnownHosts:
     """Refuses a request for another host name than this server's: DNS rebinding reaches nothing."""
 
@@ -75,7 +82,7 @@ class SameOrigin:
 
     def __init__(self, app: ASGIApp, url: str | None = None, *, required: bool = False):
         self.app = app
-        self.url, self.required = url and url.lower(), required
+        self.url, self.required = url and _without_default_port(url.lower()), required
         self._name = "" if self.url is None else host_name(self.url.partition("://")[2])
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:

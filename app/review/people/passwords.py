@@ -14,8 +14,8 @@ from app.errors import InputError, OverloadedError
 
 SHORTEST, LONGEST = 10, 200
 """Letters of a password. Length is what makes it hard to guess; no kinds of letters are asked for."""
-MOST_GUESSED = 72
-"""Letters that are looked at: no longer text is easy to guess, but by repeating itself."""
+MOST_GUESSED = 40
+"""Letters that are looked at. Longer texts of signs that stand for letters keep the library busy for seconds."""
 T = TypeVar("T")
 
 HASHER = PasswordHash((Argon2Hasher(),))
@@ -40,7 +40,7 @@ def hash_password(password: str, name: str, *, pointer: str = "/password") -> st
         )
     if password.casefold() == name.casefold():
         raise InputError("a password is not the name itself", pointer=pointer)
-    if _is_easy_to_guess(password, name):
+    if _in_turn(lambda: _is_easy_to_guess(password, name)):
         raise InputError(
             "this password is easy to guess: it is one of the common ones, or made of few parts",
             hint="Three or four words that nobody would put together are easy to keep in mind.",

@@ -106,6 +106,15 @@ class TestOwnAddress:
         plain_app.add_middleware(SameOrigin, url="https://touchline.example.org")
         return client_of(plain_app)
 
+    def test_its_default_port_may_be_written_out(self, plain_app: FastAPI, client_of) -> None:
+        @plain_app.api_route("/x", methods=["POST"])
+        def answer() -> str:
+            return "reached"
+
+        plain_app.add_middleware(SameOrigin, url="https://touchline.example.org:443")
+        sent = {"Origin": "https://touchline.example.org", "Host": "touchline.example.org"}
+        assert client_of(plain_app).post("/x", headers=sent).status_code == 200
+
     @pytest.mark.parametrize(
         ("origin", "host", "status"),
         [
