@@ -136,6 +136,7 @@ _ROWS: Mapping[Action | None, tuple[str, ...]] = {
         "PATCH /api/v1/views/{view}/lines",
         "PATCH /api/v1/views/{view}/ball",
         "PATCH /api/v1/views/{view}",
+        "POST /api/v1/datasets/{dataset}/edits",
         "POST /api/v1/views/{view}/paint",
         "POST /api/v1/views/{view}/propose",
         "PATCH /api/v1/stations/{station}",

@@ -46,6 +46,7 @@ KEPT: dict[str, Made] = {
     "deleteExport": dataset_requests.no_export,
     "deletePredictions": dataset_requests.no_predictions,
     "deleteSavedView": dataset_requests.no_saved_view,
+    "editViews": group_requests.bulk_edits,
     "estimateMatchPictures": dataset_requests.estimate,
     "forgetDatasetProposals": dataset_requests.no_proposals,
     "freezeVersion": dataset_requests.freeze,
