@@ -194,6 +194,7 @@ _ROWS: Mapping[Action | None, tuple[str, ...]] = {
         "PATCH /api/v1/datasets/{dataset}/pitches",
         "POST /api/v1/datasets/{dataset}/pictures",
         "PATCH /api/v1/datasets/{dataset}/pictures",
+        "POST /api/v1/datasets/{dataset}/solve",
         "POST /api/v1/datasets/{dataset}/noise",
         "DELETE /api/v1/datasets/{dataset}/noise",
         "POST /api/v1/datasets/{dataset}/positions",

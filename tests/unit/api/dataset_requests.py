@@ -266,6 +266,10 @@ def pitch(api: Any) -> Request:
     return "PATCH", path, body, etag_of(api, path)
 
 
+def solving(_api: Any) -> Request:
+    return "POST", f"{BROADCAST}/solve", None, {}
+
+
 def positions(api: Any) -> Request:
     using(api, values={"calibration.share_position": True})
     return "POST", f"{BROADCAST}/positions", {"match": match_of(api, "positions")}, {}

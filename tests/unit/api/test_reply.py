@@ -76,6 +76,7 @@ KEPT: dict[str, Made] = {
     "setViewBall": group_requests.ball,
     "setViewLines": group_requests.lines,
     "sharePositions": dataset_requests.positions,
+    "solveDataset": dataset_requests.solving,
     "startEvaluation": dataset_requests.evaluation,
     "startImport": dataset_requests.data_import,
     "startPractice": dataset_requests.practice,
