@@ -5,9 +5,11 @@ from __future__ import annotations
 import json
 import os
 import re
+import signal
 import threading
 import time
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -32,6 +34,7 @@ from app.review.evaluating.evaluation import get_evaluation
 from app.review.evaluating.folder import evaluation_values
 from app.review.evaluating.predictions import list_predictions
 from app.review.importing.ingest import ingest
+from app.review.jobs.full_solve import solve_fully
 from app.review.people.access_tokens import new_text
 from app.review.people.logins import Login
 from app.review.people.people import invite
@@ -227,13 +230,21 @@ SAME: tuple[tuple[str, ...], ...] = (
     ("verdict", "rejected", "--dataset", "NAME", "--query", "", "--reason", "nonsense"),
     ("verdict", "deferred", "--dataset", "NAME", "--query", "nonsense<1"),
     ("verdict", "deferred", "--dataset", "NAME", "--query", "", "--expected", "99"),
+    ("verdict", "deferred", "--dataset", "NAME", "--query", "passes:yes", "--json"),
+    ("policy", "set", "paper", "--dataset", "NAME", "--json"),
+    ("policy", "show", "policy.yaml", "--dataset", "NAME"),
     ("import", "soccernet-v3", "tree", "--dataset", "NAME"),
+    ("import", "soccernet-v3", "tree", "--dataset", "NAME", "--json"),
     ("freeze", "--dataset", "NAME", "--groups", "passing", "--dry-run"),
     ("freeze", "one", "--dataset", "NAME", "--groups", "passing"),
+    ("freeze", "two", "--dataset", "NAME", "--groups", "passing", "--json"),
     ("versions", "--dataset", "NAME"),
+    ("export", "out", "--dataset", "NAME", "--format", "coco", "--all", "--json"),
     ("export", "out", "--dataset", "NAME", "--format", "yolo", "--all"),
     ("evaluate", "found.csv", "--dataset", "NAME", "--groups", "all"),
+    ("evaluate", "found.csv", "--dataset", "NAME", "--groups", "all", "--json"),
     ("batch", "give", "NAME", "First", "--size", "2"),
+    ("batch", "give", "NAME", "Second", "--size", "2", "--json"),
     ("batch", "list", "NAME"),
 )
 """Commands in an order in which each has something to do."""
@@ -246,7 +257,7 @@ PLAIN = (
     (r"\b(?:twin|here)\b", "NAME"),
     (r"\d{4}-\d\d-\d\dT[\d:.+]+", "TIME"),
     (r"anna-\S+ \(token cli\)|\blocal\b", "WHO"),
-    (r"\b(id|batch|evaluation)(\W+)\d+|^ +\d+(?= )", r"\1\2#"),
+    (r"(?m)\b((?:\w+_)?id|batch|evaluation)(\W+)\d+(?:\.0)?|^ +\d+(?= )", r"\1\2#"),
 )
 """What differs: lines of the server's log, hashes, names, times, people and ids."""
 
@@ -254,6 +265,9 @@ PLAIN = (
 def plain(done: Result) -> tuple[int, str, str, str]:
     """What a command printed, without what differs between two equal datasets."""
     texts = [done.stdout, done.stderr, str(done.exception or "")]
+    with suppress(ValueError):
+        # The order of names in an object says nothing, and 6 is 6.0.
+        texts[0] = json.dumps(json.loads(texts[0], parse_int=float), indent=0, sort_keys=True)
     for pattern, other in PLAIN:
         texts = [re.sub(pattern, other, text) for text in texts]
     return done.exit_code, texts[0], texts[1], texts[2]
@@ -300,12 +314,26 @@ class TestFollow:
     def test_ctrl_c_leaves_the_job_running_and_says_so(
         self, place: Place, remote: Run, twins: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        def pressed(*_: object, **__: object) -> None:
-            raise KeyboardInterrupt
+        held, waiting, wait = threading.Event(), threading.Event(), Client.wait
 
-        with monkeypatch.context() as patch:
-            patch.setattr(Client, "wait", pressed)
-            stopped = remote("solve", "--dataset", "twin", "--policy", "strict")
+        def solve_later(*given: Any) -> Any:
+            held.wait(SECONDS)
+            return solve_fully(*given)
+
+        def wait_seen(*given: Any, **how: Any) -> Any:
+            waiting.set()
+            return wait(*given, **how)
+
+        def press() -> None:
+            waiting.wait(SECONDS)
+            os.kill(os.getpid(), signal.SIGINT)
+
+        monkeypatch.setattr("app.review.jobs.solve.solve_fully", solve_later)
+        monkeypatch.setattr(Client, "wait", wait_seen)
+        (pressing := threading.Thread(target=press)).start()
+        stopped = remote("solve", "--dataset", "twin", "--policy", "strict")
+        pressing.join()
+        held.set()
         assert (stopped.exit_code, stopped.stdout) == (INTERRUPTED, "")
         assert re.search(r"job \d+ goes on on the server", stopped.stderr)
         assert told(remote("policy", "show", "--dataset", "twin", "--json"))["name"] == "strict"

@@ -9,6 +9,7 @@ import pytest
 from app.api.services import Services
 from app.review.editing.bulk_edits import MAX_ITEMS
 from app.review.editing.point_limits import REQUEST_POINTS
+from app.store.log import read_log
 from tests.databases import content
 from tests.unit.api.group_requests import etag_of, send, take_handed_in
 from tests.unit.api.test_reply import stopped_after_a_commit
@@ -202,6 +203,18 @@ class TestEditViews:
         }
         report = edit(api, *[one] * MAX_ITEMS)
         assert report["refused"] == MAX_ITEMS
+
+
+class TestEvents:
+    def test_each_group_that_changed_is_an_event_as_of_single_edits(self, app, api) -> None:
+        documents = [group(api, number) for number in (1, 2, 3)]
+        store = app.state.services.store
+        with store.read() as session:
+            last = max(entry.id for entry in read_log(session))
+        edit(api, *[item(document, 0, ball=POINT) for document in documents[:2]])
+        with store.read() as session:
+            new = [entry for entry in read_log(session) if entry.id > last]
+        assert [(entry.kind, entry.group_id) for entry in new] == [("edit", 1), ("edit", 2)]
 
 
 class TestDryRun:
