@@ -105,8 +105,10 @@ def _array(schema: Schema, schemas: Mapping[str, Schema], name: str, deep: int) 
 
 def _number(schema: Schema, kind: str, name: str) -> int | float:
     usual = NUMBERS.get(name, 12 if kind == "integer" else 0.5)
-    least = schema.get("minimum", schema.get("exclusiveMinimum", usual - 1) + 1)
-    value = max(least, min(usual, schema.get("maximum", usual)))
+    value = min(usual, schema.get("maximum", usual))
+    if value <= schema.get("exclusiveMinimum", value - 1):
+        value = schema["exclusiveMinimum"] + 1
+    value = max(value, schema.get("minimum", value))
     return int(value) if kind == "integer" else float(value)
 
 

@@ -29,7 +29,7 @@ def finding_values(client: Client, dataset: str) -> Iterator[dict[str, Any]]:
     """As ``findings`` has them."""
     names = ("kind", "group", "sentence", "view", "marking", "suggested", "number", "threshold")
     for item in client.pages("findings", dataset=dataset):
-        yield some(item, *names, "confidence", "fix")
+        yield some(item, *names, "confidence", "fix", "dismissed")
 
 
 def solve_values(

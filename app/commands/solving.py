@@ -105,4 +105,6 @@ def findings(dataset: Dataset, json_: Json = False) -> None:
         return
     for value in values:
         place = " ".join(value[key] for key in ("group", "view") if value.get(key))
-        say(f"{value['kind']:20} {place}: {value['sentence']}")
+        said = value.get("dismissed")
+        checked = "" if said is None else f" (checked by {said['by']}, fine)"
+        say(f"{value['kind']:20} {place}: {value['sentence']}{checked}")

@@ -27,6 +27,8 @@ _STEERING = (*range(0x20), *range(0x7F, 0xA0), *range(0x202A, 0x202F), *range(0x
 _SPELT = {code: f"\\u{code:04x}" for code in _STEERING if code not in (0x0A, 0x09)}
 MIN_SECONDS = 0.1
 """A bar that moves more often costs more than it shows."""
+LINE_SECONDS = 3.0
+"""Where output is no terminal, a line of progress comes no more often."""
 
 
 def harmless(text: str) -> str:
@@ -39,7 +41,7 @@ def harmless(text: str) -> str:
 
 @contextmanager
 def show_progress(what: str) -> Iterator[TellProgress]:
-    """A bar on stderr while something runs; without a terminal, nothing."""
+    """A bar on stderr while something runs; without a terminal, a line every few seconds."""
     from rich import progress as rich
     from rich.console import Console
 
@@ -51,7 +53,10 @@ def show_progress(what: str) -> Iterator[TellProgress]:
         rich.TimeRemainingColumn(),
     )
     console = Console(stderr=True)
-    with rich.Progress(*columns, console=console, disable=not console.is_terminal) as bar:
+    if not console.is_terminal:
+        yield _telling_lines(what)
+        return
+    with rich.Progress(*columns, console=console) as bar:
         task = bar.add_task(what, total=None)
         last = 0.0
 
@@ -63,6 +68,22 @@ def show_progress(what: str) -> Iterator[TellProgress]:
                 bar.update(task, completed=done, total=total)
 
         yield progress
+
+
+def _telling_lines(what: str) -> TellProgress:
+    """Progress in plain lines; what is done within seconds tells none."""
+    last = time.monotonic()
+
+    def progress(done: int, total: int | None = None, sentence: str = "") -> None:
+        nonlocal last
+        if time.monotonic() - last < LINE_SECONDS:
+            return
+        last = time.monotonic()
+        place = f"{done:,}" if total is None else f"{done:,} of {total:,}"
+        stage = f"{sentence.rstrip('.')} ({place})" if sentence else place
+        complain(f"{what}: {stage}")
+
+    return progress
 
 
 @contextmanager
@@ -158,6 +179,11 @@ def print_export(values: Mapping[str, Any], as_json: bool) -> None:
     print_values(values, as_json)
     if as_json:
         return
+    from app.review.exporting.formats import lacking
+
+    lacks = lacking(values.get("format", ""), values["counts"])
+    if lacks is not None:
+        say(f"Not complete: {lacks}. --images copy puts them there.")
     missing = values["missing_images"]
     for line in missing[:MAX_MISSING]:
         say(f"  {line}")

@@ -11,15 +11,15 @@ from typing import Any
 
 from app.datasets.camera_arrays import cameras_of_arrays, opencv_storage
 from app.datasets.camera_json import camera_from_json
-from app.datasets.camera_matrices import camera_from_matrices, holds_matrices
+from app.datasets.camera_matrix import camera_from_matrices, holds_matrices
 from app.datasets.corner_origin import HALF
 from app.datasets.file_tree import DEFAULT_LIMITS, FileTree, Limits, Root
-from app.datasets.json_kind import is_camera, json_kind
+from app.datasets.json_document import is_camera, json_kind
 from app.datasets.json_text import read_json, read_json_lines
 from app.datasets.match_info import place_of, read_match_info
+from app.datasets.record_size import stated_size
 from app.datasets.report import Report
 from app.datasets.sn_calibration import CAMERAS, LINES
-from app.datasets.stated_size import stated_size
 from app.datasets.synloc import camera_from_synloc, images_of, is_synloc
 from app.datasets.trees import opened_tree
 from app.errors import DatasetFormatError
@@ -69,7 +69,7 @@ def read_cameras(
     ``{"cam1": {...}, ...}`` (also inside ``{"cameras": {...}}``, also double-encoded), a list or JSON
     lines whose objects name their image, numpy's ``.npz`` with K, R and t of each frame, or a COCO
     file of SynLoc. A camera is SoccerNet's object, also within PnLCalib's ``cam_params``, or matrices
-    (``camera_matrices``). The key is the stem of the file or the image, with
+    (``camera_matrix``). The key is the stem of the file or the image, with
     ``<league>/<season>/<match>/`` before it where it lies that deep. In an export as
     sn-calibration ``match_info.json`` says where each frame came from: that is its key. ``sizes``
     takes the size of the images of each camera whose file states it.

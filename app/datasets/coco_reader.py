@@ -13,13 +13,14 @@ from app.datasets.coco import CAMERA, CORNER, ORIGIN, OUTSIDE, PREFIX, STATE
 from app.datasets.coco_annotation import NoPlaceError, ball_of, box_of
 from app.datasets.coco_categories import Categories, Category
 from app.datasets.coco_frames import Frame, FrameFile, groups_of, split_of_folders
+from app.datasets.coco_joins import Joined, spelt
 from app.datasets.corner_origin import box_from_corner
 from app.datasets.file_tree import DEFAULT_LIMITS, FileTree, Limits, Root
 from app.datasets.frame_names import UNASSIGNED
 from app.datasets.json_text import read_json
 from app.datasets.picture_finder import Home, PictureFinder
 from app.datasets.picture_names import picture_parts
-from app.datasets.record_ids import IdIndex, id_text
+from app.datasets.record_ids import id_text
 from app.datasets.report import Report
 from app.datasets.safe_path import check_name
 from app.datasets.split_names import split_in
@@ -28,7 +29,6 @@ from app.datasets.trees import opened_tree
 from app.datasets.view_groups import PlacedView, ViewGroups
 from app.datasets.view_state import StateReader
 from app.errors import DatasetFormatError, UnsafePathError
-from app.finite import quoted
 from app.geometry.camera import Camera
 from app.soccer.annotation import BallAnnotation, Extras
 from app.soccer.frames import Box
@@ -111,12 +111,9 @@ def _value(tree: FileTree, name: str, report: Report, limits: Limits) -> dict[st
 
 def _is_gamestate(annotations: Any) -> bool:
     """Whether annotations are those of sn-gamestate, whose files are alike but for their boxes."""
-    items = (
-        [item for item in annotations[:100] if isinstance(item, dict)]
-        if isinstance(annotations, list)
-        else []
-    )
-    return any("bbox_image" in item for item in items) and not any("bbox" in item for item in items)
+    listed = annotations[:100] if isinstance(annotations, list) else []
+    names = {name for item in listed if isinstance(item, dict) for name in item}
+    return "bbox_image" in names and "bbox" not in names
 
 
 def _tell_balls(files: list[_File], report: Report) -> None:
@@ -154,17 +151,12 @@ class _File:
         self.categories = Categories(
             self._listed("categories"), annotations, self.path, report, ball_category
         )
-        self._by_last: dict[str, list[int]] = {}
-        for index, item in enumerate(value["images"]):
-            self._by_last.setdefault(_last_part(item), []).append(index)
-        self._images: IdIndex[int] = IdIndex()
-        self._of_image: list[list[tuple[str, Mapping[str, Any]]]] = []
-        self.captions = False
-        self._join(annotations)
+        self._joined = Joined(value["images"], annotations, self.path, report)
+        self.captions = self._joined.captions
 
     def close(self) -> None:
         """Let go of everything but the frames: the next file may be as large."""
-        self._value, self._of_image = {}, []
+        self._value, self._joined = {}, Joined([], [], self.path, self._report)
 
     def _listed(self, name: str) -> list[Any]:
         """A list that need not be there."""
@@ -172,58 +164,6 @@ class _File:
         if found is not None and not isinstance(found, list):
             self._report.note(self.path, None, name, "is not a list; left out")
         return found if isinstance(found, list) else []
-
-    def _join(self, annotations: list[Any]) -> None:
-        """Give each annotation to its image; whatever joins none is named."""
-        for index, item in enumerate(self._value["images"]):
-            self._of_image.append([])
-            value = item.get("id") if isinstance(item, dict) else None
-            if isinstance(item, dict) and not self._images.add(value, index):
-                known = id_text(value) is not None
-                problem = f"is {_spelt(value)}, as another image's is" if known else "is missing"
-                self._note(f"images[{index}]", "id", f"{problem}; no annotation joins this image")
-        seen: dict[str, Mapping[str, Any]] = {}
-        shared = captions = 0
-        for index, item in enumerate(annotations):
-            record = f"annotations[{index}]"
-            if not isinstance(item, dict):
-                self._note(record, None, "is not an object; left out")
-                continue
-            if "image_id" not in item:
-                self._note(record, "image_id", "is missing; left out")
-                continue
-            image = self._images.find(item["image_id"])
-            if image is None:
-                image = self._image_by_name(item["image_id"])
-            if image is None:
-                self._report.counts["annotations without image"] += 1
-                problem = f"is {_spelt(item['image_id'])}, which no image of the file has; left out"
-                self._note(record, "image_id", problem)
-                continue
-            if isinstance(item.get("caption"), str) and "category_id" not in item:
-                captions += 1
-                continue
-            identity = id_text(item.get("id"))
-            other = None if identity is None else seen.setdefault(identity, item)
-            if other is not None and other is not item:
-                if other == item:
-                    self._note(record, "id", f"is {identity}: the same annotation twice; left out")
-                    continue
-                shared += 1
-            self._of_image[image].append((record, item))
-        if captions:
-            self.captions = captions == len(annotations)
-            self._report.counts["captions"] += captions
-        if shared:
-            self._report.remark(
-                f"{self.path}: {shared:,} annotations have the id of another one; all are read"
-            )
-
-    def _image_by_name(self, value: Any) -> int | None:
-        """The image that a file refers to by its name instead of its id."""
-        parts = picture_parts(value) if isinstance(value, str) else ()
-        found = self._by_last.get(parts[-1], []) if parts else []
-        return found[0] if len(found) == 1 else None
 
     def _note(self, record: str, field: str | None, problem: str) -> None:
         self._report.note(self.path, record, field, problem)
@@ -243,7 +183,16 @@ class _File:
                 else:
                     self.frames.frames.append(self._theirs(image, index))
             except DatasetFormatError as error:
-                self._report.skip(error)
+                self._report.skip(self._with_annotations(error, index))
+
+    def _with_annotations(self, error: DatasetFormatError, index: int) -> DatasetFormatError:
+        """Why an image is left out, with how many annotations go with it."""
+        count = len(self._joined.of_image[index])
+        if not count:
+            return error
+        annotations = "annotation" if count == 1 else "annotations"
+        problem = f"{error.problem}; left out with {count} {annotations}"
+        return DatasetFormatError(error.path, error.record, error.field, problem)
 
     def _ours(self, image: StateReader) -> PlacedView:
         state = StateReader(image.value[STATE], self.path, image.record)
@@ -264,6 +213,8 @@ class _File:
             from_corner: Whether boxes are measured from the corner of the first pixel; those of
                 our files of before are in our own frame.
         """
+        if not view.balls:
+            return self._drawn(image, from_corner)
         if len(view.balls) != 1:
             return view.balls
         for item in self._annotations(image):
@@ -274,9 +225,20 @@ class _File:
                     return (replace(view.balls[0], box=box, point=None),)
         return view.balls
 
+    def _drawn(self, image: StateReader, from_corner: bool) -> tuple[BallAnnotation, ...]:
+        """A ball that somebody has drawn since on a view that had none when it was written."""
+        boxes = [
+            self._box(item, image.record)
+            for item in self._annotations(image)
+            if "written_bbox" not in item
+        ]
+        found = [box for box in boxes if box is not None]
+        return tuple(
+            BallAnnotation(box=box_from_corner(box) if from_corner else box) for box in found
+        )
+
     def _annotations(self, image: StateReader) -> list[Mapping[str, Any]]:
-        found = self._images.find(image.value.get("id"))
-        return [] if found is None else [item for _, item in self._of_image[found]]
+        return self._joined.of_id(image.value.get("id"))
 
     def _box(self, item: Mapping[str, Any], record: str) -> Box | None:
         try:
@@ -299,7 +261,7 @@ class _File:
             self.path, image.record, parts, key, group, view, image.size(), split,
             self._camera(image), named=image.value.get("view") is not None,
         )  # fmt: skip
-        for record, item in self._of_image[index]:
+        for record, item in self._joined.of_image[index]:
             self._add(frame, item, record)
         return frame
 
@@ -311,7 +273,7 @@ class _File:
             if not parts:
                 check_name(text)
                 raise image.error("file_name", "is no name of a file")
-            if not _is_relative(text) and len(self._by_last[parts[-1]]) == 1:
+            if not _is_relative(text) and self._joined.is_alone(parts[-1]):
                 key = parts[-1]
             return check_name(key)
         except UnsafePathError as error:
@@ -321,7 +283,7 @@ class _File:
         """One annotation of a frame: its ball, or the box of something else."""
         category = self.categories.find(item.get("category_id"))
         if category is None:
-            shown = _spelt(item["category_id"]) if "category_id" in item else "missing"
+            shown = spelt(item["category_id"]) if "category_id" in item else "missing"
             problem = f"is {shown}, which no category of the file has; kept as a box without class"
             self._note(record, "category_id", problem)
         try:
@@ -385,19 +347,6 @@ def _is_relative(name: str) -> bool:
         return bool(check_name(name.replace("\\", "/"))) and "://" not in name and "?" not in name
     except UnsafePathError:
         return False
-
-
-def _spelt(value: Any) -> str:
-    """A value as the file spells it, no longer than a sentence can take."""
-    if isinstance(value, str):
-        return quoted(value, 40)
-    return "null" if value is None else str(value)[:40]
-
-
-def _last_part(image: Any) -> str:
-    name = image.get("file_name") if isinstance(image, dict) else None
-    parts = picture_parts(name) if isinstance(name, str) else ()
-    return parts[-1] if parts else ""
 
 
 def _shown(category: str, item: Mapping[str, Any], box: Box) -> Mapping[str, Any]:

@@ -233,6 +233,8 @@ def _read_tracks(
             else:
                 found.tracks[camera] = _shifted(track, options.offset(camera))
                 _compare_sizes(camera, track, shown, options, report)
+                if not track.balls:
+                    report.remark(f"{shown} brings no ball for camera {camera}.")
 
 
 def _cameras(

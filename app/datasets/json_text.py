@@ -6,6 +6,7 @@ import ast
 import json
 import math
 import re
+from collections import Counter
 from typing import Any, Literal, NoReturn
 
 import numpy as np
@@ -17,6 +18,8 @@ NanRule = Literal["refuse", "keep"]
 MAX_BYTES = 256 * 1024 * 1024
 MAX_LITERAL_CHARACTERS = 16 * 1024 * 1024
 MAX_DEPTH = 64
+MAX_NAMED = 100
+"""Numbers of one file that are not finite and are named one by one."""
 
 # Possessive, and an open string runs to the end: one pass, whatever the text.
 _DOUBLE = rb'"(?:[^"\\]++|\\.)*+\\?(?:"|\Z)'
@@ -207,20 +210,33 @@ def _depth(content: bytes, strings: re.Pattern[bytes]) -> int:
     return int(np.cumsum(steps).max(initial=0))
 
 
-def _null_infinite(value: Any, path: str, report: Report, place: tuple[str | int, ...] = ()) -> Any:
-    """The value with null for each number that is not finite, which is reported with its place."""
+def _null_infinite(value: Any, path: str, report: Report) -> Any:
+    """The value with null for each number that is not finite, the first of which are reported."""
+    found: list[tuple[tuple[str | int, ...], float]] = []
+    value = _cleared(value, (), found)
+    for place, number in found[:MAX_NAMED]:
+        what = (
+            "is NaN, which is not a number" if math.isnan(number) else "is too large for a number"
+        )
+        report.note(path, *_spelt(place), f"{what}; read as missing")
+    if len(found) > MAX_NAMED:
+        fields = Counter(str(place[-1]) for place, _ in found[MAX_NAMED:] if place)
+        shown = ", ".join(f"{name} ({count:,})" for name, count in fields.most_common(5))
+        problem = f"{len(found) - MAX_NAMED:,} more numbers are not finite: {shown}"
+        report.note(path, None, None, f"{problem}; read as missing")
+    return value
+
+
+def _cleared(
+    value: Any, place: tuple[str | int, ...], found: list[tuple[tuple[str | int, ...], float]]
+) -> Any:
     if isinstance(value, dict):
-        return {
-            key: _null_infinite(item, path, report, (*place, key)) for key, item in value.items()
-        }
+        return {key: _cleared(item, (*place, key), found) for key, item in value.items()}
     if isinstance(value, list):
-        return [
-            _null_infinite(item, path, report, (*place, index)) for index, item in enumerate(value)
-        ]
+        return [_cleared(item, (*place, index), found) for index, item in enumerate(value)]
     if not isinstance(value, float) or math.isfinite(value):
         return value
-    what = "is NaN, which is not a number" if math.isnan(value) else "is too large for a number"
-    report.note(path, *_spelt(place), f"{what}; read as missing")
+    found.append((place, value))
     return None
 
 

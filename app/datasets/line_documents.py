@@ -8,10 +8,10 @@ from pathlib import PurePosixPath
 from typing import Any
 
 from app.datasets.frame_names import IMAGE_SUFFIXES
-from app.datasets.json_kind import json_kind
+from app.datasets.json_document import json_kind
 from app.datasets.json_text import read_json, read_json_lines
+from app.datasets.record_size import stated_size
 from app.datasets.report import Report
-from app.datasets.stated_size import stated_size
 from app.errors import DatasetFormatError
 from app.soccer.frames import ImageSize
 from app.soccer.pitch import WITHOUT_GEOMETRY, marking_like

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-_SPLIT = re.compile(r"(train|val|test|challenge)(?:ing|id|idation)?(?:[-_ ]?(?:set|data|\d{1,4}))?")
+_SPLIT = re.compile(r"(train|val|test|challenge)(?:ing|id|idation)?(?:[-_ ]?(?:set|\d{1,4}))?")
 _WORDS = re.compile(r"[^a-z0-9]+")
 
 

@@ -73,7 +73,7 @@ def view_to_json(view: View) -> dict[str, Any]:
         "given": None if given is None else camera_to_json(given),
         **({} if covariance is None else {"given_covariance": [*map(float, covariance)]}),
         **({} if station.picture is None else {"picture": picture_to_json(station.picture)}),
-        "lines": lines_to_json(station.lines),
+        "lines": lines_to_json(station.said_lines),
         **({"proposed": [*station.proposed]} if station.proposed else {}),
         "balls": [ball_to_json(ball) for ball in view.balls],
     }
@@ -89,7 +89,7 @@ def picture_to_json(picture: PictureGeometry) -> dict[str, Any]:
 
 
 def lines_to_json(lines: Lines) -> dict[str, Any]:
-    """``{marking: [[x, y], ...]}``, pixels."""
+    """``{marking: [[x, y], ...]}``, pixels; no points where it is said not to be visible."""
     return {marking: [[float(x), float(y)] for x, y in points] for marking, points in lines.items()}
 
 
@@ -186,7 +186,7 @@ class StateReader:
         calibration = self.text("calibration", "given")
         if calibration not in CALIBRATIONS:
             raise self.error("calibration", f"is none of {' and '.join(CALIBRATIONS)}")
-        given, lines = self.value.get("given"), self.lines()
+        given, (lines, not_visible) = self.value.get("given"), self.lines()
         station = Station(
             key=self.key("station"),
             size=size,
@@ -196,6 +196,7 @@ class StateReader:
             flipped=self.flag("flipped", False),
             picture=self.picture(),
             proposed=self.proposed(lines),
+            not_visible=not_visible,
         )
         camera = None if given is None else camera_from_json(given, self.path, self.record)
         try:
@@ -246,8 +247,8 @@ class StateReader:
         except (ValueError, InputError) as error:
             raise self.error("left_out", str(error)) from error
 
-    def lines(self) -> Lines:
-        """Back from ``lines_to_json``."""
+    def lines(self) -> tuple[Lines, tuple[str, ...]]:
+        """Back from ``lines_to_json``: the lines, and what is said not to be visible."""
         lines = {}
         try:
             for name, points in fields.mapping(self.value.get("lines") or {}).items():
@@ -256,7 +257,7 @@ class StateReader:
             raise self.error("lines", error.message) from error
         except ValueError as error:
             raise self.error("lines", str(error)) from error
-        return make_lines(lines)
+        return make_lines(lines), tuple(sorted(name for name in lines if not lines[name]))
 
     def proposed(self, lines: Lines) -> tuple[str, ...]:
         """Names of the lines that were accepted as they were proposed."""

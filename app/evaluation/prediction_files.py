@@ -28,7 +28,7 @@ from typing import Any, get_args
 from app.datasets import fields
 from app.datasets.cameras_reader import read_cameras
 from app.datasets.file_tree import DEFAULT_LIMITS, FileTree, Limits
-from app.datasets.json_kind import json_kind
+from app.datasets.json_document import json_kind
 from app.datasets.json_text import read_json, read_json_lines
 from app.datasets.report import Report
 from app.datasets.trees import opened_tree

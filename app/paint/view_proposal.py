@@ -11,6 +11,7 @@ from app.config import Settings
 from app.errors import GeometryError
 from app.geometry.camera import Camera
 from app.paint.evidence import Image
+from app.paint.goal import goal_lines
 from app.paint.picture_scale import PictureScale, why_unreadable
 from app.paint.propose import propose
 from app.soccer.annotation import Lines
@@ -29,7 +30,8 @@ class ViewProposal:
     Attributes:
         outcome: ``proposed``, ``unsure`` or ``nothing``.
         sentence: Why nothing is proposed, or which drawn lines lie elsewhere; else empty.
-        lines: Points on the paint of each marking that is seen; none unless proposed.
+        lines: Points on the paint of each marking that is seen, and on posts and crossbars, which
+            JaC counts like them; none unless proposed.
         supported, explained: As of ``ViewPaint``.
         runner_up: How much less the next best camera agrees; None where there is no other.
         error_px: Median distance of the paint to its marking.
@@ -85,6 +87,8 @@ def proposal_of(
     scale, lines, seen, snapped = PictureScale.of(image, size), {}, found.agreement, found.snapped
     if found.outcome == "proposed" and snapped is not None:
         lines = dict(scale.evidence(snapped).some_points())
+        goals = goal_lines(image, snapped.camera, pitch)
+        lines |= {name: tuple(scale.told(*place) for place in goals[name]) for name in goals}
     return ViewProposal(
         found.outcome,
         "" if found.reason is None else f"{found.reason[:1].upper()}{found.reason[1:]}.",

@@ -16,10 +16,11 @@ CORNERS = ("x1", "y1", "x2", "y2")
 
 
 def make_lines(lines: Mapping[str, Any]) -> Lines:
-    """Lines from any mapping of marking to points, in the order of names."""
+    """Lines from any mapping of marking to points, in the order of names; none without points."""
     return {
         marking: tuple(ImagePoint(float(x), float(y)) for x, y in lines[marking])
         for marking in sorted(lines)
+        if len(lines[marking])
     }
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 PITCH_SIZE = "pitch_size"
@@ -31,12 +32,17 @@ FINDING_KINDS = (
 """Every kind of finding."""
 
 
+UNUSABLE_SIGMA_M = 2.0
+"""A ball that is less certain is of no use: it is more than the 2 m off that evaluations allow in
+one of three groups."""
+
+
 @dataclass(frozen=True)
 class Fix:
     """What a finding or a remedy proposes to do.
 
     ``action`` is ``relabel``, ``move_point``, ``drop_point``, ``drop_marking``, ``swap_sides``,
-    ``include_view``, ``exclude_view``, ``free_picture`` or ``pick_ball``: edits. ``draw_marking`` and ``look_ball``
+    ``include_view``, ``exclude_view``, ``free_picture``, ``hide_marking`` or ``pick_ball``: edits. ``draw_marking`` and ``look_ball``
     say where a person should look and draw: what was computed there is no evidence for itself.
     ``read_paint`` asks for its picture to be read, which is no edit either.
     """
@@ -61,3 +67,55 @@ class Finding:
     threshold: float | None = None
     confidence: float | None = None
     fix: Fix | None = None
+
+    @property
+    def is_unusable_ball(self) -> bool:
+        """Whether nobody can use the ball of which it is said: accepting it needs a reason."""
+        return makes_unusable(self.kind, self.number)
+
+
+def makes_unusable(kind: str, number: float | None) -> bool:
+    """Whether a finding of that kind and number says that the ball cannot be used."""
+    if kind == "high_uncertainty":
+        # An infinite sigma is null in a table.
+        return number is None or number > UNUSABLE_SIGMA_M
+    return kind == "implausible_ball"
+
+
+SAME_SHARE = 0.05
+"""A finding whose number has moved by no more than this share of it is still the same."""
+
+
+@dataclass(frozen=True)
+class Dismissal:
+    """A finding that a person has checked and found to be fine, as it was then.
+
+    Attributes:
+        kind, view, marking, suggested, number, sentence: Of the finding.
+        actor: Who dismissed it.
+        at: When.
+        note: Why; None: nobody said.
+    """
+
+    kind: str
+    view: str | None
+    marking: str | None
+    suggested: str | None
+    number: float | None
+    sentence: str
+    actor: str
+    at: str
+    note: str | None = None
+
+    def covers(self, finding: Finding | Dismissal) -> bool:
+        """Whether a finding (or what somebody said of one) still says what was dismissed.
+
+        It names the same, and its number is about the same; one without a number has the same
+        sentence.
+        """
+        names = (finding.kind, finding.view, finding.marking, finding.suggested)
+        if names != (self.kind, self.view, self.marking, self.suggested):
+            return False
+        if finding.number is None or self.number is None:
+            return finding.number is self.number and finding.sentence == self.sentence
+        return math.isclose(finding.number, self.number, rel_tol=SAME_SHARE, abs_tol=1e-9)

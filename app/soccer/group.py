@@ -42,6 +42,8 @@ class Station:
             that is found from its lines follows.
         proposed: Markings whose points a person accepted as they were proposed from the paint,
             sorted; what is drawn or moved later is not among them.
+        not_visible: Markings of which a person said that the picture does not show them, sorted:
+            something hides them, or they are worn. JaC does not count them as missing.
     """
 
     key: str
@@ -55,6 +57,7 @@ class Station:
     given_covariance: tuple[float, ...] | None = None
     picture: PictureGeometry | None = None
     proposed: tuple[str, ...] = ()
+    not_visible: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         if self.given is not None and self.given.is_wide and self.given_covariance is not None:
@@ -70,11 +73,20 @@ class Station:
             self,
             lines=other.lines,
             proposed=other.proposed,
+            not_visible=other.not_visible,
             given=other.given,
             given_covariance=other.given_covariance,
             calibration=other.calibration,
             picture=other.picture,
         )
+
+    @property
+    def said_lines(self) -> Lines:
+        """The lines, and those that are said not to be visible, without points: as they are kept."""
+        if not self.not_visible:
+            return self.lines
+        said = {**self.lines, **dict.fromkeys(self.not_visible, ())}
+        return {marking: said[marking] for marking in sorted(said)}
 
     def with_given(
         self, given: Camera | None, covariance: tuple[float, ...] | None = None

@@ -100,6 +100,18 @@ class CalibrationPolicy:
         told=False,
     )
     """What the points of a marking have in common of that variance; None: weighed image by image."""
+    shortest_marking_px: float = _threshold(
+        0.0,
+        CALIBRATION,
+        "Shortest marking that JaC misses when nobody drew it",
+        "px at 960x540",
+        0.0,
+        50.0,
+        later=True,
+        told=False,
+    )
+    """0: each one, as the public evaluator does. Stubs of a few pixels at the border of a picture
+    are none that people draw. Not in the ``repr``: ``calibration_key`` knows it where it is set."""
 
     @cached_property
     def spelling(self) -> str:

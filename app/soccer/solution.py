@@ -12,7 +12,7 @@ from app.geometry.camera import Camera
 from app.soccer.finding import Finding
 from app.soccer.frames import Box, ImagePoint, height_above_grass
 
-SOLVER_VERSION = "7"
+SOLVER_VERSION = "8"
 """Part of every solution's key; raised by one whenever a number changes."""
 
 GAMMAS_PERCENT = (0.5, 1.0, 2.0)
@@ -386,6 +386,11 @@ class Solution:
     def passes(self) -> bool:
         """Whether every active gate is passed."""
         return all(gate.passed for gate in self.gates if gate.active)
+
+    @property
+    def unusable_ball(self) -> Finding | None:
+        """Why nobody can use the ball, or None."""
+        return next((item for item in self.findings if item.is_unusable_ball), None)
 
     @property
     def first_failing(self) -> Gate | None:

@@ -17,9 +17,9 @@ from app.geometry.arrays import BoolArray
 from app.soccer.finding import Finding
 from app.soccer.group import view_letter
 from app.soccer.policy import Policy
-from app.soccer.solution import Pair, Solution
+from app.soccer.solution import Solution
 from app.solving.facts import Facts
-from app.solving.findings import closest, view_disagrees
+from app.solving.findings import closest, misses_ball, view_disagrees
 from app.solving.gates import reprojection
 from app.solving.judgement import failures, view_jac
 
@@ -55,24 +55,44 @@ def retold(solution: Solution, diagonals: Sequence[float], policy: Policy) -> So
         diagonals: Of the pictures of its views, pixels.
         policy: The policy with that tau.
     """
-    if any(item.kind == "sides_swapped" for item in solution.findings):
+    if any(item.kind == "sides_swapped" or _is_behind(item) for item in solution.findings):
         return None
     keys = [view.view for view in solution.views]
     tau_px = {key: policy.tau_px(diagonal) for key, diagonal in zip(keys, diagonals, strict=True)}
+    missed = {
+        view.view
+        for view in solution.views
+        if view.included and view.ball is not None and (view.ball.error_px or 0) > tau_px[view.view]
+    }
+    told = {item.view for item in solution.findings if item.kind == "view_disagrees"}
+    if not missed <= told:
+        return None
     letters = {key: view_letter(place) for place, key in enumerate(keys)}
     gate = reprojection(solution.pairs, letters, tau_px)
     return replace(
         solution,
         gates=tuple(gate if item.name == gate.name else item for item in solution.gates),
-        findings=tuple(_finding(item, solution.pairs, tau_px) for item in solution.findings),
+        findings=tuple(_finding(item, solution, letters, tau_px) for item in solution.findings),
         policy_hash=policy.hash,
     )
 
 
-def _finding(found: Finding, pairs: Sequence[Pair], tau_px: Mapping[str, float]) -> Finding:
+def _is_behind(found: Finding) -> bool:
+    """Whether rays meet behind a camera: how far apart the pixels are was not told."""
+    return found.kind in ("view_disagrees", "not_synchronous") and found.number is None
+
+
+def _finding(
+    found: Finding, solution: Solution, letters: Mapping[str, str], tau_px: Mapping[str, float]
+) -> Finding:
+    judged = [pair for pair in solution.pairs if pair.failed == "reprojection"]
     if found.kind == "view_disagrees" and found.view is not None and found.number is not None:
-        return view_disagrees(found.view, found.number, tau_px[found.view])
+        view = solution.view(found.view)
+        if view is not None and view.included:
+            return misses_ball(found.view, found.number, tau_px[found.view])
+        own = closest([pair for pair in judged if found.view in (pair.a, pair.b)])
+        return view_disagrees(found.view, own, letters, tau_px[found.view])
     if found.kind == "not_synchronous":
-        best = closest([pair for pair in pairs if pair.failed == "reprojection"])
+        best = closest(judged)
         return replace(found, threshold=max(tau_px[best.a], tau_px[best.b]))
     return found

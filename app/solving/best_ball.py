@@ -7,12 +7,14 @@ from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
+from scipy.special import chdtrc
 
 from app.geometry.arrays import FloatArray, IntArray, row_by_row
 from app.geometry.likely_point import CameraTable, likely_points
 from app.soccer.policy import Policy
-from app.soccer.solution import BestBall, Pair
+from app.soccer.solution import BestBall, ChiSquare, Pair
 from app.solving.ball_covariance import sight_covariances
+from app.solving.chi_square import widening
 from app.solving.triangulate import Sighting
 
 MAX_MAHALANOBIS = 13.8
@@ -39,7 +41,7 @@ def best_ball(pairs: Sequence[Pair], usable: Sequence[Sighting], policy: Policy)
 
     All views count, weighted by the uncertainty of click and calibration. Where they contradict
     each other the largest set of views that does not is taken, so that one bad view does no
-    harm; two views that contradict each other stay, with their covariance widened accordingly.
+    harm; where those that stay contradict each other, as two views may, its covariance is widened.
 
     Args:
         pairs: Of the group.
@@ -59,11 +61,9 @@ def best_ball(pairs: Sequence[Pair], usable: Sequence[Sighting], policy: Policy)
     estimate = _most_consistent(views, starts)
     if estimate is None:
         return None
-    freedom = 2 * len(estimate.numbers) - 3
-    excess = max(1.0, float(estimate.distances.sum()) / freedom)
-    if estimate.is_consistent:
-        excess = 1.0
-    covariance = excess * estimate.covariance
+    freedom, total = 2 * len(estimate.numbers) - 3, float(estimate.distances.sum())
+    test = ChiSquare(total, freedom, float(chdtrc(freedom, total)), ())
+    covariance = widening(test) ** 2 * estimate.covariance
     used = tuple(views.sights[number].view for number in estimate.numbers)
     x, y, z = estimate.point.tolist()
     return BestBall(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import replace
 from types import MappingProxyType
 
@@ -31,6 +31,7 @@ from app.soccer.solution import (
 from app.solving.jaccard import (
     jaccard,
     measure_markings,
+    not_missing,
     outcomes,
     project_markings,
 )
@@ -40,7 +41,12 @@ from app.solving.observations import Observations, observe
 from app.solving.paint_camera import PaintProblem, solve_paint
 from app.solving.picture_camera import WIDTH, PictureProblem, estimate_picture, warp_of
 from app.solving.picture_findings import find_picture
-from app.solving.resect import Resection, ResectionProblem, measurement_count
+from app.solving.resect import (
+    REFERENCE_DIAGONAL,
+    Resection,
+    ResectionProblem,
+    measurement_count,
+)
 
 MIN_MEASUREMENTS = 7
 """A camera with one focal length has seven unknowns; the distortion has a prior."""
@@ -83,7 +89,7 @@ def calibrate(
     fit = problem.refine_main(fit, observations)
     picture = find_picture(problem, fit.parameters, observations)
     found = replace(_found(problem, fit, observations), suspects=suspects, picture=picture)
-    return measure(found, lines, pitch, size)
+    return measure(found, lines, pitch, size, shortest_px=shortest_px(policy, size))
 
 
 def calibrate_near(
@@ -112,7 +118,7 @@ def calibrate_near(
     found = _found(problem, shared, observations)
     # Whether the picture was stretched or cropped its own lines say, to the camera that fits them.
     found = replace(found, suspects=alone.suspects, picture=alone.picture)
-    return measure(found, lines, pitch, size)
+    return measure(found, lines, pitch, size, shortest_px=shortest_px(policy, size))
 
 
 def calibrate_picture(
@@ -156,6 +162,7 @@ def calibrate_picture(
         lines,
         pitch,
         size,
+        shortest_px=shortest_px(policy, size),
     )
 
 
@@ -201,9 +208,19 @@ def calibrate_station(
 
     ``shared`` is what other pictures of the match say of its position.
     """
+    found = _calibrated(station, pitch, policy, shared)
+    if not station.not_visible:
+        return found
+    return _measured(found, station, pitch, policy)
+
+
+def _calibrated(
+    station: Station, pitch: Pitch, policy: CalibrationPolicy, shared: SharedPosition | None
+) -> Calibration:
+    """``calibrate_station`` as if every visible marking was one that people draw."""
     if station.given is not None and station.calibration == "given":
         given = Calibration("given", station.given, covariance=station.given_covariance)
-        return measure(given, station.lines, pitch, station.size)
+        return _measured(given, station, pitch, policy)
     if station.picture is not None:
         return calibrate_picture(station.lines, pitch, station.size, policy, station.picture)
     alone = calibrate(station.lines, pitch, station.size, policy)
@@ -213,12 +230,19 @@ def calibrate_station(
     return calibrate_near(alone, near, station.lines, pitch, station.size, policy)
 
 
+def _measured(
+    found: Calibration, station: Station, pitch: Pitch, policy: CalibrationPolicy
+) -> Calibration:
+    """A calibration measured against the lines of its station, and what is said not to be visible."""
+    size, shortest = station.size, shortest_px(policy, station.size)
+    return measure(found, station.lines, pitch, size, station.not_visible, shortest)
+
+
 def calibrate_paint(
     clicked: Calibration,
     reading: PaintReading,
-    lines: Lines,
+    station: Station,
     pitch: Pitch,
-    size: ImageSize,
     policy: CalibrationPolicy,
 ) -> Calibration:
     """A calibration of clicks with what was read of the paint in its picture.
@@ -229,7 +253,9 @@ def calibrate_paint(
     Args:
         clicked: The calibration that the paint was sought for.
         reading: What was read.
+        station: With the clicks.
     """
+    size = station.size
     fit = PaintFit(
         reading.supported, reading.explained, reading.evidence.count, reason=reading.reason
     )
@@ -249,7 +275,7 @@ def calibrate_paint(
         unobservable=_unobservable(found.covariance),
         paint=replace(fit, error_px=found.error_px),
     )
-    return measure(painted, lines, pitch, size)
+    return _measured(painted, station, pitch, policy)
 
 
 def calibrate_view(
@@ -272,7 +298,7 @@ def calibrate_view(
     reading = wanted_paint(group, view, policy)
     if reading is None or reading.sought_for != key:
         return clicked
-    return calibrate_paint(clicked, reading, view.station.lines, group.pitch, view.size, policy)
+    return calibrate_paint(clicked, reading, view.station, group.pitch, policy)
 
 
 def calibrate_clicks(group: Group, view: View, policy: CalibrationPolicy) -> Calibration:
@@ -314,14 +340,29 @@ def _shared(group: Group, view: View, policy: CalibrationPolicy) -> SharedPositi
     return group.positions.get(view.key)
 
 
-def measure(calibration: Calibration, lines: Lines, pitch: Pitch, size: ImageSize) -> Calibration:
+def shortest_px(policy: CalibrationPolicy, size: ImageSize) -> float:
+    """Length below which a marking that nobody drew is not missing, pixels; 0: none is."""
+    return policy.shortest_marking_px * size.diagonal / REFERENCE_DIAGONAL
+
+
+def measure(
+    calibration: Calibration,
+    lines: Lines,
+    pitch: Pitch,
+    size: ImageSize,
+    not_visible: Collection[str] = (),
+    shortest_px: float = 0.0,
+) -> Calibration:
     """The calibration with JaC and the distances of the annotated points filled in.
 
-    Without lines there is no JaC; the projected markings are there all the same.
+    Without lines there is no JaC; the projected markings are there all the same, but for those that
+    nobody drew and that are ``not_missing``.
     """
     if calibration.camera is None:
         return calibration
     measured = measure_markings(project_markings(calibration.camera, pitch, size), lines)
+    for marking in not_missing(measured, lines, not_visible, shortest_px):
+        del measured[marking]
     by_gamma = [outcomes(measured, lines, gamma / 100 * size.diagonal) for gamma in GAMMAS_PERCENT]
     left_out = {suspect.marking for suspect in calibration.suspects}
     markings = []
@@ -357,20 +398,23 @@ def calibration_key(
     # Plain tuples are spelt out in half the time.
     lines = [(marking, [*map(tuple, points)]) for marking, points in sorted(station.lines.items())]
     parts = [*map(repr, (SOLVER_VERSION, station.size, pitch)), policy.spelling, repr(lines)]
+    counted = [repr(("not visible", station.not_visible))] if station.not_visible else []
+    if policy.shortest_marking_px:
+        counted.append(repr(("shortest", policy.shortest_marking_px)))
     if station.given is not None and station.calibration == "given":
         parts.append(repr(station.given.parameters.tolist()))
         if station.given.is_wide:
             parts.append(repr(station.given.lens))
         if station.given_covariance is not None:
             parts.append(repr(station.given_covariance))
-        return _key(parts)
+        return _key(parts + counted)
     if station.picture is not None:
         parts.append(repr(station.picture))
     elif shared is not None:
         parts.append(repr(shared))
     if (policy.line_sigma_px, policy.line_share) != (None, None):
         parts.append(repr(("line noise", policy.line_sigma_px, policy.line_share)))
-    return _key(parts)
+    return _key(parts + counted)
 
 
 def _key(parts: list[str]) -> str:

@@ -130,7 +130,7 @@ def _not_annotated(
             yield Finding(
                 "visible_not_annotated",
                 f"“{fit.marking}” should be visible over {length:.0f} px and is not drawn. "
-                "Draw it if you see it.",
+                "Draw it if you see it, or mark it as not visible under Lines.",
                 view,
                 fit.marking,
                 number=length,

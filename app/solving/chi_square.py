@@ -9,9 +9,12 @@ from scipy.special import chdtrc
 
 from app.geometry.arrays import BoolArray, FloatArray, IntArray, cross
 from app.soccer.policy import Policy
+from app.soccer.solution import ChiSquare
 from app.solving.ball_covariance import pixel_covariances
 from app.solving.facts import Facts
 
+LOW_P_VALUE = 0.002
+"""Below it views contradict each other. Chance alone makes one in five hundred groups."""
 _STEPS = 6
 
 
@@ -31,6 +34,43 @@ class Residuals:
     chi_square: FloatArray
     freedom: IntArray
     p_value: FloatArray
+
+    @property
+    def widening(self) -> FloatArray:
+        """``widening_of`` each group, shape (G,)."""
+        return widening_of(self.chi_square, self.freedom, self.p_value)
+
+
+def widening_of(chi_square: FloatArray, freedom: IntArray, p_value: FloatArray) -> FloatArray:
+    """By what the sigma of a ball is multiplied whose views contradict each other, shape (N,).
+
+    The Birge ratio, sqrt(chi-square / degrees of freedom), where the p-value is below
+    ``LOW_P_VALUE``; 1 elsewhere. It is the most likely scale of the noise, if one scale is wrong
+    for all clicks. It is not used above the level: with one degree of freedom (two views) a third
+    of all ordinary groups have a ratio above 1 by chance, and their sigma is right. Nor are the
+    quantiles of Student's t for few degrees of freedom: residuals of two views are one number,
+    and its scale is known to a factor of two or three only.
+
+    Args:
+        chi_square: Sums of squared residuals in units of sigma, shape (N,).
+        freedom: Their degrees of freedom, shape (N,).
+        p_value: How often chance alone makes them as large, NaN where that is not known, (N,).
+
+    Source: Birge, "The calculation of errors by the method of least squares", Phys. Rev. 40, 1932.
+    """
+    with np.errstate(invalid="ignore"):
+        contradicted = p_value < LOW_P_VALUE
+    ratio = np.sqrt(np.where(contradicted, chi_square / np.maximum(freedom, 1), 1.0))
+    widened: FloatArray = np.maximum(ratio, 1.0)
+    return widened
+
+
+def widening(found: ChiSquare | None) -> float:
+    """``widening_of`` one group; 1 where its views were not tested."""
+    if found is None:
+        return 1.0
+    numbers = (np.array([number]) for number in (found.value, found.freedom, found.p_value))
+    return float(widening_of(*numbers)[0])
 
 
 def residuals_of(facts: Facts, used: BoolArray, start: FloatArray, policy: Policy) -> Residuals:

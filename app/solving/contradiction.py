@@ -11,13 +11,17 @@ from app.geometry.arrays import BoolArray, FloatArray
 from app.soccer.frames import height_above_grass
 from app.soccer.policy import Policy
 from app.soccer.solution import ChiSquare
-from app.solving.chi_square import residuals_of, residuals_without, untestable
+from app.solving.chi_square import (
+    LOW_P_VALUE,
+    residuals_of,
+    residuals_without,
+    untestable,
+    widening,
+)
 from app.solving.facts import Facts
 from app.solving.judgement import Judgement, views_of
 from app.solving.triangulate import Sighting
 
-LOW_P_VALUE = 0.002
-"""Below: the finding ``views_contradict``. Chance alone makes one in five hundred groups."""
 SURE = 0.9
 """How sure the solver must be of a view to name it."""
 TYPICAL_SPEED = 15.0
@@ -43,6 +47,7 @@ class Contradiction:
         gap_m: How far the rays miss each other: so far at least did the ball move, metres; None
             where it is not clear between which views to measure.
         moved_m: How far it moved if it moved level, metres; None where that is not known.
+        is_known: Whether it is known how exact each of the cameras is.
     """
 
     chi_square: ChiSquare
@@ -50,6 +55,12 @@ class Contradiction:
     confidence: float | None
     gap_m: float | None = None
     moved_m: float | None = None
+    is_known: bool = True
+
+    @property
+    def widening(self) -> float:
+        """By what the sigma of the ball is multiplied for it."""
+        return widening(self.chi_square)
 
     @property
     def is_motion(self) -> bool:
@@ -91,7 +102,7 @@ def contradiction(
 ) -> Contradiction | None:
     """Where the views of the ball contradict each other; None where they do not.
 
-    Where nobody says how far a given camera is off, nothing can be said with it.
+    Where nobody says how far a given camera is off, that is one more thing that may be wrong.
 
     Args:
         chi_square: Of the group.
@@ -104,20 +115,19 @@ def contradiction(
     if chi_square is None or chi_square.p_value >= LOW_P_VALUE:
         return None
     used = np.array([key in chi_square.views for key in keys])
-    if untestable(facts, used, policy)[0]:
-        return None
+    known = not untestable(facts, used, policy)[0]
     chosen = [sight for sight in sights if sight.view in chi_square.views]
     if len(chosen) == 2:
         one, other = chosen
         gap, moved = _apart(one, other, judgement.point[0], policy)
-        return Contradiction(chi_square, None, None, gap, moved)
+        return Contradiction(chi_square, None, None, gap, moved, known)
     view, confidence, point = _blamed(keys, facts, used, judgement.point, policy)
     if view is None:
-        return Contradiction(chi_square, None, None)
+        return Contradiction(chi_square, None, None, is_known=known)
     sight = next(sight for sight in chosen if sight.view == view)
     place = _to_level(sight, float(point[2]))
     level = None if place is None else float(np.linalg.norm(place - point))
-    return Contradiction(chi_square, view, confidence, _off_ray(sight, point), level)
+    return Contradiction(chi_square, view, confidence, _off_ray(sight, point), level, known)
 
 
 def _blamed(

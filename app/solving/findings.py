@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
-from app.soccer.finding import Finding, Fix
-from app.soccer.group import Group, View
+from app.soccer.finding import UNUSABLE_SIGMA_M, Finding, Fix
+from app.soccer.group import Group, View, view_letter
 from app.soccer.pitch import Pitch
 from app.soccer.policy import Policy
 from app.soccer.solution import Ball3D, Pair, ViewSolution
 from app.solving.calibration_findings import calibration_findings
-from app.solving.contradiction import LOW_P_VALUE, SPEEDS, TYPICAL_SPEED, Contradiction
+from app.solving.chi_square import LOW_P_VALUE
+from app.solving.contradiction import SPEEDS, TYPICAL_SPEED, Contradiction
 from app.solving.gates import chance
 from app.solving.paint_findings import paint_findings
 from app.solving.plausible import implausible
@@ -23,6 +24,7 @@ HIGH_SIGMA_M = 0.25
 """Beyond it more than one ball in twenty is half a metre off or more."""
 
 _BY_WEIGHT = (
+    "implausible_ball",
     "camera_size",
     "sides_swapped",
     "wrong_label",
@@ -30,7 +32,6 @@ _BY_WEIGHT = (
     "not_synchronous",
     "view_disagrees",
     "views_contradict",
-    "implausible_ball",
     "implausible_camera",
     "picture_geometry",
     "under_constrained",
@@ -42,7 +43,7 @@ _BY_WEIGHT = (
     "visible_not_annotated",
     "no_paint",
 )
-"""What explains the most comes first."""
+"""What makes the ball unusable comes first, then what explains the most."""
 
 
 def find(
@@ -54,7 +55,7 @@ def find(
     policy: Policy,
     contradicted: Contradiction | None = None,
 ) -> tuple[Finding, ...]:
-    """All findings of a group, those that explain most first, then by view."""
+    """All findings of a group: what makes its ball unusable first, then what explains most."""
     swaps = {swap.view: swap for swap in _swaps(group, views, sights, policy)}
     found: list[Finding] = []
     for view, solved in zip(group.views, views, strict=True):
@@ -70,17 +71,24 @@ def find(
         if view.key in swaps:
             found.append(_sides_swapped(swaps[view.key]))
         else:
-            found.extend(_view_disagrees(view, solved, pairs, policy))
+            found.extend(_view_disagrees(group, view, solved, pairs, policy))
+            found.extend(_misses_ball(solved, policy.tau_px(view.size.diagonal)))
         found.extend(_ball_size(solved))
     if ball is None and not swaps:
         found.extend(_not_synchronous(pairs, policy, group))
     if contradicted is not None and not swaps:
-        found.append(_views_contradict(contradicted, group))
+        found.append(_views_contradict(contradicted, group, ball))
     if ball is not None:
         found.extend(_low_parallax(ball, policy))
-        found.extend(_high_uncertainty(ball))
+        found.extend(_high_uncertainty(ball, contradicted))
         found.extend(_implausible_ball(ball, group.pitch, policy))
-    return tuple(sorted(found, key=lambda finding: _BY_WEIGHT.index(finding.kind)))
+    return tuple(sorted(found, key=_weight))
+
+
+def _weight(finding: Finding) -> tuple[bool, int, float]:
+    """What comes first; of views that disagree the one that is farther off."""
+    far = (finding.number or 0.0) if finding.kind == "view_disagrees" else 0.0
+    return not finding.is_unusable_ball, _BY_WEIGHT.index(finding.kind), -far
 
 
 def _swaps(
@@ -131,7 +139,7 @@ def _sides_swapped(swap: Swap) -> Finding:
 
 
 def _view_disagrees(
-    view: View, solved: ViewSolution, pairs: Sequence[Pair], policy: Policy
+    group: Group, view: View, solved: ViewSolution, pairs: Sequence[Pair], policy: Policy
 ) -> Iterator[Finding]:
     """A view in no valid pair, though it was judged and others agree."""
     judged = [
@@ -139,18 +147,61 @@ def _view_disagrees(
     ]
     if solved.included or not judged or not any(pair.valid for pair in pairs):
         return
-    tau_px = policy.tau_px(view.size.diagonal)
-    yield view_disagrees(view.key, min(max(pair.errors_px) for pair in judged), tau_px)
+    letters = {other.key: view_letter(place) for place, other in enumerate(group.views)}
+    yield view_disagrees(view.key, closest(judged), letters, policy.tau_px(view.size.diagonal))
 
 
-def view_disagrees(view: str, apart_px: float, tau_px: float) -> Finding:
-    """What is said of a view that misses the others' ball by so many pixels."""
+def view_disagrees(view: str, best: Pair, letters: Mapping[str, str], tau_px: float) -> Finding:
+    """What is said of a view that misses the others' ball in its closest pair.
+
+    Rays may also meet behind a camera, and the pixels there be as near as is allowed.
+
+    Args:
+        view: Key of the view.
+        best: The pair that it comes closest in.
+        letters: What people call the views, by key.
+        tau_px: Largest error of a valid pair in the view, pixels.
+    """
+    fix = Fix("exclude_view", view)
+    apart_px = max(best.errors_px)
+    if apart_px <= tau_px:
+        return Finding(
+            "view_disagrees",
+            "The ray of this view meets those of the others behind a camera only, where no ball "
+            "is. Check the sides of its lines and its ball, or leave the view out.",
+            view,
+            fix=fix,
+        )
+    other = best.b if best.a == view else best.a
+    here, there = best.errors_px if best.a == view else best.errors_px[::-1]
     return Finding(
         "view_disagrees",
-        f"This view does not see the ball where another view sees it: {apart_px:.1f} px apart at "
-        f"best, {tau_px:.1f} px are allowed. Correct its ball, or leave the view out.",
+        f"This view does not see the ball where another view sees it: at best {here:.1f} px apart "
+        f"here and {there:.1f} px in {letters[other]}, {tau_px:.1f} px are allowed. Correct its "
+        "ball, or leave the view out.",
         view,
         number=apart_px,
+        threshold=tau_px,
+        fix=fix,
+    )
+
+
+def _misses_ball(solved: ViewSolution, tau_px: float) -> Iterator[Finding]:
+    """A view in a valid pair that the 3D ball does not fit: it is the mean of several pairs."""
+    error_px = solved.ball.error_px if solved.ball is not None and solved.included else None
+    if error_px is not None and error_px > tau_px:
+        yield misses_ball(solved.view, error_px, tau_px)
+
+
+def misses_ball(view: str, error_px: float, tau_px: float) -> Finding:
+    """What is said of a view that counts and that the 3D ball misses by so many pixels."""
+    return Finding(
+        "view_disagrees",
+        f"The 3D ball is {error_px:.1f} px from the ball of this view, {tau_px:.1f} px are "
+        "allowed, although each pair that counts fits: the pairs contradict each other. Correct "
+        "the ball of a view, or leave a view out.",
+        view,
+        number=error_px,
         threshold=tau_px,
         fix=Fix("exclude_view", view),
     )
@@ -180,18 +231,21 @@ def _not_synchronous(pairs: Sequence[Pair], policy: Policy, group: Group) -> Ite
         return
     best = closest(judged)
     sizes = [view.size.diagonal for view in group.views if view.key in (best.a, best.b)]
-    apart = f"{max(best.errors_px):.0f} px apart"
+    error_px, tau_px = max(best.errors_px), policy.tau_px(max(sizes))
+    apart = f"{best.errors_px[0]:.1f} and {best.errors_px[1]:.1f} px apart"
     sentence = (
         f"The two views do not see the ball in the same place ({apart})"
         if len(group.views) == 2
         else f"No two views see the ball in the same place (the closest are {apart})"
     )
+    if error_px <= tau_px:
+        sentence = "The rays of no two views meet in front of their cameras"
     yield Finding(
         "not_synchronous",
         f"{sentence}. Look first whether each ball is drawn on the ball. If they are, compare "
         "players and clock: the pictures show different instants where these differ.",
-        number=max(best.errors_px),
-        threshold=policy.tau_px(max(sizes)),
+        number=error_px if error_px > tau_px else None,
+        threshold=tau_px if error_px > tau_px else None,
     )
 
 
@@ -200,23 +254,35 @@ def closest(pairs: Sequence[Pair]) -> Pair:
     return min(pairs, key=lambda pair: max(pair.errors_px))
 
 
-def _views_contradict(item: Contradiction, group: Group) -> Finding:
+def _views_contradict(item: Contradiction, group: Group, ball: Ball3D | None) -> Finding:
     """Views that pass tau and are still farther apart than their uncertainty lets them be."""
     found = item.chi_square
     one = "The two views do" if len(found.views) == 2 else "The views do"
+    degrees = "degree" if found.freedom == 1 else "degrees"
     sentences = [
-        f"{one} not show one ball: consistent views have residuals as large as these in only "
+        f"{one} not show one ball: consistent views have residuals as large as these "
+        f"(χ² {found.value:,.1f}, {found.freedom} {degrees} of freedom) in only "
         f"{chance(found.p_value)}."
     ]
+    if ball is not None and item.widening > 1:
+        sentences.append(
+            f"Sigma is widened {item.widening:.1f} times for it, to {ball.sigma_m:.2f} m."
+        )
+    if not item.is_known:
+        sentences.append(
+            "Nobody says how exact the given cameras are: “Noise of the clicks” under Statistics "
+            "estimates it."
+        )
     if item.view is not None:
         sentences.append("Without this view the others agree.")
     if item.gap_m is not None and item.is_motion and not _one_clock(group):
         sentences.append(_another_instant(item.gap_m, item.moved_m))
-    sentences.append(
-        "If its ball is drawn on the ball, leave the view out."
-        if item.view is not None
-        else "If each ball is drawn on the ball, a camera is wrong or the instants differ."
-    )
+    if item.view is not None:
+        sentences.append("If its ball is drawn on the ball, leave the view out.")
+    elif item.is_known:
+        sentences.append(
+            "If each ball is drawn on the ball, a camera is wrong or the instants differ."
+        )
     return Finding(
         "views_contradict",
         " ".join(sentences),
@@ -266,15 +332,33 @@ def _low_parallax(ball: Ball3D, policy: Policy) -> Iterator[Finding]:
         )
 
 
-def _high_uncertainty(ball: Ball3D) -> Iterator[Finding]:
-    if ball.sigma_m > HIGH_SIGMA_M:
-        yield Finding(
-            "high_uncertainty",
-            f"The position of the ball is uncertain, about ± {ball.sigma_m:.2f} m, although the "
-            "views agree. Decide whether that is good enough.",
-            number=ball.sigma_m,
-            threshold=HIGH_SIGMA_M,
+def _high_uncertainty(ball: Ball3D, contradicted: Contradiction | None) -> Iterator[Finding]:
+    """Above ``UNUSABLE_SIGMA_M`` with that as the threshold: nobody can use such a ball."""
+    if not ball.sigma_m > HIGH_SIGMA_M:
+        return
+    why = "although the views agree" if contradicted is None else "as the views contradict it"
+    limit, sentence = (
+        HIGH_SIGMA_M,
+        f"The position of the ball is uncertain, about ± {ball.sigma_m:.2f} m, {why}. Decide "
+        "whether that is good enough.",
+    )
+    if ball.sigma_m > UNUSABLE_SIGMA_M:
+        limit, sentence = (
+            UNUSABLE_SIGMA_M,
+            f"The ball is known to ± {ball.sigma_m:.1f} m only, {why}; its rays meet at "
+            f"{ball.parallax_degrees:.1f}°. Beyond ± {UNUSABLE_SIGMA_M:.0f} m a ball is of no use.",
         )
+    yield Finding("high_uncertainty", sentence, number=ball.sigma_m, threshold=limit)
+
+
+def _known_to(ball: Ball3D) -> str:
+    """Words for a place of which nothing is known."""
+    if not ball.sigma_m > UNUSABLE_SIGMA_M:
+        return ""
+    return (
+        f", known to ± {ball.sigma_m:.1f} m only, with rays that meet at "
+        f"{ball.parallax_degrees:.1f}°"
+    )
 
 
 def _implausible_ball(ball: Ball3D, pitch: Pitch, policy: Policy) -> Iterator[Finding]:
@@ -283,7 +367,7 @@ def _implausible_ball(ball: Ball3D, pitch: Pitch, policy: Policy) -> Iterator[Fi
     if wrong:
         number, threshold, _ = wrong[0]
         sentence = (
-            f"The 3D ball {' and '.join(words for _, _, words in wrong)}. Check the sides of the "
-            "views and the ball in each."
+            f"The 3D ball {' and '.join(words for _, _, words in wrong)}{_known_to(ball)}. Check the "
+            "sides of the views and the ball in each."
         )
         yield Finding("implausible_ball", sentence, number=number, threshold=threshold)

@@ -11,7 +11,7 @@ from math import floor, isnan, log10
 
 from app.soccer.policy import Policy
 from app.soccer.solution import GATES, Ball3D, Calibration, ChiSquare, Gate, Pair, margin_of
-from app.solving.contradiction import LOW_P_VALUE
+from app.solving.chi_square import LOW_P_VALUE
 from app.solving.judgement import MIN_VIEWS, Judgement
 
 UNLIKELY_P_VALUE = 0.05
@@ -147,7 +147,15 @@ def _worst(
     """A gate of views, by the smallest number of those that it judges."""
     blamed = name in group.failed
     fallen = [item for item in measured if item[1].failed == name]
-    shown = fallen if blamed else [item for item in measured if item[1].failed is None] or measured
+    left = [item for item in measured if item[1].failed != name]
+    if not blamed and not left:
+        # The views that are left have nothing to measure: no tick stands beside those that fell.
+        value, view = min(measured, key=lambda item: item[0])
+        sentence = f"{view.letter}: {_beside(value, threshold)}, not used"
+        if len(measured) < len(group.views):
+            sentence += "; the rest not measured"
+        return Gate(name, True, None, threshold, None, sentence)
+    shown = fallen if blamed else [item for item in left if item[1].failed is None] or left
     value, view = min(shown, key=lambda item: item[0])
     sentence = f"{view.letter}: {_beside(value, threshold)}"
     if value == threshold and view.failed == name:
@@ -248,10 +256,13 @@ def reprojection(
         return _unjudged("reprojection", None)
     (_, error, tau), best = min(judged, key=lambda item: (not item[1].valid, item[0][0]))
     sentence = f"{_name(best, letters)} {error:.1f} px"
+    margin = margin_of(error, tau, at_most=True)
+    if not best.valid and error <= tau:
+        # Its pixels are near enough, and there is no ball: no share of tau says how far it is off.
+        sentence, margin = f"the rays of {_name(best, letters)} meet behind a camera", None
     left_out = [pair for _, pair in judged if not pair.valid]
     if best.valid and left_out:
         sentence += f"; {', '.join(_name(pair, letters) for pair in left_out)} left out"
-    margin = margin_of(error, tau, at_most=True)
     return Gate("reprojection", best.valid, error, tau, margin, sentence)
 
 

@@ -9,6 +9,7 @@ camera calibration for sports", 2024.
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -97,6 +98,29 @@ def outcomes(
         elif annotated:
             result[marking] = FALSE_NEGATIVE
     return result
+
+
+def not_missing(
+    measured: dict[str, ProjectedMarking],
+    lines: Lines,
+    not_visible: Collection[str],
+    shortest_px: float,
+) -> frozenset[str]:
+    """Visible markings that nobody annotated and that are not counted as missing.
+
+    The public evaluator counts every one: this is for curation alone.
+
+    Args:
+        measured: The visible markings.
+        lines: Annotated points by marking.
+        not_visible: Markings that a person says the picture does not show.
+        shortest_px: A shorter stub is none that people draw; 0: each is.
+    """
+    return frozenset(
+        marking
+        for marking, seen in measured.items()
+        if not lines.get(marking) and (marking in not_visible or seen.length < shortest_px)
+    )
 
 
 def jaccard(found: dict[str, str]) -> float:

@@ -13,7 +13,7 @@ from app.geometry.triangulation import parallax_angle
 from app.soccer.policy import Policy
 from app.soccer.solution import GATES
 from app.solving.ball_covariance import MeanCovariance, is_certain, is_within
-from app.solving.chi_square import p_values
+from app.solving.chi_square import p_values, residuals_of
 from app.solving.facts import Facts
 
 MIN_VIEWS = 2
@@ -132,8 +132,12 @@ def judge_standing(
     def certain(limit_m: float) -> BoolArray:
         asked = np.flatnonzero(~before())
         covariances = uncertainty.covariances(valid, asked, point[asked], policy)
+        # Contradictions only widen: whoever is uncertain without them is so with them.
+        within = is_within(covariances, limit_m)
+        asked, covariances = asked[within], covariances[within]
         found = np.zeros(facts.groups, bool)
-        found[asked] = is_within(covariances, limit_m)
+        widened = widened_covariances(facts, valid, asked, covariances, point, policy)
+        found[asked] = is_within(widened, limit_m)
         return found
 
     def p_value() -> FloatArray:
@@ -198,6 +202,32 @@ def _compare(
         failed[_SIGMA] = ~certain(policy.max_sigma_m)
     if policy.min_p_value is not None:
         failed[_CHI_SQUARE] = ~(p_value() >= policy.min_p_value)
+
+
+def widened_covariances(
+    facts: Facts,
+    valid: BoolArray,
+    groups: IntArray,
+    covariances: FloatArray,
+    point: FloatArray,
+    policy: Policy,
+) -> FloatArray:
+    """Covariances of balls, wider where the views of a ball contradict each other, (N, 3, 3).
+
+    Args:
+        facts: The groups.
+        valid: Pairs that count, shape (P,).
+        groups: Rows of the groups, shape (N,).
+        covariances: Of their balls by the noise alone, square metres, shape (N, 3, 3).
+        point: Of every group, pitch frame, metres, shape (G, 3).
+        policy: How noisy a click is.
+    """
+    asked = np.zeros(facts.groups, bool)
+    asked[groups] = True
+    used = views_of(facts, valid) & asked[facts.view_group]
+    widening = residuals_of(facts, used, point, policy).widening[groups]
+    widened: FloatArray = covariances * (widening**2)[:, None, None]
+    return widened
 
 
 def failures(facts: Facts, jac: FloatArray, policy: Policy) -> tuple[IntArray, IntArray]:

@@ -9,8 +9,9 @@ import numpy as np
 
 from app.geometry.arrays import row_by_row
 from app.soccer.policy import Policy
-from app.soccer.solution import GATES, Ball3D, BestBall, Pair
+from app.soccer.solution import GATES, Ball3D, BestBall, ChiSquare, Pair
 from app.solving.ball_covariance import MeanCovariance, longest_sigma
+from app.solving.chi_square import widening
 from app.solving.facts import Facts
 from app.solving.judgement import PASSES, Judgement
 from app.solving.triangulate import Meeting
@@ -39,8 +40,11 @@ def mean_ball(
     judgement: Judgement,
     uncertainty: MeanCovariance,
     policy: Policy,
+    chi_square: ChiSquare | None = None,
 ) -> Ball3D | None:
     """The mean of the valid pairs with its uncertainty; None without a valid pair.
+
+    Where the views contradict each other its sigma is multiplied by ``widening_of`` them.
 
     Args:
         keys: Of the views.
@@ -48,10 +52,12 @@ def mean_ball(
         judgement: What the policy makes of them.
         uncertainty: Of the same facts.
         policy: How noisy a click is.
+        chi_square: The test of the views, or None.
     """
     if not judgement.valid.any():
         return None
     covariance = uncertainty.covariances(judgement.valid, np.array([0]), judgement.point, policy)
+    covariance = covariance * widening(chi_square) ** 2
     x, y, z = judgement.point[0].tolist()
     return Ball3D(
         point=(x, y, z),

@@ -6,6 +6,9 @@ from app.soccer.frames import height_above_grass
 from app.soccer.pitch import Pitch
 from app.soccer.policy import Policy
 
+LOW_BALL_M = 2.0
+"""Up to this height beside the pitch a ball counts as one that lies there."""
+
 
 def is_plausible(point: tuple[float, float, float], pitch: Pitch, policy: Policy) -> bool:
     """Whether a ball can be there: on or near the pitch, not below it, not sky-high.
@@ -21,10 +24,18 @@ def is_plausible(point: tuple[float, float, float], pitch: Pitch, policy: Policy
 def implausible(
     point: tuple[float, float, float], pitch: Pitch, policy: Policy
 ) -> list[tuple[float, float, str]]:
-    """What is wrong with a place: number and limit, metres, and the words for it."""
+    """What is wrong with a place: number and limit, metres, and the words for it.
+
+    Beside the pitch balls lie and roll, and high balls fly over it: the higher a ball, the less far
+    outside may it be, down to nothing at the largest height.
+    """
     x, y, z = point
     height = height_above_grass(z)
     outside = max(abs(x) - pitch.length / 2, abs(y) - pitch.width / 2)
+    reach = policy.outside_pitch_m * (1 - height / policy.max_height_m)
+    if LOW_BALL_M < height <= policy.max_height_m and reach < outside <= policy.outside_pitch_m:
+        words = f"is {outside:.0f} m outside the pitch at a height of {height:.0f} m"
+        return [(outside, reach, words)]
     return [
         (number, limit, words)
         for number, limit, words in (

@@ -71,10 +71,10 @@ def solve_with_facts(
     failed = _failed(group, judgement)
     left = {name for name, gate in zip(names, failed, strict=True) if gate is None}
     usable = [sight for sight in sights if sight.view in left]
-    mean = mean_ball(names, facts, judgement, uncertainty, policy)
+    chi_square = chi_square_of(names, facts, judgement, policy)
+    mean = mean_ball(names, facts, judgement, uncertainty, policy, chi_square)
     best = best_ball(pairs, usable, policy)
     ball = leaving_ball(mean, best, policy)
-    chi_square = chi_square_of(names, facts, judgement, policy)
     contradicted = contradiction(chi_square, names, facts, judgement, sights, policy)
     views = tuple(
         _with_ball(view, ViewSolution(view.key, known[key], key, False, gate), ball, policy)

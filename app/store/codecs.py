@@ -43,7 +43,12 @@ def lines_from_json(value: Mapping[str, Any]) -> Lines:
     Raises:
         ValueError: It is not what that makes.
     """
-    return dict(sorted(msgspec.convert(value, _LINES).items()))
+    return {name: at for name, at in sorted(msgspec.convert(value, _LINES).items()) if at}
+
+
+def not_visible_from_json(value: Mapping[str, Any]) -> tuple[str, ...]:
+    """Markings without points: somebody said that the picture does not show them."""
+    return tuple(sorted(name for name, points in value.items() if not points))
 
 
 def ball_to_json(ball: BallAnnotation) -> Json:
@@ -165,7 +170,7 @@ def station_to_json(station: Station) -> Json:
         "key": station.key,
         "size": [station.size.width, station.size.height],
         "shared": station.shared,
-        "lines": lines_to_json(station.lines),
+        "lines": lines_to_json(station.said_lines),
         "given": None if station.given is None else camera_to_json(station.given),
         "calibration": station.calibration,
         "flipped": station.flipped,
@@ -195,6 +200,7 @@ def station_from_json(value: Mapping[str, Any]) -> Station:
         given_covariance=covariance_from_json(covariance),
         picture=picture_from_json(value.get("picture")),
         proposed=tuple(value.get("proposed", ())),
+        not_visible=not_visible_from_json(value["lines"]),
     )
 
 

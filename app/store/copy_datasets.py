@@ -43,6 +43,11 @@ def find_copies(session: Session, copies: CopiesOf) -> Any | None:
     return session.execute(_COPIES.where(mine, column.person == copies.person)).one_or_none()
 
 
+def copy_dataset_ids(session: Session) -> frozenset[int]:
+    """Ids of the datasets that hold somebody's copies."""
+    return frozenset(session.scalars(select(CopyDatasetModel.dataset_id)))
+
+
 def is_copy(session: Session, dataset_id: int) -> bool:
     """Whether a dataset holds somebody's copies."""
     mine = CopyDatasetModel.dataset_id == dataset_id

@@ -9,6 +9,7 @@ from __future__ import annotations
 import threading
 from collections import OrderedDict
 from collections.abc import Callable
+from concurrent.futures import Future
 from dataclasses import dataclass, replace
 from functools import partial
 from math import inf
@@ -89,6 +90,7 @@ class Frames:
         self._fetchers = ChildPool(FETCHING, FETCHERS, WAITING, "pictures", FIGURES["fetchers"])
         self._indexers = ChildPool(INDEXING, INDEXERS, WAITING, "videos", FIGURES["indexers"])
         self._refused: OrderedDict[str, tuple[ReviewError, float]] = OrderedDict()
+        self._indexing: dict[str, PoolTask] = {}
         self._lock = threading.Lock()
 
     def warm(self) -> None:
@@ -202,9 +204,18 @@ class Frames:
         def explain(error: ChildEnded) -> ReviewError:
             return refused_picture(frame_name(replace(media, frame=None)), error)
 
-        return self._indexers.submit(
-            index_video, media, self._settings, explain=explain, bounded=bounded
-        )
+        with self._lock:
+            running = self._indexing.get(media.path)
+            if running is None:
+                running = self._indexers.submit(
+                    index_video, media, self._settings, explain=explain, bounded=bounded
+                )
+                self._indexing[media.path] = running
+        running.future.add_done_callback(lambda _: self._indexing.pop(media.path, None))
+        # Who waits may leave; the index is made all the same, for it takes long and is needed again.
+        waiting = PoolTask(explain)
+        running.future.add_done_callback(partial(_pass_on, waiting.future))
+        return waiting
 
     def _submit(self, media: Media, width: int | None, flipped: bool, *, bounded: bool) -> PoolTask:
         def explain(error: ChildEnded) -> ReviewError:
@@ -237,6 +248,18 @@ class Frames:
             self._refused[frame_stamp(media)] = (refusal, monotonic() + seconds)
             while len(self._refused) > REMEMBERED:
                 self._refused.popitem(last=False)
+
+
+def _pass_on(waiting: Future[Any], done: Future[Any]) -> None:
+    """Give what became of a task to one who waits for it."""
+    if done.cancelled():
+        waiting.cancel()
+    elif waiting.set_running_or_notify_cancel():
+        error = done.exception()
+        if error is None:
+            waiting.set_result(done.result())
+        else:
+            waiting.set_exception(error)
 
 
 def refused_picture(name: str, error: ChildEnded) -> ReviewError:

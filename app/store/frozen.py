@@ -10,11 +10,14 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, cast
 
+import msgspec
 from sqlalchemy import Table, insert, select
 from zlib_ng import zlib_ng
 
 from app.canonical import canonical, digest_of
+from app.soccer.frames import ImageSize
 from app.soccer.group import Group, Station, View
+from app.soccer.media import Media
 from app.soccer.paint_evidence import reading_from_json
 from app.soccer.pitch import Pitch
 from app.store.codecs import (
@@ -27,7 +30,7 @@ from app.store.codecs import (
 )
 from app.store.session import Session
 from app.store.solutions import read_calibration_bodies
-from app.store.stored_json import Json, inflate, parse
+from app.store.stored_json import Json, inflate, look_through, parse
 from app.store.tables.versions import FrozenModel
 
 SAID, STATION, SOLUTION, CALIBRATION = "said:", "station:", "solution:", "calibration:"
@@ -70,6 +73,34 @@ def _station(station: Station) -> Json:
     return {name: value for name, value in station_to_json(station).items() if name != "flipped"}
 
 
+class OutlineStation(msgspec.Struct):
+    """What names the files of a frozen station."""
+
+    key: str
+    size: tuple[int, int]
+    shared: bool
+
+
+class OutlineView(msgspec.Struct):
+    """The same of a view; a shared station stands as its key."""
+
+    key: str
+    station: str | OutlineStation
+
+
+class FrozenOutline(msgspec.Struct):
+    """The same of a group."""
+
+    key: str
+    match: str
+    split: str
+    views: list[OutlineView]
+
+
+for _kind in (FrozenOutline, OutlineStation):
+    look_through(_kind)
+
+
 def named_texts(said: Json) -> set[str]:
     """Keys of the shared stations and readings of paint that a frozen group names."""
     stations = {view["station"] for view in said["views"] if isinstance(view["station"], str)}
@@ -97,6 +128,23 @@ def thaw_group(said: Json, texts: Mapping[str, Json], frames: Frames | None = No
         positions=positions_from_json(said.get("positions")),
         paint={view: reading_from_json(texts[PAINT + digest]) for view, digest in paint},
     )
+
+
+def thaw_outline(
+    said: FrozenOutline, stations: Mapping[str, OutlineStation], frames: Frames | None = None
+) -> Group:
+    """What names the files of a frozen group: no lines, no cameras, no balls, no paint."""
+    views = []
+    for value in said.views:
+        named, known = value.station, (frames or {}).get(value.key, {})
+        found = stations[named] if isinstance(named, str) else named
+        flipped = known.get("flipped", False)
+        station = Station(found.key, ImageSize(*found.size), shared=found.shared, flipped=flipped)
+        media = None
+        if "path" in known:
+            media = Media(known["path"], known["member"], known["frame"])
+        views.append(View(value.key, station, media=media))
+    return Group(said.key, tuple(views), said.match, split=said.split)
 
 
 def _thaw_view(

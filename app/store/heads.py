@@ -9,17 +9,26 @@ from sqlalchemy import bindparam, func, select
 
 from app.store.session import Session
 from app.store.solutions import is_current
+from app.store.tables.dismissals import DismissalModel
 from app.store.tables.groups import DatasetModel, GroupModel, StationModel, ViewModel
 from app.store.tables.solutions import SolutionModel
 from app.store.tables.verdicts import VerdictModel
 
 _GROUP, _DATASET, _VERDICT = GroupModel.__table__, DatasetModel.__table__, VerdictModel.__table__
+_DISMISSAL = DismissalModel.__table__
 _LAST = (
     select(func.coalesce(func.max(_VERDICT.c.id), 0))
     .where(_VERDICT.c.group_id == _GROUP.c.id)
     .correlate(_GROUP)
     .scalar_subquery()
     .label("last")
+)
+_DISMISSED = (
+    select(func.coalesce(func.max(_DISMISSAL.c.id), 0))
+    .where(_DISMISSAL.c.group_id == _GROUP.c.id)
+    .correlate(_GROUP)
+    .scalar_subquery()
+    .label("last_dismissal")
 )
 _STATIONS = (
     select(func.coalesce(func.sum(StationModel.revision), 0))
@@ -30,7 +39,7 @@ _STATIONS = (
     .label("station_revisions")
 )
 _HEAD = (
-    select(_GROUP.c.inputs_hash, _GROUP.c.revision, _DATASET.c.policy_hash, _LAST)
+    select(_GROUP.c.inputs_hash, _GROUP.c.revision, _DATASET.c.policy_hash, _LAST, _DISMISSED)
     .join_from(_GROUP, _DATASET, _DATASET.c.id == _GROUP.c.dataset_id)
     .where(_GROUP.c.id == bindparam("group"))
 )
@@ -43,6 +52,7 @@ _HEADS = (
         _DATASET.c.policy_hash,
         SolutionModel.__table__.c.summary,
         _LAST,
+        _DISMISSED,
         _STATIONS,
     )
     .join_from(_GROUP, _DATASET, _DATASET.c.id == _GROUP.c.dataset_id)
@@ -52,7 +62,8 @@ _HEADS = (
 
 
 def find_head(session: Session, group_id: int) -> Any | None:
-    """Row (inputs_hash, revision, policy_hash, last) of a group; ``last`` is its newest verdict."""
+    """Row (inputs_hash, revision, policy_hash, last, last_dismissal) of a group; ``last`` is its
+    newest verdict."""
     return session.execute(_HEAD, {"group": group_id}).one_or_none()
 
 

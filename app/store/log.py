@@ -78,7 +78,7 @@ def append(session: Session, entries: Sequence[Entry]) -> list[int]:
 
 _LOG = cast(Table, LogModel.__table__)
 _LAST = select(_LOG.c.id, _LOG.c.hash).order_by(_LOG.c.id.desc()).limit(1)
-_CHANGES = LogModel.kind.not_in(("verdict", "comment"))
+_CHANGES = LogModel.kind.not_in(("verdict", "comment", "dismissal"))
 """Entries that change what a group is."""
 _STEPS = (
     select(_LOG.c.group_id, _LOG.c.id, _LOG.c.kind)

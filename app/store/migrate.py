@@ -51,6 +51,7 @@ KNOWN_REVISIONS = (
     "0031",
     "0032",
     "0033",
+    "0034",
 )
 """Every revision that this version can migrate, oldest first."""
 SCHEMA_REVISION = KNOWN_REVISIONS[-1]

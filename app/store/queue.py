@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import fields
 from typing import Any, cast
 
@@ -14,18 +14,23 @@ from sqlalchemy import (
     bindparam,
     func,
     literal,
+    null,
     or_,
     select,
     union_all,
     update,
 )
+from sqlalchemy import cast as cast_to
 
+from app.soccer.finding import Finding
 from app.store.aliases import shown_actor
 from app.store.dialect.statements import insert_or_replace
+from app.store.dismissals import SHOWN, GroupDismissals, dismissed_kinds, standing
 from app.store.groups import StoredGroup
 from app.store.session import Session
-from app.store.solutions import fitting_solution, read_summary
+from app.store.solutions import SolutionKey, fitting_solution, read_solutions, read_summary
 from app.store.summary import SolutionSummary
+from app.store.tables.dismissals import DismissalModel
 from app.store.tables.groups import (
     DatasetModel,
     GroupModel,
@@ -39,26 +44,38 @@ from app.store.tables.verdicts import VerdictModel
 from app.store.verdicts import StoredVerdict
 
 _BATCH = 1000
+_DISMISSED = 2
+"""Where rows of ``_NOTICED`` are dismissals."""
 _QUEUE = cast(Table, QueueModel.__table__)
 _REPLACE = insert_or_replace(_QUEUE)
 _ROW = update(_QUEUE).where(_QUEUE.c.group_id == bindparam("row"))
 _NOTICE = ImportFindingModel.__table__
 _VIEW = ViewModel.__table__
 _IDS: BindParameter[Any] = bindparam("ids", expanding=True)
+_CHECKED = DismissalModel.__table__
+_UNKNOWN = [cast_to(null(), column.type).label(column.name) for column in SHOWN]
 _NOTICED = union_all(
     select(
         _NOTICE.c.group_id.label("group"),
         _NOTICE.c.kind,
         _NOTICE.c.sentence,
         _NOTICE.c.view,
-        literal(0).label("shared"),
+        literal(0).label("source"),
         _NOTICE.c.id,
+        *_UNKNOWN,
     ).where(_NOTICE.c.group_id.in_(_IDS)),
-    select(_VIEW.c.group_id, _NOTICE.c.kind, _NOTICE.c.sentence, _VIEW.c.key, 1, _NOTICE.c.id)
+    select(
+        *(_VIEW.c.group_id, _NOTICE.c.kind, _NOTICE.c.sentence, _VIEW.c.key, literal(1)),
+        *(_NOTICE.c.id, *_UNKNOWN),
+    )
     .join_from(_VIEW, _NOTICE, _NOTICE.c.station_id == _VIEW.c.station_id)
     .where(_VIEW.c.group_id.in_(_IDS)),
-).order_by("shared", "id")
-"""A group's own come before those of its static cameras."""
+    select(
+        *(_CHECKED.c.group_id, _CHECKED.c.kind, _CHECKED.c.sentence, _CHECKED.c.view, literal(2)),
+        *(_CHECKED.c.id, *SHOWN),
+    ).where(_CHECKED.c.group_id.in_(_IDS)),
+).order_by("source", "id")
+"""A group's own come before those of its static cameras; then what people have dismissed."""
 _NUMBERS = [
     item.name for item in fields(SolutionSummary) if item.name not in ("passes", "findings")
 ]
@@ -99,6 +116,8 @@ def update_row(
     summary: SolutionSummary,
 ) -> None:
     """Bring a group's row in step whose edit and solution are at hand: nothing is read.
+
+    Not of a group in which findings were dismissed: ``refresh_queue`` knows these.
 
     Args:
         session: A write session.
@@ -151,15 +170,47 @@ def _refresh(session: Session, ids: Sequence[int]) -> None:
 def _rows(session: Session, ids: Sequence[int]) -> list[dict[str, Any]]:
     """Rows of groups as they follow from everything else."""
     views, verdicts = _views(session, ids), _verdicts(session, ids)
-    findings, edited = import_findings(session, ids), edited_groups(session, ids)
+    (findings, dismissals), edited = read_noticed(session, ids), edited_groups(session, ids)
+    checked = _checked(session, dismissals, findings)
     rows = []
     for head, summary in _heads(session, ids):
         passes = None if summary is None else summary.passes
         judged = _judged(head, verdicts.get(head.id), edited, passes)
         row = {**_said(head, views[head.id]), **judged}
         row.update(_computed(summary, [item.kind for item in findings[head.id]]))
-        rows.append(row)
+        rows.append(row | checked.get(head.id, {}))
     return rows
+
+
+def _checked(
+    session: Session,
+    dismissals: Mapping[int, GroupDismissals],
+    noticed: Mapping[int, Sequence[Any]],
+) -> dict[int, dict[str, Any]]:
+    """Which kinds of findings are open and which dismissed, of the few groups in which people have
+    dismissed any: their solutions are decoded."""
+    if not dismissals:
+        return {}
+    keys = session.execute(
+        select(
+            GroupModel.id,
+            GroupModel.inputs_hash,
+            DatasetModel.policy_hash,
+            SolutionModel.solver_version,
+        )
+        .join(DatasetModel, DatasetModel.id == GroupModel.dataset_id)
+        .join(SolutionModel, SolutionModel.id == fitting_solution())
+        .where(GroupModel.id.in_(list(dismissals)))
+    )
+    solutions = read_solutions(session, [SolutionKey(*key) for key in keys], markings=False)
+    checked = {}
+    for group, said in dismissals.items():
+        solved = solutions.get(group)
+        own = [Finding(row.kind, row.sentence, view=row.view) for row in noticed[group]]
+        found = [*(() if solved is None else solved.findings), *own]
+        opened, closed = dismissed_kinds(found, said)
+        checked[group] = {"findings": _list(opened), "dismissed": _list(closed)}
+    return checked
 
 
 def _heads(session: Session, ids: Sequence[int]) -> list[tuple[Any, SolutionSummary | None]]:
@@ -203,16 +254,26 @@ def _verdicts(session: Session, ids: Sequence[int]) -> dict[int, Any]:
     return {row.group_id: row for row in rows}
 
 
-def import_findings(session: Session, ids: Sequence[int]) -> dict[int, list[Any]]:
-    """What imports noticed about groups and about the shared stations of their views.
+def read_noticed(
+    session: Session, ids: Sequence[int]
+) -> tuple[dict[int, list[Any]], dict[int, GroupDismissals]]:
+    """What imports noticed about groups and about the shared stations of their views, and which
+    findings people have dismissed, in one statement.
 
     Returns:
-        Rows (kind, sentence, view) by group id.
+        Rows (kind, sentence, view), and what was dismissed, by group id.
     """
+    rows = session.execute(_NOTICED, {"ids": list(ids)}).all()
     found: dict[int, list[Any]] = defaultdict(list)
-    for row in session.execute(_NOTICED, {"ids": list(ids)}):
-        found[row.group].append(row)
-    return found
+    for row in rows:
+        if row.source != _DISMISSED:
+            found[row.group].append(row)
+    return found, standing(row for row in rows if row.source == _DISMISSED)
+
+
+def import_findings(session: Session, ids: Sequence[int]) -> dict[int, list[Any]]:
+    """The first part of ``read_noticed``."""
+    return read_noticed(session, ids)[0]
 
 
 def _said(head: Any, views: Sequence[Any]) -> dict[str, Any]:
@@ -276,7 +337,7 @@ def _judged(
 
 def _computed(summary: SolutionSummary | None, noticed: Sequence[str]) -> dict[str, Any]:
     if summary is None:
-        nothing: dict[str, Any] = dict.fromkeys(_NUMBERS)
+        nothing: dict[str, Any] = {**dict.fromkeys(_NUMBERS), "dismissed": ""}
         return {**nothing, "solved": False, "passes": None, "findings": _list(noticed)}
     values = {name: getattr(summary, name) for name in _NUMBERS}
     return {
@@ -284,6 +345,7 @@ def _computed(summary: SolutionSummary | None, noticed: Sequence[str]) -> dict[s
         "passes": summary.passes,
         "solved": True,
         "findings": _list([*summary.findings, *noticed]),
+        "dismissed": "",
     }
 
 

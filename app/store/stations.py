@@ -59,6 +59,7 @@ def stored_station(row: Any) -> StoredStation:
         given_covariance=None if row.given is None else _covariance(row.given),
         picture=None if row.picture is None else _picture(row.picture),
         proposed=() if row.proposed is None else _proposed(row.proposed),
+        not_visible=_not_visible(row.lines),
     )
     return StoredStation(
         row.id, row.dataset_id, row.revision, station, row.digest, row.source_digest
@@ -100,6 +101,12 @@ def station_pitches(session: Session, dataset_id: int) -> list[tuple[int, Pitch]
 def _lines(text: str) -> Lines:
     with as_written():
         return codecs.lines_from_json(parse(text))
+
+
+@lru_cache(maxsize=1024)
+def _not_visible(text: str) -> tuple[str, ...]:
+    with as_written():
+        return codecs.not_visible_from_json(parse(text))
 
 
 @lru_cache(maxsize=1024)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -110,8 +110,8 @@ class NamedView:
         return Media(self.media_path, self.media_member, self.media_frame)
 
 
-def named_views(session: Session, dataset_id: int) -> Iterator[NamedView]:
-    """The views of a dataset in its order, streamed."""
+def named_views(session: Session, group_ids: Sequence[int]) -> list[NamedView]:
+    """The views of a few hundred groups in the order of their dataset."""
     view, group, station = ViewModel, GroupModel, StationModel
     statement = (
         select(
@@ -121,11 +121,11 @@ def named_views(session: Session, dataset_id: int) -> Iterator[NamedView]:
         )
         .join(group, group.id == view.group_id)
         .join(station, station.id == view.station_id)
-        .where(group.dataset_id == dataset_id)
+        .where(group.id.in_(group_ids))
         .order_by(group.number, view.position)
     )  # fmt: skip
     rows: Iterable[Any] = session.execute(statement)
-    return (NamedView(*row) for row in rows)
+    return [NamedView(*row) for row in rows]
 
 
 def frame_files(session: Session, dataset_id: int) -> list[str]:

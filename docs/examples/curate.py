@@ -19,10 +19,13 @@ with Client(address) as client:
         sure = row["sigma_m"] is not None and row["sigma_m"] < SURE_M and row["pictures"] > 0
         state = "accepted" if sure else "deferred"
         group = client.get(f"groups/{row['id']}")
+        if group["verdict"]["state"] != "unreviewed":
+            counts["changed meanwhile"] += 1  # judged since the list was read: that verdict stays
+            continue
         try:
             client.put(f"groups/{row['id']}/verdict", {"state": state}, if_match=group)
         except StaleError:
-            state = "changed meanwhile"  # somebody else is at it: theirs counts
+            state = "changed meanwhile"  # edited or judged since it was read
         counts[state] += 1
     print(", ".join(f"{count} {state}" for state, count in counts.items()))
     plan = client.post(f"datasets/{dataset}/versions", {"name": name}, params={"dry_run": True})

@@ -16,8 +16,14 @@ import { queryText, request } from './client.js';
  * @property {Counts | null} counts
  * @property {Counts | null} left_out
  * @property {string[] | null} missing_images
+ * @property {string | null} incomplete what the files lack before they can be used
  * @property {string | null} error
  */
+
+/** In which formats a dataset, or a version of it, can be exported. @param {number} dataset @param {{version?: number}} options @param {AbortSignal} [signal] @returns {Promise<{items: {format: string, possible: boolean, reason: string | null, hint: string | null}[]}>} */
+export function getFormats(dataset, options, signal) {
+	return request(`/datasets/${dataset}/export-formats${queryText(options)}`, { signal });
+}
 
 /** @param {{dataset?: string, limit?: number, cursor?: string | null}} options @param {AbortSignal} [signal] @returns {Promise<{items: ExportRow[], next: string | null}>} */
 export function getExports(options, signal) {

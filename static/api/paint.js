@@ -26,6 +26,9 @@ import { idempotencyKey, request } from './client.js';
  * @property {LinesJson} lines
  * @property {number | null} supported
  * @property {number | null} explained
+ * @property {number | null} runner_up
+ * @property {number | null} error_px
+ * @property {number} points
  */
 
 /**

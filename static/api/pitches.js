@@ -30,6 +30,11 @@ export async function getPitches(dataset, signal) {
 	return json;
 }
 
+/** Estimate the pitches that are not estimated yet. @param {number} dataset @returns {Promise<JobJson>} */
+export function estimatePitches(dataset) {
+	return request(`/datasets/${dataset}/pitches`, { method: 'POST', key: idempotencyKey() });
+}
+
 /** Give a match another pitch. @param {number} dataset @param {string} match @param {PitchSizeJson} size @param {string} etag @returns {Promise<JobJson>} */
 export function setPitch(dataset, match, { length, width }, etag) {
 	return request(`/datasets/${dataset}/pitches`, { method: 'PATCH', body: { match, length, width }, etag, key: idempotencyKey() });

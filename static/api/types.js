@@ -65,6 +65,7 @@
  * @property {StationJson} station
  * @property {LinesJson} lines
  * @property {string[]} [proposed] markings that a person accepted as they were proposed
+ * @property {string[]} [not_visible] markings that a person says the picture does not show
  * @property {BallJson[]} balls
  * @property {string | null} image
  * @property {string | null} [neighbours] where the frames before and after are listed
@@ -176,7 +177,7 @@
  */
 
 /**
- * @typedef {{edit: 'set_lines', view: string, lines: {[marking: string]: PairJson[] | null}, source?: {[marking: string]: 'proposed'}}
+ * @typedef {{edit: 'set_lines', view: string, lines: {[marking: string]: PairJson[] | null}, source?: {[marking: string]: 'proposed' | 'not_visible'}}
  *   | {edit: 'set_balls', view: string, balls: BallJson[]}
  *   | {edit: 'set_picture', view: string, picture: PictureJson | null}
  *   | {edit: 'include_view', view: string, included: boolean}} EditJson   as the history writes edits
@@ -204,6 +205,8 @@
  * @property {FixJson | null} fix
  * @property {OfferJson[]} offers edits that mend it
  * @property {GuideJson | null} guide where no edit does
+ * @property {boolean} unusable_ball whether nobody can use the ball: accepting needs a note
+ * @property {{by: string, at: string, note: string | null} | null} [dismissed] who has checked it and found it fine
  */
 
 /**
@@ -340,6 +343,7 @@
  * @property {string} status
  * @property {string | null} content
  * @property {Counts | null} counts
+ * @property {string | null} [incomplete] what the files lack before they can be used
  * @property {string | null} [error]
  */
 

@@ -21,6 +21,7 @@ const EVERY = 3;
 export function viewPaint(picture, paint) {
 	const whiskers = picture.markings.flatMap(({ marking, polyline }) => whiskersOf(marking, polyline, paint, picture));
 	return {
+		found: paint,
 		draw: (context, scene) => {
 			for (const { point, nearest, distance } of whiskers) {
 				drawWhisker(context, scene, point, nearest, distance, gradeOfResidual(distance, picture.gamma));

@@ -25,6 +25,7 @@ import { pinsOf } from '../lib/pins.js';
  * @typedef {object} ViewPaint   its code is loaded with it
  * @property {Draw} draw whiskers from the markings to their paint
  * @property {(marking: string) => ImagePoint[]} places of the paint of a marking
+ * @property {import('../api/paint.js').PaintJson} found what was read, and how the camera agrees with it
  */
 /** @typedef {{item: import('../api/proposals.js').ViewProposalJson, draw: Draw}} ViewProposal   its code is loaded with it */
 /**
@@ -32,7 +33,7 @@ import { pinsOf } from '../lib/pins.js';
  * @property {ViewJson} view
  * @property {ViewSolutionJson | null} solved
  * @property {BallFitJson | null} ball the 3D ball seen in this view
- * @property {number | null} apart when the view agrees with no other: its error in the best pair, px
+ * @property {number | null} apart when the view agrees with no other: its own error in its best pair, px
  * @property {number} gamma pixels
  * @property {number} tau largest error of a ball that two views agree on, pixels
  * @property {MarkingResiduals[]} markings
@@ -100,11 +101,17 @@ export function ballError(key, solution) {
 	return apartOf(key, solution) ?? solution?.views.find(({ view }) => view === key)?.ball?.error_px ?? null;
 }
 
-/** @param {string} key @param {SolutionJson | null} solution @returns {number | null} */
+/**
+ * The error of a view in its best pair, as the table of pairs has it; null where it is in a valid one, or in none.
+ *
+ * @param {string} key @param {SolutionJson | null} solution @returns {number | null}
+ */
 function apartOf(key, solution) {
 	const own = (solution?.pairs ?? []).filter(({ a, b }) => a === key || b === key);
 	if (own.length === 0 || own.some(({ valid }) => valid)) return null;
-	return Math.min(...own.map(({ errors_px }) => Math.max(...errors_px)));
+	const worst = (/** @type {typeof own[0]} */ { errors_px }) => Math.max(...errors_px);
+	const best = own.reduce((a, b) => (worst(b) < worst(a) ? b : a));
+	return best.errors_px[best.a === key ? 0 : 1];
 }
 
 /**

@@ -2,6 +2,7 @@
 /** What to make of a solution: its findings in a few words, and the reason for which a group would be rejected. */
 
 import { capital, words } from '../lib/format.js';
+import { openFindings } from './open_findings.js';
 
 /** @import {FindingJson, GroupDocument, SolutionJson} from '../api/types.js' */
 
@@ -53,17 +54,43 @@ const OF_GATE = /** @type {Record<string, string>} */ ({
  */
 export function suggestedReason(solution) {
 	const failing = solution?.first_failing;
-	if (!solution || !failing) return null;
-	const telling = solution.findings.find(({ kind }) => OF_FINDING[kind]);
+	// A view alone fails for want of another one, whatever is drawn in it.
+	if (!solution || !failing || solution.views.length < 2) return null;
+	const telling = openFindings(solution).find(({ kind }) => OF_FINDING[kind]);
 	return (telling && OF_FINDING[telling.kind]) ?? OF_GATE[failing.gate] ?? null;
 }
 
+/** Findings that say of views that they do not show one ball. */
+const APART = new Set(['view_disagrees', 'views_contradict', 'sides_swapped', 'not_synchronous']);
+
+/** Whether a finding says that views of the ball disagree. @param {FindingJson} finding */
+export function saysApart({ kind }) {
+	return APART.has(kind);
+}
+
 /**
- * Why a group that passes should not be accepted without a second thought; null when nothing speaks against it.
+ * Whether a finding is said first, whatever could be mended beside it: nobody can use the ball, or the group passes though its views disagree.
+ *
+ * @param {FindingJson} finding @param {SolutionJson | null} solution
+ */
+export function isGrave(finding, solution) {
+	return finding.unusable_ball || Boolean(solution?.passes && saysApart(finding));
+}
+
+/** What is wrong, without what to do about it. @param {string} text */
+function firstSentence(text) {
+	const [first] = text.split('. ');
+	return first.charAt(0).toLowerCase() + first.slice(1);
+}
+
+/**
+ * Why a group should not be accepted without a second thought; null when nothing speaks against it.
  *
  * @param {SolutionJson | null} solution @returns {string | null}
  */
 export function doubt(solution) {
-	const swapped = solution?.passes ? solution.findings.find(({ kind }) => kind === 'sides_swapped') : undefined;
+	const unusable = solution?.findings.find(({ unusable_ball: no }) => no);
+	if (unusable) return `the ball cannot be used: ${firstSentence(unusable.sentence)}`;
+	const swapped = solution?.passes ? openFindings(solution).find(({ kind }) => kind === 'sides_swapped') : undefined;
 	return swapped ? `left and right seem to be swapped: ${swapped.sentence}` : null;
 }

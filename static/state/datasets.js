@@ -16,8 +16,12 @@ export const datasets = signal(/** @type {DatasetJson[] | null} */ (null));
 /** Why the list could not be read; null when it could. */
 export const failure = signal(/** @type {ApiError | null} */ (null));
 
-/** The dataset of practice groups, as the server calls it. */
-export const PRACTICE = 'practice';
+const PRACTICE = 'practice';
+
+/** Whether a dataset holds practice groups: everybody's, or (`practice NAME`) those of one person. @param {string} name */
+export function isPractice(name) {
+	return name === PRACTICE || name.startsWith(`${PRACTICE} `);
+}
 
 const remembered = stored('dataset', '');
 
@@ -27,7 +31,7 @@ export const dataset = computed(() => {
 	const named = pageDataset.value || param('dataset');
 	if (named) return all.find((one) => one.name === named) ?? null;
 	// Nobody is sent to the practice who did not ask for it.
-	const first = all.find((one) => one.name !== PRACTICE) ?? all[0];
+	const first = all.find((one) => !isPractice(one.name)) ?? all[0];
 	return all.find((one) => one.name === remembered.value) ?? first ?? null;
 });
 

@@ -5,7 +5,7 @@ import { leftOutText } from './reasons.js';
 
 /** @import {BallJson, EditJson, GroupDocument, LeftOutJson, PictureJson, PointJson, ViewJson} from '../api/types.js' */
 
-/** @typedef {{kind: 'lines', view: string, lines: Record<string, PointJson[] | null>, proposed?: string[]}} LinesEdit   proposed: those whose points are as they were proposed */
+/** @typedef {{kind: 'lines', view: string, lines: Record<string, PointJson[] | null>, proposed?: string[], notVisible?: string[]}} LinesEdit   proposed: those whose points are as they were proposed; notVisible: those without points that the picture does not show */
 /** @typedef {{kind: 'ball', view: string, ball: BallJson | null, prediction?: {id: number, replace: boolean}}} BallEdit   prediction: that this ball is accepted from */
 /** @typedef {{kind: 'include', view: string, included: boolean, reason?: string | null, note?: string | null}} IncludeEdit   reason: why it is left out, one of REASONS */
 /** @typedef {{kind: 'picture', view: string, picture: PictureJson | null}} PictureEdit   what was done to the picture since it was taken */
@@ -35,7 +35,8 @@ function editView(view, edit) {
 		else delete lines[marking];
 	}
 	const proposed = [...(view.proposed ?? []).filter((marking) => !(marking in edit.lines)), ...(edit.proposed ?? [])].sort();
-	return { ...view, lines, proposed };
+	const unseen = [...(view.not_visible ?? []).filter((marking) => !(marking in edit.lines)), ...(edit.notVisible ?? [])].sort();
+	return { ...view, lines, proposed, not_visible: unseen };
 }
 
 /**
@@ -58,7 +59,9 @@ export function requestOf(group, edit) {
 	if (edit.kind === 'ball') {
 		return { path: `/views/${view.id}/ball`, body: edit.ball && ballBody(edit.ball), etag: group.etag };
 	}
-	const body = { lines: edit.lines, ...(edit.proposed?.length ? { proposed: edit.proposed } : {}) };
+	const body = {
+		lines: edit.lines, ...(edit.proposed?.length ? { proposed: edit.proposed } : {}), ...(edit.notVisible?.length ? { not_visible: edit.notVisible } : {}),
+	};
 	// The lines of a static camera belong to its station, which has a state of its own.
 	if (!view.station.shared) return { path: `/views/${view.id}/lines`, body, etag: group.etag };
 	const etag = view.station.etag ?? group.etag;
@@ -130,6 +133,7 @@ export function describe(group, edit) {
 	if (edit.kind === 'picture') return `Picture of ${letter} ${edit.picture ? 'taken as stretched or cropped' : 'taken as it is'}`;
 	const drawn = Object.keys(edit.lines).filter((marking) => edit.lines[marking]);
 	const markings = drawn.length ? drawn : Object.keys(edit.lines);
+	if (edit.notVisible?.length && edit.notVisible.length === markings.length) return `${markings.join(', ')} of ${letter} marked as not visible`;
 	if (edit.proposed?.length === markings.length) return `Lines of ${letter} accepted as proposed`;
 	return `${markings.length > FEW ? `${markings.length} markings` : markings.join(', ')} of ${letter} changed`;
 }
@@ -169,8 +173,9 @@ export function editOf(said) {
 	if (said.edit === 'set_picture') return { kind: 'picture', view, picture: said.picture };
 	if (said.edit === 'set_balls') return { kind: 'ball', view, ball: said.balls[0] ?? null };
 	const lines = Object.entries(said.lines).map(([marking, points]) => [marking, points?.length ? points.map(([x, y]) => ({ x, y })) : null]);
-	const proposed = Object.keys(said.source ?? {});
-	return { kind: 'lines', view, lines: Object.fromEntries(lines), ...(proposed.length ? { proposed } : {}) };
+	const source = said.source ?? {};
+	const [proposed, notVisible] = ['proposed', 'not_visible'].map((wanted) => Object.keys(source).filter((marking) => source[marking] === wanted));
+	return { kind: 'lines', view, lines: Object.fromEntries(lines), ...(proposed.length ? { proposed } : {}), ...(notVisible.length ? { notVisible } : {}) };
 }
 
 /** Every marking of a view under its twin's name. @param {ViewJson} view @returns {LinesEdit} */
@@ -179,5 +184,13 @@ export function swapSides(view) {
 	const lines = Object.fromEntries(Object.keys(view.lines).map((marking) => [marking, null]));
 	for (const [marking, points] of Object.entries(view.lines)) lines[twinMarking(marking)] = points;
 	const proposed = (view.proposed ?? []).map(twinMarking);
-	return { kind: 'lines', view: view.key, lines, ...(proposed.length ? { proposed } : {}) };
+	const hidden = view.not_visible ?? [];
+	const notVisible = hidden.map(twinMarking);
+	for (const marking of [...hidden, ...notVisible]) lines[marking] ??= null;
+	return { kind: 'lines', view: view.key, lines, ...(proposed.length ? { proposed } : {}), ...(notVisible.length ? { notVisible } : {}) };
+}
+
+/** A marking of a view that the picture does not show, or one that it shows after all. @param {ViewJson} view @param {string} marking @param {boolean} hidden @returns {LinesEdit} */
+export function markNotVisible(view, marking, hidden) {
+	return { kind: 'lines', view: view.key, lines: { [marking]: null }, ...(hidden ? { notVisible: [marking] } : {}) };
 }

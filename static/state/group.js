@@ -18,6 +18,7 @@ import { applyEdit, describe, previewBody, requestOf, sameTarget, stationOf, vie
 import { did } from './last_action.js';
 import { announce, complain } from './notice.js';
 import { discard, enqueue, outbox, revise } from './outbox.js';
+import { withDismissals } from './open_findings.js';
 import { refuses } from './rights.js';
 import { hearFrom, isAway, wake } from './sending.js';
 import { resetForGroup } from './workspace.js';
@@ -59,7 +60,8 @@ export const group = computed(() => {
 
 /** The solution that fits `group`: the server's, with the ball computed here while it moves. */
 export const solution = computed(() => {
-	const base = expected.value ?? groupDocument.value?.solution ?? null;
+	const saved = groupDocument.value?.solution;
+	const base = withDismissals(expected.value ?? saved ?? null, saved);
 	const moved = edits.value.some((edit) => edit.kind !== 'lines');
 	return group.value && base && moved ? previewBall(group.value, base) : base;
 });
@@ -153,7 +155,7 @@ export function submit(edit) {
 	const shown = pending.value.reduce(applyEdit, at);
 	batch(() => {
 		draft.value = null;
-		did({ kind: 'edit', group: at.id, number: at.number, times: 1 });
+		did({ kind: 'edit', dataset: at.dataset.name, group: at.id, number: at.number, times: 1 });
 		enqueue({
 			method: 'PATCH', ...requestOf(at, edit), group: at.id, station: stationOf(at, edit), edit,
 			verdict: null, base: baseOf(shown, edit.view),
@@ -171,6 +173,22 @@ export function submitVerdict(verdict) {
 		station: null, edit: null, verdict, base: baseOf(at, at.views[0]?.key),
 	});
 	wake();
+}
+
+/**
+ * Say that a finding was checked, or that it is to be looked at again.
+ *
+ * @param {import('./last_action.js').FindingName} finding @param {boolean} dismissed @returns {boolean} whether it is on its way
+ */
+export function submitDismissal(finding, dismissed) {
+	const at = groupDocument.value;
+	if (!at || refuses('review', at.dataset.name)) return false;
+	enqueue({
+		path: `/groups/${at.id}/dismissal`, body: { ...finding, dismissed }, etag: at.etag, group: at.id, method: 'PUT',
+		station: null, edit: null, verdict: null, base: null,
+	});
+	wake();
+	return true;
 }
 
 /** Take the last edit back, or make it again. @param {'undo' | 'redo'} verb */

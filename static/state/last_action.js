@@ -4,10 +4,12 @@
 import { stored } from '../lib/storage.js';
 
 /** @typedef {{state: string, reason: string | null, note: string | null}} Said */
-/** @typedef {{kind: 'edit', group: number, number: number, times: number}} EditDone   `times` in a row */
-/** @typedef {{kind: 'verdict', group: number, number: number, given: Said, before: Said}} VerdictDone */
-/** @typedef {{kind: 'batch', batch: number, text: string}} BatchDone */
-/** @typedef {EditDone | VerdictDone | BatchDone} Action */
+/** @typedef {{kind: 'edit', dataset: string, group: number, number: number, times: number}} EditDone   `times` in a row */
+/** @typedef {{kind: 'verdict', dataset: string, group: number, number: number, given: Said, before: Said}} VerdictDone */
+/** @typedef {{kind: 'batch', dataset: string, batch: number, text: string}} BatchDone */
+/** @typedef {{kind: string, view: string | null, marking: string | null, suggested: string | null, number: number | null}} FindingName */
+/** @typedef {{kind: 'dismissal', dataset: string, group: number, number: number, finding: FindingName, dismissed: boolean}} DismissalDone */
+/** @typedef {EditDone | VerdictDone | BatchDone | DismissalDone} Action */
 
 const KEPT = 100;
 
@@ -36,11 +38,10 @@ export function tookBack(action) {
 	undone.value = [...undone.value.slice(1 - KEPT), action];
 }
 
-/** What was taken back last is done again. @param {Action | undefined} [as] what it is called now, where that is something else */
-export function didAgain(as) {
-	const action = undone.value.at(-1);
-	if (!action) return;
-	undone.value = undone.value.slice(0, -1);
+/** What was taken back is done again. @param {Action} action @param {Action} [as] what it is called now, where that is something else */
+export function didAgain(action, as) {
+	if (!undone.value.includes(action)) return;
+	undone.value = undone.value.filter((other) => other !== action);
 	actions.value = withAction(actions.value, as ?? action);
 }
 
@@ -70,15 +71,22 @@ export function forgetEdit(group) {
 	actions.value = actions.value.toSpliced(at, 1, ...rest);
 }
 
+/** What was taken back last in a dataset. @param {readonly Action[]} back @param {string | undefined} dataset */
+export function nextAgain(back, dataset) {
+	return back.findLast((action) => action.dataset === dataset);
+}
+
 /**
- * What undo takes back next.
+ * What undo takes back next: of the dataset on screen, for nobody expects to leave it.
  *
  * @param {readonly Action[]} done @param {number | null} group on screen
  * @param {boolean} edited whether that has an edit to take back, whoever made it
+ * @param {string | undefined} dataset
  * @returns {Action | 'here' | null} `here`: the last edit of the group on screen
  */
-export function nextBack(done, group, edited) {
+export function nextBack(done, group, edited, dataset) {
 	for (const action of done.toReversed()) {
+		if (action.dataset !== dataset) continue;
 		if (action.kind !== 'edit') return action;
 		if (edited) return 'here';
 		// One of this group that cannot be taken back any more is passed over.

@@ -28,6 +28,8 @@ import { outbox } from './outbox.js';
  * @property {string} sentence why it is not mine
  * @property {string | null} [handedInBy] who has handed it in
  * @property {HandedBackJson | null} [back] why its annotator has it back
+ * @property {number | null} [place] of the groups that I annotate on my own, from 1
+ * @property {number | null} [of] how many these are; null: nobody is told
  */
 
 /** The group on screen as one of a batch; null: it is none, or nobody knows yet. */
@@ -48,7 +50,7 @@ export const others = computed(() => (lease.value?.here ?? []).filter(({ person 
 /** @param {LeaseJson} answer @param {number} id */
 function got(answer, id) {
 	batch.value = answer.batch;
-	lease.value = { batch: answer.batch.id, group: id, state: 'mine', part: answer.part, here: answer.here, sentence: '', handedInBy: answer.handed_in_by, back: answer.handed_back };
+	lease.value = { batch: answer.batch.id, group: id, state: 'mine', part: answer.part, here: answer.here, sentence: '', handedInBy: answer.handed_in_by, back: answer.handed_back, place: answer.place, of: answer.of };
 }
 
 /** @param {number} id @param {number} group */

@@ -4,12 +4,13 @@
 import { computed, effect, signal, untracked } from '@preact/signals';
 
 import { plural } from '../lib/format.js';
-import { findingTitle } from './advice.js';
+import { findingTitle, isGrave } from './advice.js';
 import { placeExpected } from './drawing.js';
 import { editOf } from './edits.js';
 import { group, groupDocument, solution } from './group.js';
 import { remedies } from './insight.js';
-import { openProposals, scoreWords, settledState, stateOf, waitingViews } from './proposal_lines.js';
+import { openFindings } from './open_findings.js';
+import { lookedAt, openProposals, scoreWords, settledState, stateOf, waitingViews, waitsForLines } from './proposal_lines.js';
 import { fitPanel, returnLent } from './viewports.js';
 import { focused } from './workspace.js';
 
@@ -67,15 +68,29 @@ function missingBalls(shown, solved) {
 		const place = solved.views.find((one) => one.view === view.key)?.expected?.place;
 		// Where there is no 3D ball yet, another view's ball may bring it.
 		if (solved.ball ? !(place && inPicture(view, place)) : solved.passes) return [];
+		const seen = shown.views.some((other) => other !== view && other.balls.length > 0 && solved.views.some((one) => one.view === other.key && one.calibration.camera));
+		const where = seen ? 'The dotted line is the ray of another view: the ball lies on it.' : 'No other view shows where it is.';
 		const why = NEEDS_A_PAIR.has(solved.first_failing?.gate ?? '') ? ` With it ${view.letter} may form the missing pair.` : '';
 		return [{
 			view: view.key, caption: '',
 			...(place ? { label: 'Place it there', run: placeExpected } : { label: 'Draw it', guide: { ball: true } }),
 			title: `No ball is drawn in ${view.letter}`, passes: false,
 			sentence: (place ? 'A green cross marks where the other views see it. If it is not visible there, press O.'
-				: 'The dotted line is the ray of another view: the ball lies on it. If it is not visible, press O.') + why,
+				: `${where} If it is not visible, press O.`) + why,
 		}];
 	});
+}
+
+/** To look for lines in the picture of a view that nobody has looked at. @param {GroupDocument} shown @param {SolutionJson | null} solved @param {ViewJson} view @returns {Mend} */
+function lookForLines(shown, solved, view) {
+	const finding = solved?.findings.find((one) => one.kind === 'under_constrained' && one.view === view.key);
+	return {
+		view: view.key, caption: '', passes: false, finding,
+		label: lookedAt.value.has(view.id) ? 'Looking…' : 'Propose lines',
+		title: finding ? findingTitle(shown, finding) : `View ${view.letter} has no lines`,
+		sentence: finding?.sentence ?? 'Its picture may show them.',
+		run: (at) => import('./proposals.js').then(({ proposeNow }) => proposeNow(at)),
+	};
 }
 
 /** Lines that are proposed for views without a camera. @param {GroupDocument} shown @param {ReadonlyMap<string, ViewProposalJson>} proposed @returns {Mend[]} */
@@ -127,15 +142,16 @@ function isSame(a, b) {
 function mendsOf(shown, solved, helping, proposed) {
 	// Without its camera a view says nothing of the ball: that comes before everything else.
 	const lines = proposedLines(shown, proposed);
-	if (!solved) return lines;
+	const looks = shown.views.filter((view) => waitsForLines(view, solved) && !proposed.has(view.key)).map((view) => lookForLines(shown, solved, view));
+	if (!solved) return [...lines, ...looks];
 	const missing = missingBalls(shown, solved);
 	const short = solved.first_failing?.gate === 'ball';
 	const tried = helping.flatMap(ofRemedy);
-	const found = solved.findings.flatMap((finding) => ofFinding(shown, finding))
+	const found = openFindings(solved).flatMap((finding) => ofFinding(shown, finding))
 		.map((mend) => ({ ...mend, passes: tried.some((remedy) => remedy.passes && isSame(remedy, mend)) }));
 	const known = short ? [...missing, ...found] : [...found, ...missing];
 	const more = tried.filter((remedy) => !known.some((mend) => isSame(remedy, mend)));
-	return [...lines, ...known, ...more];
+	return solved.passes ? [...lines, ...known, ...looks, ...more] : [...lines, ...looks, ...known, ...more];
 }
 
 /** Everything that would mend the group on screen. */
@@ -157,10 +173,18 @@ export const isHeld = computed(() => {
 /** The one that the card shows and Enter carries out. */
 export const mend = computed(() => (isHeld.value ? null : mends.value[mendIndex.value] ?? null));
 
-/** The finding that the card speaks about; null where it speaks of something else. */
+/** The finding that the card speaks about: the worst, whatever else could be mended, else that of the mend; null where it speaks of something else. */
 export const toldFinding = computed(() => {
 	const meant = mend.value;
-	return (meant?.title ? meant.finding : solution.value?.findings[0]) ?? null;
+	const first = openFindings(solution.value)[0];
+	if (first && isGrave(first, solution.value)) return first;
+	return (meant?.title ? meant.finding : first) ?? null;
+});
+
+/** Whether the card's title is that of the mend that it offers. */
+export const isMendTold = computed(() => {
+	const meant = mend.value;
+	return Boolean(meant?.title) && (meant?.finding ?? null) === toldFinding.value;
 });
 
 /** Show another one. @param {number} step */

@@ -18,20 +18,21 @@ function listed(names) {
 	return names.length > MOST_NAMES ? `${shown} and ${names.length - MOST_NAMES} more` : shown;
 }
 
-/** @param {Record<string, unknown> | undefined} lines */
-function lineWords(lines) {
+/** @param {Record<string, unknown> | undefined} lines @param {Record<string, string>} [source] */
+function lineWords(lines, source = {}) {
 	const names = Object.keys(lines ?? {});
-	const gone = names.filter((name) => lines?.[name] === null);
+	const hidden = names.filter((name) => source[name] === 'not_visible');
+	const gone = names.filter((name) => lines?.[name] === null && !hidden.includes(name));
 	const drawn = names.filter((name) => lines?.[name] !== null);
-	return [drawn.length ? `drew ${listed(drawn)}` : '', gone.length ? `removed ${listed(gone)}` : ''].filter(Boolean).join(' and ') || 'changed lines';
+	return [drawn.length ? `drew ${listed(drawn)}` : '', gone.length ? `removed ${listed(gone)}` : '', hidden.length ? `marked ${listed(hidden)} as not visible` : ''].filter(Boolean).join(' and ') || 'changed lines';
 }
 
 /** @param {any} edit @param {(view: string) => string} letterOf */
 function editWords(edit, letterOf) {
 	const where = edit.view ? ` in ${letterOf(edit.view)}` : '';
 	switch (edit.edit) {
-		case 'set_lines': return `${lineWords(edit.lines)}${where}`;
-		case 'set_station_lines': return `${lineWords(edit.lines)} of a static camera`;
+		case 'set_lines': return `${lineWords(edit.lines, edit.source)}${where}`;
+		case 'set_station_lines': return `${lineWords(edit.lines, edit.source)} of a static camera`;
 		case 'set_balls': return `${edit.balls?.length ? 'placed the ball' : 'removed the ball'}${where}`;
 		case 'include_view': return edit.included ? `used view ${letterOf(edit.view)}` : `left view ${letterOf(edit.view)} out${edit.reason ? `: ${reasonWords(edit.reason)}` : ''}`;
 		case 'set_calibration': return `chose the ${edit.calibration} calibration${where}`;

@@ -7,8 +7,10 @@ import { postPractice } from '../api/practice.js';
 import { ApiError } from '../api/problem.js';
 import { navigate } from '../lib/router.js';
 import { stored } from '../lib/storage.js';
+import { loadDatasets } from './datasets.js';
 import { follow } from './jobs.js';
 import { actions } from './last_action.js';
+import { askWhoIsThere, isTeam } from './me.js';
 
 /** @import {JobJson} from '../api/jobs.js' */
 
@@ -39,6 +41,8 @@ export async function startPractice(again = false) {
 		const job = await follow(await postPractice(again), (moved) => { making.value = moved; });
 		if (job.state === 'done') {
 			endFirstSteps();
+			// A team's server has made a dataset in which one may judge, whatever one may elsewhere.
+			if (isTeam) await Promise.all([askWhoIsThere(), loadDatasets()]);
 			navigate(`/review/${job.result.first}`);
 		} else makingFailed.value = job.problem?.detail ?? `The job was ${job.state}.`;
 	} catch (error) {

@@ -12,6 +12,9 @@ import { twinMarking } from './edits.js';
 /** What is proposed for the views of the group on screen, by key; filled once the code that asks is there. */
 export const openProposals = signal(/** @type {ReadonlyMap<string, ViewProposalJson>} */ (new Map()));
 
+/** Views whose picture is being looked at for lines to propose, by id. */
+export const lookedAt = signal(/** @type {ReadonlySet<number>} */ (new Set()));
+
 /** State of the group on screen for which that is known, or known to be unknown: the server is away, or refuses. */
 export const settledState = signal('');
 

@@ -3,13 +3,14 @@
 
 import { batch, computed, effect, signal, untracked } from '@preact/signals';
 
+import { proposeLines } from '../api/paint.js';
 import { getGroupProposals } from '../api/proposals.js';
 import { ApiError } from '../api/problem.js';
 import { plural } from '../lib/format.js';
 import { page } from '../lib/router.js';
 import { group, groupDocument, submit } from './group.js';
 import { announce, complain } from './notice.js';
-import { areNew, openProposals, settledState, stateOf, waitingViews, waitsForLines } from './proposal_lines.js';
+import { areNew, lookedAt, openProposals, settledState, stateOf, waitingViews, waitsForLines } from './proposal_lines.js';
 import { focused, overlaysHidden } from './workspace.js';
 
 /** @import {ViewProposalJson} from '../api/proposals.js' */
@@ -19,14 +20,17 @@ import { focused, overlaysHidden } from './workspace.js';
 const PAUSE = 120;
 const PAGES = ['review', 'calibration'];
 
+/** What was looked for here and now; the server keeps nothing of it. */
+const own = signal(/** @type {{group: number, items: ViewProposalJson[]}} */ ({ group: 0, items: [] }));
 const answered = signal(/** @type {{group: number, items: ViewProposalJson[]} | null} */ (null));
 
 /** What is proposed for views of the group on screen that have no camera, by key of the view. */
 export const proposals = computed(() => {
-	const [at, saved, known] = [group.value, groupDocument.value, answered.value];
-	if (!at || !saved || known?.group !== at.id) return new Map();
+	const [at, saved] = [group.value, groupDocument.value];
+	if (!at || !saved) return new Map();
+	const known = [answered.value, own.value].flatMap((one) => (one?.group === at.id ? one.items : []));
 	const waiting = new Map(at.views.filter((view) => waitsForLines(view, saved.solution)).map((view) => [view.id, view.lines]));
-	const items = known.items.filter(({ open, view, lines }) => open && waiting.has(view) && areNew(waiting.get(view) ?? {}, lines));
+	const items = known.filter(({ open, view, lines }) => open && waiting.has(view) && areNew(waiting.get(view) ?? {}, lines));
 	return new Map(/** @type {[string, ViewProposalJson][]} */ (items.map((item) => [item.key, item])));
 });
 
@@ -79,8 +83,28 @@ async function ask(state, abort) {
 /** Why there is no proposal for a view. @param {ViewJson} view */
 function whyNone(view) {
 	if (!waitsForLines(view, groupDocument.value?.solution ?? null)) return `View ${view.letter} has a camera already.`;
-	const looked = `Nothing was proposed for view ${view.letter} yet: start the search under Statistics.`;
+	const looked = `Nothing was proposed for view ${view.letter} yet: “Propose lines” in the result searches its picture, Statistics those of all.`;
 	return view.station.shared ? `${looked} Of a static camera the first view with a picture has the proposal, maybe in another group.` : looked;
+}
+
+/** Look at the picture of a view for lines; what is found is shown as proposed. @param {ViewJson} view */
+export async function proposeNow(view) {
+	const id = group.peek()?.id;
+	if (id === undefined || lookedAt.peek().has(view.id)) return;
+	lookedAt.value = new Set([...lookedAt.peek(), view.id]);
+	announce(`Looking at the picture of view ${view.letter}…`);
+	try {
+		const found = await proposeLines(view.id, {});
+		const before = own.peek().group === id ? own.peek().items : [];
+		own.value = { group: id, items: [...before.filter((item) => item.view !== view.id), { ...found, view: view.id, key: view.key, open: true }] };
+		if (found.outcome !== 'proposed') complain(`No lines are proposed for view ${view.letter}. ${found.sentence}`);
+		else announce(`${plural(Object.keys(found.lines).length, 'marking')} proposed for view ${view.letter}.`);
+	} catch (error) {
+		if (!(error instanceof ApiError)) throw error;
+		complain(`View ${view.letter}: ${error.message}`);
+	} finally {
+		lookedAt.value = new Set([...lookedAt.peek()].filter((one) => one !== view.id));
+	}
 }
 
 /** Add the proposed lines of a view to its lines. @param {ViewJson} view */

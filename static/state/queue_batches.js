@@ -14,8 +14,8 @@ import { openQueue, queue } from './queue.js';
 /** @import {BulkResult} from '../api/queue.js' */
 /** @import {BatchDone} from './last_action.js' */
 
-/** Say what a bulk verdict did, and offer to take it back. @param {BulkResult} result @param {string} state */
-export function tellBatch({ batch, changed, refused }, state) {
+/** Say what a bulk verdict did, and offer to take it back. @param {BulkResult} result @param {string} state @param {string} dataset */
+export function tellBatch({ batch, changed, refused }, state, dataset) {
 	const left = refused.reduce((sum, { groups }) => sum + groups, 0);
 	const text = batchText(changed, state);
 	const rest = left ? ` ${count(left)} ${left === 1 ? 'stays as it was' : 'stay as they were'}.` : '';
@@ -24,7 +24,7 @@ export function tellBatch({ batch, changed, refused }, state) {
 		return;
 	}
 	/** @type {BatchDone} */
-	const action = { kind: 'batch', batch, text };
+	const action = { kind: 'batch', dataset, batch, text };
 	did(action);
 	inform(`${text}.${rest}`, { label: 'Undo', run: () => takeBatchBack(action) });
 }
@@ -57,11 +57,11 @@ export async function giveBatchAgain(action) {
 			inform(`No verdict was redone.${rest}`);
 		} else {
 			/** @type {BatchDone} */
-			const again = { kind: 'batch', batch, text: action.text.replace(/^[\d,]+ groups?/, plural(changed, 'group')) };
+			const again = { kind: 'batch', dataset: action.dataset, batch, text: action.text.replace(/^[\d,]+ groups?/, plural(changed, 'group')) };
 			if (undone.value.some((other) => other.kind === 'batch' && other.batch === action.batch)) {
 				forgetUndone(action);
 				undone.value = [...undone.value, action];
-				didAgain(again);
+				didAgain(action, again);
 			} else did(again);
 			inform(`${again.text} again.${rest}`, { label: 'Undo', run: () => takeBatchBack(again) });
 		}

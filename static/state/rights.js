@@ -4,7 +4,7 @@
  * keys by `needs`, edits and verdicts before they are made (state/group.js).
  */
 
-import { me } from './me.js';
+import { COPIES, me } from './me.js';
 import { complain } from './notice.js';
 
 /** @import {Action, Role} from '../api/people.js' */
@@ -21,7 +21,7 @@ export function roleIn(dataset) {
 	if (role === 'admin') return role;
 	if (dataset) return datasets.find((one) => one.dataset === dataset)?.role ?? role;
 	const ranks = /** @type {Role[]} */ (Object.keys(allows));
-	return [role, ...datasets.map((one) => one.role)].sort((a, b) => ranks.indexOf(b) - ranks.indexOf(a))[0];
+	return [role, ...datasets.filter(({ id }) => id <= COPIES).map((one) => one.role)].sort((a, b) => ranks.indexOf(b) - ranks.indexOf(a))[0];
 }
 
 /** Why somebody may not do that in a dataset; empty: they may. @param {Action} action @param {string} [dataset] */

@@ -1,11 +1,13 @@
 // @ts-check
 /** Swapping left and right: which view a finding names, and what speaks against turning another one. */
 
+import { openFindings } from './open_findings.js';
+
 /** @import {GroupDocument, SolutionJson, ViewJson} from '../api/types.js' */
 
 /** Keys of the views whose sides a finding calls swapped. @param {SolutionJson | null} solution @returns {string[]} */
 export function swappedViews(solution) {
-	return (solution?.findings ?? []).flatMap(({ kind, view }) => (kind === 'sides_swapped' && view ? [view] : []));
+	return openFindings(solution).flatMap(({ kind, view }) => (kind === 'sides_swapped' && view ? [view] : []));
 }
 
 /** How far a view's camera stands to the near side, metres; null without a camera. @param {SolutionJson | null} solution @param {ViewJson} view */

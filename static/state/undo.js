@@ -4,8 +4,9 @@
 import { computed } from '@preact/signals';
 
 import { navigate, page } from '../lib/router.js';
+import { dataset } from './datasets.js';
 import { groupDocument, lastStationOf, open, pending, submitTurn } from './group.js';
-import { actions, didAgain, forget, forgetEdit, nextBack, tookBack, undone } from './last_action.js';
+import { actions, didAgain, forget, forgetEdit, nextAgain, nextBack, tookBack, undone } from './last_action.js';
 import { returnTo, reviewAddress } from './navigation.js';
 import { announce, complain } from './notice.js';
 import { discard, outbox } from './outbox.js';
@@ -21,9 +22,14 @@ const onScreen = computed(() => ('group' in page.value ? page.value.group : null
 const isEdited = computed(() => (
 	Boolean(groupDocument.value?.can_undo) || ownStation.value !== null || pending.value.length > 0
 ));
+/** The dataset that the page is about; while its first group loads, that of what was done last. */
+const here = computed(() => {
+	if (onScreen.value === null) return dataset.value?.name;
+	return groupDocument.value?.dataset.name ?? actions.value.at(-1)?.dataset;
+});
 const next = computed(() => {
 	const shown = onScreen.value === groupDocument.value?.id ? groupDocument.value : null;
-	return nextBack(actions.value, onScreen.value, shown !== null && isEdited.value);
+	return nextBack(actions.value, onScreen.value, shown !== null && isEdited.value, here.value);
 });
 /** What undo would take back, in words; null when there is nothing. */
 export const undoable = computed(() => {
@@ -32,15 +38,17 @@ export const undoable = computed(() => {
 	if (action === 'here') return 'Undo the last edit of this group';
 	if (action.kind === 'batch') return `Undo: ${action.text}`;
 	if (action.kind === 'edit') return `Go back to group ${action.number} and undo its last edit`;
+	if (action.kind === 'dismissal') return `${action.dismissed ? 'Reopen the finding' : 'Dismiss the finding again'} in group ${action.number}`;
 	return `Undo the verdict on group ${action.number}`;
 });
 const canRedoHere = computed(() => Boolean(groupDocument.value?.can_redo) || ownStation.value !== null);
 /** What redo would do again, in words; null when there is nothing. */
 export const redoable = computed(() => {
-	const action = undone.value.at(-1);
+	const action = nextAgain(undone.value, here.value);
 	if (!action) return canRedoHere.value ? 'Redo the undone edit of this group' : null;
 	if (action.kind === 'batch') return `Redo: ${action.text}`;
 	if (action.kind === 'edit') return `Redo the undone edit of group ${action.number}`;
+	if (action.kind === 'dismissal') return `${action.dismissed ? 'Dismiss the finding again' : 'Reopen the finding'} in group ${action.number}`;
 	return `Redo the verdict on group ${action.number}`;
 });
 
@@ -60,6 +68,11 @@ async function undoOne() {
 	else if (action === 'here') undoHere();
 	else if (action.kind === 'verdict') await takeVerdictBack(action);
 	else if (action.kind === 'edit') await undoThere(action);
+	else if (action.kind === 'dismissal') {
+		// Findings are the review's: the queue opens without them.
+		const { takeDismissalBack } = await import('./dismissals.js');
+		await takeDismissalBack(action);
+	}
 	else {
 		// Bulk verdicts are the queue's: the review screen opens without them.
 		const { takeBatchBack } = await import('./queue_batches.js');
@@ -74,7 +87,7 @@ function undoHere() {
 		if (undoUnsent()) forgetEdit(at.id);
 	} else {
 		forgetEdit(at.id);
-		tookBack({ kind: 'edit', group: at.id, number: at.number, times: 1 });
+		tookBack({ kind: 'edit', dataset: at.dataset.name, group: at.id, number: at.number, times: 1 });
 		submitTurn('undo');
 	}
 }
@@ -92,8 +105,12 @@ export function redo() {
 }
 
 async function redoOne() {
-	const action = undone.value.at(-1);
+	const action = nextAgain(undone.value, here.value);
 	if (action?.kind === 'verdict') await giveVerdictAgain(action);
+	else if (action?.kind === 'dismissal') {
+		const { dismissAgain } = await import('./dismissals.js');
+		await dismissAgain(action);
+	}
 	else if (action?.kind === 'batch') {
 		const { giveBatchAgain } = await import('./queue_batches.js');
 		await giveBatchAgain(action);
@@ -109,7 +126,7 @@ async function redoThere(action) {
 	if (onScreen.value !== action.group) navigate(reviewAddress(action.group));
 	if (groupDocument.value?.id !== action.group) await open(action.group);
 	if (groupDocument.value?.id !== action.group) return;
-	didAgain();
+	didAgain(action);
 	submitTurn('redo');
 }
 

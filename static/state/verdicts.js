@@ -123,7 +123,7 @@ function decide(state, reason, note) {
 	settle();
 	const { state: was, reason: because, note: said } = group.verdict;
 	did({
-		kind: 'verdict', group: group.id, number: group.number, given: { state, reason, note },
+		kind: 'verdict', dataset: group.dataset.name, group: group.id, number: group.number, given: { state, reason, note },
 		before: { state: was, reason: because, note: said },
 	});
 	submitVerdict({ state, reason, note });
@@ -180,7 +180,7 @@ export async function giveVerdictAgain(action) {
 		complain(`Group ${action.number} was reviewed since; the new verdict stays.`);
 		return;
 	}
-	didAgain();
+	didAgain(action);
 	submitVerdict(action.given);
 	announce(`Group ${action.number} ${action.given.state} again.`);
 }

@@ -5,6 +5,18 @@ import { html } from 'htm/preact';
 
 /** @typedef {{edges: number[], log: boolean, open_high: boolean}} Bins */
 
+/** What a number needs, for histograms without any: which of it is missing is not known here. */
+const NEEDS = /** @type {{[name: string]: string}} */ ({
+	jac: 'JaC needs drawn field lines and a camera',
+	agreement: 'Agreement needs a camera and the paint of its picture',
+	size_ratio: 'A ratio needs a 3D ball and a box drawn around the ball',
+});
+
+/** Why no group has a number. @param {string} name */
+export function noneOf(name) {
+	return NEEDS[name] ? `${NEEDS[name]}; no group here has both.` : 'No group here has this number.';
+}
+
 /** Up to four digits, none that says nothing. @param {number} value */
 export function short(value) {
 	return String(Number(value.toPrecision(4))).replace('-', '−');

@@ -31,6 +31,7 @@ const STATES = [
 const REFUSALS = /** @type {{[reason: string]: string}} */ ({
 	unsolved: 'they are not solved yet',
 	needs_note: 'they fail a gate, and accepting that needs a note',
+	unusable_ball: 'their ball cannot be used (below the grass, or known to metres only), and accepting that needs a note',
 	no_picture: 'no view of them has a picture, and accepting that needs a note',
 });
 
@@ -120,7 +121,7 @@ export function BulkDialog({ dataset, q, total, ticked, onClose }) {
 		if (why) return;
 		setState({ busy: 'Deciding…', error: '' });
 		try {
-			tellBatch(await postVerdicts(dataset.id, { q: asked, ...ask, expected: would }), verdict);
+			tellBatch(await postVerdicts(dataset.id, { q: asked, ...ask, expected: would }), verdict, dataset.name);
 			onClose();
 			if (chosen) clearTicks();
 			readAgain();

@@ -11,6 +11,7 @@ import { datasets, failure, loadDatasets } from '../state/datasets.js';
 import { DATASET_PAGES, pageAddress } from './dataset_menu.js';
 import { DeleteDataset } from './delete_dataset.js';
 import { ExportDialog } from './export_dialog.js';
+import { NoDatasets, mayImport } from './no_datasets.js';
 import { Loading, PageFrame, Trouble } from './page_frame.js';
 import { ProgressLine } from './progress_card.js';
 
@@ -40,25 +41,6 @@ function DatasetCard({ one, ask }) {
 	`;
 }
 
-function NoDatasets() {
-	if (isTeam && whyNot('lead')) {
-		return html`
-			<section class="card empty">
-				<h2>No dataset that you can see</h2>
-				<p>A lead of a dataset, or an admin, gives you a role in it.</p>
-			</section>
-		`;
-	}
-	return html`
-		<section class="card empty">
-			<h2>No dataset yet</h2>
-			<p>Bring your own annotations, or make the sample dataset with known truth:</p>
-			<pre>touchline serve --sample</pre>
-			<p><a class="button button--primary" href="/import">Import a dataset</a></p>
-		</section>
-	`;
-}
-
 export function DatasetsPage() {
 	const [asked, setAsked] = useState(/** @type {{what: string, one: DatasetJson} | null} */ (null));
 	useEffect(() => { loadDatasets(); }, []);
@@ -67,7 +49,7 @@ export function DatasetsPage() {
 	return html`
 		<${PageFrame}
 			current="datasets" title="Datasets" where=${html`<strong>Datasets</strong>`}
-			actions=${html`<a class="button button--primary" href="/import">Import…</a>`}
+			actions=${mayImport() ? html`<a class="button button--primary" href="/import">Import…</a>` : null}
 		>
 			${failure.value ? html`<${Trouble} title="The datasets cannot be shown" error=${failure.value} retry=${loadDatasets} />` : null}
 			${all === null && !failure.value ? html`<${Loading} what="datasets" />` : null}

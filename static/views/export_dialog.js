@@ -4,8 +4,10 @@
 import { html } from 'htm/preact';
 import { useEffect, useRef, useState } from 'preact/hooks';
 
+import { getFormats } from '../api/exports.js';
 import { withForm } from '../lib/field.js';
 import { count, words } from '../lib/format.js';
+import { useResource } from '../lib/resource.js';
 import { dataset, loadDatasets } from '../state/datasets.js';
 import { download, FORMATS, makeExport } from '../state/exports.js';
 import { JobProgress } from './job_progress.js';
@@ -14,14 +16,38 @@ import { JobProgress } from './job_progress.js';
 /** @import {DatasetJson, ExportJson} from '../api/types.js' */
 /** @import {VersionJson} from '../api/versions.js' */
 
-/** @param {{legend: string, name: string, options: {name: string, label: string, note: string}[]}} props */
-function Choice({ legend, name, options }) {
+/** @typedef {{items: {format: string, reason: string | null}[]}} Formats */
+
+/**
+ * The formats: one that has no place for the groups says why and cannot be chosen.
+ *
+ * @param {{answers: Formats | undefined, chosen: string, choose: (name: string) => void}} props
+ */
+function FormatChoice({ answers, chosen, choose }) {
+	const reasons = new Map(answers?.items.map(({ format, reason }) => [format, reason]));
+	return html`
+		<fieldset class="choice">
+			<legend>Format</legend>
+			${FORMATS.map(({ name, label, note }) => {
+				const reason = reasons.get(name);
+				return html`
+					<label key=${name} data-disabled=${Boolean(reason)} title=${reason ?? undefined}>
+						<input type="radio" name="format" value=${name} checked=${chosen === name} disabled=${Boolean(reason)} onChange=${() => choose(name)} />
+						<span>${label}<small>${reason ? `Not possible: ${reason}` : note}</small></span>
+					</label>`;
+			})}
+		</fieldset>
+	`;
+}
+
+/** @param {{legend: string, name: string, options: {name: string, label: string, note: string}[], onChoose?: (name: string) => void}} props */
+function Choice({ legend, name, options, onChoose = () => {} }) {
 	return html`
 		<fieldset class="choice">
 			<legend>${legend}</legend>
 			${options.map((option, i) => html`
 				<label key=${option.name}>
-					<input type="radio" name=${name} value=${option.name} defaultChecked=${i === 0} />
+					<input type="radio" name=${name} value=${option.name} defaultChecked=${i === 0} onChange=${() => onChoose(option.name)} />
 					<span>${option.label}<small>${option.note}</small></span>
 				</label>`)}
 		</fieldset>
@@ -47,7 +73,8 @@ function Result({ made }) {
 	const counts = Object.entries(made.counts ?? {}).map(([name, n]) => `${count(n)} ${words(name)}`);
 	return html`
 		<p class="export__result" role="status">
-			Ready${counts.length ? `: ${counts.join(', ')}` : ''}.
+			${made.incomplete ? 'Written, but not complete' : 'Ready'}${counts.length ? `: ${counts.join(', ')}` : ''}.
+			${made.incomplete ? html`${' '}<strong data-grade="warn">${made.incomplete}.</strong>${' '}` : null}
 			<a href=${made.content} download>Download again</a>
 		</p>
 	`;
@@ -66,14 +93,23 @@ export function ExportDialog({ one, version = null, onClose }) {
 		loadDatasets();
 		return () => closed.current.abort();
 	}, []);
+	const [all, setAll] = useState(false);
+	const [wanted, setWanted] = useState(FORMATS[0].name);
+	const formats = useResource((signal) => getFormats(one.id, version ? { version: version.id } : {}, signal), [one.id, version?.id]);
+	const reasons = formats.value?.items ?? [];
+	/** @param {string} name */
+	const isPossible = (name) => !reasons.some(({ format, reason }) => format === name && reason);
+	const chosen = isPossible(wanted) ? wanted : FORMATS.find(({ name }) => isPossible(name))?.name ?? wanted;
+	const none = !version && !all && one.accepted === 0 && chosen !== 'touchline' ? 'Nobody has accepted a group yet' : '';
+	const why = state.busy ? 'Under way' : isPossible(chosen) ? none : reasons.find(({ format }) => format === chosen)?.reason ?? '';
 	/** @param {FormData} form */
 	async function send(form) {
-		if (state.busy) return;
+		if (why) return;
 		setState({ busy: true, job: null, made: null, error: null });
 		try {
 			const made = await makeExport({
 				dataset: one.name,
-				format: String(form.get('format')),
+				format: chosen,
 				all: form.get('groups') === 'all',
 				boxes: String(form.get('boxes')),
 				images: form.get('images') ? 'copy' : 'none',
@@ -97,10 +133,10 @@ export function ExportDialog({ one, version = null, onClose }) {
 					<button class="button" type="button" onClick=${() => dialog.current?.close()}>Close <kbd>Esc</kbd></button>
 				</header>
 				<div class="export">
-					<${Choice} legend="Format" name="format" options=${FORMATS} />
+					<${FormatChoice} answers=${formats.value} chosen=${chosen} choose=${setWanted} />
 					<div class="export__column">
 						${version ? html`<p class="note">${count(version.counts.groups)} groups as they were frozen: always the same bytes.</p>`
-							: html`<${Choice} legend="Groups" name="groups" options=${groupChoices(one)} />`}
+							: html`<${Choice} legend="Groups" name="groups" options=${groupChoices(one)} onChoose=${(/** @type {string} */ name) => setAll(name === 'all')} />`}
 						<${Choice} legend="Ball boxes" name="boxes" options=${BOXES} />
 						<label class="form__check"><input type="checkbox" name="images" />Copy the frames into the zip</label>
 						<label class="form__check"><input type="checkbox" name="views" />COCO and YOLO: include balls that no other view confirms</label>
@@ -109,8 +145,9 @@ export function ExportDialog({ one, version = null, onClose }) {
 				${state.job ? html`<${JobProgress} job=${state.job} />` : null}
 				${state.error ? html`<p class="export__error" role="alert">${state.error}</p>` : null}
 				${state.made ? html`<${Result} made=${state.made} />` : null}
+				${none ? html`<p class="note">${none}: accept groups, or export all.</p>` : null}
 				<p class="dialog__buttons">
-					<button class="button button--primary" type="submit" aria-disabled=${state.busy}>${state.busy ? 'Exporting…' : 'Export'}</button>
+					<button class="button button--primary" type="submit" aria-disabled=${why !== ''} title=${why}>${state.busy ? 'Exporting…' : 'Export'}</button>
 				</p>
 			</form>
 		</dialog>

@@ -36,9 +36,10 @@ function Row({ row, remove }) {
 			<th scope="row">${row.request.dataset}<small>${row.request.format}</small></th>
 			<td>${contents(row)}
 				${left.length ? html`<small>left out: ${left.map(([why, n]) => `${count(n)} ${words(why)}`).join(', ')}</small>` : null}
+				${row.incomplete ? html`<small>${row.incomplete}</small>` : null}
 				${row.missing_images?.length ? html`<small>${plural(row.missing_images.length, 'frame')} missing</small>` : null}
 				${row.error ? html`<small class="form__error">${row.error}</small>` : null}</td>
-			<td><span class="pill" data-state=${row.status}>${row.status}</span></td>
+			<td>${row.incomplete ? html`<span class="pill" data-status="deferred" title=${row.incomplete}>incomplete</span>` : html`<span class="pill" data-state=${row.status}>${row.status}</span>`}</td>
 			<td data-numeric="true">${row.bytes === null ? '–' : sizeText(row.bytes)}</td>
 			<td><${When} at=${row.created} /></td>
 			<td><span class="table__actions">

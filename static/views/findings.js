@@ -4,10 +4,13 @@
 import { html } from 'htm/preact';
 
 import { findingTitle } from '../state/advice.js';
+import { dismiss } from '../state/dismissals.js';
 import { mends, toldFinding } from '../state/mends.js';
+import { openFindings } from '../state/open_findings.js';
 import { focusView } from '../state/workspace.js';
 import { Letter } from './letter.js';
 import { pageAddress } from './dataset_menu.js';
+import { When } from './when.js';
 import { carryOut } from './mend_actions.js';
 
 /** @import {FindingJson, GroupDocument, SolutionJson} from '../api/types.js' */
@@ -18,15 +21,18 @@ function Finding({ group, finding }) {
 	const sure = finding.confidence === null ? '' : ` (${Math.round(finding.confidence * 100)} % sure)`;
 	const title = findingTitle(group, finding);
 	const offered = mends.value.filter((mend) => mend.sentence === finding.sentence && mend.view === finding.view);
+	const checked = finding.dismissed;
 	return html`
-		<li class="finding" data-kind=${finding.kind}>
+		<li class="finding" data-kind=${finding.kind} data-dismissed=${Boolean(checked)}>
 			<p>
 				${view ? html`<button class="row-button" type="button" aria-label=${`Focus view ${view.letter}`} onClick=${() => focusView(view.letter)}><${Letter} letter=${view.letter} /></button>` : null}
-				<strong>${title}${sure}.</strong> ${finding.sentence}
+				${checked ? html`<s><strong>${title}${sure}.</strong> ${finding.sentence}</s>` : html`<strong>${title}${sure}.</strong> ${finding.sentence}`}
 			</p>
+			${checked ? html`<p class="finding__checked">Checked, fine${checked.by === 'local' ? '' : `: ${checked.by}`}, <${When} at=${checked.at} />${checked.note ? ` · “${checked.note}”` : ''}</p>` : null}
 			${finding.kind === 'pitch_size' ? html`<${PitchLink} dataset=${group.dataset.name} />` : null}
-			${offered.length === 0 ? null : html`
+			${html`
 				<p class="finding__fixes">
+					<button type="button" data-needs="review" class="button button--small" title=${checked ? 'Let this finding count again' : 'This finding was checked and is fine: it no longer flags the group'} onClick=${() => dismiss(finding, !checked)}>${checked ? 'Look again' : 'Checked, fine'}<span class="hidden-text"> ${title}</span></button>
 					${offered.map((mend) => html`<button type="button" data-needs="annotate" class="button button--fix" onClick=${() => carryOut(mend)}>${mend.label}</button>`)}
 				</p>`}
 		</li>
@@ -42,10 +48,11 @@ export function PitchLink({ dataset }) {
 export function Findings({ group, solution }) {
 	const findings = solution.findings.filter((finding) => finding !== toldFinding.value);
 	if (findings.length === 0) return null;
-	const more = findings.length < solution.findings.length;
+	const more = toldFinding.value !== null;
+	const open = openFindings({ ...solution, findings }).length;
 	return html`
 		<section class="card" aria-label="Findings">
-			<h2>${more ? 'More findings' : 'Findings'} · ${findings.length}</h2>
+			<h2>${more ? 'More findings' : 'Findings'} · ${open}${open < findings.length ? ` open, ${findings.length - open} checked` : ''}</h2>
 			<ul class="findings">
 				${findings.map((finding, i) => html`<${Finding} key=${i} group=${group} finding=${finding} />`)}
 			</ul>

@@ -4,6 +4,7 @@
 import { html } from 'htm/preact';
 
 import { endFirstSteps, making, makingFailed, offerFirstSteps, startPractice } from '../state/practice.js';
+import { whyNot } from '../state/rights.js';
 import { openHelpAt } from '../state/workspace.js';
 import { JobProgress } from './job_progress.js';
 
@@ -12,7 +13,7 @@ const SAMPLE = 'sample';
 
 /** @param {{dataset: string}} props */
 export function FirstSteps({ dataset }) {
-	if (dataset !== SAMPLE || !offerFirstSteps.value) return null;
+	if (dataset !== SAMPLE || !offerFirstSteps.value || whyNot('annotate')) return null;
 	return html`
 		<section class="card first-steps" aria-label="First steps">
 			<p><strong>New here?</strong> Learn it on eight made-up groups: you decide, and see at once whether it was right.</p>

@@ -48,7 +48,7 @@ function SplitFields({ split, change }) {
 		${split.kind === 'match' ? html`
 			<div class="form__columns">
 				<div class="form__row"><label for="split-seed">Seed</label><input class="field" id="split-seed" type="number" step="1" min="0" value=${split.seed} onChange=${withValue((text) => change({ ...split, seed: Math.trunc(Number(text)) }))} /></div>
-				<div class="form__row"><label for="split-share">Share of matches for testing</label><input class="field" id="split-share" type="number" step="0.05" min="0.01" max="0.99" value=${split.test_share} onChange=${withValue((text) => change({ ...split, test_share: Number(text) }))} /></div>
+				<div class="form__row"><label for="split-share">Share of matches for testing</label><input class="field" id="split-share" type="number" step="any" min="0.01" max="0.99" value=${split.test_share} onChange=${withValue((text) => change({ ...split, test_share: Number(text) }))} /></div>
 			</div>` : null}
 		${split.kind === 'camera' ? html`
 			<div class="form__row"><label for="split-cameras">Test cameras</label><input class="field" id="split-cameras" value=${(split.test_cameras ?? []).join(' ')} onChange=${withValue((text) => change({ ...split, test_cameras: text.split(/[\s,]+/).filter(Boolean) }))} /><small>Keys of views, for example cam1 cam2</small></div>` : null}

@@ -8,22 +8,22 @@ import { withValue } from '../lib/field.js';
 import { plural } from '../lib/format.js';
 import { rangeOf, withField } from '../state/query.js';
 import { summary } from '../state/queue.js';
-import { BinAxis, endsOf, short } from './bin_axis.js';
+import { BinAxis, endsOf, noneOf, short } from './bin_axis.js';
 
 /** @import {Histogram} from '../api/types.js' */
 
 const COLUMNS = [
-	{ name: 'jac', field: 'jac', label: 'min JaC 0.5 %', title: 'The lowest share of field lines that fit, of the views of a group', none: 'JaC is measured from drawn field lines, and no group here has any.' },
-	{ name: 'agreement', field: 'agreement', label: 'paint agrees', title: 'The least agreement of a camera with the paint of its picture, of the views of a group: supported times explained', none: 'No paint was read of these groups.' },
+	{ name: 'jac', field: 'jac', label: 'min JaC 0.5 %', title: 'The lowest share of field lines that fit, of the views of a group' },
+	{ name: 'agreement', field: 'agreement', label: 'paint agrees', title: 'The least agreement of a camera with the paint of its picture, of the views of a group: supported times explained' },
 	{ name: 'error_percent', field: 'error_percent', label: 'ball error, %', title: 'Reprojection error of the ball, in per cent of the picture’s diagonal; logarithmic' },
 	{ name: 'sigma', field: 'sigma', label: 'σ, m', title: 'Uncertainty of the ball’s position, metres; logarithmic' },
 	{ name: 'parallax', field: 'parallax', label: 'parallax, °', title: 'The largest angle between two rays to the ball' },
-	{ name: 'size_ratio', field: 'size_ratio', label: 'ball Ø ratio', title: 'Drawn diameter of the ball over the expected one', none: 'Only balls drawn as boxes have a size to compare.' },
+	{ name: 'size_ratio', field: 'size_ratio', label: 'ball Ø ratio', title: 'Drawn diameter of the ball over the expected one' },
 ];
 const WIDTH = 200;
 const HEIGHT = 44;
 
-/** @typedef {{name: string, field: string, label: string, title: string, none?: string}} Column */
+/** @typedef {{name: string, field: string, label: string, title: string}} Column */
 
 /** The words of a query that ask for the bins from `first` to `last`, and for nothing beside them. @param {Column} column @param {Histogram} data @param {number} first @param {number} last */
 function wordsFor({ field }, { edges, open_high: beyond }, first, last) {
@@ -110,7 +110,7 @@ function OneHistogram({ column, data, q, onQuery }) {
 					return html`<rect key=${bin} data-inside=${bin >= first && bin <= last} x=${bin * step + 0.8} y=${HEIGHT - tall} width=${step - 1.6} height=${tall} rx="0.8"><title>${endsOf(data, bin)}: ${plural(n, 'group')}</title></rect>`;
 				})}
 			</svg>
-			${known ? html`<${BinAxis} bins=${data} />` : html`<p class="histogram__none">${data.unknown === 0 ? 'No group matches.' : column.none ?? 'No group here has this number.'}</p>`}
+			${known ? html`<${BinAxis} bins=${data} />` : html`<p class="histogram__none">${data.unknown === 0 ? 'No group matches.' : noneOf(column.name)}</p>`}
 			<${Ends} column=${column} data=${data} bins=${bins} choose=${choose} />
 		</section>
 	`;

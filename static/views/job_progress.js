@@ -14,7 +14,6 @@ import { FormError } from './form_error.js';
 /** @param {JobJson} job @returns {string} */
 function jobText(job) {
 	if (job.state === 'failed') return capital(job.problem?.detail ?? 'It failed.');
-	if (job.state === 'done') return job.kind === 'solve' ? job.sentence : '';
 	if (job.sentence) return job.sentence;
 	if (job.state === 'waiting') return 'Waiting.';
 	return job.total ? `${count(job.done)} of ${count(job.total)}` : '';

@@ -5,7 +5,7 @@ import { html } from 'htm/preact';
 
 import { suggestedReason } from '../state/advice.js';
 import { isSearching } from '../state/insight.js';
-import { mend, mendIndex, mends, turnMend } from '../state/mends.js';
+import { isMendTold, mend, mendIndex, mends, turnMend } from '../state/mends.js';
 import { REASONS } from '../state/reasons.js';
 import { askReason } from '../state/verdicts.js';
 import { drawing } from '../state/workspace.js';
@@ -28,7 +28,7 @@ export function MendBox({ group, solution }) {
 	}
 	return html`
 		<div class="mend" role="group" aria-label="What to do">
-			${offered && !offered.title ? html`<p class="mend__sentence">${offered.sentence}</p>` : null}
+			${offered && !isMendTold.value ? html`<p class="mend__sentence">${offered.title ? `${offered.title}. ` : ''}${offered.finding ? '' : offered.sentence}</p>` : null}
 			<p class="mend__row">
 				${offered ? html`<button data-needs="annotate" class="button button--fix" type="button" onClick=${mendNow}>${offered.label} <kbd>Enter</kbd></button>` : null}
 				${offered && count > 1 ? html`

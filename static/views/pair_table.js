@@ -3,11 +3,28 @@
 
 import { html } from 'htm/preact';
 
+import { diagonal } from '../geometry/preview.js';
 import { fixed, pixels, words } from '../lib/format.js';
 import { Letter } from './letter.js';
 import { Term } from './term.js';
 
 /** @import {GroupDocument, SolutionJson} from '../api/types.js' */
+
+/** @typedef {SolutionJson['pairs'][number]} PairSolution */
+
+/**
+ * Why a pair does not count, in words.
+ *
+ * @param {GroupDocument} group @param {PairSolution} pair
+ */
+export function whyNot(group, { a, b, errors_px: errors, failed }) {
+	if (failed !== 'reprojection') return words(failed ?? 'not valid');
+	const off = [a, b].some((key, i) => {
+		const view = group.views.find((one) => one.key === key);
+		return !view || errors[i] > (group.policy.tau_percent / 100) * diagonal(view);
+	});
+	return off ? 'reprojection' : 'the rays meet behind a camera';
+}
 
 /** @param {{group: GroupDocument, solution: SolutionJson}} props */
 export function PairTable({ group, solution }) {
@@ -34,9 +51,9 @@ export function PairTable({ group, solution }) {
 							<td>${fixed(pair.parallax_degrees, 1, '°')}</td>
 							<td>${fixed(pair.baseline_m, 1)}</td>
 							<td data-number="pair-errors">${pixels(pair.errors_px[0])} · ${pixels(pair.errors_px[1])}</td>
-							<td class="pair-state" data-grade=${pair.valid ? 'ok' : 'bad'} title=${pair.valid ? 'valid' : words(pair.failed ?? '')}>
+							<td class="pair-state" data-grade=${pair.valid ? 'ok' : 'bad'} title=${pair.valid ? 'valid' : whyNot(group, pair)}>
 								<span aria-hidden="true">${pair.valid ? '✓' : '✗'}</span>
-								<span class="hidden-text">${pair.valid ? 'valid' : words(pair.failed ?? 'not valid')}</span>
+								<span class="hidden-text">${pair.valid ? 'valid' : whyNot(group, pair)}</span>
 							</td>
 						</tr>
 					`)}

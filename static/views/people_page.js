@@ -40,6 +40,12 @@ function stateOf(one) {
 	return one.invited ? 'invited' : 'invitation is too old';
 }
 
+/** Who let somebody in; whoever did it themselves was the first admin, or came by single sign-on. @param {UserJson} one */
+function cameBy({ name, created_by: by, sign_on: identity }) {
+	if (by !== name) return `invited by ${by}`;
+	return identity ? 'came by single sign-on' : 'first admin of this server';
+}
+
 /** A link that is shown once. @param {{made: UserWithLink, close: () => void}} props */
 function LinkCard({ made, close }) {
 	return html`
@@ -99,7 +105,7 @@ function InviteCard({ invite, error }) {
 			<form class="form" onSubmit=${send}>
 				<div class="form__columns">
 					<div class="form__row"><label for="people-name">Name</label><input class="field" id="people-name" name="name" required maxlength="40" autocomplete="off" autocapitalize="none" spellcheck=${false} /><small>Small letters and digits; the history keeps it permanently.</small></div>
-					<div class="form__row"><label for="people-role">Role</label><select class="field" id="people-role" name="role">${ROLES.map(({ name, note }) => html`<option key=${name} value=${name} selected=${name === 'reviewer'}>${name}: ${note}</option>`)}</select><small>Each role includes the rights of those above it.</small></div>
+					<div class="form__row"><label for="people-role">Role</label><select class="field" id="people-role" name="role">${ROLES.map(({ name, note }) => html`<option key=${name} value=${name} defaultSelected=${name === 'reviewer'}>${name}: ${note}</option>`)}</select><small>Each role includes the rights of those above it.</small></div>
 				</div>
 				<${FormError} error=${error} />
 				<p><button class="button button--primary" type="submit">Make a link</button></p>
@@ -114,7 +120,7 @@ function PersonRow({ one, change, link, tokens, factor, unlink }) {
 	const why = mine ? 'You cannot change your own role' : undefined;
 	return html`
 		<tr>
-			<th scope="row">${one.name}${mine ? ' (you)' : ''}<small>invited by ${one.created_by}</small>${one.datasets.length ? html`<small>${one.datasets.map(({ dataset, role }) => `${role} in ${dataset}`).join(', ')}</small>` : null}</th>
+			<th scope="row">${one.name}${mine ? ' (you)' : ''}<small>${cameBy(one)}</small>${one.datasets.length ? html`<small>${one.datasets.map(({ dataset, role }) => `${role} in ${dataset}`).join(', ')}</small>` : null}</th>
 			<td>
 				<select class="field" aria-label=${`Role of ${one.name}`} value=${one.role} disabled=${mine} title=${why} onChange=${withValue((role) => change({ role: /** @type {Role} */ (role) }))}>
 					${ROLES.map(({ name }) => html`<option key=${name} value=${name}>${name}</option>`)}

@@ -3,10 +3,11 @@
 
 import { html } from 'htm/preact';
 
-import { getPitches, setPitch } from '../api/pitches.js';
+import { estimatePitches, getPitches, setPitch } from '../api/pitches.js';
 import { count } from '../lib/format.js';
 import { matchName } from '../lib/match_name.js';
 import { pitchSize, shownSize } from '../lib/pitch_size.js';
+import { JobButton } from './job_button.js';
 import { MatchButton, MatchCard, MatchHead, useMatchCard } from './match_card.js';
 import { Trouble } from './page_frame.js';
 
@@ -45,10 +46,12 @@ export function Pitches({ dataset }) {
 	const { job, busy, error: refused, send } = saving;
 	if (error) return html`<${Trouble} title="The pitches cannot be shown" error=${error} retry=${reload} />`;
 	if (!value?.items.length) return null;
+	const open = value.items.some(({ estimate, problem }) => !estimate && !problem);
 	const proposals = value.items.filter(({ proposed }) => proposed).length;
 	return html`
 		<${MatchCard}
-			id="pitches" title=${html`Pitch sizes${proposals ? html` · ${count(proposals)} proposed` : null}`}
+			id="pitches" title=${html`Pitch sizes${proposals ? html` · ${count(proposals)} proposed` : null}
+				${open ? html`<span class="card__aside"><${JobButton} busy=${busy} act=${() => send(() => estimatePitches(dataset))} kind="button--small" title="Estimate the pitch of each match from its lines">Estimate<//></span>` : null}`}
 			columns=${['in use', 'estimated from lines']} card=${card} job=${job} refused=${refused}
 			rows=${value.items.map((one) => html`
 				<${MatchPitch} key=${one.match} one=${one} busy=${busy} onSet=${(/** @type {PitchSizeJson} */ size) => send(() => setPitch(dataset, one.match, size, value.etag))} />`)}

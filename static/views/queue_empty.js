@@ -9,6 +9,7 @@ import { dataset, datasets, failure, loadDatasets } from '../state/datasets.js';
 import { queueAddress } from '../state/navigation.js';
 import { wordsOf } from '../state/query.js';
 import { queue } from '../state/queue.js';
+import { NoDatasets, mayImport } from './no_datasets.js';
 
 /** The query with the word that cannot be read marked. @param {{q: string, pointer: string | null}} props */
 function Marked({ q, pointer }) {
@@ -41,21 +42,15 @@ export function QueueEmpty({ q }) {
 		`;
 	}
 	if (datasets.value?.length === 0) {
-		return html`
-			<section class="card empty">
-				<h2>No dataset yet</h2>
-				<p>Import your own files here, or start the server with the sample dataset:</p>
-				<pre>touchline serve --sample</pre>
-				<p><a class="button button--primary" href="/import">Import a dataset</a></p>
-			</section>
-		`;
+		return html`<${NoDatasets} />`;
 	}
 	if (!dataset.value) {
 		return html`
 			<section class="card empty">
 				<h2>There is no dataset “${param('dataset')}”</h2>
-				<p>It may have been deleted, or its import may have brought nothing; the list of jobs says which. Open another dataset, or import the files again.</p>
-				<p class="buttons"><a class="button button--primary" href="/datasets">All datasets</a><a class="button" href=${`/import?dataset=${encodeURIComponent(param('dataset'))}`}>Import</a><a class="button" href="/jobs">Jobs</a></p>
+				${mayImport() ? html`<p>It may have been deleted, or its import may have brought nothing; the list of jobs says which. Open another dataset, or import the files again.</p>`
+					: html`<p>It may have been deleted, or you have no role in it: ask a lead or an admin for one. You can open another dataset.</p>`}
+				<p class="buttons"><a class="button button--primary" href="/datasets">All datasets</a>${mayImport() ? html`<a class="button" href=${`/import?dataset=${encodeURIComponent(param('dataset'))}`}>Import</a>` : null}<a class="button" href="/jobs">Jobs</a></p>
 			</section>
 		`;
 	}
@@ -63,7 +58,7 @@ export function QueueEmpty({ q }) {
 		<section class="card empty">
 			<h2>${q ? 'No group matches this query' : 'This dataset has no groups'}</h2>
 			${q ? html`<p>Remove a filter, or show all groups.</p><p><a class="button" href=${queueAddress(name, '')}>Show all groups</a></p>`
-				: html`<p>Nothing was imported into it yet.</p><p><a class="button button--primary" href=${`/import?dataset=${encodeURIComponent(name)}`}>Import</a></p>`}
+				: html`<p>Nothing was imported into it yet.</p>${mayImport(name) ? html`<p><a class="button button--primary" href=${`/import?dataset=${encodeURIComponent(name)}`}>Import</a></p>` : html`<p>A lead of this dataset can import files.</p>`}`}
 		</section>
 	`;
 }

@@ -27,6 +27,13 @@ import { QueueTools } from './queue_tools.js';
 function setQuery(q) {
 	const name = dataset.value?.name ?? '';
 	navigate(queueAddress(name, q.trim()), { replace: true });
+	letGo();
+}
+
+/** Whoever filters with the mouse goes on with the rows: Enter opens one, and does not turn the filter off again. */
+function letGo() {
+	const held = document.activeElement;
+	if (held instanceof HTMLElement && !held.matches(':focus-visible')) held.blur();
 }
 
 /** @param {{field: import('preact').RefObject<HTMLInputElement>}} props */

@@ -4,7 +4,7 @@
 import { html } from 'htm/preact';
 
 import { lazy } from '../lib/lazy.js';
-import { PRACTICE } from '../state/datasets.js';
+import { isPractice } from '../state/datasets.js';
 import { Findings } from './findings.js';
 import { Gates } from './gates.js';
 import { PairTable } from './pair_table.js';
@@ -31,7 +31,7 @@ export function Rail({ group, solution, pictures, live }) {
 	return html`
 		<aside class="rail" aria-label="Numbers and verdict">
 			<div class="rail__scroll" tabindex="0" role="group" aria-label="Numbers">
-				${group.dataset.name === PRACTICE ? html`<${LessonCard} group=${group} />` : null}
+				${isPractice(group.dataset.name) ? html`<${LessonCard} group=${group} />` : null}
 				<${VerdictCard} group=${group} solution=${solution} live=${live} />
 				${solution ? html`<${Gates} group=${group} solution=${solution} />` : null}
 				<${ViewTable} group=${group} pictures=${pictures} />

@@ -11,7 +11,8 @@ import { groupDocument, unsaved } from '../state/group.js';
 import { redo, redoable, undo, undoable } from '../state/undo.js';
 import { batchId, goNext, goPrevious, neighbours, query, queueAddress, reviewAddress } from '../state/navigation.js';
 import { standing } from '../state/walk.js';
-import { batch } from '../state/leases.js';
+import { batch, lease } from '../state/leases.js';
+import { isCopy } from '../state/takes.js';
 import { changedElsewhere } from '../state/live.js';
 import { lasting } from '../state/outbox.js';
 import { isAway, isSending, savedAt, waiting, wake, wasRefused } from '../state/sending.js';
@@ -84,9 +85,22 @@ function placeText({ place, total }) {
 	return place === null ? `not in this queue of ${count(total)}` : `group ${count(place)} of ${count(total)}`;
 }
 
+/** Where a copy stands: it is in no queue, and its place is among those of its person. */
+function OwnPlace() {
+	const held = lease.value?.group === groupDocument.value?.id ? lease.value : null;
+	if (!held?.place) return null;
+	return html`
+		<span class="header__place">
+			<a href="/work" title="Back to my work">group ${count(held.place)}${held.of ? ` of ${count(held.of)}` : ''}</a>
+			<span class="header__queue"> in ${batch.value?.name ?? 'a batch'}</span>
+		</span>
+	`;
+}
+
 function Place() {
 	const at = standing.value;
 	const group = groupDocument.value;
+	if (isCopy(group)) return html`<${OwnPlace} />`;
 	if (!group || !at) return null;
 	// Who does not have the group has not been told what its batch is called.
 	const named = batch.value?.id === batchId.value && batch.value?.name;

@@ -5,6 +5,7 @@ import { ballName } from '../geometry/estimator.js';
 import { ballCenter, ballOf } from '../geometry/preview.js';
 import { capital } from '../lib/format.js';
 import { toggleOccluded, toggleOutOfView } from '../state/ball_edits.js';
+import { dismissTold } from '../state/dismissals.js';
 import { drawHere, endDrawing, placeExpected, startDrawing } from '../state/drawing.js';
 import { moveCross } from '../state/drawing_cross.js';
 import { swapSides } from '../state/edits.js';
@@ -209,6 +210,7 @@ const VERDICT = [
 	{ keys: ['s'], label: 'Defer and next', group: 'Verdict', needs: 'review', run: defer },
 	{ keys: ['Shift+a'], label: 'Use the focused view', group: 'Verdict', needs: 'annotate', run: useView },
 	{ keys: ['Shift+x'], label: 'Leave the focused view out; then a digit for the reason', group: 'Verdict', needs: 'annotate', run: askViewReason },
+	{ keys: ['Shift+s'], label: 'Dismiss the finding on the card: checked, fine', group: 'Verdict', needs: 'review', run: dismissTold },
 	{ keys: ['Shift+n'], label: 'Note at the pointer', group: 'Verdict', needs: 'review', run: askNote },
 	{ keys: ['Shift+c'], label: 'Comment at the pointer, or on the group', group: 'Verdict', needs: 'annotate', run: compose },
 ];

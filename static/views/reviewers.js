@@ -49,12 +49,12 @@ function Batches({ dataset }) {
 	const items = batches.value?.items ?? [];
 	/** @param {typeof items[number]} batch */
 	async function undo({ id, changed, state }) {
-		await takeBatchBack({ kind: 'batch', batch: id, text: batchText(changed, state) });
+		await takeBatchBack({ kind: 'batch', dataset: dataset.name, batch: id, text: batchText(changed, state) });
 		batches.reload();
 	}
 	/** @param {typeof items[number]} batch */
 	async function redo({ id, changed, state }) {
-		await giveBatchAgain({ kind: 'batch', batch: id, text: batchText(changed, state) });
+		await giveBatchAgain({ kind: 'batch', dataset: dataset.name, batch: id, text: batchText(changed, state) });
 		batches.reload();
 	}
 	if (items.length === 0) return null;

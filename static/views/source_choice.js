@@ -63,13 +63,12 @@ function useUpload(onUploaded) {
 	return { state, send };
 }
 
-/** Takes what is dropped anywhere on the page. @param {boolean} listens @param {(files: Promise<PathFile[]>) => void} take @returns {boolean} whether something is held over it */
-function useDrop(listens, take) {
+/** Takes what is dropped anywhere on the page. @param {(files: Promise<PathFile[]>) => void} take @returns {boolean} whether something is held over it */
+function useDrop(take) {
 	const [over, setOver] = useState(false);
 	const latest = useRef(take);
 	latest.current = take;
 	useEffect(() => {
-		if (!listens) return undefined;
 		/** @param {DragEvent} event */
 		const holds = (event) => event.dataTransfer?.types.includes('Files');
 		/** @param {DragEvent} event */
@@ -97,7 +96,7 @@ function useDrop(listens, take) {
 			removeEventListener('dragleave', leave);
 			removeEventListener('drop', drop);
 		};
-	}, [listens]);
+	}, []);
 	return over;
 }
 
@@ -124,10 +123,10 @@ export function UploadField({ id, label, accept, hint = '', onUploaded }) {
 	`;
 }
 
-/** Any number of files or a folder, chosen or dropped anywhere on the page. @param {{onUploaded: (sent: UploadJson | null) => void}} props */
-function DropField({ onUploaded }) {
+/** Any number of files or a folder, chosen here or dropped. @param {{dropped: Promise<PathFile[]> | null, over: boolean, onUploaded: (sent: UploadJson | null) => void}} props */
+function DropField({ dropped, over, onUploaded }) {
 	const { state, send } = useUpload(onUploaded);
-	const over = useDrop(true, send);
+	useEffect(() => { if (dropped) send(dropped); }, [dropped]);
 	return html`
 		<div class="form__row import__drop" data-over=${over}>
 			<label for="import-file">File</label>
@@ -185,11 +184,14 @@ function FolderList({ chosen, choose, guess }) {
 export function SourceChoice({ onSource, guess }) {
 	const [kind, setKind] = useState('upload');
 	const [folder, setFolder] = useState('');
-	/** @param {string} next */
-	function change(next) {
+	const [dropped, setDropped] = useState(/** @type {Promise<PathFile[]> | null} */ (null));
+	/** @param {string} next @param {Promise<PathFile[]> | null} [files] */
+	function change(next, files = null) {
 		setKind(next);
+		setDropped(files);
 		onSource(next === 'folder' && folder ? { folder } : null);
 	}
+	const over = useDrop((files) => change('upload', files));
 	return html`
 		<fieldset class="choice import__choice">
 			<legend>Source</legend>
@@ -197,7 +199,7 @@ export function SourceChoice({ onSource, guess }) {
 			<label><input type="radio" name="source" checked=${kind === 'folder'} onChange=${() => change('folder')} /><span>A folder on the server<small>or in an object store; frames stay there</small></span></label>
 		</fieldset>
 		${kind === 'upload'
-			? html`<${DropField} onUploaded=${(/** @type {UploadJson | null} */ sent) => {
+			? html`<${DropField} dropped=${dropped} over=${over} onUploaded=${(/** @type {UploadJson | null} */ sent) => {
 				onSource(sent && { upload: sent.id });
 				if (sent?.format) guess(sent.format);
 			}} />`

@@ -7,7 +7,7 @@ import { useRef, useState } from 'preact/hooks';
 import { count, plural } from '../lib/format.js';
 import { queueAddress } from '../state/navigation.js';
 import { withField, wordsOf } from '../state/query.js';
-import { BinAxis, endsOf } from './bin_axis.js';
+import { BinAxis, endsOf, noneOf } from './bin_axis.js';
 
 /** @import {SpreadJson} from '../api/statistics.js' */
 
@@ -23,16 +23,9 @@ function queryOf({ field, queries }, bin, q) {
 	return withField(q, field, wordsOf(queries[bin]));
 }
 
-/** Why nobody has a number, where that is known. */
-const NONE = /** @type {{[name: string]: string}} */ ({
-	jac: 'JaC is measured from drawn field lines, and none of these groups has any.',
-	agreement: 'No paint was read of the pictures of these groups.',
-	size_ratio: 'Only balls drawn as boxes have a size to compare; none of these is.',
-});
-
 /** What the picture does not say: how tall it is, and who is not in it. @param {{most: number, unknown: number, name: string}} props */
 function Aside({ most, unknown, name }) {
-	if (most === 0) return html`<p class="note">${NONE[name] ?? 'None of these groups has this number.'}</p>`;
+	if (most === 0) return html`<p class="note">${noneOf(name)}</p>`;
 	const without = unknown ? ` · ${plural(unknown, 'group')} without this number` : '';
 	return html`<p class="note">Tallest bar: ${plural(most, 'group')}${without}</p>`;
 }

@@ -5,8 +5,10 @@ import { html } from 'htm/preact';
 
 import { ballOf } from '../geometry/preview.js';
 import { capital, words } from '../lib/format.js';
-import { findingTitle } from '../state/advice.js';
+import { findingTitle, saysApart } from '../state/advice.js';
+import { dismissTold } from '../state/dismissals.js';
 import { mend, toldFinding } from '../state/mends.js';
+import { openFindings } from '../state/open_findings.js';
 import { REASONS } from '../state/reasons.js';
 import { isBlind } from '../state/verdicts.js';
 import { GATE_TITLES, gateLabel } from './gate_names.js';
@@ -15,9 +17,6 @@ import { MendBox } from './mend_box.js';
 
 /** @import {GroupDocument, SolutionJson, VerdictJson, ViewJson} from '../api/types.js' */
 /** @import {Mend} from '../state/mends.js' */
-
-/** Findings that say why a view does not meet the others. */
-const ODD = new Set(['view_disagrees', 'views_contradict', 'sides_swapped', 'not_synchronous']);
 
 /** @typedef {{tone: 'ok' | 'warn' | 'bad' | 'unseen', over: string, title: string, text: string}} Headline */
 
@@ -40,8 +39,8 @@ function headline(group, solution, offered) {
 	}
 	const used = solution.ball?.views.length ?? 0;
 	const all = group.views.length;
-	const [first] = solution.findings;
-	const told = offered?.title ? offered : first && { title: findingTitle(group, first), sentence: first.sentence };
+	const first = toldFinding.value;
+	const told = first ? { title: findingTitle(group, first), sentence: first.sentence } : offered?.title ? offered : null;
 	if (!solution.passes) {
 		const failing = solution.first_failing;
 		const gate = failing ? (GATE_TITLES[failing.gate] ?? capital(words(failing.gate))) : 'A gate fails';
@@ -49,8 +48,11 @@ function headline(group, solution, offered) {
 		if (!told) return { tone: 'bad', over: 'Does not pass', title: gate, text: measured };
 		return { tone: 'bad', over: `Does not pass: ${lower(gate)}`, title: told.title ?? gate, text: told.sentence };
 	}
-	const odd = solution.findings.some(({ kind, view }) => view !== null && ODD.has(kind));
-	if (odd || used < all) {
+	if (first?.unusable_ball) return { tone: 'bad', over: 'Passes, but the ball cannot be used', title: told?.title ?? '', text: told?.sentence ?? '' };
+	if (used === all && (openFindings(solution).some(saysApart) || misses(group, solution))) {
+		return { tone: 'warn', over: 'Passes, but its views disagree', title: told?.title ?? 'The views disagree', text: told?.sentence ?? '' };
+	}
+	if (used < all) {
 		return {
 			tone: 'warn', over: `Passes with ${used} of ${all} views`, title: told?.title ?? `${used} of ${all} views agree`,
 			text: told?.sentence ?? missing(group, solution),
@@ -58,6 +60,11 @@ function headline(group, solution, offered) {
 	}
 	if (told) return { tone: 'warn', over: 'Passes, worth a look', title: told.title ?? '', text: told.sentence };
 	return { tone: 'ok', over: 'Passes every gate', title: all === 2 ? 'Both views agree' : `All ${all} views agree`, text: [spread(solution), unused(group, solution)].filter(Boolean).join(' ') };
+}
+
+/** Whether the 3D ball misses a view that counts, as it may while a ball is dragged, before the server has found it. @param {GroupDocument} group @param {SolutionJson} solution */
+function misses(group, solution) {
+	return solution.views.some(({ included, ball }) => included && (ball?.error_percent ?? 0) > group.policy.tau_percent);
 }
 
 /** @param {string} title */
@@ -113,6 +120,7 @@ export function VerdictCard({ group, solution, live }) {
 			<p class="verdict-card__text">${text}${sure === null ? '' : html` <span class="verdict-card__sure">${Math.round(sure * 100)} % sure.</span>`}</p>
 			${solution?.findings.some(({ kind, sentence }) => kind === 'pitch_size' && sentence === text) ? html`<${PitchLink} dataset=${group.dataset.name} />` : null}
 			<${MendBox} group=${group} solution=${solution} />
+			${toldFinding.value ? html`<p class="verdict-card__checked"><button class="button button--small" type="button" data-needs="review" title="This finding was checked and is fine; Ctrl Z opens it again" onClick=${dismissTold}>Checked, fine <kbd>⇧S</kbd></button></p>` : null}
 			${isBlind(group) ? html`<p><span class="pill" data-status="no-picture">no picture</span> <span data-grade="warn">No view of this group has a picture to look at.</span></p>` : null}
 			${verdict.state === 'unreviewed' && !verdict.note ? null : html`
 				<p class="verdict-card__verdict">

@@ -4,6 +4,8 @@
 import { html } from 'htm/preact';
 
 import { pixels } from '../lib/format.js';
+import { markNotVisible } from '../state/edits.js';
+import { submit } from '../state/group.js';
 import { influence } from '../state/insight.js';
 import { focused, selected } from '../state/workspace.js';
 import { Letter } from './letter.js';
@@ -59,12 +61,29 @@ function LineRow({ picture, marking, one }) {
 	`;
 }
 
+/** Markings that the picture would show and nobody has drawn, and those that it is said not to show. @param {{picture: ViewPicture}} props */
+export function Undrawn({ picture: { view, markings } }) {
+	const missing = markings.filter(({ points }) => points.length === 0);
+	const hidden = view.not_visible ?? [];
+	return html`
+		${missing.length ? html`
+			<p class="view-lines__missing">${missing.length} visible, not drawn:</p>
+			<ul class="view-lines__undrawn">${missing.map(({ marking }) => html`
+				<li key=${marking}>${marking} <button class="mend__more" type="button" data-needs="annotate" title="Something hides it, or it is worn: JaC does not count it as missing" aria-label=${`${marking} is not visible`} onClick=${() => submit(markNotVisible(view, marking, true))}>not visible</button></li>`)}
+			</ul>` : null}
+		${hidden.length ? html`
+			<p class="view-lines__missing">Marked as not visible:</p>
+			<ul class="view-lines__undrawn">${hidden.map((marking) => html`
+				<li key=${marking}>${marking} <button class="mend__more" type="button" data-needs="annotate" aria-label=${`${marking} is visible`} onClick=${() => submit(markNotVisible(view, marking, false))}>is visible</button></li>`)}
+			</ul>` : null}
+	`;
+}
+
 /** @param {{group: GroupDocument, pictures: ViewPicture[]}} props */
 export function ViewLines({ group, pictures }) {
 	const picture = pictures.find(({ view }) => view.letter === focused.value);
 	if (!picture) return null;
 	const drawn = picture.markings.filter(({ points }) => points.length > 0);
-	const missing = picture.markings.length - drawn.length;
 	const known = influence.value?.id === picture.view.id ? influence.value.items : [];
 	const jac = jacOf(picture.solved);
 	return html`
@@ -79,7 +98,7 @@ export function ViewLines({ group, pictures }) {
 							one=${known.find((one) => one.marking === marking.marking)}
 						/>`)}
 				</ul>` : html`<p class="empty-note">No lines are drawn in this view. N draws one.</p>`}
-			${missing > 0 ? html`<p class="view-lines__missing">${missing} visible, not drawn: ${picture.markings.filter(({ points }) => points.length === 0).map(({ marking }) => marking).join(', ')}.</p>` : null}
+			<${Undrawn} picture=${picture} />
 		</section>
 	`;
 }

@@ -25,13 +25,13 @@ export function jacOf(solved) {
 }
 
 /**
- * How the camera and the paint of its picture agree, or null where none was read for its lines.
+ * How the camera and the paint of its picture agree, or null where none was read for its lines, nor since the group is shown.
  *
- * @param {ViewSolutionJson | null} solved
+ * @param {ViewSolutionJson | null} solved @param {import('../api/paint.js').PaintJson | undefined} [read] what was read of the picture while the group is shown
  * @returns {{supported: string, explained: string, reason: string} | null} shares or –, and why the camera is that of the clicks
  */
-export function paintOf(solved) {
-	const fit = solved?.calibration.paint;
+export function paintOf(solved, read) {
+	const fit = solved?.calibration.paint ?? read;
 	if (!fit) return null;
 	const share = (/** @type {number | null} */ value) => (value === null ? '–' : sharePercent(value));
 	const reason = fit.reason === null ? '' : REASONS[fit.reason] ?? fit.reason;

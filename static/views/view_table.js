@@ -7,7 +7,7 @@ import { gradeOfSize } from '../geometry/residual.js';
 import { fixed, percent, pixels } from '../lib/format.js';
 import { submit } from '../state/group.js';
 import { leftOutText } from '../state/reasons.js';
-import { focused, focusView } from '../state/workspace.js';
+import { focused, focusView, paintWhiskers } from '../state/workspace.js';
 import { Letter } from './letter.js';
 import { Term } from './term.js';
 import { errorOf, gradesOf, jacOf, paintOf } from './view_state.js';
@@ -45,9 +45,21 @@ export function ViewTable({ group, pictures }) {
 	`;
 }
 
-/** How the camera and the paint of its picture agree, where that was read. @param {{solved: ViewPicture['solved'], view: ViewPicture['view']}} props */
-function PaintLine({ solved, view }) {
-	const paint = paintOf(solved);
+/** A camera that no lines say how well it fits, over a picture that could. @param {ViewPicture} picture */
+function isUnmeasured({ view, solved }) {
+	return Boolean(view.image && solved?.calibration.camera) && Object.keys(view.lines).length === 0;
+}
+
+/** How the camera and the paint of its picture agree, where that was read, or the way to it. @param {{picture: ViewPicture}} props */
+function PaintLine({ picture }) {
+	const { solved, view, paint: read } = picture;
+	const paint = paintOf(solved, read?.found);
+	if (!paint && isUnmeasured(picture) && !paintWhiskers.value) {
+		return html`
+			<tr class="numbers__aside" data-paint=${view.letter}>
+				<td colspan="7">paint: not compared with the camera <button class="mend__more" type="button" data-needs="annotate" aria-label=${`Compare the camera of view ${view.letter} with its paint`} onClick=${() => { paintWhiskers.value = true; }}>compare</button></td>
+			</tr>`;
+	}
 	if (!paint) return null;
 	return html`
 		<tr class="numbers__aside" data-paint=${view.letter}>
@@ -83,7 +95,7 @@ function ViewRow({ group, picture }) {
 				/>
 			</td>
 		</tr>
-		<${PaintLine} solved=${solved} view=${view} />
+		<${PaintLine} picture=${picture} />
 		${view.proposed?.length ? html`
 			<tr class="numbers__aside" data-proposed=${view.letter}>
 				<td colspan="7">lines: ${view.proposed.length} of ${Object.keys(view.lines).length} accepted as <${Term} word="proposal">proposed<//></td>

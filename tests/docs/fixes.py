@@ -31,6 +31,7 @@ ACTIONS: dict[str, tuple[str, str | None]] = {
     "move_point": ("a point of a marking goes where `point` says", "set_lines"),
     "drop_point": ("a point of a marking goes", "set_lines"),
     "drop_marking": ("a marking goes", "set_lines"),
+    "hide_marking": ("a marking is said not to be visible: a stub of a few pixels", "set_lines"),
     "include_view": ("a view that a person left out is used again", "include_view"),
     "exclude_view": ("a view is left out", "include_view"),
     "look_ball": ("no edit: look whether the ball is at `point`, then send its box", None),
@@ -87,7 +88,9 @@ def request_of(edit: dict[str, Any], views: dict[str, int]) -> tuple[str, dict[s
             marking: [{"x": x, "y": y} for x, y in points] if points else None
             for marking, points in edit["lines"].items()
         }
-        return f"{place}/lines", {"lines": lines}
+        source = edit.get("source", {})
+        hidden = [marking for marking in source if source[marking] == "not_visible"]
+        return f"{place}/lines", {"lines": lines, **({"not_visible": hidden} if hidden else {})}
     if edit["edit"] == "set_balls":
         ball = edit["balls"][0] if edit["balls"] else None
         return f"{place}/ball", ball and {key: ball[key] for key in ball if ball[key] is not None}

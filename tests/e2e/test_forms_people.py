@@ -56,6 +56,12 @@ PEOPLE = [
     ),
     Row("has seen the link", [press("Done")], {}, hides="#people-link"),
     Row(
+        "invites somebody else with the role that is proposed, once more",
+        [fill("Name", "olga", INVITE), press("Make a link", INVITE)],
+        {"POST /users": {"name": "olga", "role": "reviewer"}},
+        {f"{EVERYBODY} tr:has-text('olga')": "invited by anna"},
+    ),
+    Row(
         "looks at somebody's tokens",
         [press("Tokens of finn")],
         {"GET /users/{finn}/tokens": None},
@@ -106,7 +112,7 @@ PEOPLE = [
         "asks a second factor of everybody",
         [tick("Require a second factor: people without one set it up at their next login")],
         {"PUT /team": {"require_second_factor": True}},
-        {".people__rule:has(input:checked)": "Everybody needs a second factor"},
+        {".people__rule:has(input:checked)": "Require a second factor"},
     ),
     Row(
         "asks it of nobody any more",
@@ -117,7 +123,7 @@ PEOPLE = [
             )
         ],
         {"PUT /team": {"require_second_factor": False}},
-        {".people__rule:not(:has(input:checked))": "Everybody needs a second factor"},
+        {".people__rule:not(:has(input:checked))": "Require a second factor"},
     ),
     Row(
         "gives a role in one dataset",
@@ -166,7 +172,7 @@ class TestPeople:
     ) -> None:
         console.expect("503")
         page = open_as(open_page, crew.log_in("ada"), "/people")
-        rule = page.get_by_label("Everybody needs a second factor")
+        rule = page.get_by_label("Require a second factor")
         expect(rule).not_to_be_checked()
         page.route("**/api/v1/team", lambda route: route.fulfill(status=503), times=1)
         rule.click()

@@ -83,7 +83,7 @@ EXPORTS = [
                 "version": None,
             }
         },
-        {".export__result": "Ready"},
+        {".export__result": "Written, but not complete"},
     ),
 ]
 
@@ -125,7 +125,9 @@ class TestExports:
             expect(cells.nth(0)).to_contain_text(what)
             for why, n in one["left_out"].items():
                 expect(cells.nth(0)).to_contain_text(f"{n} {why.replace('_', ' ')}")
-            expect(cells.nth(1)).to_have_text(one["status"])
+            expect(cells.nth(1)).to_have_text(
+                one["status"] if one["incomplete"] is None else "incomplete"
+            )
             expect(cells.nth(2)).to_have_text(size_text(one["bytes"]))
             expect(cells.nth(3).locator("time")).to_have_attribute("datetime", one["created"])
             expect(line.get_by_role("link")).to_have_attribute("href", one["content"])
@@ -182,7 +184,7 @@ class TestJobs:
         runs = page.get_by_role("region", name=f"Job {ids['runs']}: Evaluate for long")
         expect(runs.get_by_role("progressbar")).to_have_attribute("aria-valuenow", "33")
         expect(runs).to_contain_text("3 of 9")
-        expect(runs).to_contain_text("evaluate · sample · dora · begun")
+        expect(runs).to_contain_text("evaluate · sample · dora · started")
         expect(runs.locator("time")).to_have_attribute("datetime", BEGUN)
         failed = page.get_by_role("region", name=f"Job {ids['failed']}: Solve in vain")
         expect(failed.locator(".pill")).to_have_text("failed")

@@ -87,6 +87,8 @@ class TestPictures:
     ) -> None:
         page = open_page("/import")
         page.get_by_label("Dataset", exact=True).fill("stills")
+        # Also while a folder of the server is chosen: what is dropped is never opened instead.
+        page.get_by_role("radio", name="A folder on the server").check()
         drop(page, stills / "1.png", stills / "second half" / "2.jpg")
         expect(page.get_by_text("2 files, ")).to_contain_text("are uploaded")
         expect(page.get_by_role("radio", name="Pictures without")).to_be_checked()

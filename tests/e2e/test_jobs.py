@@ -68,6 +68,6 @@ class TestHowFar:
         for share in shares[1:]:
             expect(share).to_be_empty()
             assert share.get_attribute("aria-valuenow") is None
-        expect(cards[1]).to_contain_text("begun")
+        expect(cards[1]).to_contain_text("started")
         expect(cards[2]).to_contain_text("Waiting.")
-        expect(cards[2]).to_contain_text("asked for")
+        expect(cards[2]).to_contain_text("requested")

@@ -153,5 +153,5 @@ class TestUnmeasuredJac:
     def test_the_queue_says_why_it_has_no_bars(self, given: Page) -> None:
         given.goto("/groups?dataset=given")
         card = given.get_by_label("min JaC 0.5 %", exact=True)
-        expect(card).to_contain_text("JaC is measured from drawn field lines")
+        expect(card).to_contain_text("JaC needs drawn field lines and a camera")
         assert collisions(given, "body") == []

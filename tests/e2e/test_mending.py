@@ -389,3 +389,41 @@ class TestStates:
         expect(one.card).to_have_attribute("data-tone", "ok")
         screen.press("Enter")
         expect(one.page.locator(".object-list")).to_be_visible()
+
+
+class TestDismissing:
+    def test_a_finding_that_was_checked_flags_nothing_until_it_is_opened_again(
+        self, open_page: OpenPage
+    ) -> None:
+        page = open_page("/review/1")
+        asked = "/api/v1/groups?dataset=sample&q=finding:any passes:yes status:unreviewed"
+        rows = page.request.get(asked).json()["items"]
+        one = next(row for row in rows if len(row["findings"]) == 1)
+        group = f"/api/v1/groups/{one['id']}"
+        page.goto(f"/review/{one['id']}?q=id:{one['id']}")
+        screen = Screen(page)
+        screen.ready()
+        card = page.locator(".verdict-card")
+        expect(card).to_have_attribute("data-tone", "warn")
+        many = len(page.request.get(group).json()["solution"]["findings"])
+        struck = page.locator(".finding[data-dismissed='true']")
+        for count in range(1, many + 1):
+            page.keyboard.press("Shift+s")
+            expect(struck).to_have_count(count)
+        screen.saved()
+        expect(struck.first).to_contain_text("Checked, fine")
+        row = page.request.get(f"/api/v1/groups?dataset=sample&q=id:{one['id']}").json()["items"][0]
+        assert (row["findings"], row["dismissed"]) == ([], one["findings"])
+        # Undone like a verdict, also from a page that is new; and by its button.
+        page.reload()
+        screen.ready()
+        for count in range(many, 0, -1):
+            expect(struck).to_have_count(count)
+            page.keyboard.press("Control+z")
+        expect(struck).to_have_count(0)
+        expect(card).to_have_attribute("data-tone", "warn")
+        page.keyboard.press("Control+Shift+z")
+        expect(struck).to_have_count(1)
+        struck.get_by_role("button", name="Look again").click()
+        expect(struck).to_have_count(0)
+        screen.saved()

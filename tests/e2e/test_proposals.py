@@ -98,6 +98,28 @@ def test_they_are_looked_for_drawn_and_accepted_with_one_key(bare: tuple[Page, i
     until(page, lambda: screen_document(page, number)["views"][0]["proposed"] == view["proposed"])
 
 
+def test_the_card_offers_to_look_at_the_picture_of_a_view_without_lines(
+    bare: tuple[Page, int],
+) -> None:
+    page, number = bare
+    page.goto(f"/review/{number}")
+    screen = Screen(page)
+    screen.ready()
+    box = page.get_by_role("group", name="What to do")
+    expect(box.get_by_role("button", name="Propose lines")).to_be_visible()
+    expect(box).not_to_contain_text("here mends it")
+    page.keyboard.press("Enter")
+    title = page.locator(".verdict-card h1")
+    expect(title).to_contain_text("proposed for A", timeout=60_000)
+    expect(page.locator('.proposals [data-proposal="A"]')).to_contain_text("supported")
+    assert screen.document()["views"][0]["lines"] == {}
+    page.keyboard.press("Enter")
+    screen.saved()
+    view = screen.document()["views"][0]
+    assert view["proposed"] == sorted(view["lines"]) != []
+    expect(box.get_by_role("button", name="Propose lines")).to_be_hidden()
+
+
 def test_they_join_the_lines_that_determine_no_camera(bare: tuple[Page, int]) -> None:
     page, number = bare
     before = screen_document(page, number)

@@ -124,6 +124,32 @@ class TestQueryBox:
         expect(head).to_have_attribute("aria-sort", "descending")
         expect(page.locator(".save")).to_contain_text("14 of 14 match")
 
+    @pytest.mark.parametrize("control", ["filter", "column"])
+    def test_enter_opens_a_group_after_a_control_was_clicked(
+        self, open_page: OpenPage, control: str
+    ) -> None:
+        page = opened(open_page)
+        if control == "filter":
+            page.get_by_role("button", name="unreviewed").click()
+            expect(page.locator(".field--query")).to_have_value("status:unreviewed")
+        else:
+            page.get_by_role("button", name="margin").click()
+            expect(page.locator(".field--query")).to_have_value("sort:margin")
+        expect(page.locator(".save")).to_contain_text("match")
+        page.keyboard.press("Enter")
+        page.wait_for_url("**/review/**")
+
+    def test_a_filter_that_the_keyboard_turned_on_keeps_the_focus(
+        self, open_page: OpenPage
+    ) -> None:
+        page = opened(open_page)
+        button = page.get_by_role("button", name="unreviewed")
+        page.keyboard.press("Tab")
+        button.focus()
+        page.keyboard.press("Enter")
+        expect(page.locator(".field--query")).to_have_value("status:unreviewed")
+        expect(button).to_be_focused()
+
     def test_the_ends_of_a_histogram_move_by_keyboard(self, open_page: OpenPage) -> None:
         page = opened(open_page)
         slider = page.get_by_role("slider", name="min JaC 0.5 % from")

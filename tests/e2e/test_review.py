@@ -8,24 +8,30 @@ import json
 import re
 import zipfile
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from playwright.sync_api import Page, expect
 
+from app.datasets.camera_json import camera_from_json
 from tests.e2e.screen import (
     Screen,
     at_rest,
     holding,
     interior_point,
     lie_ready,
+    on_present,
     passing,
     rows,
     submitted,
+    undo_edit,
     until,
     withdraw_verdict,
 )
+from tests.e2e.test_access import serious_in_both
 
 OpenPage = Callable[..., Page]
 
@@ -35,6 +41,20 @@ GREEN_PIXELS = """canvas => {
   for (let i = 0; i < data.length; i += 4) found += data[i + 1] > 220 && data[i] < 160 && data[i + 2] > 160;
   return found;
 }"""
+
+
+def bury(page: Page, number: int) -> int:
+    """Move the balls of a group to where its cameras see a place 3 m below the grass; how many."""
+    document = page.request.get(f"/api/v1/groups/{number}").json()
+    x, y, _ = document["solution"]["ball"]["point"]
+    pairs = [*zip(document["views"], document["solution"]["views"], strict=True)]
+    for view, solved in pairs:
+        camera = camera_from_json(solved["calibration"]["camera"], "answer", view["key"])
+        ((right, down),) = camera.project(np.array([[x, y, 3.0]])).tolist()
+        address = f"/api/v1/views/{view['id']}/ball"
+        patch = partial(page.request.patch, address, data={"point": [right, down]})
+        on_present(page, number, lambda headers, patch=patch: patch(headers=headers))
+    return len(pairs)
 
 
 COUNT_PICTURES = """() => {
@@ -358,6 +378,66 @@ class TestVerdicts:
         document = page.request.get(f"/api/v1/groups/{failing}").json()
         assert document["verdict"]["note"] == "seen on video"
         withdraw_verdict(page, failing)
+
+    def test_a_ball_that_cannot_be_used_is_said_first_and_accepted_only_with_a_reason(
+        self, open_page: OpenPage
+    ) -> None:
+        page = open_page(None)
+        number = passing(page, 2)
+        edits = bury(page, number)
+        page.goto(f"/review/{number}")
+        screen = Screen(page)
+        screen.ready()
+        card = page.get_by_role("region", name="Result")
+        expect(card).to_have_attribute("data-tone", "bad")
+        expect(card).to_contain_text("Passes, but the ball cannot be used")
+        expect(card.locator(".verdict-card__text")).to_contain_text("lies 3.0 m below the grass")
+        assert serious_in_both(page) == []
+        screen.press("a")
+        note = page.get_by_label("Say why.")
+        expect(note).to_be_focused()
+        expect(page.locator(".ask__title")).to_contain_text("the ball cannot be used")
+        page.keyboard.press("Escape")
+        assert screen.document()["verdict"]["state"] == "unreviewed"
+        for _ in range(edits):
+            undo_edit(page, number)
+
+    def test_a_line_that_the_picture_does_not_show_is_marked_and_taken_back(
+        self, open_page: OpenPage
+    ) -> None:
+        page = open_page(None)
+        listed = page.request.get(
+            "/api/v1/groups", params={"dataset": "sample", "q": "finding:visible_not_annotated"}
+        )
+        page.goto(f"/review/{listed.json()['items'][0]['id']}")
+        screen = Screen(page)
+        screen.ready()
+        before = screen.document()
+        finding = next(
+            item
+            for item in before["solution"]["findings"]
+            if item["kind"] == "visible_not_annotated"
+        )
+        place = [view["key"] for view in before["views"]].index(finding["view"])
+        page.keyboard.press(str(place + 1))
+        name = finding["marking"]
+        page.get_by_role("button", name=f"{name} is not visible").click()
+        back = page.get_by_role("button", name=f"{name} is visible")
+        expect(back).to_be_visible()
+        screen.saved()
+        after = screen.document()
+        assert after["views"][place]["not_visible"] == [name]
+        jac = [
+            item["solution"]["views"][place]["calibration"]["jac"]["0.5"]
+            for item in (before, after)
+        ]
+        assert jac[0] < jac[1]
+        kinds = [(item["kind"], item["marking"]) for item in after["solution"]["findings"]]
+        assert ("visible_not_annotated", name) not in kinds
+        assert serious_in_both(page) == []
+        back.click()
+        screen.saved()
+        assert screen.document()["views"][place]["not_visible"] == []
 
     def test_a_verdict_that_is_refused_puts_the_group_back(
         self, review: Callable[..., Screen], console: Any

@@ -42,7 +42,7 @@ class TestSessions:
         log_in(page, "tina")
         page.get_by_label("What it is for").fill("nightly")
         page.get_by_label("export: make exports").check()
-        expect(page.get_by_label("admin: look")).to_be_disabled()
+        expect(page.get_by_label("admin: list")).to_be_disabled()
         page.locator("#token-dataset").select_option("sample")
         page.locator("#token-days").select_option("30")
         page.get_by_role("button", name="Make a token").click()

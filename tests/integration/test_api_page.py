@@ -9,6 +9,7 @@ import zipfile
 from argparse import ArgumentParser, Namespace
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import httpx
 import pytest
@@ -122,14 +123,25 @@ def folder(tmp_path: Path, address: str) -> Path:
     """A folder with the files that the page uploads."""
     with zipfile.ZipFile(tmp_path / "league.zip", "w") as archive:
         archive.writestr("Labels-v3.json", "{}")
-    group = first_group(address)
-    view = group["views"][0]
-    found = {"image_id": 1, "category_id": 1, "bbox": view["balls"][0]["box"], "score": 0.9}
-    image = {"id": 1, "file_name": f"{group['match']}/{view['key']}"}
-    image |= {"width": view["width"], "height": view["height"]}
-    results = {"images": [image], "annotations": [found], "categories": [{"id": 1, "name": "ball"}]}
+    images, annotations = [], []
+    for number, (group, view) in enumerate(seen_balls(address), 1):
+        box = view["balls"][0]["box"]
+        annotations.append({"image_id": number, "category_id": 1, "bbox": box, "score": 0.9})
+        image = {"id": number, "file_name": f"{group['match']}/{view['key']}"}
+        images.append(image | {"width": view["width"], "height": view["height"]})
+    classes = [{"id": 1, "name": "ball"}]
+    results = {"images": images, "annotations": annotations, "categories": classes}
     (tmp_path / "results.json").write_text(json.dumps(results))
     return tmp_path
+
+
+def seen_balls(address: str) -> Iterator[tuple[dict[str, Any], dict[str, Any]]]:
+    """A view with a ball of each of some groups that pass; the page rejects one of them."""
+    with httpx.Client(base_url=f"{address}/api/v1") as client:
+        page = client.get("/groups", params={"dataset": "sample", "q": "passes:yes", "limit": 5})
+        for row in page.json()["items"]:
+            group = client.get(f"/groups/{row['id']}").json()
+            yield group, next(view for view in group["views"] if view["balls"])
 
 
 class TestPage:

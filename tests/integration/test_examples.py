@@ -6,6 +6,7 @@ import os
 import re
 import subprocess
 import sys
+from collections.abc import Iterable
 from pathlib import Path
 
 import pytest
@@ -95,6 +96,47 @@ class TestExamples:
         told = run(tmp_path, EXAMPLES / "curate.py", address, "small", "curated")
         assert "4 accepted, 0 deferred" in told
         assert "4 groups would enter version curated" in told
+
+
+class TestPeoplesWork:
+    """No example undoes what people decided."""
+
+    STATES = ("accepted", "rejected", "deferred")
+
+    def judged(self, client: Client) -> dict[int, str]:
+        """Groups that pass, each with the verdict that a person gives it; the last with none."""
+        rows = list(client.pages("groups", dataset="small", q="passes:yes"))
+        assert len(rows) > len(self.STATES)
+        states = dict(zip([row["id"] for row in rows], self.STATES, strict=False))
+        for row in rows:
+            state = states.get(row["id"], "unreviewed")
+            reason = "other" if state == "rejected" else None
+            body = {"state": state, "reason": reason, "note": "seen" if reason else None}
+            at = f"groups/{row['id']}"
+            client.put(f"{at}/verdict", body, if_match=client.get(at))
+        return states
+
+    def states(self, client: Client, groups: Iterable[int]) -> dict[int, str]:
+        return {one: client.get(f"groups/{one}")["verdict"]["state"] for one in groups}
+
+    @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+    def test_pages_leave_verdicts_alone(
+        self, page: Path, address: str, client: Client, export: Path, tmp_path: Path
+    ) -> None:
+        given = self.judged(client)
+        TestPages().test_every_block_of_python_runs(page, address, export, tmp_path)
+        assert self.states(client, given) == given
+
+    @pytest.mark.parametrize("script", sorted(EXAMPLES.glob("*.py")), ids=lambda path: path.name)
+    def test_scripts_leave_verdicts_alone(
+        self, script: Path, address: str, client: Client, tmp_path: Path
+    ) -> None:
+        if "Client" not in script.read_text(encoding="utf-8"):
+            pytest.skip("it speaks to no server")
+        given = self.judged(client)
+        version = {"curate.py": "kept"}.get(script.name, "examples")
+        run(tmp_path, script, address, "small", version)
+        assert self.states(client, given) == given
 
 
 class TestPages:

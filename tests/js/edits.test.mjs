@@ -2,7 +2,7 @@ import assert from 'node:assert/strict';
 import { describe, it } from 'node:test';
 
 import {
-	applyEdit, describe as describe_, editOf, movePoint, previewBody, requestOf, sameTarget,
+	applyEdit, describe as describe_, editOf, markNotVisible, movePoint, previewBody, requestOf, sameTarget, swapSides,
 } from '../../static/state/edits.js';
 import { leftOutText } from '../../static/state/reasons.js';
 
@@ -26,6 +26,28 @@ describe('movePoint', () => {
 		const edit = movePoint(view, 'Goal left post left', 0, null);
 		assert.deepEqual(edit.lines, { 'Goal left post left': null });
 		assert.ok(!('Goal left post left' in applyEdit(group, edit).views[0].lines));
+	});
+});
+
+describe('a marking that is not visible', () => {
+	const name = 'Goal left post left';
+	const hidden = markNotVisible(view, name, true);
+	const marked = applyEdit(group, hidden).views[0];
+
+	it('is said without points, is kept while others change, and is taken back', () => {
+		assert.deepEqual([marked.not_visible, name in marked.lines], [[name], false]);
+		assert.deepEqual(requestOf(group, hidden).body, { lines: { [name]: null }, not_visible: [name] });
+		assert.deepEqual(editOf({ edit: 'set_lines', view: '7.png', lines: { [name]: null }, source: { [name]: 'not_visible' } }), hidden);
+		assert.equal(describe_(group, hidden), 'Goal left post left of A marked as not visible');
+		const shown = { ...group, views: [marked] };
+		assert.deepEqual(applyEdit(shown, movePoint(marked, 'Middle line', 0, null)).views[0].not_visible, [name]);
+		assert.deepEqual(applyEdit(shown, markNotVisible(marked, name, false)).views[0].not_visible, []);
+	});
+
+	it('is the other end of the pitch once the sides are swapped', () => {
+		const swapped = applyEdit({ ...group, views: [marked] }, swapSides(marked)).views[0];
+		assert.deepEqual(swapped.not_visible, ['Goal right post left']);
+		assert.deepEqual(Object.keys(swapped.lines), ['Middle line']);
 	});
 });
 

@@ -1,11 +1,11 @@
 import assert from 'node:assert/strict';
 import { beforeEach, describe, it } from 'node:test';
 
-import { actions, did, didAgain, forget, forgetEdit, forgetUndone, nextBack, tookBack, undone, withAction } from '../../static/state/last_action.js';
+import { actions, did, didAgain, forget, forgetEdit, forgetUndone, nextAgain, nextBack, tookBack, undone, withAction } from '../../static/state/last_action.js';
 
-const edit = (group) => ({ kind: 'edit', group, number: group, times: 1 });
-const verdict = (group) => ({ kind: 'verdict', group, number: group, given: {}, before: {} });
-const batch = { kind: 'batch', batch: 3, text: '3 groups deferred' };
+const edit = (group) => ({ kind: 'edit', dataset: 'a', group, number: group, times: 1 });
+const verdict = (group) => ({ kind: 'verdict', dataset: 'a', group, number: group, given: {}, before: {} });
+const batch = { kind: 'batch', dataset: 'a', batch: 3, text: '3 groups deferred' };
 
 describe('withAction', () => {
 	it('counts edits of one group in a row, and keeps the last hundred', () => {
@@ -19,24 +19,33 @@ describe('withAction', () => {
 
 describe('nextBack', () => {
 	it('is what was done last, wherever that was', () => {
-		assert.equal(nextBack([verdict(1), batch], 2, true), batch);
-		assert.deepEqual(nextBack([edit(1), verdict(1)], 2, true), verdict(1));
-		assert.equal(nextBack([verdict(1), edit(2)], 2, true), 'here');
+		assert.equal(nextBack([verdict(1), batch], 2, true, 'a'), batch);
+		assert.deepEqual(nextBack([edit(1), verdict(1)], 2, true, 'a'), verdict(1));
+		assert.equal(nextBack([verdict(1), edit(2)], 2, true, 'a'), 'here');
 	});
 
 	it('is the edit of the group on screen before one elsewhere', () => {
-		assert.equal(nextBack([edit(1)], 2, true), 'here');
-		assert.deepEqual(nextBack([edit(1)], 2, false), edit(1));
+		assert.equal(nextBack([edit(1)], 2, true, 'a'), 'here');
+		assert.deepEqual(nextBack([edit(1)], 2, false, 'a'), edit(1));
 	});
 
 	it('passes over edits that cannot be taken back any more', () => {
-		assert.deepEqual(nextBack([verdict(1), edit(2)], 2, false), verdict(1));
-		assert.equal(nextBack([edit(2)], 2, false), null);
+		assert.deepEqual(nextBack([verdict(1), edit(2)], 2, false, 'a'), verdict(1));
+		assert.equal(nextBack([edit(2)], 2, false, 'a'), null);
+	});
+
+	it('is nothing of another dataset', () => {
+		const elsewhere = { ...verdict(9), dataset: 'b' };
+		assert.deepEqual(nextBack([verdict(1), elsewhere], null, false, 'a'), verdict(1));
+		assert.equal(nextBack([elsewhere, { ...batch, dataset: 'b' }], null, false, 'a'), null);
+		assert.equal(nextBack([elsewhere, { ...edit(2), dataset: 'b' }], 1, true, 'a'), 'here');
+		assert.deepEqual(nextAgain([verdict(1), elsewhere], 'a'), verdict(1));
+		assert.equal(nextAgain([elsewhere], 'a'), undefined);
 	});
 
 	it('is the last edit of a group where this window has done nothing', () => {
-		assert.equal(nextBack([], 2, true), 'here');
-		assert.equal(nextBack([], 2, false), null);
+		assert.equal(nextBack([], 2, true, 'a'), 'here');
+		assert.equal(nextBack([], 2, false, 'a'), null);
 	});
 });
 
@@ -60,11 +69,11 @@ describe('what was taken back', () => {
 		actions.value = [];
 		tookBack(edit(1));
 		tookBack(verdict(2));
-		didAgain();
+		didAgain(undone.value.at(-1));
 		assert.deepEqual([actions.value, undone.value], [[verdict(2)], [edit(1)]]);
 		did(verdict(3));
 		assert.deepEqual(undone.value, []);
-		didAgain();
+		didAgain(edit(1));
 		assert.deepEqual(actions.value, [verdict(2), verdict(3)]);
 	});
 
@@ -72,7 +81,7 @@ describe('what was taken back', () => {
 		actions.value = [];
 		undone.value = [];
 		tookBack(batch);
-		didAgain({ ...batch, batch: 4 });
+		didAgain(batch, { ...batch, batch: 4 });
 		assert.deepEqual([actions.value, undone.value], [[{ ...batch, batch: 4 }], []]);
 		tookBack(batch);
 		forgetUndone({ ...batch });

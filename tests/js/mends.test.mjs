@@ -35,7 +35,11 @@ describe('what the card offers', () => {
 		openProposals.value = new Map();
 		assert.equal(mend.value, null);
 		settledState.value = stateOf(groupDocument.value);
+		// Nobody has looked at the picture of A, which has no lines.
+		assert.deepEqual(mends.value.map(({ label }) => label), ['Propose lines', 'Draw it']);
+		openProposals.value = new Map([['A', { ...proposal, outcome: 'nothing', lines: {} }]]);
 		assert.equal(offered(), 'Draw it');
+		openProposals.value = new Map();
 	});
 
 	it('waits for nothing where every view has a camera', () => {

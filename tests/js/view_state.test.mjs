@@ -1,6 +1,9 @@
 import assert from 'node:assert/strict';
 import { describe, it } from 'node:test';
 
+import { picturesOf } from '../../static/overlays/scene.js';
+import { gradeOfSize } from '../../static/geometry/residual.js';
+import { whyNot } from '../../static/views/pair_table.js';
 import { errorOf, gradeOfView, paintOf } from '../../static/views/view_state.js';
 
 const box = { box: [10, 10, 8, 8], point: null, out_of_view: false, occluded: false };
@@ -24,6 +27,12 @@ describe('paintOf', () => {
 		assert.deepEqual(found(fit), { supported: '87 %', explained: '4.1 %', reason: '' });
 		assert.equal(found(null), null);
 		assert.equal(paintOf(null), null);
+	});
+
+	it('says what was read of the picture of a camera without lines, while the group is shown', () => {
+		const given = picture().solved;
+		assert.equal(paintOf(given), null);
+		assert.deepEqual(paintOf(given, { ...fit, points: {} }), { supported: '87 %', explained: '4.1 %', reason: '' });
 	});
 
 	it('says why the camera is that of the clicks, and a dash where nothing was measured', () => {
@@ -64,5 +73,28 @@ describe('errorOf', () => {
 	it('is one error: in the best pair where the view agrees with no other, else to the 3D ball', () => {
 		assert.equal(errorOf(picture({ apart: 27 })).px, 27);
 		assert.equal(errorOf(picture()).px, 3200);
+	});
+});
+
+describe('one number in every place', () => {
+	const policy = { tau_percent: 1, jac_gamma_percent: 0.5, ball_diameter_m: 0.226 };
+	const views = ['a', 'b', 'c'].map((key, i) => ({ key, letter: 'ABC'[i], width: 1280, height: 720, included: true, lines: {}, balls: [box] }));
+	const group = { policy, views, verdict: { note: null } };
+	const pair = (a, b, first, second) => ({ a, b, errors_px: [first, second], valid: false, failed: 'reprojection' });
+
+	it('a view in no valid pair has its own error in its best pair, as the table of pairs has it', () => {
+		const solution = { views: [], ball: null, pairs: [pair('a', 'b', 14.5, 27), pair('a', 'c', 90, 80), pair('b', 'c', 60.4, 59)] };
+		assert.deepEqual(picturesOf(group, solution, null).map((picture) => errorOf(picture).px), [14.5, 27, 59]);
+	});
+
+	it('a pair whose errors are allowed is refused for what is wrong with it', () => {
+		assert.equal(whyNot(group, pair('a', 'b', 9, 4)), 'the rays meet behind a camera');
+		assert.equal(whyNot(group, pair('a', 'b', 9, 14.8)), 'reprojection');
+		assert.equal(whyNot(group, { ...pair('a', 'b', 9, 4), failed: 'baseline' }), 'baseline');
+	});
+
+	it('a box that people draw around a ball is ordinary, and a red one is a finding', () => {
+		assert.deepEqual([0.5, 0.6, 0.67, 1, 1.43, 1.5].map(gradeOfSize), ['warn', 'warn', 'ok', 'ok', 'ok', 'ok']);
+		assert.deepEqual([1.51, 2, 2.01, 0.49, null].map(gradeOfSize), ['warn', 'warn', 'bad', 'bad', 'unseen']);
 	});
 });

@@ -8,7 +8,14 @@ from pathlib import Path
 import pytest
 
 from app.config import Settings
+from app.paint.view_proposal import proposal_of
 from app.review.datasets.paint_files import agree_files, snap_files
+from app.soccer.frames import ImageSize
+from app.soccer.media import Media
+from app.soccer.pitch import Pitch
+from app.soccer.policy import PAPER
+from app.solving.calibrate import calibrate
+from app.store.media import decode_frame
 
 DATA = Path(
     os.environ.get("TOUCHLINE_REAL_DATA", Path(__file__).parents[3] / "shared" / "data")
@@ -30,3 +37,17 @@ def test_cameras_of_real_stills_agree_with_no_picture_of_something_else(tmp_path
     snap_files(DATA / "lines", [DATA / "stills"], tmp_path, settings=Settings())
     rows = agree_files(tmp_path, [DATA / "stills"], settings=Settings())
     assert all(row["supported"] * row["explained"] > 0.2 for row in rows if row["supported"])
+
+
+def test_accepted_proposals_qualify_with_the_goals_that_are_seen():
+    """Nine lines of twelve markings are a JaC of 0.75, which must be exceeded."""
+    counted, pitch = 0, Pitch()
+    for path in sorted((DATA / "stills").iterdir()):
+        image = decode_frame(Media(str(path)), False, Settings())
+        size = ImageSize(image.shape[1], image.shape[0])
+        found = proposal_of(image, size, (), pitch, PAPER.calibration)
+        if found.outcome == "proposed":
+            made = calibrate(found.lines, pitch, size, PAPER.calibration)
+            assert made.jac is not None and made.jac[0] > PAPER.min_jac, path.name
+            counted += 1
+    assert counted >= 19

@@ -32,7 +32,7 @@ PLAIN_WORDS = """
     cluster serving hosts executors packing day browser database
     private kept another smaller index
     stored tree trees safe path refusal attempt cookie fit
-    categories corner finder ids like
+    categories corner finder ids joins like
     compiler dialect postgresql sqlite statements transfer triggers
     attempts lived processes shared sharing short shown web
     addresses messages sender signing
@@ -41,7 +41,7 @@ PLAIN_WORDS = """
     proof provider identities sign
     access account join links login logins passwords roles team tokens
     bearer codes devices me remote rules tries users
-    characters null kind matrices stated
+    characters null examples property paging endings dismiss dismissals
     adopt aliases asked concealment needs ownership rights sight
     actors
     candidate drawn proposal propose scoring search straight

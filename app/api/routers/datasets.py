@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from fastapi import APIRouter, Query, Response
+from fastapi import APIRouter, Query, Request, Response
 
 from app.api.deps import Actor, AppServices, AppStore, DatasetPath, QueryText, Sees
 from app.api.jobs import by_job, job_answer
@@ -18,6 +18,7 @@ from app.api.schemas.dataset import (
     DeletedDocument,
     SummaryDocument,
 )
+from app.api.security.access import login_of
 from app.review.datasets import dataset as review
 from app.review.datasets import delete as deletion
 from app.review.datasets.delete import DatasetContents, read_contents
@@ -29,9 +30,11 @@ router = APIRouter(prefix="/datasets", tags=["datasets"])
 
 @router.get("", operation_id="listDatasets", responses=responses())
 @paged()
-def list_datasets(store: AppStore, sight: Sees) -> DatasetList:
+def list_datasets(request: Request, store: AppStore, sight: Sees) -> DatasetList:
     """Every dataset that one sees, with its progress."""
-    return DatasetList(items=review.list_datasets(store, sight))
+    login = login_of(request.scope)
+    own = () if login is None else login.roles.single.keys()
+    return DatasetList(items=review.list_datasets(store, sight, own))
 
 
 @router.get(

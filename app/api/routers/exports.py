@@ -6,11 +6,11 @@ import asyncio
 import time
 from typing import Annotated
 
-from fastapi import APIRouter, Depends, Path, Request, Response
+from fastapi import APIRouter, Depends, Path, Query, Request, Response
 from starlette.responses import FileResponse
 
 from app.api.cursor import parse_cursor
-from app.api.deps import Actor, AppServices, SeesWhole
+from app.api.deps import Actor, AppServices, AppStore, DatasetPath, SeesWhole
 from app.api.jobs import ACCEPTED, job_address
 from app.api.problem import Responses, responses
 from app.api.reply import AskedUnder, Reply, document, nothing
@@ -20,17 +20,20 @@ from app.api.schemas.export import (
     ExportJobDocument,
     ExportPage,
     ExportRequest,
+    FormatDocument,
+    FormatList,
 )
 from app.api.schemas.job import JobDocument
 from app.api.services import Services
 from app.api.stored_file import stored_file
 from app.errors import ConflictError, NotFoundError
 from app.review.datasets.dataset import dataset_id
+from app.review.exporting.export import possible_formats
 from app.review.jobs.exports import KIND, request_export
 from app.review.jobs.records import Job
 from app.review.people.deeds import record_deed
 
-router = APIRouter(prefix="/exports", tags=["exports"])
+router = APIRouter(tags=["exports"])
 
 PATIENCE = 20.0
 """Seconds that a request for the zip waits for it to be written."""
@@ -43,8 +46,28 @@ ZIP: Responses = {
 }
 
 
+@router.get(
+    "/datasets/{dataset}/export-formats",
+    operation_id="listExportFormats",
+    responses=responses(400, 404),
+)
+def list_formats(
+    dataset: DatasetPath,
+    store: AppStore,
+    version: Annotated[
+        str | None, Query(max_length=200, description="Of a frozen version: id, name or hash.")
+    ] = None,
+) -> FormatList:
+    """In which formats a dataset, or a version of it, can be exported, and why not in the others."""
+    found = dataset_id(store, dataset)
+    answers = possible_formats(store, found, version)
+    return FormatList(
+        items=[FormatDocument(**vars(one), possible=one.reason is None) for one in answers]
+    )
+
+
 @router.post(
-    "",
+    "/exports",
     operation_id="makeExport",
     status_code=202,
     response_model=ExportJobDocument,
@@ -72,7 +95,7 @@ def _export_answer(job: Job) -> Response:
     return document(started, 202, job_address(job))
 
 
-@router.get("", operation_id="listExports", responses=responses(404))
+@router.get("/exports", operation_id="listExports", responses=responses(404))
 def list_exports(
     services: AppServices,
     sight: SeesWhole,
@@ -94,14 +117,14 @@ def list_exports(
     return ExportPage(items=items, next=more)
 
 
-@router.get("/{export}", operation_id="getExport", responses=responses(404))
+@router.get("/exports/{export}", operation_id="getExport", responses=responses(404))
 def get_export(export: ExportId, services: AppServices) -> ExportDocument:
     """What was asked for, how far it is, and what came of it."""
     return _document(services, export)
 
 
 @router.delete(
-    "/{export}",
+    "/exports/{export}",
     operation_id="deleteExport",
     status_code=204,
     response_class=Response,
@@ -134,7 +157,7 @@ async def written(export: ExportId, services: AppServices) -> str:
 
 
 @router.get(
-    "/{export}/content",
+    "/exports/{export}/content",
     operation_id="getExportContent",
     response_class=FileResponse,
     responses={**responses(404, 409, 503), **ZIP},

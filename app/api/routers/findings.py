@@ -25,15 +25,24 @@ def list_findings(
     store: AppStore,
     dataset: DatasetQuery,
     kind: Annotated[FindingKind | None, Query(description="Only these.")] = None,
+    dismissed: Annotated[
+        bool | None, Query(description="Only those that somebody has checked, or nobody has.")
+    ] = None,
     limit: Annotated[int, Query(ge=1, le=MAX_GROUPS, description="Groups a page.")] = 50,
     cursor: Annotated[
         str | None, Query(max_length=20, description="`next` of the page before.")
     ] = None,
 ) -> FindingList:
-    """Findings by number of the group; `total` counts the groups that have some."""
+    """Findings by number of the group, dismissed ones too; `total` counts the groups that have some."""
     found = dataset_id(store, dataset)
     after = parse_cursor(cursor) or 0
-    groups = read_findings(store, found, after=after, limit=limit, kind=kind)
-    rows = [FindingRow.of(group, finding) for group in groups for finding in group.findings]
+    groups = read_findings(store, found, after=after, limit=limit, kind=kind, dismissed=dismissed)
+    rows = [
+        FindingRow.of(group, finding, said)
+        for group in groups
+        for finding, said in zip(group.findings, group.dismissed, strict=True)
+    ]
     following = str(groups[-1].number) if len(groups) == limit else None
-    return FindingList(items=rows, next=following, total=count_groups(store, found, kind))
+    return FindingList(
+        items=rows, next=following, total=count_groups(store, found, kind, dismissed=dismissed)
+    )

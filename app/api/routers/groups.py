@@ -172,7 +172,7 @@ def get_solution(group: Id, store: AppStore) -> SolutionDocument:
     state = submit.load_solved(store, group)
     if state.solution is None:
         raise NotFoundError(f"group {group} has no solution")
-    return SolutionDocument.of(state.solution, state.group)
+    return SolutionDocument.of(state.solution, state.group, state.dismissed)
 
 
 @router.get(

@@ -6,14 +6,14 @@ from fastapi import APIRouter, Response
 
 from app.api.conflicts import current_state
 from app.api.deps import Actor, AppServices, AppStore, DatasetPath, IfMatch
-from app.api.jobs import job_address
+from app.api.jobs import by_job, job_address, job_answer
 from app.api.paging import paged
 from app.api.problem import Responses, responses
 from app.api.reply import AskedUnder, Reply, document
 from app.api.schemas.job import JobDocument
 from app.api.schemas.pitches import PitchChange, PitchesDocument
 from app.review.editing.pitches import DatasetPitches, read_pitches
-from app.review.jobs.solve import PitchJob, request_pitches
+from app.review.jobs.solve import PitchJob, request_estimates, request_pitches
 from app.soccer.pitch import Pitch
 
 router = APIRouter(prefix="/datasets/{dataset}/pitches", tags=["datasets"])
@@ -39,6 +39,19 @@ def list_pitches(dataset: DatasetPath, store: AppStore, response: Response) -> P
     state = read_pitches(store, dataset)
     response.headers.update(_tagged(state))
     return PitchesDocument.model_validate(state)
+
+
+@router.post("", operation_id="estimatePitches", **by_job(404))
+def estimate_pitches(
+    dataset: DatasetPath, services: AppServices, actor: Actor, asked: AskedUnder
+) -> Response:
+    """Estimate the pitches of the matches whose lines were not looked at as they are now.
+
+    The job solves what is stale, too: it is the one that follows an import.
+    """
+    reply = Reply(asked, job_answer)
+    job = request_estimates(services.jobs, services.store, dataset, actor=actor, keep=reply.keep)
+    return reply.of(job)
 
 
 @router.patch(

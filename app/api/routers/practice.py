@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from fastapi import APIRouter, Response
+from typing import Annotated
+
+from fastapi import APIRouter, Depends, Request, Response
 
 from app.api.deps import Actor, AppServices, Id, Sees
 from app.api.jobs import by_job, job_answer
 from app.api.problem import responses
 from app.api.reply import AskedUnder, Reply
 from app.api.schemas.practice import LessonDocument, PracticeBody, PracticeDocument
+from app.api.security.access import login_of
 from app.review.editing.submit import load
 from app.review.practice.practice import (
     Practice,
@@ -21,15 +24,27 @@ from app.review.practice.practice import (
 router = APIRouter(tags=["practice"])
 
 
+async def _person(request: Request) -> str | None:
+    """Whose practice it is; None where nobody logs in."""
+    login = login_of(request.scope)
+    return None if login is None else login.name
+
+
+Person = Annotated[str | None, Depends(_person)]
+
+
 @router.get(
     "/practice",
     operation_id="getPractice",
     response_model=PracticeDocument,
     responses=responses(),
 )
-def get_practice(services: AppServices, sight: Sees) -> Practice:
-    """Every lesson and what has come of it; none until the practice is made."""
-    return read_practice(services.store, services.settings, sight)
+def get_practice(services: AppServices, sight: Sees, person: Person) -> Practice:
+    """Every lesson and what has come of it; none until the practice is made.
+
+    Where people log in, each has lessons of their own.
+    """
+    return read_practice(services.store, services.settings, sight, person)
 
 
 @router.post(
@@ -38,9 +53,16 @@ def get_practice(services: AppServices, sight: Sees) -> Practice:
     **by_job(409, 413, 415, 503),
 )
 def start_practice(
-    request: PracticeBody, services: AppServices, actor: Actor, asked: AskedUnder
+    request: PracticeBody,
+    services: AppServices,
+    actor: Actor,
+    person: Person,
+    asked: AskedUnder,
 ) -> Response:
     """Make the dataset `practice`; sent again it changes nothing, with `again` it begins afresh.
+
+    Where people log in, the dataset is the person's own, `practice NAME`: they are a reviewer in
+    it, and only they and admins see it.
 
     The job's result has `dataset`, `groups` and `first`, the id of the first lesson's group.
     """
@@ -51,6 +73,7 @@ def start_practice(
         services.settings,
         again=request.again,
         actor=actor,
+        person=person,
         keep=reply.keep,
     )
     return reply.of(job)

@@ -78,7 +78,7 @@ def patch_lines(
 
     The group that is answered is solved at once, the others in the background.
     """
-    edit = SetStationLines(lines.points(), tuple(lines.proposed))
+    edit = SetStationLines(lines.points(), tuple(lines.proposed), tuple(lines.not_visible))
     change = partial(submit_station, edit=edit)
     return _change(services, station, group, change, if_match, actor, asked)
 

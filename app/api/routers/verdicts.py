@@ -20,11 +20,12 @@ from app.api.schemas.bulk import (
     UndoDocument,
 )
 from app.api.schemas.group import GroupDocument
-from app.api.schemas.verdict import VerdictEdit
+from app.api.schemas.verdict import DismissalEdit, VerdictEdit
 from app.review.agreement.weigh import after_hand_in
 from app.review.datasets.dataset import dataset_id
 from app.review.editing.state import GroupState
 from app.review.verdicts import bulk, bulk_redo, bulk_undo
+from app.review.verdicts.dismiss import FindingName, set_dismissal
 from app.review.verdicts.verdict import set_verdict
 
 router = APIRouter()
@@ -61,6 +62,41 @@ def put_verdict(
     return answer
 
 
+@router.put(
+    "/groups/{group}/dismissal",
+    tags=["groups"],
+    operation_id="dismissFinding",
+    response_model=GroupDocument,
+    responses={**responses(*CONFLICTS), **CHANGED},
+)
+def put_dismissal(
+    group: Id,
+    said: DismissalEdit,
+    services: AppServices,
+    actor: Actor,
+    if_match: IfMatch,
+    asked: AskedUnder,
+) -> Response:
+    """Say that a finding was checked and is fine, or that it is to be looked at again.
+
+    A dismissed finding stays in the solution with `dismissed`. It stands again by itself once it
+    says something else: its number has moved by more than 5 %, or, without one, its sentence is
+    another.
+    """
+    named = FindingName(said.kind, said.view, said.marking, said.suggested, said.number)
+    change = partial(
+        set_dismissal,
+        services.store,
+        group,
+        named,
+        dismissed=said.dismissed,
+        note=said.note,
+        if_match=if_match,
+        actor=actor,
+    )
+    return change_group(asked, lambda: load_document(services.store, group), change)
+
+
 @router.post(
     "/datasets/{dataset}/verdicts",
     tags=["verdicts"],
@@ -79,7 +115,7 @@ def post_verdicts(
     """Judge every group that the query matches, as each of them is when its turn comes.
 
     Accepting a group that fails a gate needs a note; without one such groups are refused and
-    counted, as are groups that nobody has solved. Groups that have this very verdict already
+    counted, as are groups whose ball cannot be used and groups that nobody has solved. Groups that have this very verdict already
     stay as they are.
     """
     found = dataset_id(store, dataset)

@@ -78,10 +78,10 @@ def patch_lines(
     request: Request,
 ) -> Response:
     """Draw, move or delete markings; 409 names the station when the camera is static."""
-    points, proposed = lines.points(), tuple(lines.proposed)
+    said = (lines.points(), tuple(lines.proposed), tuple(lines.not_visible))
 
     def edit(key: str) -> Edit:
-        return SetLines(key, points, proposed)
+        return SetLines(key, *said)
 
     apart = partial(services.large.run, solve_encoded)
     solve = apart if is_large(request.scope) else solve_encoded

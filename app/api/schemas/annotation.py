@@ -84,6 +84,20 @@ class LinesEdit(BaseModel):
         description="Those of them whose points are as they were proposed from the paint: their "
         "source is `proposed`, until somebody moves them.",
     )
+    not_visible: Annotated[list[Marking], Field(max_length=len(MARKINGS))] = Field(
+        default_factory=list,
+        description="Those of them without points that the picture does not show, hidden or worn: "
+        "JaC does not count them as missing, until somebody draws them.",
+    )
+
+    @model_validator(mode="after")
+    def _check_not_visible(self) -> LinesEdit:
+        for marking in self.not_visible:
+            if marking not in self.lines or self.lines[marking]:
+                raise ValueError(
+                    f"`not_visible` names {marking}, which needs null under `lines` then"
+                )
+        return self
 
     def points(self) -> dict[str, tuple[ImagePoint, ...] | None]:
         """The edit in values of the pitch's vocabulary."""

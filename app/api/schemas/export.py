@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, StrictBool
 
-from app.api.schemas.document import ListDocument
+from app.api.schemas.document import Document, ListDocument
 from app.api.schemas.job import JobDocument
 from app.api.schemas.version import VersionId
 from app.datasets.format_names import ExportFormat
@@ -48,6 +48,19 @@ class ExportRequest(BaseModel):
     )
 
 
+class FormatDocument(Document):
+    """Whether a dataset can be exported in a format."""
+
+    format: ExportFormat
+    possible: bool = Field(description="Whether it holds what the dataset has.")
+    reason: str | None = Field(description="Why it cannot; null: it can.")
+    hint: str | None = Field(description="What to do instead, where there is anything.")
+
+
+class FormatList(ListDocument[FormatDocument]):
+    """Every export format."""
+
+
 class ExportJobDocument(JobDocument):
     """The job that writes an export; its `id` is that of the export, too."""
 
@@ -82,6 +95,9 @@ class ExportDocument(BaseModel):
         description="Accepted groups that are not in it, by reason: stale, failing, unsolved."
     )
     missing_images: list[str] | None
+    incomplete: str | None = Field(
+        description="What the files still lack before they can be used, in words; null: nothing."
+    )
     error: str | None = Field(description="Why it failed.")
 
     @staticmethod
@@ -92,6 +108,7 @@ class ExportDocument(BaseModel):
                 **vars(entry),
                 "state": "done",
                 "status": "ready",
+                "incomplete": entry.incomplete,
                 "content": f"/api/v1/exports/{entry.id}/content",
                 "error": None,
             }
@@ -102,7 +119,9 @@ class ExportDocument(BaseModel):
         """The document of an export by its job; ``entry`` is what it left behind, if anything."""
         if entry is not None:
             return ExportDocument.of(entry)
-        nothing = dict.fromkeys(("content", "bytes", "counts", "left_out", "missing_images"))
+        nothing = dict.fromkeys(
+            ("content", "bytes", "counts", "left_out", "missing_images", "incomplete")
+        )
         return ExportDocument.model_validate(
             {
                 **nothing,

@@ -92,6 +92,10 @@ class ViewDocument(Document):
         description="Markings whose source is `proposed`: a person accepted their points as they "
         "were proposed from the paint."
     )
+    not_visible: list[str] = Field(
+        description="Markings that a person says the picture does not show: JaC does not count them "
+        "as missing."
+    )
     balls: list[Ball]
     image: str | None = Field(description="Address of the frame, where there is one.")
     neighbours: str | None = Field(
@@ -147,7 +151,9 @@ class GroupDocument(Document):
                     zip(group.views, view_labels(group), strict=True)
                 )
             ],
-            solution=None if state.solution is None else SolutionDocument.of(state.solution, group),
+            solution=None
+            if state.solution is None
+            else SolutionDocument.of(state.solution, group, state.dismissed),
         )
 
 
@@ -184,6 +190,7 @@ def _view(state: GroupState, view: View, index: int, label: str) -> ViewDocument
         station=_station(state, view),
         lines=lines_document(view.station.lines),
         proposed=[*view.station.proposed],
+        not_visible=[*view.station.not_visible],
         balls=[Ball.of(ball, edited=view.key in state.stored.edited_views) for ball in view.balls],
         image=None if view.media is None else image_address(view_id),
         neighbours=_neighbours(state.key, view, view_id),

@@ -10,6 +10,7 @@ from pydantic import Field
 from app.api.schemas.document import Document, ListDocument
 from app.api.schemas.group import image_address
 from app.api.schemas.solution import (
+    DismissedDocument,
     FailingGate,
     FindingDocument,
     FixDocument,
@@ -21,11 +22,22 @@ from app.review.queue.findings import GroupFindings
 from app.review.queue.listing import GroupRow as QueueRow
 from app.review.queue.listing import Neighbours as QueueNeighbours
 from app.soccer.choices import VerdictState
-from app.soccer.finding import Finding
+from app.soccer.finding import Dismissal, Finding
 
 THUMBNAIL_WIDTH = 208
 TOLD_KINDS = frozenset(STATION_EDITS) | frozenset(
-    {"edit", "undo", "redo", "verdict", "pitch", "position", "noise", "paint", "comment"}
+    {
+        "edit",
+        "undo",
+        "redo",
+        "verdict",
+        "pitch",
+        "position",
+        "noise",
+        "paint",
+        "comment",
+        "dismissal",
+    }
     | {"take", "agreement", "work"}
 )
 
@@ -76,7 +88,8 @@ class GroupRow(Document):
     y_m: float | None
     views: int
     pictures: int = Field(description="Views that have a picture; 0: nothing to look at.")
-    findings: list[str]
+    findings: list[str] = Field(description="Kinds that are open.")
+    dismissed: list[str] = Field(description="Kinds that somebody has checked and dismissed.")
     reviewer: str | None
     reason: str | None
     override: str | None = Field(description="The gate that was overridden with a reason.")
@@ -108,6 +121,7 @@ class GroupRow(Document):
             changed=datetime.fromisoformat(row.changed),
             first_failing=failing,
             findings=list(row.findings),
+            dismissed=list(row.dismissed),
             thumbnail=thumbnail_address(row.main_view),
         )
 
@@ -115,7 +129,7 @@ class GroupRow(Document):
 _SAME = tuple(
     name
     for name in GroupRow.model_fields
-    if name not in ("label", "changed", "first_failing", "findings", "thumbnail")
+    if name not in ("label", "changed", "first_failing", "findings", "dismissed", "thumbnail")
 )
 
 
@@ -157,11 +171,14 @@ class FindingRow(Document):
         description="Where a person is led who has to look or draw; null where edits are offered, "
         "or nothing."
     )
+    dismissed: DismissedDocument | None = Field(
+        description="Who has checked the finding and found it fine; null: nobody."
+    )
 
     @staticmethod
-    def of(found: GroupFindings, finding: Finding) -> FindingRow:
+    def of(found: GroupFindings, finding: Finding, dismissed: Dismissal | None) -> FindingRow:
         """The row of a finding in a group."""
-        said = FindingDocument.model_validate(finding, context=found.group)
+        said = FindingDocument.of(finding, found.group, dismissed)
         return FindingRow(group=found.group.key, group_id=found.group_id, **dict(said))
 
 

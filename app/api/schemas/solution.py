@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
+from datetime import datetime
 from typing import Annotated, Any
 
 import numpy as np
@@ -16,7 +18,7 @@ from app.geometry.lens import BROWN_CONRADY
 from app.review.editing.codec import edit_to_json
 from app.review.editing.fixes import guide_of_finding, offers_of_finding
 from app.soccer.camera_sigma import CameraSigma, camera_sigma
-from app.soccer.finding import Finding, Fix
+from app.soccer.finding import Dismissal, Finding, Fix
 from app.soccer.frames import Box, ImageSize
 from app.soccer.group import Group
 from app.soccer.pitch import Pitch
@@ -320,10 +322,21 @@ class GuideDocument(Document):
     )
 
 
+class DismissedDocument(Document):
+    """Who has checked a finding and found it fine."""
+
+    by: str = Field(validation_alias="actor")
+    at: datetime
+    note: str | None
+
+
 class FindingDocument(Document, shows=Finding):
     """Something that a person should look at."""
 
     fix: FixDocument | None
+    unusable_ball: bool = Field(
+        description="Whether nobody can use the ball: accepting the group needs a note then."
+    )
     offers: list[OfferDocument] = Field(
         description="Edits that mend it, as its fix proposes or without one: none when only a person "
         "can, several to choose from."
@@ -332,6 +345,19 @@ class FindingDocument(Document, shows=Finding):
         description="Where a person is led who has to look or draw; null where edits are offered, "
         "or nothing."
     )
+    dismissed: DismissedDocument | None = Field(
+        default=None,
+        description="Who has checked the finding and found it fine, as long as it says the same; "
+        "null: nobody.",
+    )
+
+    @staticmethod
+    def of(finding: Finding, group: Group, dismissed: Dismissal | None) -> FindingDocument:
+        """The document of a finding of a group."""
+        said = FindingDocument.model_validate(finding, context=group)
+        if dismissed is not None:
+            said.dismissed = DismissedDocument.model_validate(dismissed)
+        return said
 
     @model_validator(mode="before")
     @classmethod
@@ -339,7 +365,7 @@ class FindingDocument(Document, shows=Finding):
         group: Any = info.context
         if isinstance(value, Finding):
             found = {"offers": offers_of_finding(group, value), "guide": guide_of_finding(value)}
-            return {**vars(value), **found}
+            return {**vars(value), **found, "unusable_ball": value.is_unusable_ball}
         return value
 
 
@@ -366,6 +392,15 @@ class SolutionDocument(Document):
     findings: list[FindingDocument]
 
     @staticmethod
-    def of(solution: Solution, group: Group) -> SolutionDocument:
-        """The document of a solution; what its findings offer are edits of the group."""
-        return SolutionDocument.model_validate(solution, context=group)
+    def of(
+        solution: Solution, group: Group, dismissed: Sequence[Dismissal | None] = ()
+    ) -> SolutionDocument:
+        """The document of a solution; what its findings offer are edits of the group.
+
+        ``dismissed`` says of each finding who has checked it.
+        """
+        document = SolutionDocument.model_validate(solution, context=group)
+        for finding, said in zip(document.findings, dismissed, strict=False):
+            if said is not None:
+                finding.dismissed = DismissedDocument.model_validate(said)
+        return document

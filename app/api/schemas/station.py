@@ -29,6 +29,9 @@ class StationDetail(BaseModel):
     proposed: list[str] = Field(
         description="Markings whose points were accepted as they were proposed from the paint."
     )
+    not_visible: list[str] = Field(
+        description="Markings that a person says its pictures do not show: JaC does not count them."
+    )
     groups: int = Field(description="How many groups it takes part in.")
     revision: int
     etag: str

@@ -158,6 +158,14 @@ class LeaseDocument(Document):
     handed_back: HandedBackDocument | None = Field(
         description="Why its annotator has it back; null: they have not."
     )
+    place: int | None = Field(
+        default=None,
+        description="Of the groups that they annotate on their own: which this is, from 1.",
+    )
+    of: int | None = Field(
+        default=None,
+        description="How many these are as the batch stands; null where gold groups are mixed in.",
+    )
 
 
 class MyBatchDocument(Document):

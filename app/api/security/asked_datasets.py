@@ -114,8 +114,9 @@ EVERYWHERE_FIELDS: Mapping[str, tuple[str, ...]] = {
     "POST /api/v1/imports": ("source/folder", "options/lines/folder"),
 }
 """Fields of a JSON body that name what belongs to no dataset, by route."""
-FIXED: Mapping[str, Named] = {"POST /api/v1/practice": Named(OwnedKind.NEW_DATASET, "practice")}
-"""Routes about one dataset that no request names."""
+OWN = frozenset({"POST /api/v1/practice"})
+"""Routes that make a dataset of one's own: the highest role counts that somebody has anywhere; a
+token of one dataset makes none."""
 
 WHOLE = frozenset(
     {
@@ -140,6 +141,7 @@ WHOLE_ROUTES = frozenset(
                 ("GET", "yield"),
                 ("POST", "yield"),
                 ("GET", "versions"),
+                ("GET", "export-formats"),
                 ("GET", "predictions"),
                 ("GET", "evaluations"),
                 ("GET", "verdict-batches"),
@@ -226,7 +228,7 @@ def kind_of_path(route: str) -> tuple[str, OwnedKind] | None:
 
 def is_known(route: str) -> bool:
     """Whether somebody has decided which datasets a route is about."""
-    decided = (*QUERY, *BODY, *LISTS, *EVERYWHERE, *FIXED)
+    decided = (*QUERY, *BODY, *LISTS, *EVERYWHERE, *OWN)
     return kind_of_path(route) is not None or route in decided
 
 
@@ -274,6 +276,8 @@ def require_allowed(
         return
     if asked.route in EVERYWHERE or _names_what_is_nobodys(asked):
         require(roles.everywhere, action, ALL)
+    elif asked.route in OWN and roles.limited:
+        require(Role.NONE, action, ALL)
     elif not asked.mentions and action is Action.ADMINISTER:
         require(roles.everywhere, action)
     elif not asked.mentions and not (asked.route in LISTS and action is Action.READ):
@@ -355,8 +359,6 @@ def _is_looked_for(named: Named, roles: DatasetRoles) -> bool:
 def _mentions(
     route: str, path: Mapping[str, str], query: tuple[tuple[str, str], ...], body: Any
 ) -> Iterator[Mention]:
-    if route in FIXED:
-        yield Mention("route", "", FIXED[route])
     first = kind_of_path(route)
     if first is not None:
         yield from _mention("path", first[0], first[1], path[first[0]])

@@ -13,7 +13,7 @@ from app.review.datasets.naming import require_name
 from app.soccer.policy import Policy
 from app.store.clock import now
 from app.store.codecs import policy_to_json
-from app.store.copy_datasets import CopiesOf, insert_copy_dataset
+from app.store.copy_datasets import CopiesOf, copy_dataset_ids, insert_copy_dataset
 from app.store.datasets import (
     dataset_names,
     dataset_rows,
@@ -59,12 +59,28 @@ class DatasetHead:
 
 
 def insert_dataset(
-    session: Session, name: str, policy: Policy, actor: str, copies: CopiesOf | None = None
+    session: Session,
+    name: str,
+    policy: Policy,
+    actor: str,
+    copies: CopiesOf | None = None,
+    *,
+    hidden: bool = False,
 ) -> int:
-    """Insert a dataset and its log entry; returns its id. ``copies``: of what it holds copies."""
+    """Insert a dataset and its log entry; returns its id.
+
+    Args:
+        session: A transaction that writes.
+        name: What it is called.
+        policy: Its thresholds.
+        actor: Who makes it.
+        copies: Of what it holds copies.
+        hidden: Only people with a role in it see it, as with copies; not who has one everywhere.
+    """
     require_name(name, "a dataset")
     at = now()
-    identity = insert_dataset_row(session, name, policy, at, copies=copies is not None)
+    hidden = hidden or copies is not None
+    identity = insert_dataset_row(session, name, policy, at, copies=hidden)
     body = {"name": name, "policy": policy_to_json(policy)}
     if copies is not None:
         insert_copy_dataset(session, identity, copies)
@@ -73,10 +89,17 @@ def insert_dataset(
     return identity
 
 
-def list_datasets(store: Store, sight: Sight = EVERYTHING) -> list[Dataset]:
-    """The datasets that somebody sees, by name; those of copies are in no list."""
+def list_datasets(
+    store: Store, sight: Sight = EVERYTHING, own: Collection[int] = ()
+) -> list[Dataset]:
+    """The datasets that somebody sees, by name; those of copies are in no list.
+
+    ``own`` are the ids of datasets in which they have a role: of those that are hidden from
+    others (their practice) the list has theirs.
+    """
     with store.read() as session:
-        rows = [row for row in dataset_rows(session) if row.id <= COPIES]
+        hidden = frozenset(own) - copy_dataset_ids(session) if own else frozenset[int]()
+        rows = [row for row in dataset_rows(session) if row.id <= COPIES or row.id in hidden]
         return _datasets(session, [row for row in rows if sight.sees(row.id)])
 
 

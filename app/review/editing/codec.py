@@ -49,8 +49,8 @@ def step_to_json(edit: Edit | StationEdit, inverse: Edit | StationEdit) -> Json:
 def edit_to_json(edit: Edit | StationEdit) -> Json:
     """An edit with its name under ``edit``."""
     match edit:
-        case SetLines(view, lines, proposed):
-            said = {"lines": _lines_to_json(lines), **_source(proposed)}
+        case SetLines(view, lines, proposed, not_visible):
+            said = {"lines": _lines_to_json(lines), **_source(proposed, not_visible)}
             return {"edit": "set_lines", "view": view, **said}
         case SetBalls(view, balls, noise):
             said = {"balls": [*map(ball_to_json, balls)], **_noise(noise)}
@@ -75,8 +75,8 @@ def edit_to_json(edit: Edit | StationEdit) -> Json:
             return {"edit": "several", "edits": [*map(edit_to_json, edits)]}
         case SetPaint(paint):
             return {"edit": "set_paint", "paint": paint_to_json(paint)}
-        case SetStationLines(lines, proposed):
-            said = {"lines": _lines_to_json(lines), **_source(proposed)}
+        case SetStationLines(lines, proposed, not_visible):
+            said = {"lines": _lines_to_json(lines), **_source(proposed, not_visible)}
             return {"edit": "set_station_lines", **said}
         case SetStationCalibration(calibration):
             return {"edit": "set_station_calibration", "calibration": calibration}
@@ -94,7 +94,7 @@ def edit_from_json(value: Mapping[str, Any]) -> Edit:
     """Back from ``edit_to_json``, for edits of a group."""
     match value["edit"]:
         case "set_lines":
-            return SetLines(value["view"], _lines_from_json(value["lines"]), _proposed(value))
+            return SetLines(value["view"], _lines_from_json(value["lines"]), *_sources(value))
         case "set_balls":
             balls = tuple(map(ball_from_json, value["balls"]))
             return SetBalls(value["view"], balls, float(value.get("noise", 1.0)))
@@ -120,7 +120,7 @@ def station_edit_from_json(value: Mapping[str, Any]) -> StationEdit:
     """Back from ``edit_to_json``, for edits of a station."""
     match value["edit"]:
         case "set_station_lines":
-            return SetStationLines(_lines_from_json(value["lines"]), _proposed(value))
+            return SetStationLines(_lines_from_json(value["lines"]), *_sources(value))
         case "set_station_calibration":
             return SetStationCalibration(value["calibration"])
         case "set_station_camera":
@@ -138,13 +138,21 @@ def _noise(noise: float) -> Json:
     return {} if noise == 1 else {"noise": float(noise)}
 
 
-def _source(proposed: tuple[str, ...]) -> Json:
-    """Where lines come from, only where there is something to say: all other entries are as ever."""
-    return {"source": dict.fromkeys(proposed, "proposed")} if proposed else {}
+def _source(proposed: tuple[str, ...], not_visible: tuple[str, ...]) -> Json:
+    """Where lines come from, or why there are none, only where there is something to say: all other
+    entries are as ever."""
+    said = dict.fromkeys(proposed, "proposed") | dict.fromkeys(not_visible, "not_visible")
+    return {"source": said} if said else {}
 
 
-def _proposed(value: Mapping[str, Any]) -> tuple[str, ...]:
-    return tuple(value.get("source", ()))
+def _sources(value: Mapping[str, Any]) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """The markings that were proposed, and those that are not visible."""
+    said = value.get("source", {})
+    proposed, not_visible = (
+        tuple(name for name, source in said.items() if source == wanted)
+        for wanted in ("proposed", "not_visible")
+    )
+    return proposed, not_visible
 
 
 def _lines_to_json(lines: LineChanges) -> Json:

@@ -59,11 +59,14 @@ class SetStationLines:
     lines: LineChanges
     proposed: tuple[str, ...] = ()
     """Those of the markings whose points are as they were proposed."""
+    not_visible: tuple[str, ...] = ()
+    """Those of the markings without points that the picture does not show."""
 
     def apply(self, station: Station) -> Station:
         """The station with these markings."""
         lines, accepted = dict(station.lines), set(map(canonical_marking, self.proposed))
-        own = set(station.proposed)
+        own, unseen = set(station.proposed), set(station.not_visible)
+        hidden = set(map(canonical_marking, self.not_visible))
         for name, points in self.lines.items():
             marking = canonical_marking(name)
             if points:
@@ -71,14 +74,26 @@ class SetStationLines:
             else:
                 lines.pop(marking, None)
             own.discard(marking)
+            unseen.discard(marking)
             if points and marking in accepted:
                 own.add(marking)
-        return replace(station, lines=make_lines(lines), proposed=tuple(sorted(own)))
+            if not points and marking in hidden:
+                unseen.add(marking)
+        return replace(
+            station,
+            lines=make_lines(lines),
+            proposed=tuple(sorted(own)),
+            not_visible=tuple(sorted(unseen)),
+        )
 
     def inverse(self, station: Station) -> SetStationLines:
         """Each changed marking as it was before."""
         before = _before(station.lines, self.lines)
-        return SetStationLines(before, tuple(item for item in station.proposed if item in before))
+        proposed, unseen = (
+            tuple(name for name in names if name in before)
+            for names in (station.proposed, station.not_visible)
+        )
+        return SetStationLines(before, proposed, unseen)
 
 
 @dataclass(frozen=True)
@@ -139,6 +154,8 @@ class SetLines:
     lines: LineChanges
     proposed: tuple[str, ...] = ()
     """Those of the markings whose points are as they were proposed."""
+    not_visible: tuple[str, ...] = ()
+    """Those of the markings without points that the picture does not show."""
 
     def apply(self, group: Group) -> Group:
         """The group with these markings in the view (and in others that share its station)."""
@@ -148,11 +165,11 @@ class SetLines:
     def inverse(self, group: Group) -> SetLines:
         """Each changed marking as it was before."""
         before = self._of_station.inverse(need_view(group, self.view).station)
-        return SetLines(self.view, before.lines, before.proposed)
+        return SetLines(self.view, before.lines, before.proposed, before.not_visible)
 
     @property
     def _of_station(self) -> SetStationLines:
-        return SetStationLines(self.lines, self.proposed)
+        return SetStationLines(self.lines, self.proposed, self.not_visible)
 
 
 @dataclass(frozen=True)

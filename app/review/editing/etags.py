@@ -15,9 +15,13 @@ from app.store.queue import import_findings
 from app.store.session import Session
 
 
-def said_part(inputs_hash: str, revision: int, verdict_id: int) -> str:
-    """What people said about a group: the part of its ETag that a change builds on."""
-    return digest([inputs_hash, revision, verdict_id])[:16]
+def said_part(inputs_hash: str, revision: int, verdict_id: int, dismissal_id: int = 0) -> str:
+    """What people said about a group: the part of its ETag that a change builds on.
+
+    The ids are those of the newest verdict and of the newest dismissal; 0: there is none.
+    """
+    said = [inputs_hash, revision, verdict_id]
+    return digest([*said, dismissal_id] if dismissal_id else said)[:16]
 
 
 def group_etag(
@@ -65,7 +69,8 @@ def read_head(session: Session, group_id: int) -> Head | None:
     row = find_head(session, group_id)
     if row is None:
         return None
-    return Head(said_part(row.inputs_hash, row.revision, row.last), row.policy_hash)
+    said = said_part(row.inputs_hash, row.revision, row.last, row.last_dismissal)
+    return Head(said, row.policy_hash)
 
 
 def said_of(etag: str) -> str:
@@ -116,7 +121,7 @@ def read_etags(session: Session, group_ids: Sequence[int]) -> dict[int, str]:
     noticed = import_findings(session, group_ids)
     etags = {}
     for row in read_heads(session, group_ids):
-        said = said_part(row.inputs_hash, row.revision, row.last)
+        said = said_part(row.inputs_hash, row.revision, row.last, row.last_dismissal)
         findings = None
         if row.summary is not None:
             kinds = [item.kind for item in noticed[row.id]]

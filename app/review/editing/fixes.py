@@ -159,7 +159,11 @@ def _swap_sides(view: View, _fix: Fix, _point: ImagePoint | None) -> Edit | None
     changes: dict[str, tuple[ImagePoint, ...] | None] = dict.fromkeys(lines)
     for marking, points in lines.items():
         changes[twin_marking(marking)] = tuple(points)
-    return SetLines(view.key, changes) if changes else None
+    # What is not visible is the other end of the pitch, too.
+    unseen = tuple(map(twin_marking, view.station.not_visible))
+    for marking in (*view.station.not_visible, *unseen):
+        changes.setdefault(marking, None)
+    return SetLines(view.key, changes, not_visible=unseen) if changes else None
 
 
 def _free_picture(view: View, _fix: Fix, _point: ImagePoint | None) -> Edit | None:
@@ -179,6 +183,12 @@ def _drop_marking(view: View, fix: Fix, _point: ImagePoint | None) -> Edit | Non
     if fix.marking is None or fix.marking not in view.station.lines:
         return None
     return SetLines(view.key, {fix.marking: None})
+
+
+def _hide_marking(view: View, fix: Fix, _point: ImagePoint | None) -> Edit | None:
+    if fix.marking is None or fix.marking in view.station.lines:
+        return None
+    return SetLines(view.key, {fix.marking: None}, not_visible=(fix.marking,))
 
 
 def _move_point(view: View, fix: Fix, point: ImagePoint | None) -> Edit | None:
@@ -251,6 +261,13 @@ _ACTIONS = {
         "the ball of {letter} was really {px:.1f} px away, on the ray of the other view",
         "Show the place",
         "is the ball here?",
+    ),
+    "hide_marking": _Action(
+        2,
+        "{marking} in {letter}, which is {px:.0f} px long there, was marked as not visible",
+        "Mark as not visible",
+        "{marking}: not visible?",
+        _hide_marking,
     ),
     "draw_marking": _Action(2, label="Draw it"),
     READ_PAINT: _Action(1, label="Read its paint"),

@@ -10,8 +10,14 @@ from app.soccer.group import Station
 from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy
 from app.soccer.solution import GAMMAS_PERCENT
-from app.solving.calibrate import calibrate_station
-from app.solving.jaccard import jaccard, measure_markings, outcomes, project_markings
+from app.solving.calibrate import calibrate_station, shortest_px
+from app.solving.jaccard import (
+    jaccard,
+    measure_markings,
+    not_missing,
+    outcomes,
+    project_markings,
+)
 
 
 @dataclass(frozen=True)
@@ -52,16 +58,21 @@ def influences(station: Station, pitch: Pitch, policy: CalibrationPolicy) -> lis
     for marking in station.lines:
         used = lines_without(station.lines, {marking, *doubted})
         rest = calibrate_station(replace(station, lines=used), pitch, trusting).camera
-        jac, error = (None, None) if rest is None else _seen_by(rest, marking, station, pitch)
+        jac, error = (
+            (None, None) if rest is None else _seen_by(rest, marking, station, pitch, policy)
+        )
         found.append(Influence(marking, whole.jac, jac, largest.get(marking), error))
     return found
 
 
 def _seen_by(
-    camera: Camera, marking: str, station: Station, pitch: Pitch
+    camera: Camera, marking: str, station: Station, pitch: Pitch, policy: CalibrationPolicy
 ) -> tuple[tuple[float, ...], float | None]:
     """JaC of the other markings, and the largest distance of this one."""
     measured = measure_markings(project_markings(camera, pitch, station.size), station.lines)
+    shortest = shortest_px(policy, station.size)
+    for short in not_missing(measured, station.lines, station.not_visible, shortest):
+        del measured[short]
     values = []
     for gamma in GAMMAS_PERCENT:
         found = outcomes(measured, station.lines, gamma / 100 * station.size.diagonal)

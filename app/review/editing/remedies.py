@@ -26,6 +26,7 @@ from app.soccer.group import Group, View, view_letter
 from app.soccer.policy import Policy
 from app.soccer.solution import Calibration, Gate, MarkingFit, Solution, ViewSolution
 from app.solving.jaccard import project_markings
+from app.solving.resect import REFERENCE_DIAGONAL
 from app.solving.solve import solve
 
 MOST_TRIALS = 24
@@ -33,6 +34,8 @@ MOST_TRIALS = 24
 MARKINGS_PER_VIEW = 4
 _CLICKS = 8
 """As many points a person would put on a marking."""
+STUB_PX = 5.0
+"""At 960 x 540: shorter stubs of markings are not drawn by people."""
 MIN_POINTS_LEFT = 2
 MAX_HEIGHT_M = 30.0
 MAX_POINT_SLIP_PERCENT = 7.0
@@ -189,7 +192,8 @@ def _of_gate(group: Group, solution: Solution, failing: Gate) -> Iterator[_Idea]
 
 
 def _of_undrawn(group: Group, view: View, solved: ViewSolution) -> Iterator[_Idea]:
-    """Draw what the camera sees and nobody has drawn: all of it, the longest first."""
+    """Draw what the camera sees and nobody has drawn: all of it, the longest first; stubs that
+    nobody can see are said not to be visible, for two clicks anywhere would do as well."""
     # What stands there under a wrong name is relabelled, not drawn again.
     named = {suspect.suggested for suspect in solved.calibration.suspects}
     undrawn = sorted(
@@ -202,7 +206,12 @@ def _of_undrawn(group: Group, view: View, solved: ViewSolution) -> Iterator[_Ide
         reverse=True,
     )
     camera = solved.calibration.camera
-    if not undrawn or camera is None:
+    shortest = STUB_PX * view.size.diagonal / REFERENCE_DIAGONAL
+    for fit in undrawn:
+        if fit.length_px < shortest:
+            hide = Fix("hide_marking", view.key, fit.marking)
+            yield _Idea(sentence(group, hide, max(fit.length_px, 1.0)), hide)
+    if not undrawn or undrawn[0].length_px < shortest or camera is None:
         return
     letter = view_letter(group.views.index(view))
     names = [f"{fit.marking} (visible over {max(fit.length_px, 1):.0f} px)" for fit in undrawn]

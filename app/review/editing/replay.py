@@ -338,6 +338,8 @@ _STEPS: dict[str, Callable[[Ledger, LogEntry], None]] = {
     "take": lambda _ledger, _entry: None,
     "agreement": lambda _ledger, _entry: None,
     # Gold groups, guidelines, comments, accounts and work that is given out have tables of their own.
+    # Dismissed findings have a table of their own, which stays.
+    "dismissal": lambda _ledger, _entry: None,
     "gold": lambda _ledger, _entry: None,
     "guideline": lambda _ledger, _entry: None,
     "comment": lambda _ledger, _entry: None,

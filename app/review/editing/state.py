@@ -8,13 +8,14 @@ from dataclasses import dataclass, replace
 from app.errors import NotFoundError
 from app.review.editing.etags import group_etag, said_part
 from app.review.editing.undo_stacks import Stacks, read_stacks
-from app.soccer.finding import Finding
+from app.soccer.finding import Dismissal, Finding
 from app.soccer.group import Group
 from app.soccer.policy import Policy
 from app.soccer.solution import Solution
 from app.store.digest import digest
+from app.store.dismissals import NOTHING_DISMISSED, GroupDismissals
 from app.store.groups import StoredGroup, read_groups
-from app.store.queue import import_findings, is_fixed
+from app.store.queue import is_fixed, read_noticed
 from app.store.session import Session
 from app.store.sight import COPIES
 from app.store.solutions import SolutionKey, read_solutions
@@ -76,6 +77,8 @@ class GroupState:
     can_redo: bool
     stored: StoredGroup
     """The same group with its rows' keeping."""
+    dismissed: tuple[Dismissal | None, ...] = ()
+    """Of each finding of the solution: who has checked it; None: nobody."""
 
     @property
     def is_copy(self) -> bool:
@@ -91,12 +94,14 @@ class Record:
         noticed: What imports noticed.
         verdicts: The last of each person, the newest first.
         stacks: What can be undone and done again.
+        dismissals: Findings that people have checked.
     """
 
     stored: StoredGroup
     noticed: tuple[Finding, ...]
     verdicts: tuple[StoredVerdict, ...]
     stacks: Stacks
+    dismissals: GroupDismissals = NOTHING_DISMISSED
 
     @property
     def solution_key(self) -> SolutionKey:
@@ -108,7 +113,8 @@ class Record:
         """What people said: the part of the ETag that a change builds on."""
         newest = self.newest_verdict
         verdict_id = 0 if newest is None else newest.id
-        return said_part(self.stored.inputs_hash, self.stored.revision, verdict_id)
+        stored = self.stored
+        return said_part(stored.inputs_hash, stored.revision, verdict_id, self.dismissals.last)
 
     @property
     def newest_verdict(self) -> StoredVerdict | None:
@@ -147,6 +153,7 @@ class Record:
             can_undo=self.stacks.can_undo,
             can_redo=self.stacks.can_redo,
             stored=stored,
+            dismissed=() if solution is None else self.dismissals.of(solution.findings),
         )
 
 
@@ -173,7 +180,7 @@ def read_record(session: Session, group_id: int) -> Record:
 def read_records(session: Session, group_ids: Sequence[int]) -> list[Record]:
     """Records of groups in the order asked for; at most a few hundred."""
     groups = read_groups(session, group_ids)
-    noticed = import_findings(session, group_ids)
+    noticed, dismissals = read_noticed(session, group_ids)
     verdicts = read_last_verdicts(session, group_ids)
     stacks = read_stacks(session, group_ids)
     return [
@@ -182,6 +189,7 @@ def read_records(session: Session, group_ids: Sequence[int]) -> list[Record]:
             tuple(Finding(row.kind, row.sentence, view=row.view) for row in noticed[number]),
             tuple(verdicts.get(number, ())),
             stacks[number],
+            dismissals.get(number, NOTHING_DISMISSED),
         )
         for number, stored in groups.items()
     ]

@@ -326,6 +326,9 @@ def _save(session: Session, outcome: _Outcome, actor: str) -> None:
         entries.append(Entry(PAINT, actor, stored.changed, _read_beside(outcome), *where))
     append(session, entries)
     insert_solutions(session, [(after.solution_key, outcome.encoded)])
+    if after.dismissals.last:
+        refresh_queue(session, [stored.id])
+        return
     noticed = [item.kind for item in after.noticed]
     update_row(session, stored, after.newest_verdict, noticed, outcome.encoded.summary)
 

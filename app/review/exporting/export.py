@@ -75,6 +75,19 @@ class ExportReport:
     missing_images: tuple[str, ...] = ()
 
 
+class _NoRoomError(InputError):
+    """A format has no place for what the groups hold."""
+
+
+@dataclass(frozen=True)
+class FormatAnswer:
+    """Whether a dataset can be written in a format; ``reason`` and ``hint`` where it cannot."""
+
+    format: str
+    reason: str | None = None
+    hint: str | None = None
+
+
 @dataclass(frozen=True)
 class _Options:
     format: str
@@ -203,20 +216,57 @@ def require_possible(
     Raises:
         NotFoundError: There is no such dataset or version.
         InputError: Nothing to export, none of the images that are wanted is there, or the groups
-            do not fit the format.
+            do not fit the format; then the hint names the formats that they fit.
     """
+    asked = _Options(format, everything, boxes, images, views)
+    try:
+        _try(store, dataset, asked, version)
+    except _NoRoomError as error:
+        answers = possible_formats(store, dataset, version)
+        fitting = [answer.format for answer in answers if answer.reason is None]
+        hint = f"These formats have room for it: {', '.join(fitting)}." if fitting else error.hint
+        raise InputError(error.message, hint=hint) from error
+
+
+def possible_formats(
+    store: Store, dataset: str | int, version: str | None = None
+) -> list[FormatAnswer]:
+    """Every format, and why a dataset, or a version of it, cannot be written in it.
+
+    All groups are asked about, whatever their verdicts are: another verdict opens no format.
+
+    Raises:
+        NotFoundError: There is no such dataset or version.
+    """
+    answers = []
+    for format in FORMATS:  # noqa: A001
+        options = _Options(format, version is None, "optimized", "none", "all")
+        try:
+            _try(store, dataset, options, version)
+        except InputError as error:
+            answers.append(FormatAnswer(format, error.message, error.hint))
+        else:
+            answers.append(FormatAnswer(format))
+    return answers
+
+
+def _try(store: Store, dataset: str | int, options: _Options, version: str | None) -> None:
+    """``require_possible`` of one format."""
+    format, everything = options.format, options.everything  # noqa: A001
     _require_plain(format, everything, version)
     with store.read() as session, TemporaryDirectory(prefix="touchline-") as folder:
         whole = _source(session, store, dataset, everything or format == CARRY, version)
         if format == CARRY:
             return
         source = _First(whole)
-        options = _Options(format, everything, boxes, images, views)
         frames = ExportImages(Path(folder), "none", _here(store), frame_layout(format))
         with ViewFiles(Path(folder)) as small:
-            names = export_names(format, source.outlines())
-            counts = _Run(source, options, frames, names, None).write(Path(folder), small.put)
-        if images != "none" and not frames.media:
+            try:
+                names = export_names(format, source.outlines())
+                counts = _Run(source, options, frames, names, None).write(Path(folder), small.put)
+            except InputError as error:
+                raise _NoRoomError(error.message, hint=error.hint) from error
+        if options.images != "none" and not frames.media:
             files = [] if source.is_all else frame_files(session, whole.dataset_id)
             _require_frames(whole.dataset, files)
     if source.is_all:

@@ -17,6 +17,7 @@ from app.errors import NotFoundError
 from app.finite import json_text
 from app.object_store.path import StoredPath
 from app.review.exporting.export import ExportReport
+from app.review.exporting.formats import lacking
 from app.store.clock import now
 from app.store.leftovers import DAY, last_written
 from app.store.uploads import clear
@@ -38,6 +39,11 @@ class ExportEntry:
     bytes: int
     stored: str | None = None
     """Where in an object store the zip lies, and what its content is called; None: here."""
+
+    @property
+    def incomplete(self) -> str | None:
+        """What the files still lack before they can be used; None: nothing."""
+        return lacking(self.request["format"], self.counts)
 
 
 class ExportFolder:

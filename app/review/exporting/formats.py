@@ -194,13 +194,22 @@ def view_settings(format: str, every_view: bool) -> dict[str, str]:  # noqa: A00
     return {"views": "all" if every_view else "valid"} if format in TRAINING else {}
 
 
-def missing_sentence(format: str, counts: Mapping[str, int]) -> dict[str, str]:  # noqa: A002
-    """What a manifest says of frames that a format needs and that were not copied."""
+def lacking(format: str, counts: Mapping[str, int]) -> str | None:  # noqa: A002
+    """What the files of a format still lack before they can be used; None: nothing.
+
+    YOLO trains on the pictures beside its labels; every other format is of use without them.
+    """
     missing = counts.get("images_missing", 0)
     if format != "yolo" or not missing:
-        return {}
-    images = "1 image is" if missing == 1 else f"{missing} images are"
-    return {"missing_images": f"{images} not in this export; frames.csv names their places"}
+        return None
+    images = "1 image is" if missing == 1 else f"{missing:,} images are"
+    return f"{images} not in this export; frames.csv names their places"
+
+
+def missing_sentence(format: str, counts: Mapping[str, int]) -> dict[str, str]:  # noqa: A002
+    """What a manifest says of frames that a format needs and that were not copied."""
+    sentence = lacking(format, counts)
+    return {} if sentence is None else {"missing_images": sentence}
 
 
 def _software() -> str:

@@ -13,7 +13,7 @@ from app.errors import InputError
 from app.review.datasets.dataset import DatasetHead
 from app.review.editing.state import GroupState, VerdictState, read_states
 from app.review.versions.manifest import policy_settings, version_settings, version_stamp
-from app.review.versions.version import FrozenGroup, Version, thaw, thaw_groups
+from app.review.versions.version import FrozenGroup, Version, thaw, thaw_outlines
 from app.soccer.frames import ImageSize
 from app.soccer.group import Group, Station, View
 from app.soccer.solution import SOLVER_VERSION
@@ -101,12 +101,10 @@ class LiveSource:
 
     def outlines(self) -> Iterator[Outline]:
         """The same groups with what names their files."""
-        wanted = set(self._ids)
-        views = (
-            view for view in named_views(self._session, self.dataset_id) if view.group_id in wanted
-        )
-        for _, run in groupby(views, key=lambda view: view.group_id):
-            yield _outline(list(run)), {}
+        for start in range(0, self.count, BATCH):
+            views = named_views(self._session, self._ids[start : start + BATCH])
+            for _, run in groupby(views, key=lambda view: view.group_id):
+                yield _outline(list(run)), {}
 
     def require_some(self) -> None:
         """Raise InputError where there is nothing to export."""
@@ -146,7 +144,7 @@ class VersionSource:
         """The same groups with what names their files."""
         rows = read_rows(self._session, self._version.id, members=True)
         while batch := list(islice(rows, BATCH)):
-            groups = thaw_groups(self._session, self._version, batch)
+            groups = thaw_outlines(self._session, self._version, batch)
             for row, group in zip(batch, groups, strict=True):
                 yield replace(group, split=row.split), row.splits or {}
 

@@ -24,6 +24,7 @@ from app.review.editing.lineage import Lineage, Lineages, station_lineage
 from app.soccer.group import Group
 from app.soccer.solution import SOLVER_VERSION
 from app.store.codecs import group_head_to_json, policy_to_json, station_to_json, view_to_json
+from app.store.dismissals import carried_dismissals
 from app.store.exports import newest_word
 from app.store.groups import StoredGroup, read_groups
 from app.store.imports import group_verdicts, known_groups, shared_stations
@@ -120,8 +121,11 @@ def _groups(
     for start in range(0, len(ids), _BATCH):
         stored = read_groups(session, ids[start : start + _BATCH])
         known, verdicts = lineages.of(stored.values()), group_verdicts(session, stored)
+        checked = carried_dismissals(session, stored)
         for item in stored.values():
-            yield _group(session, item, known[item.id], verdicts.get(item.id, []))
+            carried = _group(session, item, known[item.id], verdicts.get(item.id, []))
+            # Earlier releases know no such key: it is there where it says something.
+            yield carried | ({"dismissals": checked[item.id]} if item.id in checked else {})
         if progress is not None:
             progress(start + len(stored), len(ids))
 

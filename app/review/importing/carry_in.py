@@ -32,7 +32,7 @@ from app.review.importing.carry_parse import (
     read_lines,
 )
 from app.review.importing.carry_stations import merge_stations
-from app.review.importing.carry_verdicts import merge_verdicts
+from app.review.importing.carry_verdicts import merge_dismissals, merge_verdicts
 from app.review.importing.ingest import IngestReport, Origin, attempt, ingest_batch
 from app.review.importing.spare import SpareFrame, ingest_spare
 from app.soccer.group import Group, Station
@@ -175,6 +175,7 @@ def _merge_batch(
         item = items[key]
         changed = merge_group(session, origin, stored[number], lineages[number], item, run.report)
         judged = merge_verdicts(session, origin, number, item.verdicts)
+        judged |= merge_dismissals(session, origin, number, item.dismissals)
         if changed or judged:
             touched.append(number)
         if key not in counted:

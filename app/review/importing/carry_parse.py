@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import IO, Any
@@ -17,12 +18,14 @@ from app.review.importing.group_limits import MAX_POINTS, MAX_VIEWS, points_of
 from app.review.policies.text import CUSTOM, policy_values, policy_with
 from app.review.verdicts.verdict import STATES
 from app.soccer.annotation import Extras
+from app.soccer.finding import FINDING_KINDS
 from app.soccer.frames import MAX_SIDE
 from app.soccer.group import CALIBRATIONS, Group, Station, View
 from app.soccer.pitch import canonical_marking
 from app.soccer.policy import PAPER, Policy
 from app.soccer.reasons import MAX_NOTE, REASONS, left_out
 from app.store.codecs import extras_from_json, policy_from_json, station_from_json
+from app.store.dismissals import CARRIED
 from app.store.imports import VERDICT
 from app.store.stored_json import Json
 
@@ -62,6 +65,7 @@ class CarriedGroup:
     pitches: tuple[str, ...]
     log: tuple[Json, ...]
     verdicts: tuple[Mapping[str, Any], ...]
+    dismissals: tuple[Mapping[str, Any], ...] = ()
 
 
 def read_head(tree: FileTree) -> CarriedHead:
@@ -154,6 +158,7 @@ def parse_group(value: Json, shared: Mapping[str, Station]) -> CarriedGroup:
             pitches=_pitches(value, group, base),
             log=_log(value["log"]),
             verdicts=tuple(map(_verdict, _list(value["verdicts"], MAX_STATES))),
+            dismissals=tuple(map(_dismissal, _list(value.get("dismissals", []), MAX_STATES))),
         )
     except _MISSHAPEN as error:
         raise _problem(error) from error
@@ -222,7 +227,7 @@ def _checked(station: Station) -> Station:
     if station.calibration not in CALIBRATIONS:
         raise InputError("has a calibration that Touchline does not know")
     _require_truth_values("a station", station.flipped, station.shared)
-    for marking in station.lines:
+    for marking in station.said_lines:
         if canonical_marking(marking) != marking:
             raise InputError(f"has {marking}, which is not a pitch marking")
     if (count := points_of(station.lines)) > MAX_POINTS:
@@ -250,6 +255,21 @@ def _verdict(value: Json) -> Mapping[str, Any]:
         raise InputError("has a verdict that Touchline does not know")
     if (values["state"] == "rejected") != (values["reason"] in REASONS):
         raise InputError("has a rejection without a reason, or a reason without a rejection")
+    return values
+
+
+def _dismissal(value: Json) -> Mapping[str, Any]:
+    values = {name: _mapping(value)[name] for name in CARRIED}
+    for name in ("actor", "at", "sentence"):
+        _text(values[name], most=MAX_NOTE)
+    for name in ("view", "marking", "suggested", "note"):
+        if values[name] is not None:
+            _text(values[name], most=MAX_NOTE)
+    number = values["number"]
+    if number is not None and (type(number) not in (int, float) or not math.isfinite(number)):
+        raise InputError("has a dismissed finding whose number is none")
+    if values["kind"] not in FINDING_KINDS or values["dismissed"] not in (True, False):
+        raise InputError("has a dismissed finding that Touchline does not know")
     return values
 
 

@@ -1,4 +1,4 @@
-"""Carry, verdicts: everyone's are kept, and the newest of all counts."""
+"""Carry, verdicts and dismissed findings: everyone's are kept, and the newest of all counts."""
 
 from __future__ import annotations
 
@@ -6,7 +6,9 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from app.review.importing.ingest import Origin
+from app.soccer.finding import Dismissal
 from app.store.clock import now
+from app.store.dismissals import carried_dismissals, insert_dismissal
 from app.store.imports import VERDICT, group_verdicts
 from app.store.session import Session
 from app.store.verdicts import StoredVerdict, insert_verdicts, next_verdict_id
@@ -33,6 +35,36 @@ def merge_verdicts(
     first = next_verdict_id(session)
     given = [StoredVerdict(first + place, group_id, **item) for place, item in enumerate(fresh)]
     insert_verdicts(session, origin.dataset_id, given, actor=origin.actor, at=now())
+    return True
+
+
+def merge_dismissals(
+    session: Session, origin: Origin, group_id: int, carried: Sequence[Mapping[str, Any]]
+) -> bool:
+    """Add what was dismissed in another installation and is not here; whether there was any.
+
+    The last one of a finding counts: what was said here later than the first of theirs is said
+    once more, after them.
+    """
+    if not carried:
+        return False
+    known = carried_dismissals(session, [group_id]).get(group_id, [])
+    fresh = [item for item in carried if item not in known]
+    if not fresh:
+        return False
+    first = min(str(item["at"]) for item in fresh)
+    later = [item for item in known if str(item["at"]) > first]
+    brought = (origin.actor, now())
+    for item in sorted([*fresh, *later], key=lambda one: str(one["at"])):
+        values = {name: value for name, value in item.items() if name != "dismissed"}
+        insert_dismissal(
+            session,
+            origin.dataset_id,
+            group_id,
+            Dismissal(**values),
+            dismissed=item["dismissed"],
+            brought=brought,
+        )
     return True
 
 

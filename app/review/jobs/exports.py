@@ -116,6 +116,7 @@ def export_work(
         entry = folder.keep(name, request, report)
         return {
             "export": entry.id,
+            "format": request["format"],
             "content": f"/api/v1/exports/{entry.id}/content",
             "bytes": entry.bytes,
             "counts": entry.counts,

@@ -11,6 +11,7 @@ import structlog
 
 from app.errors import JobCancelled, ReviewError
 from app.progress import TellProgress
+from app.review.jobs.endings import ending
 from app.store.jobs import CANCELLED, DONE, FAILED
 from app.store.stored_json import Json
 
@@ -110,7 +111,9 @@ class JobRun:
         try:
             self.progress.require_wanted()
             with structlog.contextvars.bound_contextvars(job=self.id):
-                return {"state": DONE, "result": self.work(self.progress)}
+                result = self.work(self.progress)
+            told = ending(self.kind, result)
+            return {"state": DONE, "result": result, **({} if told is None else {"sentence": told})}
         except JobCancelled:
             if not self.progress.cancelled.is_set():
                 return None

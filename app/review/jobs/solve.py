@@ -53,14 +53,20 @@ class PitchJob:
 
 
 def request_solve(
-    jobs: Jobs, store: Store, dataset_id: int, *, actor: str, keep: Keep[Job] = keep_nothing
+    jobs: Jobs,
+    store: Store,
+    dataset_id: int,
+    *,
+    actor: str,
+    title: str | None = None,
+    keep: Keep[Job] = keep_nothing,
 ) -> Job:
     """Solve what is stale in a dataset, soon; one job a dataset waits at most."""
     with store.read() as session:
         name = dataset_name(session, dataset_id)
     return jobs.submit(
         KIND,
-        f"Solve {name}",
+        title or f"Solve {name}",
         solve_work(store, dataset_id, jobs.pool),
         dataset_id=dataset_id,
         actor=actor,
@@ -146,6 +152,21 @@ def request_pitches(
         return PitchJob(state, job)
 
     return solve_after(jobs, store, dataset_id, change, actor=actor, keep=keep)
+
+
+def request_estimates(
+    jobs: Jobs, store: Store, dataset: str | int, *, actor: str, keep: Keep[Job] = keep_nothing
+) -> Job:
+    """Estimate the pitches of a dataset's matches that are not estimated yet, soon.
+
+    That is a part of solving; where the dataset is being solved already, that job does it.
+
+    Raises:
+        NotFoundError: There is no such dataset.
+    """
+    found = get_dataset_head(store, dataset)
+    title = f"Estimate the pitches of {found.name}"
+    return request_solve(jobs, store, found.id, actor=actor, title=title, keep=keep)
 
 
 def resume_solving(jobs: Jobs, store: Store) -> None:

@@ -40,7 +40,7 @@ KINDS: Mapping[Family, tuple[str, ...]] = {
         *("edit", "undo", "redo", "pitch", "position", "noise", "paint"),
         *("station_edit", "station_undo", "station_redo"),
     ),
-    Family.VERDICT: ("verdict", "verdict_batch", "verdict_batch_undo"),
+    Family.VERDICT: ("verdict", "verdict_batch", "verdict_batch_undo", "dismissal"),
     Family.COMMENT: ("comment",),
     Family.POLICY: ("policy",),
     Family.VERSION: ("freeze",),
@@ -218,6 +218,14 @@ def _one_edit(row: AuditRow, said: Mapping[str, Any]) -> str:
     return f"{what}{view}{names}"
 
 
+def _dismissal(_row: AuditRow, body: Mapping[str, Any]) -> str:
+    did = "dismissed the finding" if body.get("dismissed") else "opened the finding again"
+    kind = str(body.get("kind")).replace("_", " ")
+    place = f" in {body['view']}" if body.get("view") else ""
+    why = f": {body['note']}" if body.get("note") else ""
+    return f"{did} {kind}{place}{why}"
+
+
 def _verdict(_row: AuditRow, body: Mapping[str, Any]) -> str:
     said = [str(body.get("state"))]
     if body.get("reason"):
@@ -322,6 +330,7 @@ _SENTENCES: Mapping[str, Callable[[AuditRow, Mapping[str, Any]], str]] = {
     **dict.fromkeys(KINDS[Family.EDIT], _edit),
     **dict.fromkeys(KINDS[Family.WORK], _work),
     "verdict": _verdict,
+    "dismissal": _dismissal,
     "verdict_batch": _bulk,
     "verdict_batch_undo": _bulk,
     "comment": _comment,

@@ -9,6 +9,7 @@ from app.review.people.logins import read_roles
 from app.review.people.names import note
 from app.review.people.roles import DatasetRoles, Role
 from app.soccer.actors import person_of
+from app.store.copy_datasets import copy_dataset_ids
 from app.store.dataset_roles import all_dataset_roles, members, set_dataset_role
 from app.store.datasets import dataset_names, find_dataset
 from app.store.people import person_by_id
@@ -60,9 +61,11 @@ def list_members(store: Store, dataset: str | int) -> list[Member]:
 
 
 def single_roles(session: Session) -> dict[int, list[SingleRole]]:
-    """The roles in single datasets of everybody, by the id of the person."""
+    """The roles in single datasets of everybody, by the id of the person; none of their practice."""
     found: dict[int, list[SingleRole]] = {}
     for row in all_dataset_roles(session):
+        if row.dataset_id > COPIES:
+            continue
         one = SingleRole(row.dataset_id, row.dataset, Role(row.role))
         found.setdefault(row.person_id, []).append(one)
     return found
@@ -73,9 +76,11 @@ def read_single_roles(store: Store, roles: DatasetRoles) -> list[SingleRole]:
     if not roles.single:
         return []
     with store.read() as session:
-        names = dataset_names(session)
+        names, copies = dataset_names(session), copy_dataset_ids(session)
     seen = {
-        key: role for key, role in roles.single.items() if role is not Role.NONE and key <= COPIES
+        key: role
+        for key, role in roles.single.items()
+        if role is not Role.NONE and key not in copies
     }
     found = [SingleRole(key, names[key], role) for key, role in seen.items() if key in names]
     return sorted(found, key=lambda one: one.dataset)

@@ -146,8 +146,10 @@ class DatasetRoles:
 
     @property
     def highest(self) -> Role:
-        """The most that they are anywhere, for what belongs to no dataset."""
-        return max((self.everywhere, *self.single.values()), key=_RANKS.index)
+        """The most that they are anywhere, for what belongs to no dataset; copies and practice, in
+        which everybody may judge, do not count."""
+        single = (role for key, role in self.single.items() if key <= COPIES)
+        return max((self.everywhere, *single), key=_RANKS.index)
 
     def only(self, dataset_id: int) -> DatasetRoles:
         """The same rights in one dataset, and none in any other."""

@@ -1,4 +1,8 @@
-"""Practice: the dataset of eight lessons, made, begun again, and how far somebody has come in it."""
+"""Practice: the dataset of eight lessons, made, begun again, and how far somebody has come in it.
+
+Where people log in, each of them has a dataset of their own, which nobody else sees but admins, and
+in which they judge whatever their role is elsewhere.
+"""
 
 from __future__ import annotations
 
@@ -12,6 +16,7 @@ from app.datasets.match_frames import ARCHIVE
 from app.errors import ConflictError, NotFoundError
 from app.progress import TellProgress, telling
 from app.review.answers.keep import Keep, keep_nothing
+from app.review.datasets.dataset import insert_dataset
 from app.review.datasets.delete import delete_dataset
 from app.review.editing.recompute import solve_dataset
 from app.review.editing.state import GroupState, read_states
@@ -19,23 +24,32 @@ from app.review.importing.sources import Source, import_source
 from app.review.jobs.child import carry_out_apart
 from app.review.jobs.jobs import Jobs
 from app.review.jobs.run import JobProgress, Work
+from app.review.people.names import note
+from app.review.people.roles import Role
 from app.review.practice.lessons import Feedback, judge, kind_of
 from app.review.practice.words import WORDS
 from app.sample.practice import LESSONS, write_practice
 from app.sample.scene import SceneTruth
 from app.sample.truth import TRUTH, read_truth
 from app.soccer.policy import PAPER
+from app.store.dataset_roles import set_dataset_role
 from app.store.datasets import find_dataset
 from app.store.imports import known_groups
 from app.store.jobs import Job
 from app.store.locks import practice_lock
+from app.store.people import person_by_name
 from app.store.sight import EVERYTHING, Sight
 from app.store.store import Store
 from app.store.stored_json import Json
 
 KIND = "practice"
 DATASET = "practice"
-"""Name of the dataset, and of its folder in the home."""
+"""Name of the dataset where nobody logs in, and of the folder of the lessons in the home."""
+
+
+def practice_name(person: str | None) -> str:
+    """Name of the dataset in which a person practises; None: where nobody logs in."""
+    return DATASET if person is None else f"{DATASET} {person}"
 
 
 @dataclass(frozen=True)
@@ -78,22 +92,23 @@ def request_practice(
     *,
     again: bool,
     actor: str,
+    person: str | None = None,
     keep: Keep[Job] = keep_nothing,
 ) -> Job:
     """Make the practice dataset soon; what is there already stays, unless it shall begin again.
 
-    ``keep`` keeps the answer with the job.
+    ``person`` is whose practice it is (``practice_name``); ``keep`` keeps the answer with the job.
 
     Raises:
         ConflictError: There is a dataset of that name with other groups.
     """
-    _require_own(store, settings)
+    _require_own(store, settings, practice_name(person))
     return jobs.submit(
         KIND,
         "Begin the practice again" if again else "Make the practice groups",
-        practice_work(store, again=again, actor=actor),
+        practice_work(store, again=again, actor=actor, person=person),
         actor=actor,
-        request={"again": again},
+        request={"again": again, "person": person},
         once=True,
         keep=keep,
     )
@@ -103,13 +118,14 @@ def resume_practice(jobs: Jobs, store: Store) -> None:
     """Let what an earlier server was at go on."""
 
     def work_of(job: Job) -> Work:
-        again = bool((job.request or {}).get("again"))
-        return practice_work(store, again=again, actor=job.actor)
+        asked = job.request or {}
+        again = bool(asked.get("again"))
+        return practice_work(store, again=again, actor=job.actor, person=asked.get("person"))
 
     jobs.resumes(KIND, work_of)
 
 
-def practice_work(store: Store, *, again: bool, actor: str) -> Work:
+def practice_work(store: Store, *, again: bool, actor: str, person: str | None) -> Work:
     """The work itself; its result names the dataset and its first group."""
 
     def work(progress: JobProgress) -> Json:
@@ -120,6 +136,7 @@ def practice_work(store: Store, *, again: bool, actor: str) -> Work:
             _make_dataset,
             again,
             actor,
+            person,
             dataset_id=None,
             progress=progress,
         )
@@ -127,12 +144,22 @@ def practice_work(store: Store, *, again: bool, actor: str) -> Work:
     return work
 
 
-def _make_dataset(store: Store, again: bool, actor: str, progress: TellProgress) -> Json:
-    return make_practice_dataset(store, store.settings, progress, again=again, actor=actor)
+def _make_dataset(
+    store: Store, again: bool, actor: str, person: str | None, progress: TellProgress
+) -> Json:
+    return make_practice_dataset(
+        store, store.settings, progress, again=again, actor=actor, person=person
+    )
 
 
 def make_practice_dataset(
-    store: Store, settings: Settings, progress: TellProgress, *, again: bool = False, actor: str
+    store: Store,
+    settings: Settings,
+    progress: TellProgress,
+    *,
+    again: bool = False,
+    actor: str,
+    person: str | None = None,
 ) -> dict[str, Json]:
     """Draw, import and solve the lessons; done once, nothing more unless ``again``.
 
@@ -146,42 +173,65 @@ def make_practice_dataset(
         ConflictError: There is a dataset of that name with other groups.
     """
     with practice_lock(settings, lambda: progress(0, 1, "Somebody else makes them.")):
-        _require_own(store, settings)
-        ids = _group_ids(store)
+        name = practice_name(person)
+        _require_own(store, settings, name)
+        ids = _group_ids(store, name)
         if len(ids) == len(LESSONS) and not again and _is_drawn(settings):
-            return {"dataset": DATASET, "groups": len(ids), "first": ids[0], "made": False}
-        ids = _made(store, settings, progress, again=again and bool(ids), actor=actor)
-    return {"dataset": DATASET, "groups": len(ids), "first": ids[0], "made": True}
+            return {"dataset": name, "groups": len(ids), "first": ids[0], "made": False}
+        ids = _made(store, settings, progress, again and bool(ids), actor, person)
+    return {"dataset": name, "groups": len(ids), "first": ids[0], "made": True}
 
 
 def _made(
-    store: Store, settings: Settings, progress: TellProgress, *, again: bool, actor: str
+    store: Store,
+    settings: Settings,
+    progress: TellProgress,
+    again: bool,
+    actor: str,
+    person: str | None,
 ) -> list[int]:
     """Ids of the lessons, once they are drawn, imported and solved."""
-    folder = settings.home / DATASET
+    folder, name = settings.home / DATASET, practice_name(person)
     if not _is_drawn(settings):
         write_practice(folder, telling(progress, "Drawing the pictures."))
     if again:
-        delete_dataset(store, DATASET, confirm=DATASET, actor=actor, afresh=PAPER)
+        afresh = PAPER if person is None else None
+        delete_dataset(store, name, confirm=name, actor=actor, afresh=afresh)
+    if person is not None:
+        _open_for(store, person, actor)
     progress(0, 1, "Reading the groups.")
     source = Source("soccernet-v3", folder.resolve(), name="the practice groups")
-    import_source(store, DATASET, source, settings, None, actor=actor)
-    solve_dataset(store, DATASET, None, telling(progress, "Solving the groups."))
-    return _group_ids(store)
+    import_source(store, name, source, settings, None, actor=actor)
+    solve_dataset(store, name, None, telling(progress, "Solving the groups."))
+    return _group_ids(store, name)
 
 
-def read_practice(store: Store, settings: Settings, sight: Sight = EVERYTHING) -> Practice:
+def _open_for(store: Store, person: str, actor: str) -> None:
+    """Make a person's practice dataset, empty, where it is missing: they judge in it."""
+    with store.write() as session:
+        row = person_by_name(session, person)
+        name = practice_name(person)
+        if row is None or find_dataset(session, name) is not None:
+            return
+        made = insert_dataset(session, name, PAPER, actor, hidden=True)
+        set_dataset_role(session, row.id, made, Role.REVIEWER, by=actor)
+        note(session, actor, person, "role in dataset", Role.REVIEWER, dataset_id=made)
+
+
+def read_practice(
+    store: Store, settings: Settings, sight: Sight = EVERYTHING, person: str | None = None
+) -> Practice:
     """Every lesson with what has come of it; none where the dataset is not made yet, or not seen."""
-    truths = _truths(settings)
+    truths, name = _truths(settings), practice_name(person)
     with store.read() as session:
-        row = find_dataset(session, DATASET)
+        row = find_dataset(session, name)
         if row is not None and not sight.sees(row.id):
-            return Practice(DATASET, ())
-        states = read_states(session, _group_ids(store))
+            return Practice(name, ())
+        states = read_states(session, _group_ids(store, name))
     lessons = [
         _lesson(state, truths) for state in states if truths is not None and state.key in truths
     ]
-    return Practice(DATASET, tuple(sorted(lessons, key=lambda lesson: lesson.number)))
+    return Practice(name, tuple(sorted(lessons, key=lambda lesson: lesson.number)))
 
 
 def read_lesson(settings: Settings, state: GroupState) -> PracticeLesson:
@@ -191,7 +241,8 @@ def read_lesson(settings: Settings, state: GroupState) -> PracticeLesson:
         NotFoundError: The group is no lesson.
     """
     truths = _truths(settings)
-    if state.dataset != DATASET or truths is None or state.key not in truths:
+    practised = state.dataset == DATASET or state.dataset.startswith(f"{DATASET} ")
+    if not practised or truths is None or state.key not in truths:
         raise NotFoundError(f"group {state.id} is no practice group")
     return _lesson(state, truths)
 
@@ -210,26 +261,26 @@ def _lesson(state: GroupState, truths: dict[str, SceneTruth]) -> PracticeLesson:
     )
 
 
-def _group_ids(store: Store) -> list[int]:
+def _group_ids(store: Store, name: str) -> list[int]:
     """Ids of the practice groups in the order of the dataset."""
     with store.read() as session:
-        row = find_dataset(session, DATASET)
+        row = find_dataset(session, name)
         if row is None:
             return []
         return [group.id for group in known_groups(session, row.id)]
 
 
-def _require_own(store: Store, settings: Settings) -> None:
+def _require_own(store: Store, settings: Settings, name: str) -> None:
     """Raise ConflictError where somebody's own dataset has the name."""
     with store.read() as session:
-        row = find_dataset(session, DATASET)
+        row = find_dataset(session, name)
         if row is None:
             return
         keys = {group.key for group in known_groups(session, row.id)}
     known = _truths(settings)
     if keys and not keys <= set(known or ()):
         raise ConflictError(
-            f'there is a dataset "{DATASET}" with groups of your own',
+            f'there is a dataset "{name}" with groups of your own',
             hint="The practice groups need that name. Rename or delete your dataset first.",
         )
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from app.progress import TellProgress
+from app.progress import TellProgress, telling
 from app.review.datasets.dataset import list_datasets
 from app.review.editing.recompute import solve_dataset
 from app.review.importing.sources import Source, import_source
@@ -69,11 +69,13 @@ def make_sample_dataset(
     found = _present(store, name)
     if found.is_complete:
         return found
-    written = write_sample(folder, **vars(order), progress=progress, workers=workers)
+    drawing = telling(progress, "Drawing the pictures.")
+    written = write_sample(folder, **vars(order), progress=drawing, workers=workers)
     source = Source("soccernet-v3", folder.resolve())
-    import_source(store, name, source, store.settings, progress, actor=actor)
+    reading = telling(progress, "Reading the groups.")
+    import_source(store, name, source, store.settings, reading, actor=actor)
     with pool() as executor:
-        solve_dataset(store, name, executor, progress)
+        solve_dataset(store, name, executor, telling(progress, "Solving the groups."))
     found = _present(store, name)
     return SampleDataset(found.dataset, found.groups, found.solved, written)
 

@@ -78,7 +78,12 @@ def _flag(name: str, meaning: str) -> QueryField:
 
 _ASKED = (
     QueryField("status", "choice", "verdict", values=STATUSES, also=("state",)),
-    QueryField("finding", "choice", "kind of finding", values=(*WHETHER, *FINDING_KINDS)),
+    QueryField(
+        "finding", "choice", "kind of finding, unless dismissed", values=(*WHETHER, *FINDING_KINDS)
+    ),
+    QueryField(
+        "dismissed", "choice", "kind of dismissed finding", values=(*WHETHER, *FINDING_KINDS)
+    ),
     QueryField(
         "gate", "choice", "first failing gate; none: it passes", values=("none", "unsolved", *GATES),
         also=("first_failing",),

@@ -8,9 +8,9 @@ from typing import Any
 
 from app.review.datasets.dataset import dataset_id
 from app.review.editing.state import GroupState, read_states
-from app.soccer.finding import Finding
+from app.soccer.finding import Dismissal, Finding
 from app.soccer.group import Group
-from app.store.conditions import Condition, compares, contains, lists
+from app.store.conditions import Condition, compares, contains, either, lists
 from app.store.listing import Listing
 from app.store.order import Order
 from app.store.store import Store
@@ -26,31 +26,51 @@ class GroupFindings:
     number: int
     group: Group
     findings: tuple[Finding, ...]
+    dismissed: tuple[Dismissal | None, ...]
+    """Of each finding: who has checked it; None: nobody."""
 
     @property
     def values(self) -> list[dict[str, Any]]:
         """The findings as plain values, each with the key of the group."""
         return [
-            {"kind": finding.kind, "group": self.group.key, **asdict(finding)}
-            for finding in self.findings
+            {
+                "kind": finding.kind,
+                "group": self.group.key,
+                **asdict(finding),
+                "dismissed": None
+                if said is None
+                else {"by": said.actor, "at": said.at, "note": said.note},
+            }
+            for finding, said in zip(self.findings, self.dismissed, strict=True)
         ]
 
 
-def count_groups(store: Store, dataset_id: int, kind: str | None) -> int:
-    """How many groups of a dataset have findings (of a kind)."""
+def count_groups(
+    store: Store, dataset_id: int, kind: str | None, *, dismissed: bool | None = None
+) -> int:
+    """How many groups of a dataset have findings, of a kind, open or dismissed, where these are named."""
     with store.read() as session:
-        return Listing(session, dataset_id, [_has(kind)]).count()
+        return Listing(session, dataset_id, [_has(kind, dismissed)]).count()
 
 
 def read_findings(
-    store: Store, dataset_id: int, *, after: int = 0, limit: int, kind: str | None = None
+    store: Store,
+    dataset_id: int,
+    *,
+    after: int = 0,
+    limit: int,
+    kind: str | None = None,
+    dismissed: bool | None = None,
 ) -> list[GroupFindings]:
-    """Findings of up to ``limit`` groups, by number of the group, from the one after ``after``."""
+    """Findings of up to ``limit`` groups, by number of the group, from the one after ``after``.
+
+    ``dismissed`` names those that people have checked (True) or have not (False); None: all.
+    """
     with store.read() as session:
-        where = [_has(kind), compares("number", ">", after)]
+        where = [_has(kind, dismissed), compares("number", ">", after)]
         ids = Listing(session, dataset_id, where).ids(Order("number"), limit)
         states = read_states(session, ids)
-    return [_group_findings(state, kind) for state in states]
+    return [_group_findings(state, kind, dismissed) for state in states]
 
 
 def finding_values(store: Store, dataset: str) -> Iterator[dict[str, Any]]:
@@ -62,11 +82,21 @@ def finding_values(store: Store, dataset: str) -> Iterator[dict[str, Any]]:
             yield from group.values
 
 
-def _has(kind: str | None) -> Condition:
-    return contains("findings", ",") if kind is None else lists("findings", kind)
+def _has(kind: str | None, dismissed: bool | None) -> Condition:
+    columns = {None: ("findings", "dismissed"), False: ("findings",), True: ("dismissed",)}
+    return either(
+        contains(column, ",") if kind is None else lists(column, kind)
+        for column in columns[dismissed]
+    )
 
 
-def _group_findings(state: GroupState, kind: str | None) -> GroupFindings:
+def _group_findings(state: GroupState, kind: str | None, dismissed: bool | None) -> GroupFindings:
     found = state.solution.findings if state.solution is not None else ()
-    chosen = tuple(item for item in found if kind is None or item.kind == kind)
-    return GroupFindings(state.id, state.number, state.group, chosen)
+    chosen = [
+        (item, said)
+        for item, said in zip(found, state.dismissed, strict=True)
+        if (kind is None or item.kind == kind)
+        and (dismissed is None or dismissed == (said is not None))
+    ]
+    findings, checked = tuple(item for item, _ in chosen), tuple(said for _, said in chosen)
+    return GroupFindings(state.id, state.number, state.group, findings, checked)

@@ -32,7 +32,8 @@ class GroupRow:
         gate: The first failing gate with its view and sentence, None when the group passes.
         main_view: Id of the main view, None when it has no frame to show.
         override: The gate that was overridden when the group was accepted, or None.
-        findings: Kinds.
+        findings: Kinds that are open.
+        dismissed: Kinds that somebody has checked.
         comments: Threads that are open.
         takes: How many people handed in an annotation of their own.
         came_to: What these came to: ``agreed``, ``open`` (somebody has to decide), ``decided``; None:
@@ -75,6 +76,7 @@ class GroupRow:
     y_m: float | None
     agreement: float | None
     findings: tuple[str, ...]
+    dismissed: tuple[str, ...] = ()
     comments: int = 0
     takes: int = 0
     came_to: str | None = None
@@ -203,11 +205,20 @@ def neighbours(store: Store, group_id: int, query: str = "") -> Neighbours:
 _STORED = [
     item.name
     for item in fields(GroupRow)
-    if item.name not in ("id", "findings", "comments", "takes", "came_to")
+    if item.name not in ("id", "findings", "dismissed", "comments", "takes", "came_to")
 ]
 
 
 def _row(row: Any, said: Mapping[int, int]) -> GroupRow:
-    kinds = tuple(row.findings.strip(",").split(",")) if row.findings else ()
-    values = {name: getattr(row, name) for name in _STORED}
-    return GroupRow(id=row.group_id, findings=kinds, comments=said.get(row.group_id, 0), **values)
+    return GroupRow(
+        id=row.group_id,
+        findings=_kinds(row.findings),
+        dismissed=_kinds(row.dismissed),
+        comments=said.get(row.group_id, 0),
+        **{name: getattr(row, name) for name in _STORED},
+    )
+
+
+def _kinds(text: str) -> tuple[str, ...]:
+    """A list between commas."""
+    return tuple(text.strip(",").split(",")) if text else ()

@@ -243,9 +243,10 @@ def _status(term: _Term, value: str) -> Condition:
 
 
 def _finding(term: _Term, value: str) -> Condition:
+    column = "dismissed" if term.field == "dismissed" else "findings"
     if value in ("any", "none"):
-        return conditions.compares("findings", "=" if value == "none" else ">", "")
-    return conditions.lists("findings", _choice(term, value))
+        return conditions.compares(column, "=" if value == "none" else ">", "")
+    return conditions.lists(column, _choice(term, value))
 
 
 def _gate(term: _Term, value: str) -> Condition:
@@ -323,6 +324,7 @@ def _exact(term: _Term, value: str) -> Condition:
 _TESTS: dict[str, Callable[[_Term, str], Condition]] = {
     "status": _status,
     "finding": _finding,
+    "dismissed": _finding,
     "gate": _gate,
     "view": _view,
     "pictures": _pictures,

@@ -120,7 +120,7 @@ def edits_between(before: Group, after: Group) -> Iterator[Edit]:
             continue
         lines = _line_changes(view.station, own.station)
         if lines is not None:
-            yield SetLines(view.key, lines.lines, lines.proposed)
+            yield SetLines(view.key, lines.lines, lines.proposed, lines.not_visible)
         if own.station.calibration != view.station.calibration:
             yield SetCalibrationSource(view.key, own.station.calibration)
         if own.station.picture != view.station.picture:
@@ -134,11 +134,17 @@ def _line_changes(before: Station, after: Station) -> SetStationLines | None:
         for name in names
         if before.lines.get(name) != after.lines.get(name)
     }
-    if not changed and before.proposed == after.proposed:
-        return None
-    for name in {*before.proposed} ^ {*after.proposed}:
+    for name in ({*before.proposed} ^ {*after.proposed}) | (
+        {*before.not_visible} ^ {*after.not_visible}
+    ):
         changed.setdefault(name, tuple(after.lines.get(name, ())) or None)
-    return SetStationLines(changed, tuple(one for one in after.proposed if one in changed))
+    if not changed:
+        return None
+    proposed, not_visible = (
+        tuple(one for one in names if one in changed)
+        for names in (after.proposed, after.not_visible)
+    )
+    return SetStationLines(changed, proposed, not_visible)
 
 
 def _require_ready(take: Take) -> None:

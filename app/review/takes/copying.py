@@ -130,7 +130,7 @@ def _imported(session: Session, stored: StoredGroup) -> Group:
 def _stripped(view: View, start: str) -> View:
     station = view.station
     if start == BARE and not station.shared:
-        station = replace(station, lines={}, proposed=())
+        station = replace(station, lines={}, proposed=(), not_visible=())
     return replace(view, station=station, balls=view.balls if start == IMPORTED else ())
 
 

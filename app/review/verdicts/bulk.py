@@ -18,6 +18,7 @@ from app.review.answers.saved_progress import SavedProgress
 from app.review.queue.fields import asks_blind
 from app.review.queue.query import MAX_LISTED_LENGTH, parse_query
 from app.review.verdicts.verdict import Verdict, check_verdict
+from app.soccer.finding import makes_unusable
 from app.store.batches import (
     Spans,
     StoredBulkVerdict,
@@ -41,9 +42,11 @@ from app.store.verdicts import StoredVerdict, insert_verdicts, next_verdict_id
 CHUNK = 100
 """Groups a transaction: two or three hundredths of a second, for which others wait to write."""
 SAMPLE = 5
-UNSOLVED, NEEDS_NOTE, NO_PICTURE = "unsolved", "needs_note", "no_picture"
-"""Why a group is left alone: its gates are not known, or it fails one, or no view of it has a
-picture, and nobody says why it shall be accepted all the same."""
+UNSOLVED, NEEDS_NOTE, UNUSABLE_BALL, NO_PICTURE = (
+    "unsolved", "needs_note", "unusable_ball", "no_picture",
+)  # fmt: skip
+"""Why a group is left alone: its gates are not known, or it fails one, or its ball cannot be used,
+or no view of it has a picture, and nobody says why it shall be accepted all the same."""
 
 
 @dataclass(frozen=True)
@@ -91,7 +94,7 @@ class BatchReport:
 
 ASKED = (
     "group_id", "key", "number", "label", "status", "stale", "reason", "solved", "passes", "gate",
-    "pictures",
+    "pictures", "findings", "sigma_m",
 )  # fmt: skip
 """What a bulk verdict asks of a group's row in the queue."""
 
@@ -137,7 +140,8 @@ def give_verdicts(
     """Give a verdict to all groups of a query, as each of them is when its turn comes.
 
     Accepting a group that fails a gate overrides the policy, as it does for one group alone:
-    without a note such groups are refused and counted, and so are groups without any picture.
+    without a note such groups are refused and counted, and so are groups whose ball cannot be
+    used and groups without any picture.
     A run that was stopped goes on with the groups behind its place that match then; what was
     imported since it began is not among them.
 
@@ -236,7 +240,7 @@ class SortedOut:
 
 def sort_out(rows: Sequence[Any], verdict: Verdict) -> SortedOut:
     """The groups that a verdict changes, and how many it is refused for, and why."""
-    change, refused = [], {UNSOLVED: 0, NEEDS_NOTE: 0, NO_PICTURE: 0}
+    change, refused = [], {UNSOLVED: 0, NEEDS_NOTE: 0, UNUSABLE_BALL: 0, NO_PICTURE: 0}
     for row in rows:
         if _has(row, verdict):
             continue
@@ -244,12 +248,19 @@ def sort_out(rows: Sequence[Any], verdict: Verdict) -> SortedOut:
             refused[UNSOLVED] += 1
         elif verdict.state == "accepted" and not row.passes and verdict.note is None:
             refused[NEEDS_NOTE] += 1
+        elif verdict.state == "accepted" and verdict.note is None and _is_unusable(row):
+            refused[UNUSABLE_BALL] += 1
         elif verdict.state == "accepted" and not row.pictures and verdict.note is None:
             refused[NO_PICTURE] += 1
         else:
             change.append(row)
     reasons = (Refusal(reason, count) for reason, count in refused.items() if count)
     return SortedOut(change, tuple(reasons))
+
+
+def _is_unusable(row: Any) -> bool:
+    """Whether a finding says that nobody can use the ball; the number of sigma's is sigma."""
+    return any(makes_unusable(kind, row.sigma_m) for kind in row.findings.split(","))
 
 
 def _has(row: Any, verdict: Verdict) -> bool:

@@ -47,7 +47,8 @@ def set_verdict(
     """Save a person's verdict on a group as it is; the newest of all people's counts.
 
     Accepting a group that fails a gate overrides the policy: it needs a note, which goes into
-    the export. So does accepting a group without any picture: nobody can have looked at it.
+    the export. So does accepting a ball that cannot be used (below the grass, known to metres
+    only), and a group without any picture: nobody can have looked at it.
 
     Raises:
         InputError: Unknown state or reason, or a note is missing.
@@ -61,6 +62,7 @@ def set_verdict(
         record, solution = read_solved(store, group_id, needed=state == "accepted")
         stored, what = record.stored, f"group {record.stored.group.key}"
         override = _override(solution, verdict)
+        _require_usable(solution, verdict)
         _require_seen(stored.group, verdict)
         with store.write() as session:
             policy_hash = require_unchanged(session, group_id, if_match, what)
@@ -108,6 +110,18 @@ def _override(solution: Solution | None, verdict: Verdict) -> str | None:
             pointer="/note",
         )
     return gate.name if gate is not None else "unknown"
+
+
+def _require_usable(solution: Solution | None, verdict: Verdict) -> None:
+    """Refuse a bare acceptance of a group whose ball nobody can use, though it passes."""
+    found = None if solution is None else solution.unusable_ball
+    if verdict.state == "accepted" and verdict.note is None and found is not None:
+        raise InputError(
+            f"the ball of this group cannot be used ({found.sentence.rstrip('.')}); accepting it "
+            "needs a note that says why",
+            hint="Correct the ball or leave a view out, or say in the note why it is right.",
+            pointer="/note",
+        )
 
 
 def _require_seen(group: Group, verdict: Verdict) -> None:

@@ -177,7 +177,21 @@ def _passages(there: dict[str, Any], elsewhere: dict[str, Any], absent: str) -> 
 
 
 def _word(value: Any) -> str:
-    return "not set" if value is None else str(value)
+    """A setting as people write it: in words, and by name where it holds several values."""
+    if value is None:
+        return "not set"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, dict):
+        rest = [
+            f"{name.replace('_', ' ')} {_word(value[name])}" for name in value if name != "kind"
+        ]
+        kind, named = value.get("kind"), ", ".join(rest)
+        told = str(kind or "")
+        return (f"{told} ({named})" if told and rest else told or named) or "none"
+    if isinstance(value, list):
+        return ", ".join(map(_word, value)) or "none"
+    return str(value)
 
 
 def _change(before: Any, after: Any) -> ChangedGroup:

@@ -21,12 +21,14 @@ from app.review.datasets.naming import require_name
 from app.review.versions.hash import version_hash
 from app.review.versions.membership import RULES, Candidate, read_candidates, require_solved
 from app.review.versions.version import Version, calibration_names, next_name, read_version
+from app.soccer.finding import Finding
 from app.soccer.group import Group
 from app.soccer.reasons import checked_note
 from app.soccer.solution import SOLVER_VERSION
 from app.soccer.split import Split, Splitter
 from app.store.clock import now
 from app.store.codecs import policy_to_json
+from app.store.dismissals import GroupDismissals
 from app.store.frozen import (
     CALIBRATION,
     SOLUTION,
@@ -40,6 +42,7 @@ from app.store.frozen import (
 from app.store.groups import read_groups
 from app.store.log import Entry, append
 from app.store.media import media_facts
+from app.store.queue import read_noticed
 from app.store.session import Session
 from app.store.solutions import known_calibrations, present_bodies, read_calibration_bodies
 from app.store.store import Store
@@ -183,7 +186,9 @@ class _Run:
             batch = self._candidates[start : start + BATCH]
             members = self._members([item.id for item in batch if item.why is None])
             for position, item in enumerate(batch, start):
-                rows.append({**_row(item, position), **members.get(item.id, {})})
+                member = members.get(item.id, {})
+                dismissed = member.pop("dismissed", [])
+                rows.append({**_row(item, position, dismissed), **member})
             if self._progress is not None:
                 self._progress(start + len(batch), len(self._candidates))
         self._require_cameras()
@@ -219,6 +224,7 @@ class _Run:
         solutions = present_bodies(self._session, ids, self._dataset.policy.hash)
         if len(solutions) < len(ids):
             raise ConflictError("a group lost its solution", hint="Solve the dataset first.")
+        noticed, dismissals = read_noticed(self._session, ids)
         texts: dict[str, str] = {}
         bodies: dict[str, bytes] = {}
         names: set[str] = set()
@@ -230,6 +236,10 @@ class _Run:
             bodies[key] = body
             names |= calibration_names(solved)
             rows[number] = self._member(item.group, said.key, key, solved)
+            if number in dismissals:
+                own = [Finding(one.kind, one.sentence, view=one.view) for one in noticed[number]]
+                found = [*(_finding(value) for value in solved["findings"]), *own]
+                rows[number]["dismissed"] = _dismissed(found, dismissals[number])
         self._keep(texts, bodies, names)
         return rows
 
@@ -305,8 +315,17 @@ class _Run:
         }
 
 
-def _row(item: Candidate, position: int) -> dict[str, Any]:
-    """What every row has; that of a member is completed."""
+def _row(item: Candidate, position: int, dismissed: Json) -> dict[str, Any]:
+    """What every row has; that of a member is completed.
+
+    Findings that people dismissed are a part of what they decided; a group without any has the
+    verdict, and the version the hash, that it always had.
+    """
+    verdict = item.verdict
+    if dismissed:
+        nothing = dict.fromkeys(("reason", "note", "override"))
+        verdict = {**({"state": "unreviewed", **nothing} if verdict is None else verdict)}
+        verdict["dismissed"] = dismissed
     nothing = dict.fromkeys(("splits", "said", "solution", "ball", "frames"))
     return {
         **nothing,
@@ -316,8 +335,31 @@ def _row(item: Candidate, position: int) -> dict[str, Any]:
         "member": item.why is None,
         "why": item.why,
         "split": item.split,
-        "verdict": None if item.verdict is None else canonical(item.verdict),
+        "verdict": None if verdict is None else canonical(verdict),
     }
+
+
+def _finding(value: Json) -> Finding:
+    """A finding as far as a dismissal asks, from the body of a solution."""
+    names = ("kind", "sentence", "view", "marking", "suggested", "number")
+    return Finding(**{name: value.get(name) for name in names})
+
+
+def _dismissed(findings: Sequence[Finding], dismissals: GroupDismissals) -> Json:
+    """What of a group's findings was dismissed, without people and times."""
+    pairs = zip(findings, dismissals.of(findings), strict=True)
+    return [
+        {
+            "kind": finding.kind,
+            "view": finding.view,
+            "marking": finding.marking,
+            "suggested": finding.suggested,
+            "number": finding.number,
+            "note": said.note,
+        }
+        for finding, said in pairs
+        if said is not None
+    ]
 
 
 def _facts(group: Group) -> dict[str, dict[str, int]]:

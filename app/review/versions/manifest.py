@@ -66,8 +66,19 @@ def version_stamp(session: Session, version: Version) -> dict[str, Json]:
             "counts": dict(version.counts),
             "changelog": read_changelog(session, version),
             "rejected": list(_rejected(session, version.id)),
+            **_dismissed(session, version.id),
         }
     }
+
+
+def _dismissed(session: Session, version_id: int) -> dict[str, Json]:
+    """Findings of its groups that people had checked; nothing of a version without any."""
+    found = [
+        {"group": key, **one}
+        for key, verdict in version_verdicts(session, version_id, member=True)
+        for one in (verdict or {}).get("dismissed", ())
+    ]
+    return {"dismissed": found} if found else {}
 
 
 def _rejected(session: Session, version_id: int) -> Iterator[dict[str, Json]]:

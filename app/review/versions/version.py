@@ -16,12 +16,21 @@ from app.soccer.policy import Policy
 from app.soccer.solution import Solution
 from app.soccer.split import Split
 from app.store.codecs import policy_from_json
-from app.store.frozen import CALIBRATION, json_of, named_texts, read_frozen, thaw_group
+from app.store.frozen import (
+    CALIBRATION,
+    FrozenOutline,
+    OutlineStation,
+    json_of,
+    named_texts,
+    read_frozen,
+    thaw_group,
+    thaw_outline,
+)
 from app.store.jobs import OPEN, read_jobs
 from app.store.session import Session
 from app.store.solutions import decode_camera, decode_solution
 from app.store.store import Store
-from app.store.stored_json import Json, parse
+from app.store.stored_json import Json, inflate, parse, parse_as
 from app.store.verifications import Verification as Verification
 from app.store.verifications import read_verifications
 from app.store.versions import VersionGroup, all_versions, dataset_versions, version_row
@@ -199,6 +208,20 @@ def thaw_groups(session: Session, version: Version, rows: Sequence[VersionGroup]
     more = _frozen(session, version, shared)
     texts = {key: json_of(more[key]) for key in shared}
     return [thaw_group(value, texts, row.frames) for row, value in zip(rows, said, strict=True)]
+
+
+def thaw_outlines(session: Session, version: Version, rows: Sequence[VersionGroup]) -> list[Group]:
+    """The same without what was annotated: what names the files of the groups.
+
+    Raises:
+        StorageError: Content is missing.
+    """
+    bodies = _frozen(session, version, {row.said or "" for row in rows})
+    said = [parse_as(inflate(bodies[row.said or ""]), FrozenOutline) for row in rows]
+    shared = {view.station for one in said for view in one.views if isinstance(view.station, str)}
+    more = _frozen(session, version, shared)
+    stations = {key: parse_as(inflate(more[key]), OutlineStation) for key in shared}
+    return [thaw_outline(one, stations, row.frames) for row, one in zip(rows, said, strict=True)]
 
 
 def _frozen(session: Session, version: Version, keys: set[str]) -> Mapping[str, bytes]:

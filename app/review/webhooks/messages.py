@@ -59,6 +59,7 @@ _OF_LOG = {
     "undo": Kind.CHANGED,
     "redo": Kind.CHANGED,
     "verdict": Kind.JUDGED,
+    "dismissal": Kind.JUDGED,
     "comment": Kind.COMMENTED,
     "freeze": Kind.FROZEN,
 }

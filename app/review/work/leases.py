@@ -14,8 +14,17 @@ from app.errors import ConflictError, HeldGroupError, NotFoundError
 from app.review.answers.keep import Keep, keep_nothing
 from app.review.takes.hand_back import checked_reason, note_hand_back
 from app.review.takes.handed_back import HandedBack, read_handed_back
+from app.review.takes.take import Take
 from app.review.work.batches import WORK, Batch, Here, Part, read_batch
-from app.review.work.own import as_seen, hand_in_own, next_own, own_of, returned_to, takes_part
+from app.review.work.own import (
+    as_seen,
+    hand_in_own,
+    next_own,
+    own_of,
+    own_total,
+    returned_to,
+    takes_part,
+)
 from app.store.clock import text_of
 from app.store.log import Entry, append
 from app.store.reader import is_blind
@@ -73,6 +82,9 @@ class Lease:
         here: Everybody who has the group open.
         handed_in_by: Who has handed it in; None: nobody.
         handed_back: Why it was handed back to its annotator; None: it was not, or is handed in again.
+        place: Of the groups that they annotate on their own: which this is, from 1; None otherwise.
+        of: How many these are as the batch stands; None where gold groups are among them, for a
+            count that stays would tell them.
     """
 
     batch: Batch
@@ -82,6 +94,8 @@ class Lease:
     here: tuple[Here, ...] = ()
     handed_in_by: str | None = None
     handed_back: HandedBack | None = None
+    place: int | None = None
+    of: int | None = None
 
 
 class Leases:
@@ -117,7 +131,10 @@ class Leases:
                 row = _group(session, batch, mine)
                 return self._kept(session, batch, row, Part.ANNOTATOR, worker)
         take = next_own(self._store, batch, worker.name)
-        return Lease(batch, None if take is None else take.copy_id, Part.ANNOTATOR)
+        if take is None:
+            return Lease(batch, None, Part.ANNOTATOR)
+        with self._store.read() as session:
+            return _own(session, batch, take, worker)
 
     def _next(self, session: Session, batch: Batch, worker: Worker, after: int | None) -> Lease:
         at = self._now()
@@ -144,8 +161,9 @@ class Leases:
         """
         with self._store.write(lasting=False) as session:
             batch = _open_batch(session, batch_id)
-            if own_of(session, batch, group, worker.name) is not None:
-                return Lease(batch, group, Part.ANNOTATOR)
+            own = own_of(session, batch, group, worker.name)
+            if own is not None:
+                return _own(session, batch, own, worker)
             _require_given(session, batch, group, worker)
             parts, row = _need_parts(batch, worker), _group(session, batch, group)
             others = _others(session, batch, group, worker, self._now())
@@ -304,6 +322,12 @@ def open_for(
         if found is not None:
             return found, part
     return None
+
+
+def _own(session: Session, batch: Batch, take: Take, worker: Worker) -> Lease:
+    """Of a copy, which nobody else can have open."""
+    of = own_total(session, batch, worker.name)
+    return Lease(batch, take.copy_id, Part.ANNOTATOR, place=take.place, of=of)
 
 
 def _others(session: Session, batch: Batch, group: int, worker: Worker, at: str) -> list[Any]:

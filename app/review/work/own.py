@@ -122,6 +122,19 @@ def _waiting(session: Session, batch: Batch) -> list[int]:
     ]
 
 
+def own_total(session: Session, batch: Batch, person: str) -> int | None:
+    """How many groups of a batch somebody annotates on their own, those that are done included.
+
+    None where gold groups are mixed in: they add to what is done and not to what is left.
+    """
+    if batch.gold_every is not None:
+        return None
+    name = person_of(person)
+    takes = takes_of_batch(session, batch.id, batch.dataset_id)
+    done = len([row for row in takes if row.person == name and row.handed_in is not None])
+    return done + sum(count_left(session, batch.id, batch.dataset_id, name, batch.verdicts))
+
+
 def take_over_handed_in(store: Store, batch: Batch, person: str) -> None:
     """Take over what somebody handed in, where nobody else annotates the same groups.
 

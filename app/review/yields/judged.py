@@ -21,6 +21,7 @@ from app.solving.judgement import (
     judge_standing,
     view_jac,
     views_of,
+    widened_covariances,
 )
 
 _NUMBERS = ("baseline", "point", "parallax", "distance")
@@ -166,7 +167,9 @@ def _sigma(
     facts: Facts, policy: Policy, judgement: Judgement, uncertainty: MeanCovariance
 ) -> FloatArray:
     there = np.flatnonzero(~np.isnan(judgement.point[:, 0]))
-    covariances = uncertainty.covariances(judgement.valid, there, judgement.point[there], policy)
+    point = judgement.point
+    covariances = uncertainty.covariances(judgement.valid, there, point[there], policy)
+    covariances = widened_covariances(facts, judgement.valid, there, covariances, point, policy)
     sigma = np.full(facts.groups, np.nan)
     sigma[there] = longest_sigma(covariances)
     return sigma

@@ -1,7 +1,7 @@
 """Every table: what people said, its append-only log, and what was computed from it.
 
 ``dataset``, ``station``, ``groups`` and ``view`` hold the present state of what was said; the
-``log`` can rebuild them. ``verdict`` and ``log`` only grow, ``solution`` and ``calibration`` are
+``log`` can rebuild them. ``verdict``, ``dismissal`` and ``log`` only grow, ``solution`` and ``calibration`` are
 inserted and never changed (triggers see to it). ``queue`` is a projection of all of these, one
 row a group. Whoever imports one table has the whole schema in ``Base``.
 """
@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from app.store.tables import agreement as agreement
 from app.store.tables import changes as changes
+from app.store.tables import dismissals as dismissals
 from app.store.tables import groups as groups
 from app.store.tables import installation as installation
 from app.store.tables import jobs as jobs

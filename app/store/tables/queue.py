@@ -45,7 +45,9 @@ dataset is read from there, a third of what the rows take."""
 class QueueModel(Base):
     """One row a group, for lists: everything that can be filtered or sorted, in plain columns.
 
-    ``findings`` and ``view_keys`` are lists between commas: ``,low_parallax,bad_point,``.
+    ``findings``, ``dismissed`` and ``view_keys`` are lists between commas:
+    ``,low_parallax,bad_point,``; ``findings`` are kinds that are open, ``dismissed`` kinds that
+    people have checked.
     ``value`` is the smallest relative distance to a gate's threshold; ``pictures`` counts the
     views that have one.
     """
@@ -97,3 +99,4 @@ class QueueModel(Base):
     x_m: Mapped[float | None]
     y_m: Mapped[float | None]
     agreement: Mapped[float | None]
+    dismissed: Mapped[str] = mapped_column(server_default=text("''"))

@@ -7,6 +7,7 @@ import { diagonal } from '../../geometry/preview.js';
 import { GLYPHS } from '../../geometry/residual.js';
 import { fixed, pixels, shortMarking } from '../../lib/format.js';
 import { changed, choice, hovered } from '../../state/calibration.js';
+import { Undrawn } from '../view_lines.js';
 import { pickMarking } from './actions.js';
 
 /** @import {InfluenceJson} from '../../api/calibration.js' */
@@ -93,6 +94,7 @@ export function LineTable({ picture, influences }) {
 						${rows.length ? null : html`<tr><td></td><td colspan="4">No lines yet. Choose a marking in the diagram and draw it.</td></tr>`}
 					</tbody>
 				</table>
+				<div class="view-lines__more"><${Undrawn} picture=${picture} /></div>
 			</div>
 		</section>
 	`;

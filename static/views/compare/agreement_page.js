@@ -92,9 +92,9 @@ function PeopleCard({ found, dataset, batch }) {
 }
 
 const LIMITS = /** @type {{name: keyof LimitsJson, label: string, step: string}[]} */ ([
-	{ name: 'line_px', label: 'lines, px', step: '0.5' }, { name: 'markings', label: 'markings drawn by only one person', step: '1' },
-	{ name: 'ball_px', label: 'ball centre, px', step: '0.5' }, { name: 'diameter_px', label: 'ball diameter, px', step: '0.5' },
-	{ name: 'ball_m', label: '3D ball, m', step: '0.05' }, { name: 'jac', label: 'least JaC', step: '0.05' },
+	{ name: 'line_px', label: 'lines, px', step: 'any' }, { name: 'markings', label: 'markings drawn by only one person', step: '1' },
+	{ name: 'ball_px', label: 'ball centre, px', step: 'any' }, { name: 'diameter_px', label: 'ball diameter, px', step: 'any' },
+	{ name: 'ball_m', label: '3D ball, m', step: 'any' }, { name: 'jac', label: 'least JaC', step: 'any' },
 ]);
 
 /** @param {{limits: LimitsJson, dataset: string, saved: () => void}} props */

@@ -8,6 +8,7 @@ import { getPractice } from '../../api/practice.js';
 import { count } from '../../lib/format.js';
 import { page } from '../../lib/router.js';
 import { useResource } from '../../lib/resource.js';
+import { isTeam } from '../../state/me.js';
 import { isJudged, making, makingFailed, startPractice } from '../../state/practice.js';
 import { JobProgress } from '../job_progress.js';
 import { MARKS, WORDS } from '../lesson_card.js';
@@ -44,14 +45,14 @@ export function PracticePart({ onLeave }) {
 	}
 	return html`
 		<div class="practice">
-			<p>Eight made-up groups, each with one known fault or none: a wrong name, a missing ball, another moment… You decide as in real work, and a card tells you at once whether it was right and which keys would have been best. It takes about five minutes. The groups are a dataset of their own, <strong>practice</strong>: they never mix with your data, and can be deleted on the page Datasets.</p>
+			<p>Eight made-up groups, each with one known fault or none: a wrong name, a missing ball, another moment… You decide as in real work, and a card tells you at once whether it was right and which keys would have been best. It takes about five minutes. The groups are a dataset of their own, <strong>${value?.dataset ?? 'practice'}</strong>: they never mix with ${isTeam ? 'other datasets, and only you and admins see your answers' : 'your data, and can be deleted on the page Datasets'}.</p>
 			${error ? html`<p role="alert">The practice could not be read.</p>` : null}
 			${judged.length > 0 ? html`<p class="practice__score" role="status"><strong>${count(right)} of ${count(lessons.length)} right</strong>${judged.length < lessons.length ? `, ${count(lessons.length - judged.length)} still to answer` : ''}.</p>` : null}
 			<p class="buttons">
-				${lessons.length === 0 ? html`<button class="button button--primary" type="button" aria-disabled=${busy} onClick=${() => begin(false)}>Make the eight groups and begin</button>`
+				${lessons.length === 0 ? html`<button class="button button--primary" type="button" data-needs="annotate" data-of="" aria-disabled=${busy} onClick=${() => begin(false)}>Make the eight groups and begin</button>`
 					: html`
 						${next ? html`<a class="button button--primary" href=${`/review/${next.group}`} onClick=${onLeave}>${judged.length ? 'Continue' : 'Begin'} with lesson ${next.number}</a>` : null}
-						<button class="button" type="button" aria-disabled=${busy} onClick=${() => begin(true)}>Start again</button>`}
+						<button class="button" type="button" data-needs="annotate" data-of="" aria-disabled=${busy} onClick=${() => begin(true)}>Start again</button>`}
 			</p>
 			${making.value ? html`<${JobProgress} job=${making.value} cancellable=${false} />` : null}
 			${makingFailed.value ? html`<p class="form__error" role="alert">${makingFailed.value}</p>` : null}

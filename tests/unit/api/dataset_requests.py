@@ -270,6 +270,10 @@ def solving(_api: Any) -> Request:
     return "POST", f"{BROADCAST}/solve", None, {}
 
 
+def pitch_estimates(_api: Any) -> Request:
+    return "POST", f"{BROADCAST}/pitches", None, {}
+
+
 def positions(api: Any) -> Request:
     using(api, values={"calibration.share_position": True})
     return "POST", f"{BROADCAST}/positions", {"match": match_of(api, "positions")}, {}

@@ -106,6 +106,18 @@ def verdict(api: Any) -> Request:
     return "PUT", "/groups/1/verdict", {"state": "deferred"}, etag_of(api, "/groups/1")
 
 
+def dismissal(api: Any) -> Request:
+    group, finding = next(
+        (one["id"], found)
+        for one in api.get(f"{API}/groups?dataset=broadcast").json()["items"]
+        for found in api.get(f"{API}/groups/{one['id']}").json()["solution"]["findings"]
+    )
+    names = ("kind", "view", "marking", "suggested", "number")
+    body = {**{name: finding[name] for name in names}, "dismissed": True}
+    path = f"/groups/{group}"
+    return "PUT", f"{path}/dismissal", body, etag_of(api, path)
+
+
 def station_of(api: Any) -> str:
     number = api.get(f"{API}/groups/4").json()["views"][0]["station"]["id"]
     return f"/stations/{number}"

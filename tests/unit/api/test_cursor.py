@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from app.api.cursor import MAX_DIGITS, parse_cursor
+from app.api.cursor import MAX_DIGITS, first_below, parse_cursor
 from app.errors import InputError
 
 
@@ -19,3 +19,8 @@ class TestParseCursor:
             parse_cursor(cursor)
         assert caught.value.pointer == "/cursor"
         assert "`next`" in str(caught.value.hint)
+
+
+class TestFirstBelow:
+    def test_the_cursor_counts_before_what_was_asked_in_its_place(self) -> None:
+        assert [first_below("7", 9), first_below(None, 9), first_below(None, None)] == [7, 9, None]

@@ -16,6 +16,7 @@ from app.review.importing.ingest import ingest
 from app.soccer.finding import FINDING_KINDS, Fix
 from app.soccer.frames import ImagePoint
 from app.soccer.group import Group
+from app.soccer.pitch import MARKINGS
 from tests.docs.fixes import ACTIONS, EDITS, FINDINGS, PAGE, fixes_page, request_of
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -44,6 +45,8 @@ def fix_of(action: str, group: Group) -> Fix:
     """A fix of that action for the first view of a group."""
     view = group.views[0]
     first, second = sorted(view.station.lines)[:2]
+    if action == "hide_marking":
+        first = next(marking for marking in MARKINGS if marking not in view.station.lines)
     to = second if action == "relabel" else None
     return Fix(action, view.key, first, to, 1 if action == "pick_ball" else 0)
 

@@ -18,6 +18,7 @@ from app.commands.terminal import (
     print_export,
     print_import,
     print_json,
+    show_progress,
     spell_out,
 )
 
@@ -111,3 +112,27 @@ class TestPrintExport:
     def test_nothing_missing_adds_no_line(self, capsys: pytest.CaptureFixture[str]) -> None:
         print_export({**REPORT, "missing_images": ()}, False)
         assert len(capsys.readouterr().out.splitlines()) == len(REPORT)
+
+
+class TestShowProgress:
+    def test_without_a_terminal_it_tells_lines(
+        self, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr("app.commands.terminal.LINE_SECONDS", 0.0)
+        with show_progress("Making the sample") as progress:
+            progress(2, 1600, "Drawing the pictures.")
+            progress(1600, 1600)
+            progress(7)
+        found = capsys.readouterr()
+        assert found.err.splitlines() == [
+            "Making the sample: Drawing the pictures (2 of 1,600)",
+            "Making the sample: 1,600 of 1,600",
+            "Making the sample: 7",
+        ]
+        assert found.out == ""
+
+    def test_what_is_done_at_once_tells_nothing(self, capsys: pytest.CaptureFixture[str]) -> None:
+        with show_progress("Exporting") as progress:
+            progress(1, 2)
+            progress(2, 2)
+        assert capsys.readouterr().err == ""

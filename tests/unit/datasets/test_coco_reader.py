@@ -80,6 +80,25 @@ class TestReadCoco:
         assert group.views[0].balls[0].box == Box(610.0, 300.0, 12.0, 11.0)
         assert group.views[1].balls[0].box == Box(599.5, 300.5, 20.0, 21.0)
 
+    def test_a_ball_drawn_in_another_tool_on_a_view_that_had_none_is_read(
+        self, tmp_path: Path, solved: Solved, soccer_group: Make, report: Report
+    ) -> None:
+        group = soccer_group()
+        bare = replace(group.views[1], balls=())
+        write_coco(
+            tmp_path, [solved(replace(group, views=(group.views[0], bare)))], everything=True
+        )
+        path = tmp_path / "annotations/instances_train.json"
+        value = json.loads(path.read_text())
+        (image,) = (one for one in value["images"] if not one["touchline"]["balls"])
+        assert not [one for one in value["annotations"] if one["image_id"] == image["id"]]
+        drawn = {"id": 99, "image_id": image["id"], "category_id": 1, "bbox": [600, 301, 20, 21]}
+        value["annotations"].append(drawn)
+        path.write_text(json.dumps(value))
+        (again,) = read_coco(tmp_path, report)
+        boxes = [ball.box for view in again.views for ball in view.balls]
+        assert Box(599.5, 300.5, 20.0, 21.0) in boxes and len(boxes) == 2
+
     def test_an_export_of_ours_that_says_no_origin_has_its_boxes_in_our_frame(
         self, tmp_path: Path, solved: Solved, soccer_group: Make, report: Report
     ) -> None:
@@ -336,6 +355,15 @@ class TestJoins:
         (problem,) = report.problems
         assert (problem.record, problem.field) == ("images[1]", "id")
         assert "no annotation joins this image" in problem.problem
+
+    def test_an_image_that_is_left_out_says_how_many_annotations_go_with_it(
+        self, read: Callable[[Any], list[Group]], report: Report
+    ) -> None:
+        images = [image(width=None), image("b.jpg", 2)]
+        read(coco(images, [ball(), ball(identity=2), ball(2, 3)]))
+        (problem,) = report.problems
+        assert (problem.record, problem.field) == ("images[0]", "width")
+        assert problem.problem.endswith("left out with 2 annotations")
 
     def test_annotations_without_an_image_are_counted(
         self, read: Callable[[Any], list[Group]], report: Report

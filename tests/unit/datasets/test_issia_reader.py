@@ -256,6 +256,14 @@ class TestSizeOfTheFile:
         assert ends == [(1279.0, 719.0), (1919.0, 1079.0)]
 
 
+class TestFileWithoutABall:
+    def test_is_told(self, folder: Path, report: Report) -> None:
+        (folder / "truth" / "cam5.xgtf").write_text(_xgtf({}, {18: 1}))
+        _groups(folder, report)
+        (remark,) = report.remarks
+        assert remark.endswith("cam5.xgtf brings no ball for camera 5.")
+
+
 class TestFilesOfOtherNames:
     def test_xml_that_is_xgtf_is_read_and_other_xml_is_reported(
         self, folder: Path, report: Report

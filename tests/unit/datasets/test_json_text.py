@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from app.datasets.json_text import (
     MAX_DEPTH,
+    MAX_NAMED,
     parse_literal,
     read_json,
     read_json_lines,
@@ -58,6 +59,16 @@ class TestReadJson:
         (problem,) = report.problems
         assert str(problem).startswith(place)
         assert str(problem).endswith("read as missing")
+
+    def test_of_many_bad_numbers_the_first_are_named_and_the_rest_are_counted(self) -> None:
+        report = Report()
+        text = json.dumps({"annotations": [{"area": math.nan}] * 150})
+        value = read_json(text.encode(), "f", report=report)
+        assert value == {"annotations": [{"area": None}] * 150}
+        assert len(report.problems) == MAX_NAMED + 1
+        assert str(report.problems[-1]) == (
+            "f: 50 more numbers are not finite: area (50); read as missing"
+        )
 
     def test_a_python_literal_with_nan_is_read_alike(self) -> None:
         report = Report()

@@ -12,7 +12,7 @@ class TestSplitOf:
             ("train", "train"), ("Train", "train"), ("training", "train"), ("train2017", "train"),
             ("train_set", "train"), ("val", "valid"), ("valid", "valid"), ("Validation", "valid"),
             ("val2017", "valid"), ("test", "test"), ("Testing", "test"), ("challenge", "challenge"),
-            ("cam1", ""), ("contest", ""), ("latest", ""), ("valley", ""), ("default", ""),
+            ("cam1", ""), ("contest", ""), ("latest", ""), ("valley", ""), ("default", ""), ("test_data", ""),
         ],
     )  # fmt: skip
     def test_names_of_folders(self, name: str, split: str) -> None:

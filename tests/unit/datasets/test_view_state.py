@@ -48,6 +48,7 @@ class TestStateReader:
             shared=True,
             picture=PictureGeometry(1.25, (0.5, -0.25), (0.125, 0.0, 0.5)),
             proposed=(min(group.views[0].station.lines),),
+            not_visible=("Circle left", "Goal left crossbar"),
         )
         why = LeftOut("duplicate_view", "as camera 2")
         view = replace(group.views[0], balls=balls, included=False, station=station, left_out=why)

@@ -14,6 +14,7 @@ from app.paint.evidence import Evidence, to_paint_evidence
 from app.paint.snap import CURVED, _suffices, snap
 from app.paint.tracing import Traced
 from app.soccer.frames import ImageSize
+from app.soccer.group import Station
 from app.soccer.paint_evidence import NO_PAINT, PAINT_DISAGREES, PaintReading
 from app.soccer.pitch import MARKINGS, Pitch
 from app.soccer.policy import CalibrationPolicy
@@ -103,9 +104,9 @@ class TestStored:
         found = snap(rendered.image, rendered.field, clicked.camera, start_covariance=known)
         kept = to_paint_evidence(found.evidence, found.camera)
         size = ImageSize(1280, 720)
-        again = calibrate_paint(
-            clicked, PaintReading("", "", kept), {}, Pitch(), size, CalibrationPolicy()
-        )
+        station = Station("main", size)
+        reading = PaintReading("", "", kept)
+        again = calibrate_paint(clicked, reading, station, Pitch(), CalibrationPolicy())
         assert again.source == "paint"
         moved = parameters_from_camera(again.camera, size.diagonal / 2) - parameters_from_camera(
             found.camera, size.diagonal / 2

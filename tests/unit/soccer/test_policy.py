@@ -60,6 +60,8 @@ class TestHash:
         sharing = replace(PAPER, calibration=CalibrationPolicy(share_position=True))
         assert sharing.hash != PAPER.hash
         assert sharing.calibration_hash != PAPER.calibration_hash
+        short = replace(PAPER, calibration=CalibrationPolicy(shortest_marking_px=5.0))
+        assert short.hash != PAPER.hash and short.calibration_hash != PAPER.calibration_hash
         painted = replace(PAPER, calibration=CalibrationPolicy(source="paint"))
         assert painted.hash == TOUCHLINE.hash != PAPER.hash
         assert painted.calibration_hash != PAPER.calibration_hash

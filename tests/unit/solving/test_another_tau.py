@@ -86,6 +86,17 @@ class TestRetold:
         assert told == solved
         assert told is not None
 
+    def test_a_view_that_counts_and_is_missed_is_told_or_left_to_the_solver(self):
+        """A and C disagree by more than tau, and each of them agrees with B."""
+        of = apart(0.9 * TAU_PX, 0.0, -0.9 * TAU_PX)
+        solution = solve(of, PAPER)
+        errors = [seen.ball.error_px / TAU_PX for seen in solution.views if seen.ball is not None]
+        told, solved = again(of, PAPER, with_tau(0.99 * max(errors)))
+        assert told is None or told == solved
+        then, facts = solve_with_facts(of, PAPER, {})
+        least = with_tau(0.99 * max(errors))
+        assert retold(then, facts.view_diagonal.tolist(), least) is None
+
     def test_leaves_turned_views_to_the_solver(self):
         then, facts = solve_with_facts(apart(0.0, 0.0), PAPER, {})
         turned = replace(then, findings=(replace(PLAIN, kind="sides_swapped"), *then.findings))

@@ -6,7 +6,7 @@ import pytest
 from app.soccer.annotation import make_lines
 from app.soccer.group import Station
 from app.soccer.pitch import Pitch
-from app.soccer.policy import CalibrationPolicy
+from app.soccer.policy import POLICIES, CalibrationPolicy
 from app.solving.calibrate import calibrate, calibrate_station, calibration_key
 from tests.cameras import SIZE, looking
 from tests.unit.solving.conftest import BEHIND_GOAL, BEND, MAIN, OPPOSITE, PITCH, click
@@ -155,3 +155,69 @@ class TestCalibrationKey:
         station = Station("7.png", SIZE, lines=lines)
         other = Station("8.png", SIZE, lines=dict(reversed(list(lines.items()))))
         assert calibration_key(station, PITCH, POLICY) == calibration_key(other, PITCH, POLICY)
+
+
+def station_of(lines, **said) -> Station:
+    return Station("main", SIZE, lines=lines, **said)
+
+
+class TestNotMissing:
+    """Markings that nobody drew, and that JaC counts or not."""
+
+    @staticmethod
+    def short(lines) -> tuple[str, float]:
+        """A drawn marking, and its length in the picture at 960 x 540."""
+        whole = calibrate_station(station_of(lines), PITCH, POLICY)
+        unit = SIZE.diagonal / np.hypot(960, 540)
+        fit = min(whole.markings, key=lambda fit: fit.length_px)
+        return fit.marking, fit.length_px / unit
+
+    def test_what_is_said_not_to_be_visible_is_not_missing(self):
+        lines = click(MAIN)
+        name = min(lines)
+        rest = {marking: points for marking, points in lines.items() if marking != name}
+        missed = calibrate_station(station_of(rest), PITCH, POLICY)
+        said = calibrate_station(station_of(rest, not_visible=(name,)), PITCH, POLICY)
+        count = len(missed.markings)
+        assert missed.jac[0] == pytest.approx((count - 1) / count) and said.jac[0] == 1.0
+        assert (said.camera, said.covariance) == (missed.camera, missed.covariance)
+        assert name not in {fit.marking for fit in said.markings}
+
+    def test_what_is_drawn_counts_whatever_is_said(self):
+        lines = {**click(MAIN)}
+        name = min(lines)
+        lines[name] = tuple(replace_point(point, 90.0) for point in lines[name])
+        policy = CalibrationPolicy(check_labels=False)
+        found = calibrate_station(station_of(lines, not_visible=(name,)), PITCH, policy)
+        assert {fit.marking: fit.outcome for fit in found.markings}[name] == "fp"
+
+    def test_a_stub_shorter_than_the_policy_says_is_not_missing(self):
+        lines = click(MAIN)
+        name, length = self.short(lines)
+        rest = {marking: points for marking, points in lines.items() if marking != name}
+        jacs = [
+            calibrate_station(
+                station_of(rest), PITCH, CalibrationPolicy(shortest_marking_px=shortest)
+            ).jac[0]
+            for shortest in (0.0, 0.9 * length, 1.1 * length)
+        ]
+        assert jacs[0] == jacs[1] < 1.0 == jacs[2]
+
+    @pytest.mark.parametrize("policy", POLICIES.values(), ids=POLICIES.keys())
+    def test_every_policy_begins_as_the_public_evaluator_counts(self, policy):
+        assert policy.calibration.shortest_marking_px == 0.0
+
+    def test_the_key_knows_both_and_is_as_ever_without(self):
+        plain = station_of(click(MAIN))
+        hidden = replace(plain, not_visible=("Circle left",))
+        short = CalibrationPolicy(shortest_marking_px=5.0)
+        keys = {
+            calibration_key(plain, PITCH, POLICY),
+            calibration_key(hidden, PITCH, POLICY),
+            calibration_key(plain, PITCH, short),
+        }
+        assert len(keys) == 3
+
+
+def replace_point(point, down: float):
+    return point._replace(y=point.y + down)

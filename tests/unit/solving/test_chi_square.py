@@ -13,7 +13,7 @@ from app.soccer.annotation import BallAnnotation
 from app.soccer.policy import PAPER
 from app.soccer.solution import Calibration
 from app.solving.ball_covariance import MeanCovariance
-from app.solving.chi_square import Residuals, residuals_of, residuals_without
+from app.solving.chi_square import Residuals, residuals_of, residuals_without, widening_of
 from app.solving.facts import Facts, group_facts, join
 from app.solving.judgement import judge, views_of
 from app.solving.solve import solve
@@ -121,7 +121,7 @@ def facts_with_parameters() -> np.ndarray:
 
 
 class TestGivenCameras:
-    """Of which nobody says how exact they are."""
+    """Of which no known uncertainty they are."""
 
     ASKED = replace(POLICY, min_p_value=0.001, tau_percent=5.0)
 
@@ -143,8 +143,9 @@ class TestGivenCameras:
         gate = next(gate for gate in solution.gates if gate.name == "chi_square")
         assert solution.chi_square is not None and solution.chi_square.p_value < 0.001
         assert (gate.passed, gate.value) == (True, None)
-        assert "nobody says how exact" in gate.sentence
-        assert "views_contradict" not in {item.kind for item in solution.findings}
+        assert "no known uncertainty" in gate.sentence
+        item = next(item for item in solution.findings if item.kind == "views_contradict")
+        assert "Nobody says how exact the given cameras are" in item.sentence
 
     def test_with_a_sigma_gate_and_finding_speak(self) -> None:
         solution = self.judged(replace(self.ASKED, given_sigma_px=1.0), 1, 15.0)
@@ -159,6 +160,46 @@ class TestGivenCameras:
         assert (one.is_bare, none.is_bare) == (False, True)
         of = group_facts(views("abc"), [one, none, replace(one, covariance=None)])
         assert of.view_bare.tolist() == [False, True, True]
+
+
+class TestWideningOf:
+    @pytest.mark.parametrize(
+        ("chi_square", "freedom", "p_value", "times"),
+        [
+            (350.0, 1, 4.2e-78, 18.708),
+            (3460.0, 3, 0.0, 33.961),
+            (9.6, 1, 0.00195, 3.098),
+            (9.5, 1, 0.00205, 1.0),
+            (0.4, 3, 0.94, 1.0),
+            (np.nan, 0, np.nan, 1.0),
+        ],
+    )
+    def test_it_is_the_birge_ratio_of_views_that_contradict_each_other(
+        self, chi_square: float, freedom: int, p_value: float, times: float
+    ) -> None:
+        numbers = (np.array([number]) for number in (chi_square, freedom, p_value))
+        assert widening_of(*numbers) == pytest.approx([times], abs=1e-3)
+
+    def test_the_sigma_of_a_contradicted_ball_is_wider_and_its_point_stays(self) -> None:
+        calm = solve(group(*views("ab")), POLICY)
+        views_apart = [moved(view, 0.0, 8.0 * place) for place, view in enumerate(views("ab"))]
+        torn = solve(group(*views_apart), POLICY)
+        assert torn.chi_square is not None and torn.ball is not None and calm.ball is not None
+        times = np.sqrt(torn.chi_square.value)
+        assert torn.chi_square.p_value < 0.002 and times > 3
+        assert torn.ball.sigma_m == pytest.approx(times * calm.ball.sigma_m, rel=0.05)
+        assert torn.ball.point == torn.pairs[0].point
+        assert torn.best_ball is not None
+        assert torn.best_ball.sigma_m == pytest.approx(torn.ball.sigma_m, rel=0.05)
+
+    def test_gate_and_ball_have_one_sigma(self) -> None:
+        of = [moved(view, 0.0, 8.0 * place) for place, view in enumerate(views("ab"))]
+        ball = solve(group(*of), POLICY).ball
+        assert ball is not None
+        for limit, passes in ((ball.sigma_m * 0.999, False), (ball.sigma_m * 1.001, True)):
+            gates = solve(group(*of), replace(POLICY, max_sigma_m=limit)).gates
+            gate = next(gate for gate in gates if gate.name == "sigma")
+            assert (gate.passed, gate.value) == (passes, ball.sigma_m)
 
 
 class TestResidualsWithout:

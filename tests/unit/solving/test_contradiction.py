@@ -97,10 +97,11 @@ class TestContradiction:
         assert chi_square is not None and chi_square.p_value < LOW_P_VALUE
         assert found is not None and (found.view, found.gap_m) == (None, None)
 
-    def test_nothing_is_said_with_a_given_camera(self) -> None:
+    def test_with_a_given_camera_it_is_said_that_nobody_knows_how_exact_it_is(self) -> None:
         chi_square, found = torn("abc", "c", by=(0.3, 0.4, 0.0), covariance=None, policy=WIDE)
         assert chi_square is not None and chi_square.p_value < LOW_P_VALUE
-        assert found is None
+        assert found is not None and not found.is_known
+        assert found.widening == pytest.approx((chi_square.value / 3) ** 0.5)
 
     def test_what_no_ball_moves_in_a_second_is_no_motion(self) -> None:
         chi_square, _ = torn("ab")

@@ -37,6 +37,11 @@ def solved(key: str, ratio: float | None = None, *, included: bool = True) -> Vi
     return ViewSolution(key, calibration, key, included, None, fit)
 
 
+def off(key: str, error_px: float | None) -> ViewSolution:
+    fit = BallFit(None, error_px, None, None, None, None, None, None, None)
+    return replace(solved(key), ball=fit)
+
+
 def found(of, *, pairs=(), ball=GOOD, views=None, policy=PAPER, torn=None) -> tuple[Finding, ...]:
     views = views or [solved(view.key) for view in of.views]
     return find(of, views, [], pairs, ball, policy, torn)
@@ -55,10 +60,17 @@ class TestFind:
         if several:
             of = of.with_view(replace(of.views[0], balls=of.views[0].balls * 2))
         ball = replace(GOOD, parallax_degrees=angle, sigma_m=sigma, point=(38.0, 2.0, z))
-        kinds = [
-            item.kind for item in found(of, ball=ball, views=[solved("a", ratio), solved("b")])
-        ]
-        assert kinds == sorted(kinds, key=_BY_WEIGHT.index)
+        items = found(of, ball=ball, views=[solved("a", ratio), solved("b")])
+        weights = [(not item.is_unusable_ball, _BY_WEIGHT.index(item.kind)) for item in items]
+        assert weights == sorted(weights)
+
+    @pytest.mark.parametrize("wrong", [{"point": (38.0, 2.0, 10.2)}, {"sigma_m": 64.0}])
+    def test_what_makes_the_ball_unusable_comes_before_what_explains_it(self, wrong) -> None:
+        of = made("ab")
+        of = of.with_view(replace(of.views[0], balls=of.views[0].balls * 2))
+        items = found(of, ball=replace(GOOD, parallax_degrees=0.2, **wrong))
+        assert [item.is_unusable_ball for item in items] == [True, False, False]
+        assert [item.kind for item in items[1:]] == ["several_balls", "low_parallax"]
 
 
 class TestSeveralBalls:
@@ -88,7 +100,8 @@ class TestViewDisagrees:
         assert (item.kind, item.view, item.number) == ("view_disagrees", "c", 35.0)
         assert item.threshold == pytest.approx(TAU)
         assert item.fix == Fix("exclude_view", "c")
-        assert f"35.0 px apart at best, {TAU:.1f} px are allowed" in item.sentence
+        here = "at best 35.0 px apart here and 20.0 px in B"
+        assert f"{here}, {TAU:.1f} px are allowed" in item.sentence
 
     def test_a_view_that_was_not_judged_does_not_disagree(self) -> None:
         views = [solved("a"), solved("b"), solved("c", included=False)]
@@ -98,6 +111,37 @@ class TestViewDisagrees:
         views = [solved(key, included=False) for key in "abc"]
         kinds = [item.kind for item in found(made("abc"), pairs=self.PAIRS[1:], views=views)]
         assert kinds == []
+
+    def test_rays_that_meet_behind_a_camera_are_not_told_as_pixels_that_are_allowed(self) -> None:
+        pairs = (
+            self.PAIRS[0],
+            pair("a", "c", 9.0, 4.0, failed="reprojection"),
+            pair("b", "c", 5.0, 12.0, failed="reprojection"),
+        )
+        views = [solved("a"), solved("b"), solved("c", included=False)]
+        (item,) = found(made("abc"), pairs=pairs, views=views)
+        assert (item.kind, item.view, item.number, item.threshold) == (
+            *("view_disagrees", "c"),
+            *(None, None),
+        )
+        assert "behind a camera" in item.sentence and " px" not in item.sentence
+
+
+class TestMissesBall:
+    """A view in a valid pair that the mean of several pairs does not fit."""
+
+    def test_a_view_that_counts_and_that_the_ball_misses_by_more_than_tau_is_named(self) -> None:
+        views = [off("a", 37.7), off("b", 2.3), off("c", 61.1)]
+        other, one = found(made("abc"), pairs=TestViewDisagrees.PAIRS, views=views)
+        assert (one.kind, one.view, one.number) == ("view_disagrees", "a", 37.7)
+        assert (other.view, other.number) == ("c", 61.1)
+        assert other.threshold == pytest.approx(TAU)
+        assert f"61.1 px from the ball of this view, {TAU:.1f} px are allowed" in other.sentence
+        assert other.fix == Fix("exclude_view", "c")
+
+    @pytest.mark.parametrize("error_px", [None, 0.0, TAU])
+    def test_up_to_tau_nothing_is_said(self, error_px: float | None) -> None:
+        assert found(made("ab"), views=[off("a", error_px), off("b", 1.0)]) == ()
 
 
 class TestBallSize:
@@ -122,7 +166,15 @@ class TestNotSynchronous:
         (item,) = found(made("ab"), pairs=(self.APART,), ball=None)
         assert (item.kind, item.number) == ("not_synchronous", 50.0)
         assert item.threshold == pytest.approx(TAU)
-        assert item.sentence.startswith("The two views do not see the ball in the same place (50 ")
+        assert item.sentence.startswith(
+            "The two views do not see the ball in the same place (30.0 and 50.0 px"
+        )
+
+    def test_rays_that_meet_behind_a_camera_are_not_told_as_pixels_that_are_allowed(self) -> None:
+        behind = replace(self.APART, errors_px=(9.0, 4.0))
+        (item,) = found(made("ab"), pairs=(behind,), ball=None)
+        assert item.sentence.startswith("The rays of no two views meet in front of their cameras.")
+        assert " px" not in item.sentence and (item.number, item.threshold) == (None, None)
 
     def test_of_more_views_the_closest_pair_is_said(self) -> None:
         pairs = (self.APART, pair("a", "c", 20.0, 10.0, failed="reprojection"))
@@ -151,6 +203,19 @@ class TestViewsContradict:
         assert (item.number, item.threshold) == (0.00016, 0.002)
         assert "by chance" not in item.sentence and "1 of 6,200 groups" in item.sentence
         assert "about 80 ms (10 to 170)" in item.sentence
+
+    def test_the_numbers_of_the_contradiction_and_of_the_wider_sigma_are_told(self) -> None:
+        wide = replace(GOOD, sigma_m=0.94)
+        test = ChiSquare(350.0, 1, 4e-78, ("a", "b"))
+        (item, _) = found(made("ab"), torn=Contradiction(test, None, None), ball=wide)
+        assert "(χ² 350.0, 1 degree of freedom) in only less than 1 of a million" in item.sentence
+        assert "Sigma is widened 18.7 times for it, to 0.94 m" in item.sentence
+
+    def test_where_nobody_knows_the_cameras_the_way_to_their_noise_is_told(self) -> None:
+        for known in (True, False):
+            torn = Contradiction(self.TWO, None, None, is_known=known)
+            (item,) = found(made("ab"), torn=torn)
+            assert ("Nobody says how exact the given cameras are" in item.sentence) == (not known)
 
     def test_the_view_without_which_the_others_agree_is_to_be_left_out(self) -> None:
         torn = Contradiction(self.THREE, "c", 0.97, 0.35, None)
@@ -181,6 +246,28 @@ class TestOfTheBall:
     def test_high_uncertainty_lies_above_a_quarter_of_a_metre(self, sigma, kinds) -> None:
         items = found(made("ab"), ball=replace(GOOD, sigma_m=sigma))
         assert [item.kind for item in items] == kinds
+
+    def test_the_words_of_uncertainty_do_not_say_that_contradicting_views_agree(self) -> None:
+        torn = Contradiction(TestViewsContradict.TWO, None, None)
+        for contradiction, words in ((None, "although the views agree"), (torn, "contradict it")):
+            items = found(made("ab"), ball=replace(GOOD, sigma_m=0.9), torn=contradiction)
+            assert words in next(one for one in items if one.kind == "high_uncertainty").sentence
+
+    @pytest.mark.parametrize(("sigma", "unusable"), [(2.0, False), (2.01, True), (64.6, True)])
+    def test_beyond_two_metres_a_ball_is_of_no_use(self, sigma: float, unusable: bool) -> None:
+        (item,) = found(made("ab"), ball=replace(GOOD, sigma_m=sigma))
+        assert (item.number, item.is_unusable_ball) == (sigma, unusable)
+        assert item.threshold == (2.0 if unusable else 0.25)
+        assert (f"known to ± {sigma:.1f} m only" in item.sentence) == unusable
+
+    def test_an_implausible_place_of_which_nothing_is_known_says_so(self) -> None:
+        ball = replace(GOOD, point=(0.0, 42.0, -14.0), sigma_m=64.6, parallax_degrees=0.2)
+        item = found(made("ab"), ball=ball)[0]
+        assert (item.kind, item.number, item.threshold) == ("implausible_ball", 8.0, 6.5)
+        assert (
+            "is 8 m outside the pitch at a height of 14 m, known to ± 64.6 m only, with rays that "
+            "meet at 0.2°"
+        ) in item.sentence
 
     def test_an_implausible_ball_has_the_number_of_what_is_wrong_first(self) -> None:
         (item,) = found(made("ab"), ball=replace(GOOD, point=(70.0, 2.0, 0.75)))

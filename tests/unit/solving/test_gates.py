@@ -75,6 +75,29 @@ NO_CAMERA = {"failed": "calibratable", "jac": None}
 LOW = {"failed": "jac", "jac": 0.5}
 
 
+class TestNumbersThatContradictTheirMark:
+    def test_no_tick_stands_beside_the_views_that_fell_where_the_rest_has_no_jac(self):
+        views = [given("A"), seen("B", failed="jac", jac=0.75), given("C")]
+        found = gates(views)["jac"]
+        assert (found.passed, found.value, found.margin) == (True, None, None)
+        assert found.view is None and "B: 0.75, not used; the rest not measured" in found.sentence
+
+    def test_a_view_that_counts_is_told_before_those_that_fell(self):
+        found = gates([seen("A", 0.9), seen("B", failed="jac", jac=0.75), given("C")])["jac"]
+        assert (found.value, found.sentence) == (0.9, "A: 0.90; B too low, not used")
+
+    def test_pixels_within_tau_are_no_reason_to_fail(self):
+        pairs = (pair("a", "b", 9.0, 4.0, failed="reprojection"),)
+        found = gates([seen("A"), seen("B")], ("reprojection",), pairs=pairs)["reprojection"]
+        assert (found.passed, found.value, found.threshold, found.margin) == (
+            False,
+            9.0,
+            20.0,
+            None,
+        )
+        assert found.sentence == "the rays of A–B meet behind a camera"
+
+
 class TestCalibratable:
     def test_counts_the_views_with_a_camera(self):
         found = gates([seen("A"), seen("B", **NO_CAMERA), seen("C")])["calibratable"]
@@ -109,7 +132,7 @@ class TestJac:
         found = gates([seen("A", **LOW), seen("B", **NO_CAMERA)], ("calibratable",))["jac"]
         assert (found.passed, found.sentence, found.view) == (
             True,
-            "A: 0.50; A too low, not used",
+            "A: 0.50, not used; the rest not measured",
             None,
         )
 

@@ -26,6 +26,7 @@ from tests.unit.solving.conftest import BEHIND_GOAL, MAIN, click
 SIGMA_PX = 0.08
 BALL = np.array([34.0, -2.0, -1.0])
 TOLD = TOUCHLINE.calibration
+CLICKS = replace(TOLD, source="lines")
 
 
 def painted(camera: Camera, moved_px: float = 0.0) -> PaintEvidence:
@@ -59,7 +60,7 @@ def clicked() -> Group:
 def read(group: Group, **changes) -> Group:
     """The group, the paint of whose first picture was read."""
     view = group.views[0]
-    key = view_key(group, view, PAPER.calibration)
+    key = view_key(group, view, CLICKS)
     reading = PaintReading("f" * 32, key, painted(MAIN), None, 0.9, 0.8)
     return replace(group, paint={view.key: replace(reading, **changes)})
 
@@ -125,14 +126,13 @@ class TestKey:
     def test_the_policy_of_lines_knows_nothing_of_paint(self):
         group = read(clicked())
         view = group.views[0]
-        assert view_key(group, view, PAPER.calibration) == view_key(
-            clicked(), view, PAPER.calibration
-        )
-        assert first(group, PAPER.calibration) == first(clicked(), PAPER.calibration)
+        for policy in (CLICKS, PAPER.calibration):
+            assert view_key(group, view, policy) == view_key(clicked(), view, policy)
+            assert first(group, policy) == first(clicked(), policy)
 
     def test_paint_that_was_not_read_leaves_the_key_of_the_clicks(self):
         view = clicked().views[0]
-        assert view_key(clicked(), view, TOLD) == view_key(clicked(), view, PAPER.calibration)
+        assert view_key(clicked(), view, TOLD) == view_key(clicked(), view, CLICKS)
 
     def test_each_reading_has_a_key_of_its_own(self):
         groups = (clicked(), read(clicked()), read(clicked(), supported=0.5))
@@ -201,7 +201,7 @@ class TestSolve:
         whole = solve(group, TOUCHLINE)
         known = {
             view.calibration_key: view.calibration
-            for policy in (PAPER, TOUCHLINE)
+            for policy in (replace(TOUCHLINE, calibration=CLICKS), TOUCHLINE)
             for view in solve(group, policy).views
         }
         assert len(known) == 3

@@ -24,4 +24,5 @@ class TestHeads:
             assert head is not None
             (row,) = read_heads(session, [1, 9])
         assert (row.id, row.summary) == (1, None)
-        assert (row.inputs_hash, row.revision, row.policy_hash, row.last) == tuple(head)
+        same = (row.inputs_hash, row.revision, row.policy_hash, row.last, row.last_dismissal)
+        assert same == tuple(head)

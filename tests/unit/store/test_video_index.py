@@ -169,6 +169,34 @@ class TestFramesOfTheServer:
         finally:
             frames.close()
 
+    def test_an_index_is_made_once_and_to_its_end_whoever_leaves(
+        self, tmp_path: Path, settings: Settings
+    ) -> None:
+        path = write_video(tmp_path / "cam1.mp4", "MPG2")
+        media, frames = Media(str(path), frame=55), Frames(settings)
+        try:
+            first, second = frames.ask_fetch(media), frames.ask_fetch(media)
+            assert first is not None and second is not None
+            assert frames._indexers.tasks == 1
+            first.leave()
+            assert second.future.result(60) and first.future.cancelled()
+            assert has_index(media, settings)
+        finally:
+            frames.close()
+
+    def test_a_video_that_cannot_be_read_is_told_to_all_who_wait(
+        self, tmp_path: Path, settings: Settings
+    ) -> None:
+        (tmp_path / "cam1.mp4").write_bytes(b"no video")
+        media, frames = Media(str(tmp_path / "cam1.mp4"), frame=0), Frames(settings)
+        try:
+            for waiting in (frames.ask_fetch(media), frames.ask_fetch(media)):
+                assert waiting is not None
+                with pytest.raises(ImageError, match="no video that can be read"):
+                    waiting.future.result(60)
+        finally:
+            frames.close()
+
     def test_neighbours_end_with_the_last_frame(self, tmp_path: Path, settings: Settings) -> None:
         path = write_video(tmp_path / "cam1.mp4", "mp4v", 20)
         found = neighbours(Media(str(path), frame=18), "18", True, settings)

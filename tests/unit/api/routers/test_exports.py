@@ -14,6 +14,7 @@ import pytest
 from app.api.routers import exports as module
 from app.review.datasets.dataset import dataset_id
 from app.review.editing.recompute import solve_dataset
+from app.review.exporting.formats import FORMATS
 from app.review.importing.ingest import ingest
 from app.review.jobs import child as job_child
 from app.review.jobs.jobs import Jobs
@@ -43,6 +44,30 @@ def busy(app: Any) -> Any:
     assert started.wait(SECONDS)
     yield finish
     finish.set()
+
+
+class TestListFormats:
+    def test_every_format_is_possible_or_says_why_not(self, api) -> None:
+        items = api.get("/api/v1/datasets/broadcast/export-formats").json()["items"]
+        assert {one["format"] for one in items} == set(FORMATS)
+        for one in items:
+            assert one["possible"] == (one["reason"] is None)
+        assert not next(one for one in items if one["format"] == "issia")["possible"]
+        assert api.get("/api/v1/datasets/none/export-formats").status_code == 404
+
+
+class TestIncomplete:
+    @pytest.mark.parametrize(("form", "lacks"), [("yolo", True), ("coco", False)])
+    def test_yolo_without_its_pictures_says_what_is_missing(
+        self, api, form: str, lacks: bool
+    ) -> None:
+        order = {**ORDER, "format": form, "views": "all"}
+        job = api.post(API, json=order).json()
+        api.get(job["content"])
+        made = api.get(f"{API}/{job['id']}").json()
+        assert (made["state"], made["incomplete"] is not None) == ("done", lacks)
+        if lacks:
+            assert "not in this export; frames.csv names their places" in made["incomplete"]
 
 
 class TestMakeExport:

@@ -35,6 +35,17 @@ class TestListPitches:
         assert api.get("/api/v1/datasets/nothing/pitches").status_code == 404
 
 
+class TestEstimatePitches:
+    def test_what_is_not_estimated_yet_is_by_a_job(self, app, api) -> None:
+        answer = api.post(PITCHES)
+        job = answer.json()
+        assert (answer.status_code, job["title"]) == (202, "Estimate the pitches of broadcast")
+        assert app.state.services.jobs.wait(job["id"], SECONDS).state == "done"
+        (item,) = api.get(PITCHES).json()["items"]
+        assert item["estimate"]["length"] == pytest.approx(105.0, abs=0.2)
+        assert api.post("/api/v1/datasets/nothing/pitches").status_code == 404
+
+
 class TestSetPitch:
     def test_all_groups_get_it_and_are_solved_again_by_a_job(self, app, api, match) -> None:
         answer = patch(api, {"match": match, "length": 103.0, "width": 66.0})

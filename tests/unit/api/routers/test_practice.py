@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 import pytest
 from sqlalchemy import update
 
+from app.review.people.roles import Role
 from app.store.tables.groups import DatasetModel
+from tests.security.apart import Apart, opened
 from tests.waiting import SECONDS
 
 Json = dict[str, Any]
@@ -86,3 +89,63 @@ def test_a_dataset_of_that_name_with_other_groups_is_left_alone(app, api) -> Non
     assert answer.status_code == 409
     assert "groups of your own" in answer.json()["detail"]
     assert api.get("/api/v1/datasets/practice").json()["groups"] > 0
+
+
+class TestTeam:
+    """Where people log in: each has a practice of their own, and judges in it."""
+
+    @pytest.fixture
+    def apart(self, tmp_path) -> Iterator[Apart]:
+        with opened(tmp_path) as made:
+            made.add("admin", Role.ADMIN)
+            made.add("ana", Role.ANNOTATOR)
+            made.add("ben", Role.ANNOTATOR)
+            made.add("cleo", Role.VIEWER)
+            yield made
+
+    def practise(self, apart: Apart, name: str, again: bool = False) -> Json:
+        result: Json = apart.done(apart.ask(name, "POST", "/practice", {"again": again}))["result"]
+        return result
+
+    def judge(self, apart: Apart, name: str, group: int) -> int:
+        etag = apart.ask(name, "GET", f"/groups/{group}").headers.get("etag", '"none"')
+        at = f"/groups/{group}/verdict"
+        answer = apart.ask(name, "PUT", at, {"state": "accepted"}, **{"If-Match": etag})
+        return int(answer.status_code)
+
+    def test_each_practises_alone(self, apart: Apart) -> None:
+        """Annotators judge, in their own lessons only; whoever leads elsewhere sees none of it."""
+        mine, theirs = self.practise(apart, "ana"), self.practise(apart, "ben")
+        assert (mine["dataset"], theirs["dataset"]) == ("practice ana", "practice ben")
+        assert self.judge(apart, "ana", mine["first"]) == 200
+        assert self.judge(apart, "ana", theirs["first"]) == 404
+        states = {
+            name: [
+                one["state"] for one in apart.ask(name, "GET", "/practice").json()["lessons"]
+            ].count("right")
+            for name in ("ana", "ben", "cleo", "admin")
+        }
+        assert states == {"ana": 1, "ben": 0, "cleo": 0, "admin": 0}
+        listed = {
+            name: [one["name"] for one in apart.ask(name, "GET", "/datasets").json()["items"]]
+            for name in states
+        }
+        assert listed == {"ana": ["practice ana"], "ben": ["practice ben"], "cleo": [], "admin": []}
+        assert apart.ask("ana", "GET", f"/groups/{mine['first']}/lesson").json()["state"] == "right"
+
+        again = self.practise(apart, "ana", again=True)
+        assert again["made"] is True
+        assert self.judge(apart, "ana", again["first"]) == 200
+        assert apart.ask("ben", "GET", f"/groups/{theirs['first']}").status_code == 200
+
+    def test_it_gives_no_rights_elsewhere(self, apart: Apart) -> None:
+        before = apart.ask("ana", "GET", "/session").json()
+        self.practise(apart, "ana")
+        after = apart.ask("ana", "GET", "/session").json()
+        assert [(one["dataset"], one["role"]) for one in after["datasets"]] == [
+            ("practice ana", "reviewer")
+        ]
+        assert (after["role"], after["may"]) == (before["role"], before["may"])
+        people = apart.ask("admin", "GET", "/users").json()["items"]
+        assert [one["datasets"] for one in people] == [[]] * len(people)
+        assert apart.ask("cleo", "POST", "/practice", {}).status_code == 403

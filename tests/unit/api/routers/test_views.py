@@ -43,6 +43,37 @@ def patch(api, document: dict[str, Any], what: str, body: Any, view: int = 0) ->
     return api.patch(path, content=json.dumps(body), headers=headers)
 
 
+class TestNotVisible:
+    def test_a_marking_that_the_picture_does_not_show_is_not_missing_and_undo_takes_it_back(
+        self, api, document
+    ) -> None:
+        fits = document["solution"]["views"][0]["calibration"]["markings"]
+        name = min(document["views"][0]["lines"])
+        gone = patch(api, document, "/lines", {"lines": {name: None}}).json()
+        said = {"lines": {name: None}, "not_visible": [name]}
+        after = patch(api, gone, "/lines", said).json()
+        assert after["views"][0]["not_visible"] == [name]
+        markings = after["solution"]["views"][0]["calibration"]["markings"]
+        assert len(markings) == len(fits) - 1
+        assert name not in {fit["marking"] for fit in markings}
+        jac = [one["solution"]["views"][0]["calibration"]["jac"]["0.5"] for one in (gone, after)]
+        assert jac[0] < jac[1] == 1.0
+        headers = {"If-Match": after["etag"]}
+        back = api.post(f"{API}/groups/{document['id']}/undo", headers=headers).json()
+        assert back["views"][0]["not_visible"] == []
+        again = api.get(f"{API}/groups/{document['id']}").json()
+        assert again["solution"]["views"][0]["calibration"]["jac"]["0.5"] == jac[0]
+
+    @pytest.mark.parametrize(
+        "lines", [{}, {"Circle left": [{"x": 1.0, "y": 2.0}, {"x": 3.0, "y": 4.0}]}]
+    )
+    def test_what_has_points_or_is_not_named_is_refused(self, api, document, lines) -> None:
+        body = {"lines": lines, "not_visible": ["Circle left"]}
+        refused = patch(api, document, "/lines", body)
+        assert refused.status_code in (400, 422)
+        assert "names Circle left, which needs null" in refused.text
+
+
 class TestPicture:
     def test_its_lines_say_what_was_done_and_the_edit_is_undone_like_others(
         self, api, document

@@ -28,6 +28,7 @@ BALL = BallAnnotation(box=Box(500.0, 300.25, 14.0, 15.0), occluded=True)
 EDITS = [
     SetLines("7.png", {"Middle line": HERE, "Side line top": None, "Side line left": HERE}),
     SetLines("7.png", {" Middle line ": ()}),
+    SetLines("7.png", {"Circle left": None, "Side line top": HERE}, (), ("Circle left",)),
     SetBall("7.png", BALL),
     SetBall("7.png", None),
     SetBalls("7.png", (BALL, BallAnnotation(point=ImagePoint(1.0, 2.0)))),
@@ -40,11 +41,39 @@ EDITS = [
 ]
 STATION_EDITS = [
     SetStationLines({"Middle line": HERE, "Circle central": None}),
+    SetStationLines({"Circle central": None}, not_visible=("Circle central",)),
     SetStationCalibration("lines"),
     SetStationCamera(EVERY_COEFFICIENT, (0.25,) * 64),
     SetStationCamera(EVERY_COEFFICIENT, None, "lines"),
     SetStationCamera(None),
 ]
+
+
+class TestNotVisible:
+    MARKED = SetLines("7.png", {"Circle left": None}, not_visible=(" Circle left",))
+
+    def test_a_marking_is_said_not_to_be_visible_until_somebody_draws_it(self, make_group) -> None:
+        group = make_group()
+        marked = self.MARKED.apply(group)
+        assert marked.views[0].station.not_visible == ("Circle left",)
+        assert "Circle left" not in marked.views[0].station.lines
+        for edit in (
+            SetLines("7.png", {"Circle left": HERE}),
+            SetLines("7.png", {"Circle left": None}),
+        ):
+            assert edit.apply(marked).views[0].station.not_visible == ()
+        other = SetLines("7.png", {"Middle line": None}).apply(marked)
+        assert other.views[0].station.not_visible == ("Circle left",)
+
+    def test_a_marking_with_points_is_visible(self, make_group) -> None:
+        edit = SetLines("7.png", {"Circle left": HERE}, not_visible=("Circle left",))
+        assert edit.apply(make_group()).views[0].station.not_visible == ()
+
+    def test_its_inverse_is_what_was_there_before(self, make_group) -> None:
+        drawn = SetLines("7.png", {"Circle left": HERE}).apply(make_group())
+        for before in (drawn, self.MARKED.apply(make_group())):
+            for edit in (self.MARKED, SetLines("7.png", {"Circle left": HERE})):
+                assert edit.inverse(before).apply(edit.apply(before)) == before
 
 
 class TestSetPicture:

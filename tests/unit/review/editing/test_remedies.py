@@ -2,6 +2,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from app.review.editing import remedies
 from app.review.editing.fixes import edit_of_fix
 from app.review.editing.influence import influences
 from app.review.editing.remedies import find_remedies
@@ -12,6 +13,7 @@ from app.soccer.pitch import Pitch
 from app.soccer.policy import PAPER
 from app.soccer.solution import Suspect
 from app.solving.solve import solve
+from tests.cameras import SIZE
 from tests.unit.solving.conftest import BEHIND_GOAL, MAIN, group, view
 
 BALL = (36.0, 3.0, -0.5)
@@ -115,6 +117,37 @@ class TestFindRemedies:
         assert all(marking in best.sentence for marking in missing)
         assert "visible over" in best.sentence
         assert edit_of_fix(bad, best.fix) is None
+
+    def lengths(self, bad, policy):
+        """Of the markings of the second view that nobody drew, pixels at 960 x 540."""
+        unit = SIZE.diagonal / np.hypot(960, 540)
+        fits = solve(bad, policy).view("b").calibration.markings
+        return {fit.marking: fit.length_px / unit for fit in fits if not fit.distances_px}
+
+    def test_where_all_are_stubs_they_are_marked_as_not_visible_and_not_drawn(self, monkeypatch):
+        """Two clicks anywhere on a stub of a pixel would pass as well."""
+        bad, policy, missing = self.undrawn()
+        monkeypatch.setattr(remedies, "STUB_PX", 2000.0)
+        found = find_remedies(bad, policy, solve(bad, policy))
+        hides = [remedy for remedy in found if remedy.fix.action == "hide_marking"]
+        hidden = sorted(remedy.fix.marking for remedy in hides)
+        assert hidden == sorted(self.lengths(bad, policy)) and {*missing} <= {*hidden}
+        assert "draw_marking" not in {remedy.fix.action for remedy in found}
+        assert "was marked as not visible" in hides[0].sentence
+        marked = bad
+        for remedy in hides:
+            (offer,) = remedy.offers
+            marked = offer.edit.apply(marked)
+        assert list(marked.views[1].station.not_visible) == hidden
+        assert solve(marked, policy).passes
+
+    def test_stubs_are_those_of_less_than_five_pixels(self):
+        bad, policy, _ = self.undrawn()
+        found = find_remedies(bad, policy, solve(bad, policy))
+        hidden = {one.fix.marking for one in found if one.fix.action == "hide_marking"}
+        short = {name for name, length in self.lengths(bad, policy).items() if length < 5.0}
+        assert hidden == short != set()
+        assert "draw_marking" in {one.fix.action for one in found}
 
     def test_a_line_that_is_there_under_a_wrong_name_is_not_to_be_drawn_again(self):
         bad, policy, missing = self.undrawn()

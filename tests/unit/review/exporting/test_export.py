@@ -15,7 +15,7 @@ from app.errors import InputError, NotFoundError
 from app.review.editing.edit import SetBall
 from app.review.editing.recompute import solve_dataset
 from app.review.editing.submit import load, submit
-from app.review.exporting.export import FORMATS, export
+from app.review.exporting.export import FORMATS, export, possible_formats, require_possible
 from app.review.importing.ingest import ensure_dataset
 from app.review.policies.policy import change_policy
 from app.review.verdicts.verdict import set_verdict
@@ -320,3 +320,30 @@ class TestImages:
         (item,) = manifest["media"]
         assert (item["view"], item["bytes"]) == ("7.png", len(data))
         assert item["crc32"] == zlib.crc32(data)
+
+
+class TestPossibleFormats:
+    def test_a_format_that_has_no_place_for_the_groups_says_why(self, store, three) -> None:
+        answers = {one.format: one for one in possible_formats(store, "demo")}
+        refused = [name for name, one in answers.items() if one.reason is not None]
+        assert refused == ["issia-3d", "issia"]
+        assert "is not from ISSIA" in answers["issia"].reason
+        assert tuple(answers) == FORMATS
+
+    def test_of_static_cameras_it_is_the_other_way_round(self, store, fill, make_static) -> None:
+        fill(make_static(10))
+        refused = {one.format for one in possible_formats(store, "demo") if one.reason is not None}
+        assert {"soccernet-v3", "soccernet-v3d"} <= refused
+        assert not {"issia", "issia-3d"} & refused
+
+    def test_an_export_that_is_refused_names_the_formats_that_fit(self, store, three) -> None:
+        with pytest.raises(InputError, match="is not from ISSIA") as caught:
+            require_possible(store, "demo", "issia", everything=True)
+        assert caught.value.hint is not None
+        named = caught.value.hint.removesuffix(".").partition(": ")[2].split(", ")
+        assert named == [form for form in FORMATS if not form.startswith("issia")]
+
+    def test_that_nothing_is_accepted_is_no_matter_of_the_format(self, store, three) -> None:
+        with pytest.raises(InputError, match="nobody has accepted") as caught:
+            require_possible(store, "demo", "issia")
+        assert caught.value.hint is None

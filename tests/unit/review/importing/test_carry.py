@@ -34,6 +34,7 @@ from app.review.importing.carry_in import carry_in
 from app.review.importing.ingest import ingest
 from app.review.importing.spare import SpareFrame, ingest_spare, spare_frames
 from app.review.policies.policy import change_policy
+from app.review.verdicts.dismiss import FindingName, set_dismissal
 from app.review.verdicts.verdict import set_verdict
 from app.review.versions.freeze import FreezeRequest, freeze
 from app.soccer.annotation import BallAnnotation, Extras
@@ -343,6 +344,35 @@ class TestVerdicts:
         judge(there, 1, "accepted")
         bring(there, here)
         assert load(here, 1).verdict.stale
+
+
+class TestDismissals:
+    def dismiss(self, store, actor: str, *, dismissed: bool = True):
+        state = load(store, 1)
+        finding = state.solution.findings[0]
+        named = FindingName(finding.kind, finding.view, finding.marking, finding.suggested)
+        sent = {"dismissed": dismissed, "if_match": state.etag, "actor": actor}
+        return set_dismissal(store, 1, named, **sent)
+
+    def test_what_was_dismissed_is_carried_and_the_newest_counts(self, both, bring) -> None:
+        here, there = both
+        for store in both:
+            edit(store, 1, SetBall("7.png", BALL))
+        self.dismiss(there, "ben")
+        bring(there, here)
+        said = load(here, 1).dismissed[0]
+        assert said is not None
+        assert said.actor == "ben"
+        etag = load(here, 1).etag
+        bring(there, here)
+        assert load(here, 1).etag == etag
+        self.dismiss(here, "ann", dismissed=False)
+        bring(there, here)
+        assert load(here, 1).dismissed[0] is None
+        self.dismiss(there, "ben", dismissed=False)
+        self.dismiss(there, "ben")
+        bring(there, here)
+        assert load(here, 1).dismissed[0] is not None
 
 
 class TestBrokenFiles:

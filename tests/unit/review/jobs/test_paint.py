@@ -49,7 +49,7 @@ def test_it_counts_solves_and_is_taken_back(asked: Store) -> None:
     done = jobs.wait(PAINT.request(jobs, asked, "demo", None, actor="ann").id, SECONDS)
     assert (done.state, done.result["views"], done.result["no_frame"]) == ("done", 12, 12)
     assert (done.result["read"], done.result["without_picture"]) == (12, 0)
-    assert done.sentence == "6 of 6 groups looked at"
+    assert done.sentence == "The paint of 12 pictures was read."
     (solve,) = jobs.find(kinds=["solve"])
     assert jobs.wait(solve.id, SECONDS).state == "done"
     back = jobs.wait(take_paint_back(jobs, asked, "demo", actor="ann").id, SECONDS)

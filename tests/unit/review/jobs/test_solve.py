@@ -46,7 +46,7 @@ class TestRequestSolve:
             "failures": [],
         }
         assert (done.done, done.total) == (2, 2)
-        assert done.sentence == "1 pass, 1 do not; 0 errors"
+        assert done.sentence == "2 groups solved: 1 pass, 1 do not; 0 errors."
         assert stale_groups(store, "demo") == []
 
     @pytest.mark.parametrize(("worth", "made"), [(2, 1), (3, 0)])

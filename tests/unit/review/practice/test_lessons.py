@@ -16,6 +16,8 @@ from app.sample.scenes import make_scene
 from app.soccer.annotation import make_lines
 from app.soccer.group import Group, View
 from app.soccer.pitch import twin_marking
+from app.soccer.policy import PAPER
+from app.solving.solve import solve
 
 NONE = VerdictState()
 ACCEPTED = VerdictState("accepted")
@@ -165,3 +167,21 @@ class TestVerdicts:
     def test_a_verdict_on_an_earlier_state_counts_as_none(self, scenes: dict[str, Scene]):
         scene = scenes["wrong_label"]
         assert told(scene, scene.group, replace(ACCEPTED, stale=True)) == Feedback("open")
+
+
+class TestOneOfTwoLines:
+    def test_one_line_is_enough_where_the_card_then_says_that_the_group_passes(
+        self, scenes: dict[str, Scene]
+    ):
+        scene = scenes["undrawn_line"]
+        whole = mended(scene, "undrawn_line")
+        for fault in scene.truth.faults:
+            view, drawn = scene.group.view(fault.view), whole.view(fault.view)
+            assert view is not None
+            assert drawn is not None
+            lines = {**view.station.lines, fault.marking: drawn.station.lines[fault.marking]}
+            station = replace(view.station, lines=make_lines(lines))
+            one = with_view(scene.group, replace(view, station=station))
+            assert solve(one, PAPER).passes
+            assert told(scene, one, NONE).state == "mended"
+            assert told(scene, one, ACCEPTED).state == "right"

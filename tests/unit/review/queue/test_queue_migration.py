@@ -33,6 +33,8 @@ def as_before(store: Store) -> None:
         for trigger in ("group_new", "group_change", "group_solved"):
             session.execute(text(f"DROP TRIGGER {trigger}_is_marked"))
         session.execute(text("DROP TABLE group_change"))
+        session.execute(text("DROP TABLE dismissal"))
+        session.execute(text("ALTER TABLE queue DROP COLUMN dismissed"))
         for table in ("begun", "attempt"):
             session.execute(text(f"DROP TABLE {table}"))
         session.execute(text("ALTER TABLE job DROP COLUMN ending"))

@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import Any
 
 import pytest
-from sqlalchemy import func, insert, select, text
+from sqlalchemy import func, insert, select, text, update
 
 from app.errors import ConflictError, InputError, NotFoundError
 from app.review.answers.saved_progress import SavedProgress
@@ -72,6 +72,30 @@ class TestPlanVerdicts:
         assert [(item.reason, item.groups) for item in plan.refused] == [("needs_note", 1)]
         assert [group.id for group in plan.sample] == [ids[1], ids[3]]
         assert statuses(store) == ["accepted", *["unreviewed"] * 3]
+
+    def test_balls_that_cannot_be_used_are_counted_and_left_alone(
+        self, store, fill, make_group
+    ) -> None:
+        below = make_group(8, ball=(5.0, 2.0, 10.2))
+        ids = fill(make_group(7), below, make_group(9, ball=(0.0, 42.0, -14.0)))
+        plan = plan_verdicts(store, 1, "passes:yes", "accepted")
+        assert [group.id for group in plan.sample] == ids[:1]
+        assert [(item.reason, item.groups) for item in plan.refused] == [("unusable_ball", 2)]
+        assert plan_verdicts(store, 1, "", "accepted", note="by eye").would_change == 3
+        assert plan_verdicts(store, 1, "", "deferred").would_change == 3
+
+    def test_a_ball_of_which_nothing_is_known_is_left_alone(self, store, fill, make_group) -> None:
+        ids = fill(make_group(7), make_group(8), make_group(9))
+        with store.write() as session:
+            for group, sigma in zip(ids, (1.9, 64.0, None), strict=True):
+                session.execute(
+                    update(QueueModel)
+                    .where(QueueModel.group_id == group)
+                    .values(findings=",high_uncertainty,", sigma_m=sigma)
+                )
+        plan = plan_verdicts(store, 1, "", "accepted")
+        assert [group.id for group in plan.sample] == ids[:1]
+        assert [(item.reason, item.groups) for item in plan.refused] == [("unusable_ball", 2)]
 
     def test_with_a_note_only_unsolved_groups_are_refused(
         self, store, ids, fill, make_group

@@ -77,6 +77,17 @@ class TestSetVerdict:
         assert after.verdict.override == "reprojection"
         assert after.verdict.note == "seen on video"
 
+    def test_accepting_a_ball_that_cannot_be_used_needs_a_note(
+        self, store, fill, make_group
+    ) -> None:
+        below = load(store, fill(make_group(9, ball=(5.0, 2.0, 10.2)))[0])
+        assert below.solution.passes
+        with pytest.raises(InputError, match=r"cannot be used .*10\.2 m below the grass") as caught:
+            judge(store, below, "accepted")
+        assert caught.value.pointer == "/note"
+        after = judge(store, below, "accepted", note="a hole")
+        assert (after.verdict.override, after.verdict.note) == (None, "a hole")
+
     def test_a_group_that_is_not_solved_is_solved_first(self, store, fill, make_group) -> None:
         state = load(store, fill(make_group(9, shift=80.0), solved=False)[0])
         with pytest.raises(InputError, match="needs a note"):

@@ -47,6 +47,14 @@ def keys(store: Store, prefix: str) -> list[str]:
         return [key for key in found if key.startswith(prefix)]
 
 
+def owner(store: Store, key: str) -> str | None:
+    """Key of the group that a version has under a key of frozen content; None where none has."""
+    statement = text("SELECT key FROM version_group WHERE :key IN (said, solution)")
+    with store.read() as session:
+        group: str | None = session.scalar(statement, {"key": key})
+        return group
+
+
 class TestVersions:
     def test_what_was_frozen_has_no_fault(self, store: Store, version) -> None:
         assert version.counts["left_out"]
@@ -119,8 +127,9 @@ class TestFrozenContent:
         key = keys(store, prefix)[0]
         change(store, "frozen_refuses_delete", f"DELETE FROM frozen WHERE key = '{key}'")
         (found,) = faults(store).values()
-        groups = "7.png first)"
-        assert found.sentence.endswith(groups if prefix in ("said:", "solution:") else key)
+        assert found.sentence.endswith(
+            f"of {owner(store, key)} first)" if owner(store, key) else key
+        )
 
     def test_a_calibration_that_is_gone_with_its_body_is_named(self, store: Store) -> None:
         key = keys(store, "calibration:")[0]

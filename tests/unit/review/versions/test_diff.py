@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from app.errors import InputError
@@ -8,7 +10,7 @@ from app.review.editing.recompute import solve_dataset
 from app.review.editing.submit import load, submit
 from app.review.importing.ingest import ensure_dataset, ingest
 from app.review.verdicts.verdict import set_verdict
-from app.review.versions.diff import changelog, diff_versions
+from app.review.versions.diff import Setting, changelog, changelog_lines, diff_versions
 from app.review.versions.freeze import FreezeRequest, freeze
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import Box
@@ -67,6 +69,32 @@ class TestDiffVersions:
     def test_settings_that_differ_are_named(self, store, two) -> None:
         (setting,) = diff_versions(store, two[0].id, two[1].id).settings
         assert (setting.name, setting.before) == ("split", {"kind": "given"})
+
+    def test_settings_are_told_in_words(self, store, two) -> None:
+        lines = changelog_lines(diff_versions(store, two[0].id, two[1].id))
+        (told,) = (line for line in lines if line.startswith("split"))
+        assert told == "split: given before, camera (test cameras 9.png) now."
+
+    @pytest.mark.parametrize(
+        ("before", "after", "told"),
+        [
+            (True, None, "yes before, not asked now"),
+            ([], ["cam1", "cam2"], "none before, cam1, cam2 now"),
+            (
+                {"source": "lines", "weights": [1.0]},
+                {},
+                "source lines, weights 1.0 before, none now",
+            ),
+        ],
+    )
+    def test_no_value_is_told_as_a_program_writes_it(
+        self, store, two, before: object, after: object, told: str
+    ) -> None:
+        diff = replace(
+            diff_versions(store, two[0].id, two[0].id),
+            settings=(Setting("policy x", before, after),),
+        )
+        assert changelog_lines(diff)[1] == f"policy x: {told}."
 
     def test_backwards_it_is_the_other_way_round(self, store, two) -> None:
         there, back = (

@@ -361,6 +361,33 @@ class TestLeases:
             leases.hand_back(batch, groups[0], BO, "once more", actor="bo")
 
 
+class TestOwnPlace:
+    """A copy is in no queue: its place is among those of its person."""
+
+    def test_it_counts_what_is_done_and_what_is_left(self, store, dataset, groups):
+        new = NewBatch("a", size=3, annotators=["ada", "bo"], reviewers=["cy"], verdicts=2)
+        batch = make_batch(store, dataset, new, actor="lead").id
+        told = []
+        for _ in range(3):
+            lease = Leases(store).next(batch, ADA)
+            again = Leases(store).take(batch, lease.group, ADA)
+            assert (again.place, again.of) == (lease.place, lease.of)
+            told.append((lease.place, lease.of))
+            judge(store, lease.group, "ada")
+        assert told == [(1, 3), (2, 3), (3, 3)]
+
+    def test_no_count_tells_gold_groups_from_others(self, store, dataset, groups):
+        new = NewBatch("a", size=3, annotators=["ada"], gold_every=2)
+        batch = make_batch(store, dataset, new, actor="lead").id
+        lease = Leases(store).next(batch, ADA)
+        assert (lease.place, lease.of) == (1, None)
+
+    def test_who_works_on_the_groups_themselves_is_told_none(self, store, dataset, groups):
+        batch = make_batch(store, dataset, NewBatch("a", annotators=["ada"]), actor="lead").id
+        lease = Leases(store).next(batch, ADA)
+        assert (lease.place, lease.of) == (None, None)
+
+
 class TestProgress:
     def test_work_is_of_those_to_whom_it_is_given(self, store, dataset, groups, leases):
         new = NewBatch("a", size=3, annotators=["ada"], reviewers=["bo"])

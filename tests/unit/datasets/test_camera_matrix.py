@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from app.datasets.camera_matrices import camera_from_matrices, holds_matrices
+from app.datasets.camera_matrix import camera_from_matrices, holds_matrices
 from app.errors import DatasetFormatError
 from app.geometry.camera import Camera
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from app.datasets.camera_matrices import holds_homography, holds_matrices
+from app.datasets.camera_matrix import holds_homography, holds_matrices
 from app.finite import quoted
 from app.soccer.pitch import marking_like
 
