@@ -38,8 +38,11 @@ def solve_values(
     """Let the server solve a dataset, by another policy from now on where one is given.
 
     Returns:
-        As ``solve`` has it, and its sentence.
+        As ``solve`` has it, and its sentence. Of groups whose solving broke, the first twenty are
+        named.
     """
+    from app.review.editing.recompute import outcome_sentence
+
     if policy is None:
         job = client.post(f"datasets/{part(dataset)}/solve")
     else:
@@ -48,7 +51,8 @@ def solve_values(
     result = done["result"]
     failed = [[item["group"], item["problem"]] for item in result["failures"]]
     values = {"total": result["groups"], "solved": result["solved"], "passed": result["passed"]}
-    return {**values, "failed": failed}, done["sentence"]
+    sentence = outcome_sentence(result["solved"], result["passed"], result["failed"])
+    return {**values, "failed": failed}, sentence
 
 
 def policy_values(client: Client, dataset: str) -> tuple[str, dict[str, Any]]:
