@@ -3,15 +3,23 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import partial
 from json import dumps
 from pathlib import Path
 from typing import Any
-from urllib.parse import urlsplit
+from urllib.parse import quote, urlsplit
 from uuid import uuid4
 
-from touchline.errors import JobError, NotFoundError, UnreachableError, error_of
+from touchline.bulk_edits import merged, placed, refusal, requests_of
+from touchline.errors import (
+    JobError,
+    NotFoundError,
+    RequestError,
+    ServerError,
+    UnreachableError,
+    error_of,
+)
 from touchline.packages import package
 
 API = "/api/v1/"
@@ -150,6 +158,53 @@ class Client:
                 raise TimeoutError(f"job {identity} is not done: {found['sentence']}")
             time.sleep(pause)
             pause = min(pause * 1.5, _LONGEST_LOOK)
+
+    def edit_views(
+        self,
+        dataset: str,
+        items: Iterable[Mapping[str, Any]],
+        *,
+        dry_run: bool = False,
+        if_match: str | None = None,
+    ) -> dict[str, Any]:
+        """Set balls and lines of any number of views, in as many requests as they need.
+
+        Items with the same ``group`` or ``etag`` are sent together, for a group is edited whole or not
+        at all. What is refused is in the report and stops nothing; where a request as a whole is
+        refused, each of its items has the reason.
+
+        Args:
+            dataset: Name or id.
+            items: Each with ``view``, ``etag`` and ``ball``, ``lines`` or both, as ``POST
+                /datasets/{dataset}/edits`` takes them.
+            dry_run: Only report what would happen.
+            if_match: ``"*"``: items without ``etag`` change whatever their group is then.
+
+        Returns:
+            One report: counts ``changed``, ``unchanged``, ``refused``, and ``items`` in the order given.
+
+        Raises:
+            ServerError: The first request was refused as a whole (nothing was done), or a later one
+                for a reason that concerns all that are left; ``report`` of the error says what was
+                done before.
+        """
+        report: dict[str, Any] = {"dry_run": dry_run, "items": []}
+        path = f"datasets/{quote(dataset, safe='')}/edits"
+        params = {"dry_run": "true" if dry_run else None}
+        for chunk in requests_of([*items]):
+            body: dict[str, Any] = {"items": [item for _, item in chunk]}
+            if if_match is not None:
+                body["if_match"] = if_match
+            places = [place for place, _ in chunk]
+            try:
+                found = _value(self.send("POST", path, params=params, json=body))["items"]
+            except ServerError as error:
+                if not report["items"] or not isinstance(error, RequestError):
+                    error.report = merged(report)
+                    raise
+                found = [refusal(error, index) for index in range(len(chunk))]
+            report["items"] += [placed(one, places) for one in found]
+        return merged(report)
 
     def upload(self, path: Path | str, name: str | None = None) -> str:
         """Send a file for an import or an evaluation; its id is the answer."""

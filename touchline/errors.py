@@ -60,7 +60,10 @@ class ServerError(TouchlineError):
     Attributes:
         status: HTTP status, 0 without an answer.
         problem: The problem document (RFC 9457); empty where the answer held none.
+        report: Of ``Client.edit_views``: what earlier requests did; else None.
     """
+
+    report: dict[str, Any] | None = None
 
     def __init__(
         self,

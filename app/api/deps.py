@@ -21,7 +21,7 @@ from app.soccer.actors import LOCAL_USER, script_name
 from app.store.store import Store
 
 ACTOR_HEADER = "X-Actor"
-_STRONG_ETAG = re.compile(r'"[\x21\x23-\x7e]*"')
+STRONG_ETAG = re.compile(r'"[\x21\x23-\x7e]*"')
 
 
 async def get_services(request: Request) -> Services:
@@ -98,7 +98,7 @@ async def require_if_match(
             "a change must name the state that it builds on",
             hint="Send the ETag of the last answer as If-Match.",
         )
-    if not _STRONG_ETAG.fullmatch(if_match.strip()):
+    if not STRONG_ETAG.fullmatch(if_match.strip()):
         raise InputError(
             "If-Match must be one strong ETag, in its quotes",
             hint='Send the "etag" of the document as it is; * and W/ are refused.',

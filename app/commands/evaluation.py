@@ -247,5 +247,7 @@ def _set_values(found: _Values) -> _Values:
         "id": found["id"],
         "name": found["name"],
         "unknown": found["unknown"],
+        # Only what a detector of ours found has one.
+        "model": None,
         **found["report"],
     }

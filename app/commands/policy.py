@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from app.commands.opened import opened_store
 from app.commands.options import POLICY_OR_FILE, Dataset, Json, acting, read_text
+from app.commands.server import connected, given_server
 from app.commands.terminal import print_json, print_values, say
 
 if TYPE_CHECKING:
@@ -26,22 +27,18 @@ def show(
     json_: Json = False,
 ) -> None:
     """Print the policy of a dataset as YAML, ready for `policy set`."""
-    from app.review.policies.policy import read_policy
-    from app.review.policies.text import policy_to_yaml, policy_values
+    server = given_server()
+    if server is not None:
+        from app.commands import remote
 
-    with opened_store() as store:
-        state = read_policy(store, dataset)
-    text = policy_to_yaml(state.policy)
+        with connected(server) as client:
+            text, values = remote.policy_values(client, dataset)
+    else:
+        text, values = _policy_here(dataset)
     if file is not None:
         _write(file, text)
     if json_:
-        history = [
-            {"version": item.version, "name": item.policy.name, "hash": item.policy.hash}
-            | {"at": item.at, "actor": item.actor}
-            for item in state.history
-        ]
-        values = {"values": policy_values(state.policy), "history": history}
-        print_json({**_head(dataset, state.policy), "version": state.version, **values})
+        print_json(values)
     elif file is None:
         say(text.rstrip("\n"))
 
@@ -54,16 +51,44 @@ def set_(
     dataset: Dataset,
     json_: Json = False,
 ) -> None:
-    """Judge a dataset by another policy; `solve` computes what that leaves out of date."""
+    """Judge a dataset by another policy; `solve` computes what that leaves out of date.
+
+    A server computes it by itself.
+    """
     from app.review.editing.recompute import stale_groups
     from app.review.policies.policy import change_policy
 
     chosen = read_policy_option(policy)
+    server = given_server()
+    if server is not None:
+        from app.commands import remote
+
+        with connected(server) as client:
+            job = remote.set_policy(client, dataset, chosen)
+        print_values(remote.policy_change(job), json_)
+        return
     with opened_store() as store:
         state = change_policy(store, dataset, chosen, if_match=None, actor=acting())
         stale = len(stale_groups(store, state.dataset_id))
     values = {**_head(state.dataset, state.policy), "version": state.version, "to_solve": stale}
     print_values(values, json_)
+
+
+def _policy_here(dataset: str) -> tuple[str, dict[str, Any]]:
+    """The policy of a dataset in a home, as YAML and as values."""
+    from app.review.policies.policy import read_policy
+    from app.review.policies.text import policy_to_yaml, policy_values
+
+    with opened_store() as store:
+        state = read_policy(store, dataset)
+    history = [
+        {"version": item.version, "name": item.policy.name, "hash": item.policy.hash}
+        | {"at": item.at, "actor": item.actor}
+        for item in state.history
+    ]
+    values = {"values": policy_values(state.policy), "history": history}
+    head = {**_head(state.dataset, state.policy), "version": state.version}
+    return policy_to_yaml(state.policy), {**head, **values}
 
 
 def read_policy_option(text: str) -> Policy:

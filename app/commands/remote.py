@@ -5,13 +5,17 @@ What sends or fetches files is in ``remote_files``.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
+import typer
+
 from app.commands.shown_fields import BATCH, DATASET, VERSION
+from app.commands.terminal import INTERRUPTED, complain
 from app.progress import TellProgress
 
 if TYPE_CHECKING:
+    from app.soccer.policy import Policy
     from touchline.client import Client
 
 
@@ -28,6 +32,65 @@ def finding_values(client: Client, dataset: str) -> Iterator[dict[str, Any]]:
         yield some(item, *names, "confidence", "fix", "dismissed")
 
 
+def solve_values(
+    client: Client, dataset: str, policy: Policy | None, progress: TellProgress
+) -> tuple[dict[str, Any], str]:
+    """Let the server solve a dataset, by another policy from now on where one is given.
+
+    Returns:
+        As ``solve`` has it, and its sentence. Of groups whose solving broke, the first twenty are
+        named.
+    """
+    from app.review.editing.recompute import outcome_sentence
+
+    if policy is None:
+        job = client.post(f"datasets/{part(dataset)}/solve")
+    else:
+        job = set_policy(client, dataset, policy)
+    done = follow(client, job, progress)
+    result = done["result"]
+    failed = [[item["group"], item["problem"]] for item in result["failures"]]
+    values = {"total": result["groups"], "solved": result["solved"], "passed": result["passed"]}
+    sentence = outcome_sentence(result["solved"], result["passed"], result["failed"])
+    return {**values, "failed": failed}, sentence
+
+
+def policy_values(client: Client, dataset: str) -> tuple[str, dict[str, Any]]:
+    """The policy of a dataset as YAML, and as ``policy show`` has it."""
+    found = client.get(f"datasets/{part(dataset)}/policy")
+    names = ("version", "name", "hash", "at", "actor")
+    history = [some({**item, "at": time_text(item["at"])}, *names) for item in found["history"]]
+    values = {**some(found, "dataset", "name", "hash", "version", "values"), "history": history}
+    return found["yaml"], values
+
+
+def set_policy(client: Client, dataset: str, policy: Policy) -> dict[str, Any]:
+    """Let the server judge a dataset by another policy; the job that solves what is stale then."""
+    from app.review.policies.text import policy_to_yaml
+
+    place = f"datasets/{part(dataset)}/policy"
+    present = client.get(place)
+    return dict(client.put(place, {"yaml": policy_to_yaml(policy)}, if_match=present))
+
+
+def policy_change(job: Mapping[str, Any]) -> dict[str, Any]:
+    """What ``set_policy`` did, as ``policy set`` has it."""
+    policy = job["result"]["policy"]
+    return {
+        **some(policy, "dataset", "name", "hash", "version"),
+        "to_solve": job["result"]["to_solve"],
+    }
+
+
+def verdict_values(
+    client: Client, dataset: str, body: Mapping[str, Any], *, dry_run: bool
+) -> tuple[dict[str, Any], dict[str, Any] | None]:
+    """What a verdict on all groups of a query would do on the server, and what it did."""
+    place = f"datasets/{part(dataset)}/verdicts"
+    plan = client.send("POST", place, params={"dry_run": "true"}, json=dict(body)).json()
+    return plan, None if dry_run else dict(client.post(place, dict(body)))
+
+
 def freeze_values(
     client: Client,
     dataset: str,
@@ -40,7 +103,7 @@ def freeze_values(
     place = f"datasets/{part(dataset)}/versions"
     if dry_run:
         return dict(client.post(place, {**request, "dry_run": True}))
-    job = client.wait(client.post(place, request), progress=told(progress))
+    job = follow(client, client.post(place, request), progress)
     return _version(client.get(f"versions/{job['result']['version']}"))
 
 
@@ -92,9 +155,23 @@ def _batch(item: Mapping[str, Any]) -> dict[str, Any]:
     return some({**item, **own}, *BATCH)
 
 
-def told(progress: TellProgress) -> Callable[[dict[str, Any]], None]:
-    """Lets a progress hear of a job, each time that it is looked at."""
-    return lambda job: progress(job["done"], job["total"], job["sentence"])
+def follow(client: Client, job: Mapping[str, Any], progress: TellProgress) -> dict[str, Any]:
+    """Wait for a job of the server and show how far it is; Ctrl+C leaves it running.
+
+    Raises:
+        JobError: It failed or was cancelled.
+        typer.Exit: Somebody pressed Ctrl+C.
+    """
+    try:
+        return client.wait(
+            job, progress=lambda seen: progress(seen["done"], seen["total"], seen["sentence"])
+        )
+    except KeyboardInterrupt:
+        complain(
+            f"not waited for: job {job['id']} goes on on the server",
+            "The page Jobs shows how far it is, and cancels it.",
+        )
+        raise typer.Exit(INTERRUPTED) from None
 
 
 def time_text(text: str) -> str:

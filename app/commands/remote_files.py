@@ -7,7 +7,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from app.commands.remote import part, some, time_text, told
+from app.commands.remote import follow, part, some, time_text
+from app.commands.shown_fields import IMPORT
 from app.errors import InputError, NotFoundError
 from app.object_store.address import is_address
 from app.progress import TellProgress
@@ -60,7 +61,7 @@ def import_values(
         "dry_run": dry_run,
     }
     try:
-        report = client.wait(client.post("imports", body), progress=told(progress))["result"]
+        report = follow(client, client.post("imports", body), progress)["result"]
     except JobError as error:
         report, problem = error.job["result"], error.job["problem"]
         if not report or not problem:
@@ -70,8 +71,9 @@ def import_values(
 
 
 def _report(result: Mapping[str, Any]) -> dict[str, Any]:
-    hidden = ("dataset", "dry_run", "solve_job", "paint_job", "proposals_job")
-    return {name: value for name, value in result.items() if name not in hidden}
+    """As ``import`` has it; the server keeps names in their alphabetical order."""
+    skipped = [some(item, "file", "record", "field", "problem") for item in result["skipped"]]
+    return {**some(result, *IMPORT), "skipped": skipped}
 
 
 def export_values(
@@ -82,7 +84,7 @@ def export_values(
     A text is an address in a store of the server, which writes it there.
     """
     if isinstance(out, str):
-        job = client.wait(client.post("exports", {**request, "to": out}), progress=told(progress))
+        job = follow(client, client.post("exports", {**request, "to": out}), progress)
         report = _export_report(client.get(f"exports/{job['id']}"))
         return {"out": out, "format": request["format"], **report}
     from app.datasets.output import output_tree
@@ -90,7 +92,7 @@ def export_values(
 
     with output_tree(out) as folder, tempfile.TemporaryDirectory() as held:
         job = client.post("exports", request)
-        client.wait(job, progress=told(progress))
+        follow(client, job, progress)
         found = client.get(f"exports/{job['id']}")
         content = client.download(f"exports/{job['id']}/content", Path(held) / "export.zip")
         unpack(content, folder)
@@ -119,7 +121,7 @@ def evaluate(
     found_sets = {name: found["id"] for name, found in sets.items()}
     body = {**vars(asked.request), **found_sets, "version": asked.version}
     place = f"datasets/{part(dataset)}/evaluations"
-    job = client.wait(client.post(place, body), progress=told(progress))
+    job = follow(client, client.post(place, body), progress)
     found = client.get(f"evaluations/{job['result']['evaluation']}")
     dataset_id = client.get(f"datasets/{part(dataset)}")["id"]
     names = {

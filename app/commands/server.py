@@ -22,7 +22,19 @@ from app.private_file import is_open_to_others
 if TYPE_CHECKING:
     from touchline.client import Client
 
-ABLE = ("datasets", "findings", "import", "export", "freeze", "versions", "evaluate", "batch")
+ABLE = (
+    "datasets",
+    "findings",
+    "import",
+    "solve",
+    "policy",
+    "verdict",
+    "export",
+    "freeze",
+    "versions",
+    "evaluate",
+    "batch",
+)
 """Commands that work against a server; of ``datasets`` its ``list``."""
 MAX_TOKEN = 1000
 """Bytes of a file that is read for a token."""

@@ -23,6 +23,21 @@ BATCH = (
     "last",
 )
 DATASET = ("id", "name", "groups", "solved", "accepted", "rejected", "deferred", "unreviewed")
+IMPORT = (
+    "outcome",
+    "read",
+    "imported",
+    "new",
+    "changed",
+    "unchanged",
+    "missing",
+    "without_picture",
+    "findings",
+    "counts",
+    "skipped",
+    "more_skipped",
+    "remarks",
+)
 VERSION = (
     "id",
     "dataset",

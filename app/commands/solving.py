@@ -2,25 +2,28 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from app.commands.opened import opened_store, opened_to_solve
 from app.commands.options import POLICY_OR_FILE, Cluster, Dataset, Json, Workers, acting
 from app.commands.policy import read_policy_option
-from app.commands.server import connected, given_server
+from app.commands.server import ServerPlace, connected, given_server
 from app.commands.terminal import (
+    INTERRUPTED,
     complain,
     held_interrupts,
     print_json,
     say,
+    show_progress,
 )
 
-commands = typer.Typer()
+if TYPE_CHECKING:
+    from app.soccer.policy import Policy
 
-INTERRUPTED = 130
-"""Exit code of what Ctrl+C ended, as shells have it."""
+commands = typer.Typer()
 
 
 @commands.command()
@@ -37,7 +40,17 @@ def solve(
     cluster: Cluster = None,
     json_: Json = False,
 ) -> None:
-    """Compute what is missing or out of date; Ctrl+C keeps what is done, and the next run goes on."""
+    """Compute what is missing or out of date; Ctrl+C keeps what is done, and the next run goes on.
+
+    A server computes by itself: there it waits, and Ctrl+C leaves the job running.
+    """
+    server = given_server()
+    if server is not None:
+        if workers is not None or cluster is not None:
+            raise typer.BadParameter("a server solves with its own processes; leave out --workers")
+        chosen = None if policy is None else read_policy_option(policy)
+        _print_solved(*_solve_at(server, dataset, chosen), json_=json_)
+        return
     from app.review.jobs.full_solve import count_yield, left_undone, solve_fully
     from app.review.policies.policy import change_policy
 
@@ -52,11 +65,24 @@ def solve(
                 complain(f"stopped; {report.solved} groups are kept, {left}")
                 raise typer.Exit(INTERRUPTED)
         count_yield(store, dataset, report, progress)
+    _print_solved(vars(report), report.sentence, json_=json_)
+
+
+def _solve_at(
+    server: ServerPlace, dataset: str, policy: Policy | None
+) -> tuple[Mapping[str, Any], str]:
+    from app.commands import remote
+
+    with connected(server) as client, show_progress("Solving") as progress:
+        return remote.solve_values(client, dataset, policy, progress)
+
+
+def _print_solved(values: Mapping[str, Any], sentence: str, *, json_: bool) -> None:
     if json_:
-        print_json(vars(report))
+        print_json(values)
         return
-    say(report.sentence if report.total else "nothing to solve: every group is up to date")
-    for key, problem in report.failed:
+    say(sentence if values["total"] else "nothing to solve: every group is up to date")
+    for key, problem in values["failed"]:
         say(f"  {key}: {problem}")
 
 

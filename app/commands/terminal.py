@@ -18,6 +18,8 @@ from app.progress import TellProgress
 
 Row = TypeVar("Row")
 
+INTERRUPTED = 130
+"""Exit code of what Ctrl+C ended, as shells have it."""
 MAX_MISSING = 20
 """Missing images that are named in a table."""
 # Steering characters of terminals (C0 and C1), and those that turn the direction of writing.

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from typing import Annotated, Any
 
 import typer
 
 from app.commands.opened import opened_store
 from app.commands.options import Dataset, Json, acting
+from app.commands.server import connected, given_server
 from app.commands.terminal import complain, print_json, print_values, say
 from app.soccer.choices import VerdictState
 
@@ -43,34 +45,54 @@ def verdict(
 
     Groups that cannot be accepted as they are stay as they are and are counted by reason.
     """
+    from app.review.verdicts.verdict import check_verdict
+
+    check_verdict(state, reason, note)
+    server = given_server()
+    if server is not None:
+        from app.commands import remote
+
+        body = {"q": query, "state": state, "reason": reason, "note": note, "expected": expected}
+        with connected(server) as client:
+            plan, report = remote.verdict_values(client, dataset, body, dry_run=dry_run)
+    else:
+        said = (query, state, reason, note)
+        plan, report = _judge_here(dataset, said, expected, dry_run=dry_run)
+    done = plan if report is None else report
+    values: dict[str, Any] = {"matches": plan["matches"]}
+    if report is None:
+        values["would_change"] = plan["would_change"]
+    else:
+        values |= {"changed": report["changed"], "batch": report["batch"]}
+    refused = {item["reason"]: item["groups"] for item in done["refused"]}
+    values |= {"dry_run": dry_run, "refused": refused}
+    sample = plan["sample"] if dry_run else []
+    if json_:
+        print_json({**values, "sample": sample})
+    else:
+        print_values(values, False)
+        for item in sample:
+            say(f"  {item['number']:6} {item['label'] or item['key']}")
+    if refused and not plan["would_change"]:
+        complain("no group was judged: each that matches was refused", "Say why in --note.")
+        raise typer.Exit(1)
+
+
+def _judge_here(
+    dataset: str,
+    said: tuple[str, str, str | None, str | None],
+    expected: int | None,
+    *,
+    dry_run: bool,
+) -> tuple[dict[str, Any], dict[str, Any] | None]:
+    """What the verdicts would do in a home, and what they did."""
     from app.review.datasets.dataset import dataset_id
     from app.review.verdicts.bulk import give_verdicts, plan_verdicts
 
     with opened_store() as store:
         found = dataset_id(store, dataset)
-        plan = plan_verdicts(store, found, query, state, reason, note)
-        values: dict[str, Any] = {"matches": plan.matches, "would_change": plan.would_change}
-        refused = plan.refused
-        if not dry_run:
-            report = give_verdicts(
-                store,
-                found,
-                query,
-                state,
-                reason,
-                note,
-                actor=acting(),
-                expected=expected,
-            )
-            values = {"matches": plan.matches, "changed": report.changed, "batch": report.batch}
-            refused = report.refused
-    values |= {"dry_run": dry_run, "refused": {item.reason: item.groups for item in refused}}
-    if json_:
-        print_json({**values, "sample": [vars(item) for item in plan.sample] if dry_run else []})
-    else:
-        print_values(values, False)
-        for item in plan.sample if dry_run else ():
-            say(f"  {item.number:6} {item.label or item.key}")
-    if refused and not plan.would_change:
-        complain("no group was judged: each that matches was refused", "Say why in --note.")
-        raise typer.Exit(1)
+        plan = plan_verdicts(store, found, *said)
+        if dry_run:
+            return asdict(plan), None
+        report = give_verdicts(store, found, *said, actor=acting(), expected=expected)
+    return asdict(plan), asdict(report)

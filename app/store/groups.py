@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections import namedtuple
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
-from sqlalchemy import BindParameter, bindparam, null, select
+from sqlalchemy import BindParameter, bindparam, null, or_, select
 from sqlalchemy.sql import FromClause
 
 from app.errors import NotFoundError
@@ -23,6 +23,7 @@ from app.store import codecs
 from app.store.datasets import policy_of
 from app.store.noise import Factors, factors_of
 from app.store.paint import paint_digests, read_readings
+from app.store.reader import seen_in
 from app.store.session import Session
 from app.store.stations import StoredStation, stored_station
 from app.store.stored_json import as_written, parse, unpack
@@ -146,6 +147,26 @@ def group_of_view(session: Session, view_id: int) -> int:
     if found is None:
         raise NotFoundError(f"there is no view {view_id}")
     return int(found)
+
+
+def find_views(
+    session: Session, dataset_id: int, ids: Collection[int], groups: Collection[str]
+) -> Sequence[Any]:
+    """Views of a dataset by their ids, and those of groups by the groups' keys.
+
+    Views of groups that are hidden from whoever asks are left out.
+
+    Returns:
+        Rows of ``id``, ``key``, ``group_id`` and ``group_key``.
+    """
+    view, group = ViewModel, GroupModel
+    statement = (
+        select(view.id, view.key, view.group_id, group.key.label("group_key"))
+        .join(group, group.id == view.group_id)
+        .where(group.dataset_id == dataset_id, or_(view.id.in_(ids), group.key.in_(groups)))
+        .where(*seen_in(dataset_id, group.id))
+    )
+    return session.execute(statement).all()
 
 
 def _stored_group(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, cast
 
@@ -238,3 +238,12 @@ def chain_hash(previous: str, number: int, entry: Entry, body: bytes) -> str:
 
 
 _COLUMNS = ("kind", "actor", "at", "dataset_id", "group_id", "station_id")
+
+
+def single_edits(value: Mapping[str, Any]) -> Iterator[Mapping[str, Any]]:
+    """A logged edit, or those that it consists of where it is several."""
+    if value.get("edit") != "several":
+        yield value
+        return
+    for one in value["edits"]:
+        yield from single_edits(one)

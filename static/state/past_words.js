@@ -39,6 +39,7 @@ function editWords(edit, letterOf) {
 		case 'set_picture': return `set how the picture was changed${where}`;
 		case 'set_pitch': return `set the pitch to ${edit.length} × ${edit.width} m`;
 		case 'set_noise': return 'set the noise of its cameras and people';
+		case 'several': return edit.edits.map((/** @type {any} */ one) => editWords(one, letterOf)).join('; ');
 		case 'set_station_camera': return 'set the camera of a static camera';
 		default: return words(String(edit.edit ?? 'changed it')).toLowerCase();
 	}

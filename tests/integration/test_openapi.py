@@ -239,6 +239,8 @@ class Attack:
             case.body = {}
         if case.operation.path.endswith("/positions") and case.method == "DELETE":
             case.query["match"] = load(self.store, 1).group.match
+        if case.operation.path.endswith("/edits"):
+            case.body = {"if_match": "*", "items": [{"view": 1, "ball": None}]}
         if case.operation.path.endswith("/exports"):
             case.body = {"dataset": "small", "format": "cameras", "all": True}
 

@@ -11,6 +11,12 @@ describe('sentenceOfEntry', () => {
 		assert.equal(said('edit', { edit }), 'Drew “Middle line” and removed “Circle left” in B');
 		assert.equal(said('undo', { edit }), 'Undid: drew “Middle line” and removed “Circle left” in B');
 	});
+	it('names each of several edits that are one', () => {
+		const edits = [{ edit: 'set_balls', view: 'x', balls: [] }, { edit: 'set_lines', view: 'x', lines: { 'Circle left': null } }];
+		const edit = { edit: 'several', edits };
+		assert.equal(said('edit', { edit }), 'Removed the ball in B; removed “Circle left” in B');
+		assert.equal(said('undo', { edit }), 'Undid: removed the ball in B; removed “Circle left” in B');
+	});
 	it('says what was decided, and why', () => {
 		assert.equal(said('verdict', { state: 'rejected', reason: 'bad_field_lines', note: 'no', override: null }), 'Rejected because of bad field lines: “no”');
 	});

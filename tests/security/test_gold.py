@@ -242,6 +242,31 @@ class TestGold:
         (view,) = ask(person, "GET", "/datasets/demo/saved-views").json()["items"]
         assert view["groups"] == OTHERS
 
+    def test_edits_of_many_views_know_nothing_of_what_is_hidden(
+        self, made: Gold, played: Played
+    ) -> None:
+        ask = made.team.ask
+        for group in (made.golden[0], made.ordinary[0]):
+            document = ask("lea", "GET", f"/groups/{group}").json()
+            number, key, view = document["id"], document["key"], document["views"][0]
+            items = [
+                {"view": view["id"], "ball": None},
+                {"view": 10**9, "ball": None},
+                {"group": key, "view": view["key"], "ball": None},
+                {"group": "nowhere", "view": view["key"], "ball": None},
+            ]
+            for target in ("/datasets/demo/edits", "/datasets/demo/edits?dry_run=true"):
+                body = {"if_match": "*", "items": items}
+                told = ask("olaf", "POST", target, body).json()["items"]
+                for one in told:
+                    for name in (str(view["id"]), str(10**9), key, "nowhere"):
+                        one["problem"] = one["problem"].replace(f"view {name} ", "view # ")
+                        one["problem"] = one["problem"].replace(f"group {name} ", "group # ")
+                    del one["index"], one["pointer"]
+                assert told[0] == told[1] and told[2] == told[3]
+                assert {one["status"] for one in told} == {404}
+            assert ask("lea", "GET", f"/groups/{number}").json()["etag"] == document["etag"]
+
     def test_what_was_submitted_is_opened_by_no_route(self, made: Gold, played: Played) -> None:
         person, cheat = "olaf", played
         ask = made.team.ask
@@ -269,6 +294,9 @@ class TestGold:
             for method, target, body in tried:
                 answer = ask(person, method, target, body, **etag)
                 assert answer.status_code in (403, 404, 409), (target, answer.status_code)
+            bulk = {"if_match": "*", "items": [{"view": view, "ball": None}]}
+            (one,) = ask(person, "POST", f"/datasets/{dataset}/edits", bulk).json()["items"]
+            assert (one["outcome"], one["status"]) == ("refused", 409)
         with made.team.store.read() as session:
             assert [take._mapping for take in takes_in(session, 1, person)] == before
 

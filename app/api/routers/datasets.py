@@ -7,6 +7,7 @@ from typing import Annotated
 from fastapi import APIRouter, Query, Request, Response
 
 from app.api.deps import Actor, AppServices, AppStore, DatasetPath, QueryText, Sees
+from app.api.jobs import by_job, job_answer
 from app.api.paging import paged
 from app.api.problem import responses
 from app.api.reply import AskedUnder, Reply, document
@@ -21,6 +22,7 @@ from app.api.security.access import login_of
 from app.review.datasets import dataset as review
 from app.review.datasets import delete as deletion
 from app.review.datasets.delete import DatasetContents, read_contents
+from app.review.jobs.solve import request_solve
 from app.review.queue.progress import summary
 
 router = APIRouter(prefix="/datasets", tags=["datasets"])
@@ -52,6 +54,21 @@ def get_summary(dataset: DatasetPath, store: AppStore, query: QueryText = "") ->
     found = review.get_dataset_head(store, dataset)
     counted = summary(store, found.id, query)
     return SummaryDocument(progress=counted, histograms=counted.histograms)
+
+
+@router.post("/{dataset}/solve", operation_id="solveDataset", **by_job(404))
+def solve_dataset(
+    dataset: DatasetPath, services: AppServices, actor: Actor, asked: AskedUnder
+) -> Response:
+    """Solve what has no solution for its present state, policy and solver, as a job.
+
+    The server does so by itself after whatever makes groups stale; this waits for it, too.
+    """
+    reply = Reply(asked, job_answer)
+    found = review.dataset_id(services.store, dataset)
+    return reply.of(
+        request_solve(services.jobs, services.store, found, actor=actor, keep=reply.keep)
+    )
 
 
 @router.delete(

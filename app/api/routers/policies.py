@@ -75,7 +75,7 @@ def put_policy(
     """Judge the dataset by another policy.
 
     What that leaves without a solution is stale and solved by the job; `result.policy` of the
-    answer is the policy as it is now. Only another calibration part calibrates anything anew.
+    answer is the policy as it is now, `result.to_solve` how many groups are solved again. Only another calibration part calibrates anything anew.
     """
     store = services.store
     present = read_policy(store, dataset)
@@ -96,7 +96,7 @@ def put_policy(
 
 def _judged(judged: PolicyJob) -> Response:
     policy, job = PolicyStateDocument.of(judged.state), JobDocument.model_validate(judged.job)
-    job.result = {"policy": policy.model_dump(mode="json")}
+    job.result = {"policy": policy.model_dump(mode="json"), "to_solve": judged.to_solve}
     return document(job, 202, {**_tagged(policy), **job_address(judged.job)})
 
 

@@ -81,7 +81,8 @@ PREVIEWS = Lane("previews", 1, 100, apart=2, each=1)
 """What a drag asks: some milliseconds of solving, dozens where lines are dragged. A person drags one thing at
 a time."""
 LARGE = Lane("large", 1, 50)
-"""Edits and previews of hundreds of points, each of which is solved for as long as dozens of others."""
+"""Edits and previews of hundreds of points, each of which is solved for as long as dozens of others, and
+edits of many views at once."""
 QUESTIONS = Lane("questions", 2, 100)
 """What is answered by solving many times, or many groups; it takes up to seconds."""
 STREAMS = Lane("streams", 1, 200)
@@ -129,6 +130,7 @@ _EDIT = re.compile(
     r"/(?:views/[^/]+(?:/ball|/lines)?|groups/[^/]+/(?:verdict|undo|redo)"
     r"|batches/[^/]+/(?:next|groups/[^/]+/lease))$"
 )
+_BULK_EDIT = re.compile(r"/datasets/[^/]+/edits$")
 _QUESTION = re.compile(r"/(?:comparison|influence|remedies|yield|noise)$")
 _LOOK = re.compile(r"/(?:groups/(?!ids$)|views/|stations/|session$|bell$|work$)")
 _LOGIN = re.compile(r"/(?:session|session/password|links/use)$")
@@ -156,6 +158,8 @@ def lane_of(method: str, path: str) -> Lane | None:
         return SIGN_ONS
     if method == "POST" and _UPLOAD.search(path):
         return UPLOADS
+    if _BULK_EDIT.search(path):
+        return LARGE
     return EDITS if _EDIT.search(path) else CHANGES
 
 

@@ -17,7 +17,7 @@ from app.soccer.group import Group, View
 from app.store.clock import now
 from app.store.datasets import group_ids
 from app.store.groups import StoredGroup
-from app.store.log import Entry, append, read_entries_of
+from app.store.log import Entry, append, read_entries_of, single_edits
 from app.store.noise import (
     NOISE,
     Factors,
@@ -36,12 +36,12 @@ def read_placed(session: Session, groups: Sequence[int]) -> dict[int, dict[str, 
     """
     placed: dict[int, dict[str, str]] = {}
     for entry in read_entries_of(session, groups, GROUP_KINDS):
-        edit = entry.body.get("edit") or {}
-        if edit.get("edit") == "set_balls" and entry.group_id is not None:
-            of_group = placed.setdefault(entry.group_id, {})
-            of_group.pop(edit["view"], None)
-            if not any(ball.get("predicted_by") for ball in edit["balls"]):
-                of_group[edit["view"]] = entry.actor
+        for edit in single_edits(entry.body.get("edit") or {}):
+            if edit.get("edit") == "set_balls" and entry.group_id is not None:
+                of_group = placed.setdefault(entry.group_id, {})
+                of_group.pop(edit["view"], None)
+                if not any(ball.get("predicted_by") for ball in edit["balls"]):
+                    of_group[edit["view"]] = entry.actor
     return placed
 
 

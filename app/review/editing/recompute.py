@@ -59,15 +59,19 @@ class SolveReport:
 
     @property
     def sentence(self) -> str:
-        """How many groups pass, how many do not, and how many could not be solved.
+        """How many groups pass, how many do not, and how many could not be solved."""
+        return outcome_sentence(self.solved, self.passed, len(self.failed))
 
-        Example:
-            >>> SolveReport(total=61, solved=60, passed=52, failed=[("7", "boom")]).sentence
-            '52 pass, 8 do not; 1 error'
-        """
-        errors = len(self.failed)
-        rest = self.solved - self.passed
-        return f"{self.passed} pass, {rest} do not; {errors} error{'' if errors == 1 else 's'}"
+
+def outcome_sentence(solved: int, passed: int, errors: int) -> str:
+    """How many groups pass, how many do not, and how many could not be solved.
+
+    Example:
+        >>> outcome_sentence(solved=60, passed=52, errors=1)
+        '52 pass, 8 do not; 1 error'
+    """
+    rest = solved - passed
+    return f"{passed} pass, {rest} do not; {errors} error{'' if errors == 1 else 's'}"
 
 
 @dataclass(frozen=True)

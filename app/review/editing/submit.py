@@ -16,7 +16,14 @@ from app.review.answers.keep import Keep, keep_nothing
 from app.review.editing.ball_noise import keeping_noise, with_noise
 from app.review.editing.codec import step_to_json
 from app.review.editing.copies import require_open
-from app.review.editing.edit import STATION_EDITS, Edit, SetPaint, SetPicture, need_view
+from app.review.editing.edit import (
+    STATION_EDITS,
+    Edit,
+    SetPaint,
+    SetPicture,
+    Several,
+    need_view,
+)
 from app.review.editing.etags import read_etags, require_said, require_unchanged
 from app.review.editing.follow_paint import PaintFollower
 from app.review.editing.known import known_calibrations
@@ -126,7 +133,17 @@ def submit(
         InputError, NotFoundError: The edit does not fit the group.
         StorageError: Nothing was saved.
     """
-    return take_step(store, lambda _session: group_id, _plan_edit(lambda _stored: edit), **how)
+    return take_step(store, lambda _session: group_id, _plan_edits(lambda _stored: [edit]), **how)
+
+
+def submit_all(
+    store: Store,
+    group_id: int,
+    edits: Sequence[Edit],
+    **how: Unpack[How],
+) -> GroupState:
+    """``submit`` for several edits of a group, which are one edit: undo takes them back together."""
+    return take_step(store, lambda _session: group_id, _plan_edits(lambda _stored: edits), **how)
 
 
 def submit_view(
@@ -137,13 +154,13 @@ def submit_view(
 ) -> GroupState:
     """``submit`` for a view's id: ``edit_of`` makes the edit from the view's key."""
 
-    def edit(stored: StoredGroup) -> Edit:
-        return edit_of(next(key for key, item in stored.view_ids.items() if item == view_id))
+    def edits(stored: StoredGroup) -> list[Edit]:
+        return [edit_of(next(key for key, item in stored.view_ids.items() if item == view_id))]
 
     def find(session: Session) -> int:
         return group_of_view(session, view_id)
 
-    return take_step(store, find, _plan_edit(edit), **how)
+    return take_step(store, find, _plan_edits(edits), **how)
 
 
 def preview(
@@ -324,12 +341,24 @@ def _read_beside(outcome: _Outcome) -> Json:
     return {FOLLOWS: outcome.change.kind, **body}
 
 
-def _plan_edit(edit_of: Callable[[StoredGroup], Edit]) -> Plan:
-    def plan(session: Session, record: Record, actor: str) -> GroupChange:
-        edit, group = edit_of(record.stored), record.stored.group
-        edit = with_noise(record.stored.factors, group, edit, actor)
-        refuse_shared(record.stored, edit)
-        require_few_points_in_all(group, [edit])
+def checked_edit(stored: StoredGroup, edits: Sequence[Edit], actor: str) -> Edit:
+    """Some edits of a group as the one edit that is saved, with the noise of who makes them.
+
+    Raises:
+        SharedStationError: One of them belongs to a static camera.
+        TooManyPointsError: They draw too many points.
+    """
+    made = [with_noise(stored.factors, stored.group, edit, actor) for edit in edits]
+    for edit in made:
+        refuse_shared(stored, edit)
+    require_few_points_in_all(stored.group, made)
+    return made[0] if len(made) == 1 else Several(tuple(made))
+
+
+def _plan_edits(edits_of: Callable[[StoredGroup], Sequence[Edit]]) -> Plan:
+    def plan(_session: Session, record: Record, actor: str) -> GroupChange:
+        group = record.stored.group
+        edit = checked_edit(record.stored, edits_of(record.stored), actor)
         body = step_to_json(edit, edit.inverse(group))
         return GroupChange("edit", body, edit.apply(group))
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from app.errors import NotFoundError
 from app.soccer.annotation import BallAnnotation
 from app.store.codecs import ball_from_json
-from app.store.log import LogEntry, group_entries
+from app.store.log import LogEntry, group_entries, single_edits
 from app.store.predictions import (
     PredictedBox,
     PredictionSet,
@@ -115,7 +115,8 @@ def _says(entry: LogEntry, view: str, ball: BallAnnotation) -> bool:
     """Whether an edit put that ball there; undo and redo only bring back what one said."""
     if entry.kind != "edit":
         return False
-    edit = entry.body["edit"]
-    return (edit["edit"], edit.get("view")) == ("set_balls", view) and ball in [
-        ball_from_json(value) for value in edit["balls"]
-    ]
+    return any(
+        (edit["edit"], edit.get("view")) == ("set_balls", view)
+        and ball in [ball_from_json(value) for value in edit["balls"]]
+        for edit in single_edits(entry.body["edit"])
+    )

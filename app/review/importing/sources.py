@@ -243,7 +243,7 @@ class Imported:
             "missing": self.result.missing,
             "without_picture": self.result.without_picture,
             "findings": self.result.findings,
-            "counts": dict(self.report.counts),
+            "counts": dict(sorted(self.report.counts.items())),
             "skipped": [
                 {
                     "file": shown(problem.path),

@@ -20,6 +20,7 @@ from app.soccer.policy import Policy
 from app.store.datasets import dataset_name
 from app.store.jobs import Job
 from app.store.session import Session
+from app.store.solutions import unsolved_groups
 from app.store.store import Store
 from app.store.stored_json import Json
 
@@ -35,10 +36,12 @@ NAMED = 20
 
 @dataclass(frozen=True)
 class PolicyJob:
-    """A dataset under another policy, and the job that solves what that left stale."""
+    """A dataset under another policy, the job that solves what that left stale, and how many groups
+    that are."""
 
     state: PolicyState
     job: Job
+    to_solve: int
 
 
 @dataclass(frozen=True)
@@ -122,7 +125,7 @@ def request_policy(
 
     def change(session: Session, job: Job) -> PolicyJob:
         state = apply_policy(session, dataset_id, policy, if_match=if_match, actor=actor)
-        return PolicyJob(state, job)
+        return PolicyJob(state, job, len(unsolved_groups(session, dataset_id)))
 
     return solve_after(jobs, store, dataset_id, change, actor=actor, keep=keep)
 

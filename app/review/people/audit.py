@@ -11,6 +11,7 @@ from app.errors import NotFoundError
 from app.review.people.roles import Sight
 from app.store.audit import AuditQuery as AuditQuery
 from app.store.audit import AuditRow, audit_rows
+from app.store.log import single_edits
 from app.store.store import Store
 from app.store.threads import find_group
 
@@ -201,6 +202,11 @@ def _plain(row: AuditRow, _body: Mapping[str, Any]) -> str:
 def _edit(row: AuditRow, body: Mapping[str, Any]) -> str:
     edit = body.get("edit")
     said = edit if isinstance(edit, dict) else body
+    verb = {"undo": "undid: ", "redo": "redid: "}.get(row.kind.removeprefix("station_"), "")
+    return verb + "; ".join(_one_edit(row, one) for one in single_edits(said))
+
+
+def _one_edit(row: AuditRow, said: Mapping[str, Any]) -> str:
     name = str(said.get("edit", row.kind))
     view = f" of view {said['view']}" if said.get("view") else ""
     lines = said.get("lines")
@@ -209,8 +215,7 @@ def _edit(row: AuditRow, body: Mapping[str, Any]) -> str:
         what = "use" if said.get("included") else "leaving out"
     else:
         what = name.removeprefix("set_").replace("_", " ")
-    verb = {"undo": "undid: ", "redo": "redid: "}.get(row.kind.removeprefix("station_"), "")
-    return f"{verb}{what}{view}{names}"
+    return f"{what}{view}{names}"
 
 
 def _dismissal(_row: AuditRow, body: Mapping[str, Any]) -> str:

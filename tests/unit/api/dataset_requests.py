@@ -266,6 +266,10 @@ def pitch(api: Any) -> Request:
     return "PATCH", path, body, etag_of(api, path)
 
 
+def solving(_api: Any) -> Request:
+    return "POST", f"{BROADCAST}/solve", None, {}
+
+
 def pitch_estimates(_api: Any) -> Request:
     return "POST", f"{BROADCAST}/pitches", None, {}
 

@@ -74,6 +74,18 @@ def lines(api: Any) -> Request:
     )
 
 
+def bulk_edits(api: Any) -> Request:
+    """The ball and lines of two views of one group, and a view that is not there."""
+    body = lines(api)[2]
+    one, two = (view["id"] for view in api.get(f"{API}/groups/1").json()["views"][:2])
+    items = [
+        {"view": one, **body, "ball": {"point": [600.5, 300.25]}},
+        {"view": two, "ball": None},
+        {"view": 10**9, "ball": None},
+    ]
+    return "POST", "/datasets/broadcast/edits", {"items": items, "if_match": "*"}, {}
+
+
 def left_out(api: Any) -> Request:
     view = api.get(f"{API}/groups/1").json()["views"][0]["id"]
     body = {"included": False, "reason": "not_same_instant"}

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import json
 import os
+import re
+import signal
 import threading
 import time
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -19,21 +22,27 @@ from app.api.server import listen, make_server
 from app.api.team import Team
 from app.commands.command_line import app
 from app.commands.remote_files import write_evaluation
-from app.commands.server import ServerPlace, _explained, connected, read_token
+from app.commands.server import ABLE, ServerPlace, _explained, connected, read_token
+from app.commands.terminal import INTERRUPTED
 from app.config import Settings
 from app.datasets.soccernet_v3_writer import write_soccernet_v3
 from app.errors import InputError, UnsafePathError
 from app.finite import json_text
 from app.log import log_to_stderr
+from app.review.editing.recompute import solve_dataset
 from app.review.evaluating.evaluation import get_evaluation
 from app.review.evaluating.folder import evaluation_values
 from app.review.evaluating.predictions import list_predictions
+from app.review.importing.ingest import ingest
+from app.review.jobs.full_solve import solve_fully
 from app.review.people.access_tokens import new_text
 from app.review.people.logins import Login
 from app.review.people.people import invite
 from app.review.people.roles import DatasetRoles, Role, Scope
+from app.review.policies.text import policy_to_yaml
 from app.review.versions.version import list_versions
 from app.review.work.batches import get_batch
+from app.soccer.policy import PAPER
 from app.store.store import Store
 from tests.scenes import make_scenes
 from tests.waiting import SECONDS
@@ -41,6 +50,7 @@ from touchline.client import Client
 from touchline.errors import RequestError, UnreachableError
 
 Run = Callable[..., Result]
+LEADING = (Scope.LEAD, Scope.EXPORT)
 
 
 @dataclass(frozen=True)
@@ -93,7 +103,7 @@ def surroundings(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
 def remote(place: Place) -> Run:
     """A command against the server, with a token of these scopes."""
 
-    def run(*words: str, scopes: tuple[Scope, ...] = (Scope.LEAD, Scope.EXPORT)) -> Result:
+    def run(*words: str, scopes: tuple[Scope, ...] = LEADING) -> Result:
         given = ["--server", place.url, "--token-file", str(place.token(*scopes))]
         return CliRunner().invoke(app, [*given, *words])
 
@@ -184,8 +194,171 @@ def test_what_is_imported_frozen_exported_and_measured_there_is_as_here(
     assert len(list_predictions(place.store, "small")) == 1, "the same files are read once"
 
 
+@pytest.fixture(scope="module")
+def twins(place: Place, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Two equal datasets, ``here`` and ``twin``; the folder has a policy file and predictions."""
+    groups = [scene.group for scene in make_scenes(groups=6, seed=4)]
+    for name in ("here", "twin"):
+        ingest(place.store, name, groups, source="files", actor="local")
+        solve_dataset(place.store, name)
+    files = tmp_path_factory.mktemp("twins")
+    text = policy_to_yaml(PAPER).replace("name: paper", "name: ours")
+    for file, tau in (("ours.yaml", 0.7), ("other.yaml", 0.6)):
+        (files / file).write_text(text.replace("tau_percent: 1.0", f"tau_percent: {tau}"))
+    write_soccernet_v3(files / "tree", groups)
+    frame = f"{groups[0].match}/{groups[0].views[0].key}"
+    (files / "found.csv").write_text(f"image,x,y,w,h,score\n{frame},600,300,9,9,0.5\n")
+    return files
+
+
+SAME: tuple[tuple[str, ...], ...] = (
+    ("datasets", "list"),
+    ("findings", "--dataset", "NAME"),
+    ("policy", "show", "--dataset", "NAME"),
+    ("policy", "set", "ours.yaml", "--dataset", "NAME"),
+    ("policy", "show", "--dataset", "NAME"),
+    ("solve", "--dataset", "NAME", "--policy", "strict"),
+    ("solve", "--dataset", "NAME"),
+    ("solve", "--dataset", "NAME", "--policy", "strickt"),
+    ("policy", "set", "paper", "--dataset", "NAME"),
+    ("solve", "--dataset", "NAME", "--policy", "other.yaml"),
+    ("verdict", "accepted", "--dataset", "NAME", "--query", "passes:yes", "--dry-run"),
+    ("verdict", "accepted", "--dataset", "NAME", "--query", "passes:yes"),
+    ("verdict", "accepted", "--dataset", "NAME", "--query", "passes:yes", "--note", "seen"),
+    ("verdict", "accepted", "--dataset", "NAME", "--query", "passes:no"),
+    ("verdict", "rejected", "--dataset", "NAME", "--query", "passes:no"),
+    ("verdict", "rejected", "--dataset", "NAME", "--query", "", "--reason", "nonsense"),
+    ("verdict", "deferred", "--dataset", "NAME", "--query", "nonsense<1"),
+    ("verdict", "deferred", "--dataset", "NAME", "--query", "", "--expected", "99"),
+    ("verdict", "deferred", "--dataset", "NAME", "--query", "passes:yes", "--json"),
+    ("policy", "set", "paper", "--dataset", "NAME", "--json"),
+    ("policy", "show", "policy.yaml", "--dataset", "NAME"),
+    ("import", "soccernet-v3", "tree", "--dataset", "NAME"),
+    ("import", "soccernet-v3", "tree", "--dataset", "NAME", "--json"),
+    ("freeze", "--dataset", "NAME", "--groups", "passing", "--dry-run"),
+    ("freeze", "one", "--dataset", "NAME", "--groups", "passing"),
+    ("freeze", "two", "--dataset", "NAME", "--groups", "passing", "--json"),
+    ("versions", "--dataset", "NAME"),
+    ("export", "out", "--dataset", "NAME", "--format", "coco", "--all", "--json"),
+    ("export", "out", "--dataset", "NAME", "--format", "yolo", "--all"),
+    ("evaluate", "found.csv", "--dataset", "NAME", "--groups", "all"),
+    ("evaluate", "found.csv", "--dataset", "NAME", "--groups", "all", "--json"),
+    ("batch", "give", "NAME", "First", "--size", "2"),
+    ("batch", "give", "NAME", "Second", "--size", "2", "--json"),
+    ("batch", "list", "NAME"),
+)
+"""Commands in an order in which each has something to do."""
+READING = {("datasets", "list"), ("findings", "--dataset"), ("policy", "show")}
+READING |= {("solve", "--dataset"), ("versions", "--dataset"), ("batch", "list")}
+"""Those that are given with ``--json``, too."""
+PLAIN = (
+    (r"timestamp='.*\n", ""),
+    (r"[0-9a-f]{12,}", "#"),
+    (r"\b(?:twin|here)\b", "NAME"),
+    (r"\d{4}-\d\d-\d\dT[\d:.+]+", "TIME"),
+    (r"anna-\S+ \(token cli\)|\blocal\b", "WHO"),
+    (r"(?m)\b((?:\w+_)?id|batch|evaluation)(\W+)\d+(?:\.0)?|^ +\d+(?= )", r"\1\2#"),
+)
+"""What differs: lines of the server's log, hashes, names, times, people and ids."""
+
+
+def plain(done: Result) -> tuple[int, str, str, str]:
+    """What a command printed, without what differs between two equal datasets."""
+    texts = [done.stdout, done.stderr, str(done.exception or "")]
+    with suppress(ValueError):
+        # The order of names in an object says nothing, and 6 is 6.0.
+        texts[0] = json.dumps(json.loads(texts[0], parse_int=float), indent=0, sort_keys=True)
+    for pattern, other in PLAIN:
+        texts = [re.sub(pattern, other, text) for text in texts]
+    return done.exit_code, texts[0], texts[1], texts[2]
+
+
+class TestSame:
+    def test_every_command_that_can_is_tried(self) -> None:
+        assert {words[0] for words in SAME} == set(ABLE)
+
+    def test_each_prints_against_a_server_what_it_prints_of_a_home(
+        self, place: Place, remote: Run, twins: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        """The same is done to one of two equal datasets here, and to the other one there."""
+        monkeypatch.chdir(twins)
+        home = {"TOUCHLINE_HOME": str(place.home)}
+
+        for words in SAME:
+            for more in ((), ("--json",)):
+                if more and words[:2] not in READING and "--dry-run" not in words:
+                    # Once is a change, and twice another one.
+                    continue
+                here = [word.replace("NAME", "here") for word in (*words, *more)]
+                there = [word.replace("NAME", "twin") for word in (*words, *more)]
+                mine = CliRunner(env=home).invoke(app, here)
+                theirs = remote(*there, scopes=(*LEADING, Scope.REVIEW))
+                _idle(place)
+                assert plain(theirs) == plain(mine), (words, theirs.output, mine.output)
+
+
+def _idle(place: Place) -> None:
+    end = time.monotonic() + SECONDS
+    with Client(place.url, headers=_asking(place)) as client:
+        while any(job["state"] in ("queued", "running") for job in client.pages("jobs")):
+            assert time.monotonic() < end
+            time.sleep(0.05)
+
+
+def _asking(place: Place) -> dict[str, str]:
+    token = place.token(*LEADING).read_text().strip()
+    return {"Authorization": f"Bearer {token}"}
+
+
+class TestFollow:
+    def test_ctrl_c_leaves_the_job_running_and_says_so(
+        self, place: Place, remote: Run, twins: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        held, waiting, wait = threading.Event(), threading.Event(), Client.wait
+
+        def solve_later(*given: Any) -> Any:
+            held.wait(SECONDS)
+            return solve_fully(*given)
+
+        def wait_seen(*given: Any, **how: Any) -> Any:
+            waiting.set()
+            return wait(*given, **how)
+
+        def press() -> None:
+            waiting.wait(SECONDS)
+            os.kill(os.getpid(), signal.SIGINT)
+
+        monkeypatch.setattr("app.review.jobs.solve.solve_fully", solve_later)
+        monkeypatch.setattr(Client, "wait", wait_seen)
+        (pressing := threading.Thread(target=press)).start()
+        stopped = remote("solve", "--dataset", "twin", "--policy", "strict")
+        pressing.join()
+        held.set()
+        assert (stopped.exit_code, stopped.stdout) == (INTERRUPTED, "")
+        assert re.search(r"job \d+ goes on on the server", stopped.stderr)
+        assert told(remote("policy", "show", "--dataset", "twin", "--json"))["name"] == "strict"
+        _idle(place)
+        (twin,) = (
+            one for one in told(remote("datasets", "list", "--json")) if one["name"] == "twin"
+        )
+        assert twin["solved"] == twin["groups"]
+        assert told(remote("solve", "--dataset", "twin", "--json"))["failed"] == []
+
+    def test_the_processes_of_a_server_are_its_own(self, remote: Run, twins: Path) -> None:
+        done = remote("solve", "--dataset", "twin", "--workers", "2")
+        assert (done.exit_code, "leave out --workers" in done.stderr) == (2, True)
+
+    def test_solving_is_for_leads(self, remote: Run, twins: Path) -> None:
+        for words in (
+            ("solve", "--dataset", "twin"),
+            ("policy", "set", "strict", "--dataset", "twin"),
+        ):
+            done = remote(*words, scopes=(Scope.READ,))
+            assert "lacks the scope lead" in str(done.exception)
+
+
 class TestRefusals:
-    @pytest.mark.parametrize("command", ["solve", "serve", "users", "restore", "calibrate"])
+    @pytest.mark.parametrize("command", ["serve", "users", "restore", "calibrate", "doctor"])
     def test_what_needs_a_home_says_so(self, remote: Run, command: str) -> None:
         assert "not against a server" in str(remote(command).exception)
 

@@ -65,6 +65,7 @@ class TestLaneOf:
             ("PATCH", "/stations/1/lines", CHANGES),
             ("DELETE", "/uploads/a", CHANGES),
             ("POST", "/datasets/a/verdicts", CHANGES),
+            ("POST", "/datasets/a/edits", LARGE),
             ("POST", "/groups/1/preview", PREVIEWS),
             ("GET", "/views/1/influence", QUESTIONS),
             ("POST", "/datasets/a/yield", QUESTIONS),

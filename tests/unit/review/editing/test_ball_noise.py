@@ -11,7 +11,7 @@ from app.review.editing.ball_noise import give_factors, read_placed, with_noise
 from app.review.editing.edit import SetBall, SetBalls, Several
 from app.review.editing.past import history
 from app.review.editing.recompute import stale_groups
-from app.review.editing.submit import load, preview, solved, submit
+from app.review.editing.submit import load, preview, solved, submit, submit_all
 from app.review.editing.undo import undo
 from app.review.importing.carry import carried_group
 from app.review.importing.ingest import ingest
@@ -197,3 +197,15 @@ class TestFactorOf:
         asked = [("cam2", "ann"), ("cam2", "eve"), ("cam9", "ann"), ("cam9", None), (None, None)]
         assert [factor_of(FACTORS, *at) for at in asked] == [4.0, 2.0, 1.5, 1.0, 1.0]
         assert factor_of((), "cam2", "ann") == 1.0
+
+
+class TestReadPlaced:
+    def test_knows_who_placed_balls_of_several_views_in_one_edit(
+        self, store: Store, static: int
+    ) -> None:
+        state = load(store, static)
+        keys = [view.key for view in state.group.views[:2]]
+        edits = [SetBall(key, BALL) for key in keys]
+        submit_all(store, static, edits, if_match=state.etag, actor="ann")
+        with store.read() as session:
+            assert read_placed(session, [static]) == {static: dict.fromkeys(keys, "ann")}

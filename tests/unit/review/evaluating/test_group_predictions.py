@@ -6,7 +6,7 @@ import pytest
 
 from app.errors import NotFoundError
 from app.review.editing.edit import SetBall
-from app.review.editing.submit import load, submit
+from app.review.editing.submit import load, submit, submit_all
 from app.review.editing.undo import redo, undo
 from app.review.evaluating.accept import accept_box
 from app.review.evaluating.group_predictions import AcceptedBall, group_predictions
@@ -87,6 +87,16 @@ class TestAcceptedBall:
         redo(store, ids[0], if_match=state.etag, actor="eve")
         (ball,) = group_predictions(store, ids[0]).accepted
         assert ball.actor == "bob"
+
+    def test_is_theirs_who_accepted_it_among_other_changes_too(self, store, ids, add) -> None:
+        add("yolo", ("7.png", 10, 0.75))
+        state = accept_first(store, ids[0], "bob")
+        ball = state.group.views[0].ball
+        state = undo(store, ids[0], if_match=state.etag, actor="bob")
+        edits = [SetBall("7.png", ball), SetBall(state.group.views[1].key, None)]
+        submit_all(store, ids[0], edits, if_match=state.etag, actor="eve")
+        (found,) = group_predictions(store, ids[0]).accepted
+        assert found.actor == "eve"
 
     def test_outlives_its_set_but_not_the_score(self, store, ids, add) -> None:
         found = add("yolo", ("7.png", 10, 0.75))

@@ -9,7 +9,7 @@ import pytest
 from app.errors import InputError
 from app.review.editing.edit import IncludeView, SetBall, SetLines
 from app.review.editing.replay import _STEPS
-from app.review.editing.submit import load, submit
+from app.review.editing.submit import load, submit, submit_all
 from app.review.editing.undo import redo, undo
 from app.review.jobs.jobs import Jobs
 from app.review.people.audit import KINDS, Family, every_entry, read_audit
@@ -113,6 +113,19 @@ class TestAudit:
 
     def test_every_kind_that_the_log_knows_has_its_family(self) -> None:
         assert {kind for kinds in KINDS.values() for kind in kinds} == set(_STEPS) | {"import"}
+
+    def test_edits_of_several_views_at_once_are_told_one_by_one(
+        self, store: Store, said: int
+    ) -> None:
+        state = load(store, said)
+        one, two = (view.key for view in state.group.views[:2])
+        edits = [SetLines(one, {"Middle line": None}), SetBall(two, None)]
+        state = submit_all(store, said, edits, if_match=state.etag, actor="anna")
+        undo(store, said, if_match=state.etag, actor="anna")
+        told = f"lines of view {one}: Middle line; balls of view {two}"
+        assert lines(store)[1] == f"anna: {told}"
+        # What takes them back begins with the last.
+        assert lines(store)[0].startswith(f"anna: undid: balls of view {two}; lines of view {one}")
 
     def test_edits_are_told_by_what_they_set_where_and_whether_they_were_taken_back(
         self, store: Store, said: int

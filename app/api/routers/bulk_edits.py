@@ -1,0 +1,75 @@
+"""Bulk edits: balls and lines of many views in one request."""
+
+from __future__ import annotations
+
+from functools import partial
+
+from fastapi import APIRouter, Response
+
+from app.api.deps import STRONG_ETAG, Actor, AppServices, DatasetPath, DryRun
+from app.api.problem import responses
+from app.api.reply import AskedUnder, Reply, document
+from app.api.schemas.bulk_edits import BulkEdit, BulkEditDocument
+from app.errors import InputError
+from app.review.datasets.dataset import dataset_id
+from app.review.editing.bulk_edits import BulkEditReport, edit_views, plan_edits
+from app.review.editing.solve_encoded import solve_encoded
+
+router = APIRouter(prefix="/datasets/{dataset}/edits", tags=["views"])
+
+
+@router.post(
+    "",
+    operation_id="editViews",
+    response_model=BulkEditDocument,
+    responses=responses(404, 413, 415),
+)
+def edit_many(
+    dataset: DatasetPath,
+    edit: BulkEdit,
+    services: AppServices,
+    actor: Actor,
+    asked: AskedUnder,
+    dry_run: DryRun = False,
+) -> Response:
+    """Set balls and lines of many views, each as `PATCH /views/{view}/ball` and `/lines` do.
+
+    The views of one group are one edit, which is done whole or not at all and undone like any
+    other. Groups do not depend on each other: the answer says of each item what came of it.
+    """
+    _require_states(edit)
+    store, found = services.store, dataset_id(services.store, dataset)
+    if dry_run:
+        plan = plan_edits(store, found, edit.edits(), actor=actor)
+        return document(BulkEditDocument.of(plan))
+    reply = Reply[BulkEditReport](asked, lambda report: document(BulkEditDocument.of(report)))
+    report = edit_views(
+        store,
+        found,
+        edit.edits(),
+        actor=actor,
+        keep=reply.keep,
+        progress=reply.progress,
+        paint=services.paint,
+        solve=partial(services.large.run, solve_encoded),
+    )
+    return reply.of(report)
+
+
+def _require_states(edit: BulkEdit) -> None:
+    """Refuse items that do not name the state that they build on, as ``require_if_match`` does."""
+    for index, item in enumerate(edit.items):
+        pointer = f"/items/{index}/etag"
+        if item.etag is None and edit.if_match is None:
+            raise InputError(
+                "an item must name the state that it builds on",
+                hint='Send the ETag of its group as "etag"; or "if_match": "*" beside the items to '
+                "change whatever is there. Nothing was done.",
+                pointer=pointer,
+            )
+        if item.etag is not None and not STRONG_ETAG.fullmatch(item.etag):
+            raise InputError(
+                "the etag of an item must be one strong ETag, in its quotes",
+                hint='Send the "etag" of the group as it is.',
+                pointer=pointer,
+            )
