@@ -140,7 +140,9 @@ class ZipTree:
             if problem is None:
                 checked[name] = member
             else:
-                report.note(str(self.path), name[:200], None, problem)
+                # As the zip file spells it: that is what a person looks for.
+                shown = member.filename if "\\" in member.filename else name
+                report.note(str(self.path), shown[:200], None, problem)
         return checked
 
     def _check_totals(self, members: list[zipfile.ZipInfo]) -> None:

@@ -29,6 +29,7 @@ from tests.scenes import make_scenes
 from tests.security.asking import JSON, Answer, assert_guarded
 from tests.security.conftest import API, FORMULA, Guarded
 from tests.security.table import CORPUS, MISSING, TABLE, Row, lines_of, rows, served
+from tests.waiting import SECONDS
 
 STALL_SECONDS = 45.0
 """A request that never comes whole has ended by then; the limits are 15 and 20 seconds."""
@@ -213,6 +214,12 @@ class TestEveryRoute:
                 assert_guarded(answer, told_of(row, answer, method))
 
     def test_reading_changes_nothing(self, guarded: Guarded) -> None:
+        # The webhook is tried in the background, twice within seconds; the third try is minutes away.
+        deliveries = f"/datasets/small/webhooks/{guarded.ids['webhook']}/deliveries"
+        end = time.monotonic() + SECONDS
+        while guarded.json("GET", deliveries)["items"][0]["attempts"] < 2:
+            assert time.monotonic() < end
+            time.sleep(0.1)
         before = _state(guarded.home)
         override = yaml.safe_load((CORPUS / "overrides.yaml").read_text())
         for row in rows("reading"):
