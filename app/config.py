@@ -195,6 +195,10 @@ class Settings(BaseSettings):
     """Largest uploaded file; a JSON body is smaller still."""
     upload_days: int = 7
     """After so many days an uploaded file that no dataset reads its frames from is deleted."""
+    upload_quota_bytes: int = Field(default=20 * 1024**3, ge=0)
+    """Bytes that the uploads of one person may have together on a team's server; 0: no limit."""
+    export_days: int = Field(default=30, ge=0)
+    """After so many days the file of a finished export is deleted, and can be made again; 0: never."""
     answer_bytes: int = 64 * 2**20
     """Room for answers under Idempotency-Keys; beyond it the oldest lose their text, not their
     key."""
