@@ -230,6 +230,7 @@ _ROWS: Mapping[Action | None, tuple[str, ...]] = {
         "DELETE /api/v1/datasets/{dataset}",
         "GET /api/v1/users",
         "POST /api/v1/users",
+        "POST /api/v1/users/invitations",
         "PATCH /api/v1/users/{user}",
         "POST /api/v1/users/{user}/link",
         "POST /api/v1/users/{user}/adoption",
