@@ -8,7 +8,7 @@ import { queryText, request } from './client.js';
 /** @typedef {{id: number, name: string, role: Role, everywhere: Role, single: Role | null}} MemberJson */
 /** @typedef {'account' | 'read' | 'describe' | 'annotate' | 'review' | 'export' | 'lead' | 'administer'} Action */
 /** @typedef {{password: boolean, sign_on: string | null}} WaysIn   how people log in */
-/** @typedef {{team: boolean, name: string | null, role: Role | null, enrol: boolean, way?: 'password' | 'passkey' | 'sign_on' | null, ways?: WaysIn | null, moment: string | null, may: Action[], datasets: SingleRole[], allows: Record<Role, Action[]>}} SessionJson */
+/** @typedef {{team: boolean, name: string | null, role: Role | null, enrol: boolean, way?: 'password' | 'passkey' | 'sign_on' | null, ways?: WaysIn | null, moment: string | null, maintenance?: import('./maintenance.js').BannerJson | null, may: Action[], datasets: SingleRole[], allows: Record<Role, Action[]>}} SessionJson */
 /** @typedef {{id: number, this: boolean, browser: string, address: string, created: string, seen: string, expires: string}} OpenSessionJson */
 /** @typedef {{id: number, name: string, role: Role, disabled: boolean, joined: boolean, invited: boolean, created: string, created_by: string, seen: string | null, second_factor: boolean, tokens: number, sign_on: string | null, datasets: SingleRole[]}} UserJson */
 /** @typedef {{user: UserJson, link: string | null, expires: string, mailed: boolean, problem: string | null}} UserWithLink   link: null where it went by mail */

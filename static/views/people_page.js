@@ -17,6 +17,7 @@ import { myName } from '../state/me.js';
 import { CopyField } from './copy_field.js';
 import { FormError } from './form_error.js';
 import { InviteManyCard } from './invite_many_card.js';
+import { MaintenanceCard } from './maintenance_bar.js';
 import { MembersCard } from './members_card.js';
 import { Loading, PageFrame, Trouble } from './page_frame.js';
 import { TokenTable } from './token_table.js';
@@ -224,6 +225,7 @@ export function PeoplePage() {
 					</table></div>
 					<${FactorRule} act=${act} />
 				</section>
+				<${MaintenanceCard} />
 				<${InOneDataset} key=${String(people.length)} />
 				<${LocalWork} people=${people} adoptedBy=${found.value?.adopted_by ?? null} give=${(/** @type {number} */ id) => act(postAdoption(id))} />` : null}
 		<//>

@@ -9,6 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field, StrictBool
 from pydantic.config import JsonDict
 
 from app.api.schemas.document import Document, ListDocument
+from app.api.schemas.maintenance import BannerDocument
 from app.review.people.invitations import MOST
 from app.review.people.logins import Way
 from app.review.people.roles import Action, Role
@@ -167,6 +168,9 @@ class SessionDocument(Document):
         default=None,
         description="How things stand, for `since` of the events: what comes after this answer is "
         "told then. Null: nobody is logged in, or they have just come.",
+    )
+    maintenance: BannerDocument | None = Field(
+        default=None, description="The notice that everybody is shown; null: there is none."
     )
     may: list[Action] = Field(description="What the role lets them do.")
     datasets: list[SingleRoleDocument] = Field(

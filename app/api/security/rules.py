@@ -238,6 +238,8 @@ _ROWS: Mapping[Action | None, tuple[str, ...]] = {
         "DELETE /api/v1/users/{user}/identity",
         "GET /api/v1/team",
         "PUT /api/v1/team",
+        "PUT /api/v1/maintenance",
+        "DELETE /api/v1/maintenance",
         "GET /api/v1/users/{user}/tokens",
         "DELETE /api/v1/users/{user}/tokens/{token}",
     ),
