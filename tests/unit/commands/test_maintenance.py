@@ -10,6 +10,8 @@ import pytest
 from typer.testing import CliRunner, Result
 
 from app.commands.command_line import app
+from app.config import Settings
+from app.store.store import Store
 
 
 @pytest.fixture(autouse=True)
@@ -17,6 +19,8 @@ def home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     for name in [name for name in os.environ if name.startswith("TOUCHLINE_")]:
         monkeypatch.delenv(name)
     monkeypatch.setenv("TOUCHLINE_HOME", str(tmp_path / "home"))
+    # What is logged of a database that is made stands before no answer.
+    Store.open(Settings()).close()
 
 
 def run(*words: str) -> Result:

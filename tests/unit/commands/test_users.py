@@ -22,6 +22,7 @@ from app.review.people import links, passwords
 from app.review.people.access_tokens import AccessTokens
 from app.review.people.audit import read_audit
 from app.review.people.logins import Login, Logins
+from app.review.people.people import list_people
 from app.review.people.roles import EVERYTHING, Role, Scope
 from app.review.people.second_factor import SecondFactors
 from app.store.audit import AuditQuery
@@ -75,8 +76,9 @@ class TestUsers:
         assert login.role is Role.LEAD
 
     def test_a_link_goes_by_mail_where_an_address_is_given(
-        self, monkeypatch: pytest.MonkeyPatch
+        self, store: Store, monkeypatch: pytest.MonkeyPatch
     ) -> None:
+        assert list_people(store) == []
         with serving(MailBox()) as box:
             for name, value in {
                 "URL": "https://touchline.example.org",
