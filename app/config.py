@@ -180,6 +180,22 @@ class Settings(BaseSettings):
     sso_second_factor: list[str] = []
     """Values of the claims ``amr`` and ``acr`` by which the provider says that it has asked for a second
     factor: with one of them ours is not asked for; empty: it always is."""
+    smtp_host: str | None = None
+    """Mail server by which invitations are sent, such as smtp.example.org; empty: no mail is sent, and links
+    are shown."""
+    smtp_port: int | None = Field(default=None, ge=1, le=65535)
+    """Its port; empty: 587 with ``starttls``, 465 with ``tls``, 25 with ``none``."""
+    smtp_security: Literal["starttls", "tls", "none"] = "starttls"
+    """``starttls`` or ``tls``: the connection is encrypted, and the server's certificate checked; ``none``
+    only for a mail server on this machine."""
+    smtp_user: str | None = None
+    """The account at the mail server, if it wants one."""
+    smtp_password: SecretStr | None = Field(default=None, repr=False)
+    """Its password."""
+    smtp_password_file: Path | None = Field(default=None, repr=False)
+    """Or a file with that password, which its owner alone may read (``chmod 600``)."""
+    smtp_from: str | None = None
+    """Address that mail is from, such as touchline@example.org."""
     workers: int = Field(default_factory=lambda: os.cpu_count() or 1)
     """Processes that solve in batches."""
     web_workers: int = Field(default=1, ge=1, le=64)
@@ -195,6 +211,11 @@ class Settings(BaseSettings):
     """Largest uploaded file; a JSON body is smaller still."""
     upload_days: int = 7
     """After so many days an uploaded file that no dataset reads its frames from is deleted."""
+    upload_quota_bytes: int = Field(default=20 * 1024**3, ge=0)
+    """Bytes that the uploads of one person may have together on a team's server; 0: no limit."""
+    export_days: int = Field(default=0, ge=0)
+    """After so many days the file of a finished export is deleted; 0: never. Of a version the same export can
+    be made again; another one has the dataset as it is then."""
     answer_bytes: int = 64 * 2**20
     """Room for answers under Idempotency-Keys; beyond it the oldest lose their text, not their
     key."""

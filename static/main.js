@@ -14,6 +14,7 @@ import { startInsight } from './state/insight.js';
 import { startLeases } from './state/leases.js';
 import { startLive } from './state/live.js';
 import { askWhoIsThere, isTeam, me, startRights } from './state/me.js';
+import { startMaintenance } from './state/maintenance.js';
 import { startMends } from './state/mends.js';
 import { lasting, outbox } from './state/outbox.js';
 import { startBell } from './state/bell.js';
@@ -39,6 +40,7 @@ function startWork() {
 	startThreads();
 	startBell();
 	startRights();
+	startMaintenance();
 }
 
 startRouter();

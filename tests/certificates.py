@@ -16,13 +16,15 @@ from cryptography.hazmat.primitives.serialization import (
 from cryptography.x509.oid import NameOID
 
 
-def write_keys(folder: Path, name: str = "touchline") -> Path:
-    """``ca.pem``, ``cert.pem`` and ``key.pem`` of an authority and a member of that name."""
+def write_keys(folder: Path, name: str = "touchline", host: str | None = None) -> Path:
+    """``ca.pem``, ``cert.pem`` and ``key.pem`` of an authority and a member of that name.
+
+    With a ``host`` the member is a server of that name."""
     folder.mkdir(parents=True, exist_ok=True)
     authority, own = (ec.generate_private_key(ec.SECP256R1()) for _ in range(2))
     issuer, subject = _name(f"{name} authority"), _name(name)
     ca = _certificate(issuer, issuer, authority, authority, is_authority=True)
-    certificate = _certificate(subject, issuer, own, authority, is_authority=False)
+    certificate = _certificate(subject, issuer, own, authority, is_authority=False, host=host)
     key = own.private_bytes(Encoding.PEM, PrivateFormat.PKCS8, NoEncryption())
     (folder / "ca.pem").write_bytes(ca.public_bytes(Encoding.PEM))
     (folder / "cert.pem").write_bytes(certificate.public_bytes(Encoding.PEM))
@@ -38,9 +40,10 @@ def _certificate(
     signer: ec.EllipticCurvePrivateKey,
     *,
     is_authority: bool,
+    host: str | None = None,
 ) -> x509.Certificate:
     now = datetime.now(UTC)
-    return (
+    builder = (
         x509.CertificateBuilder()
         .subject_name(subject)
         .issuer_name(issuer)
@@ -49,8 +52,11 @@ def _certificate(
         .not_valid_before(now - timedelta(minutes=5))
         .not_valid_after(now + timedelta(days=1))
         .add_extension(x509.BasicConstraints(is_authority, None), critical=True)
-        .sign(signer, SHA256())
     )
+    if host is not None:
+        names = x509.SubjectAlternativeName([x509.DNSName(host)])
+        builder = builder.add_extension(names, critical=False)
+    return builder.sign(signer, SHA256())
 
 
 def _name(text: str) -> x509.Name:

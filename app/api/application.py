@@ -33,6 +33,7 @@ from app.api.routers import (
     imports,
     insight,
     jobs,
+    maintenance,
     members,
     noise,
     paint,
@@ -127,6 +128,7 @@ ROUTERS = (
     sign_on,
     passkeys,
     second_factors,
+    maintenance,
     tokens,
     users,
     members,
@@ -168,7 +170,8 @@ def create_app(settings: Settings, *, static: Path = STATIC, pool: Pool = nullco
     install_handlers(app)
     app.include_router(health.router, dependencies=[Depends(require_decided)])
     # Before the API: nobody asks for as much at once as somebody who opens the first page.
-    install_pages(app, site, None if settings.team else services.events.moment)
+    events = services.events
+    install_pages(app, site, None if settings.team else events.moment, events.banner)
     for router in ROUTERS:
         app.include_router(
             router.router,

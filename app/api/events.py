@@ -21,11 +21,19 @@ import structlog
 from fastapi.sse import KEEPALIVE_COMMENT, format_sse_event
 from pydantic import BaseModel
 
-from app.api.schemas.event import DatasetEvent, GroupEvent, PresenceDocument, WorkEvent
+from app.api.schemas.event import (
+    DatasetEvent,
+    GroupEvent,
+    MaintenanceEvent,
+    PresenceDocument,
+    WorkEvent,
+)
 from app.api.schemas.job import JobDocument
+from app.api.schemas.maintenance import BannerDocument
 from app.errors import OverloadedError, StorageError
 from app.review.jobs.jobs import Jobs
 from app.review.jobs.records import Job
+from app.review.people.maintenance import Banner, read_banner
 from app.review.people.roles import EVERYTHING, Sight
 from app.review.queue.changes import (
     Change,
@@ -138,6 +146,7 @@ class Events:
         self._wake, self._closing = threading.Event(), threading.Event()
         self._thread: threading.Thread | None = None
         self._solutions = 0
+        self._banner: Banner | None = None
         self._counts = Counts()
         jobs.listen(self._tell_job)
         store.listen(self._wake.set)
@@ -150,6 +159,11 @@ class Events:
     def moment(self) -> str:
         """How things stand, as a page that begins to read them tells the stream later on."""
         return "-".join(map(str, read_moment(self._store)))
+
+    def banner(self) -> str:
+        """The notice of maintenance as JSON; empty: there is none."""
+        banner = read_banner(self._store)
+        return "" if banner is None else BannerDocument.model_validate(banner).model_dump_json()
 
     def solved_since(self, solution: int, feed: Feed) -> list[bytes]:
         """Solutions that arrived after one, for a listener that has read what was there then."""
@@ -242,6 +256,7 @@ class Events:
     def _look(self, feeds: list[Feed], *, first: bool) -> None:
         """Tell each listener what has happened since it was told last."""
         places = {feed.position for feed in feeds}
+        self._look_for_banner(feeds, first=first)
         news = read_news(self._store, places, None if first else self._solutions)
         self._solutions = news.solution
         written = functools.cache(_change_event)
@@ -252,6 +267,15 @@ class Events:
             if events := [written(item) for item in wanted if feed.is_told(item)]:
                 told[feed] = events
         _tell(told)
+
+    def _look_for_banner(self, feeds: list[Feed], *, first: bool) -> None:
+        """Tell each listener of another notice of maintenance, whichever process has set it."""
+        before, self._banner = self._banner, read_banner(self._store)
+        if first or self._banner == before:
+            return
+        banner = self._banner and BannerDocument.model_validate(self._banner)
+        event = _event("maintenance", MaintenanceEvent(banner=banner))
+        _tell({feed: [event] for feed in feeds})
 
     def tell_lease(self, lease: Lease) -> None:
         """Tell who has a group of a batch open."""

@@ -59,9 +59,15 @@ ELSEWHERE = f"/{{path:{_Elsewhere.NAME}}}"
 register_url_convertor(_Elsewhere.NAME, _Elsewhere())
 
 
-def install_pages(app: FastAPI, site: Site, moment: Callable[[], str] | None = None) -> None:
+def install_pages(
+    app: FastAPI,
+    site: Site,
+    moment: Callable[[], str] | None = None,
+    banner: Callable[[], str] = str,
+) -> None:
     """Serve the pages and the modules of the browser application.
 
+    ``banner`` is the notice of maintenance as JSON, for pages that are told the moment.
     ``moment`` says how things stand, so that a page hears of all that happens after it was asked
     for; None: the page asks who is there before it reads anything, and is told with the answer.
     """
@@ -78,7 +84,7 @@ def install_pages(app: FastAPI, site: Site, moment: Callable[[], str] | None = N
         if moment is not None:
             # A page without it asks once more for what it has read when its stream begins.
             with suppress(StorageError):
-                index = index.at(moment())
+                index = index.at(moment(), banner())
         headers = {"ETag": index.etag, "Cache-Control": REVALIDATED}
         if index.etag in request.headers.get("if-none-match", ""):
             return Response(status_code=304, headers=headers)

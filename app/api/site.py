@@ -7,6 +7,7 @@ import hashlib
 import os
 import re
 from dataclasses import dataclass, replace
+from html import escape
 from pathlib import Path
 
 from app.api.joined_modules import JoinedModules
@@ -42,10 +43,12 @@ class IndexPage:
     modules: tuple[str, ...]
     """What the page asks for beside them: paths below the folder of the application."""
 
-    def at(self, moment: str) -> IndexPage:
-        """The page that says how things stood when it was asked for."""
-        html = self.html.replace(b"<html ", f'<html data-moment="{moment}" '.encode(), 1)
-        return replace(self, html=html, etag=f'{self.etag[:-1]}-{moment}"')
+    def at(self, moment: str, banner: str = "") -> IndexPage:
+        """The page that says how things stood when it was asked for, and which notice is shown."""
+        told = f'data-moment="{moment}" ' + (f'data-banner="{escape(banner)}" ' if banner else "")
+        html = self.html.replace(b"<html ", f"<html {told}".encode(), 1)
+        version = f"{moment}-{digest_of(banner.encode())[:8]}" if banner else moment
+        return replace(self, html=html, etag=f'{self.etag[:-1]}-{version}"')
 
     @staticmethod
     def make(folder: Path, version: str, *, team: bool = False) -> IndexPage:

@@ -13,6 +13,7 @@ from app.api.security.cookie import cookie_of
 from app.api.security.tries import Tries
 from app.config import Settings
 from app.errors import ConflictError, NotLoggedInError
+from app.mail import MailServer, read_mail_server
 from app.review.people.access_tokens import AccessTokens
 from app.review.people.challenges import LASTS as CHALLENGE_LASTS
 from app.review.people.devices import LASTS as DEVICE_LASTS
@@ -50,6 +51,7 @@ class Team:
         proxies: Who is believed whom they forward.
         tries: Counts who tries too often.
         devices: Browsers in which people have logged in before.
+        mail: Sends invitations; None: links are shown.
     """
 
     logins: Logins
@@ -61,13 +63,14 @@ class Team:
     proxies: frozenset[str]
     tries: Tries
     devices: Devices
+    mail: MailServer | None
 
     @staticmethod
     def of(settings: Settings, store: Store) -> Team | None:
         """Of a server of a team; None for one that somebody runs alone.
 
         Raises:
-            InputError: The settings of single sign-on are there by half.
+            InputError: The settings of single sign-on, or of mail, are there by half.
         """
         rules = read_rules(settings)
         if not settings.team:
@@ -83,6 +86,7 @@ class Team:
             frozenset(settings.proxies),
             Tries(store),
             Devices(store),
+            read_mail_server(settings),
         )
 
     @property

@@ -24,6 +24,7 @@ from app.commands import (
     evaluation,
     files,
     lines,
+    maintenance,
     noise,
     paint,
     picture,
@@ -93,6 +94,7 @@ PARTS = (
     evaluation,
     predictions,
     doctor,
+    maintenance,
     backup,
     cluster,
 )

@@ -92,10 +92,12 @@ def serve(
 
 def _require_safe(settings: Settings) -> None:
     """Refuse to serve where strangers could come in, or passwords would be read on their way."""
+    from app.mail import read_mail_server
     from app.review.people.exposure import exposure_of
     from app.review.people.sign_on_rules import read_rules
 
     read_rules(settings)
+    read_mail_server(settings)
     problem = exposure_of(settings)
     if problem is not None:
         raise typer.BadParameter(problem)

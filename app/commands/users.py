@@ -13,6 +13,7 @@ from app.commands.terminal import print_json, print_values, say
 
 if TYPE_CHECKING:
     from app.review.people.access_tokens import AccessToken
+    from app.review.people.invitations import Post
     from app.review.people.links import Link
     from app.review.people.people import Person
     from app.review.people.roles import Role
@@ -39,15 +40,59 @@ def add(
     role: Annotated[
         str, typer.Option(help="none, viewer, annotator, reviewer, lead or admin.")
     ] = "reviewer",
+    email: Annotated[
+        str | None, typer.Option(metavar="ADDRESS", help="Send the link there by mail.")
+    ] = None,
     json_: Json = False,
 ) -> None:
-    """Make an account, and print the link with which its person chooses a password."""
-    from app.review.people.people import invite
+    """Make an account, and print or mail the link with which its person chooses a password."""
+    from app.review.people.invitations import invite_one
 
-    wanted = _role(role)
+    wanted, post = _role(role), _post()
     with opened_store() as store:
-        person, link = invite(store, name, wanted, actor=acting())
-    _print_link(person, link, json_)
+        _, row = invite_one(store, name, wanted, email, post, actor=acting())
+    values = {key: value for key, value in vars(row).items() if key not in ("row", "state")}
+    print_values({key: value for key, value in values.items() if value not in (None, False)}, json_)
+
+
+@commands.command("invite-many")
+def invite_many(
+    file: Annotated[
+        typer.FileText,
+        typer.Argument(help="A line of name,role,email for each person; - reads standard input."),
+    ],
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="Only report what would happen.")
+    ] = False,
+    json_: Json = False,
+) -> None:
+    """Make many accounts at once; mail or print each link. 1 if a row was refused."""
+    from app.review.people.invitations import invite_many as invite
+    from app.review.people.invitations import read_list
+
+    rows, post = read_list(file.read()), _post()
+    with opened_store() as store:
+        report = invite(store, rows, post, actor=acting(), dry_run=dry_run)
+    refused = sum(row.state == "refused" for row in report)
+    if json_:
+        print_json([vars(row) for row in report])
+    else:
+        for row in report:
+            told = [row.link, "link sent by mail" if row.mailed else None, row.problem]
+            more = "; ".join(part for part in told if part)
+            say(f"row {row.row:<4} {row.name:24} {row.role:10} {row.state:9} {more}".rstrip())
+        say(f"{len(report) - refused} {'possible' if dry_run else 'invited'}, {refused} refused")
+    if refused:
+        raise typer.Exit(1)
+
+
+def _post() -> Post:
+    from app.mail import read_mail_server
+    from app.review.people.invitations import Post
+
+    settings = read_settings()
+    base = settings.url or f"http://{settings.host}:{settings.port}"
+    return Post(read_mail_server(settings), settings.url, base)
 
 
 @commands.command("list")

@@ -28,6 +28,7 @@ from app.errors import InputError, NotFoundError, StorageError, TooLargeError
 from app.finite import json_text
 from app.store.clock import now
 from app.store.locks import require_lock
+from app.store.upload_quota import quota_of, require_room, used_bytes
 
 PART = ".part"
 """How the name of a half-sent upload's folder ends."""
@@ -40,6 +41,8 @@ _MAX_SUFFIX = 20
 _RECORD = "upload.json"
 _CONTENT = "content"
 _CHUNK = 1 << 20
+_STEP = 1 << 26
+"""Bytes that are reserved at a time where nobody says how many come."""
 _WRITING = threading.Lock()
 WRITING_SECONDS = 10.0
 """So long one process waits for another that writes a record."""
@@ -264,16 +267,47 @@ def upload_id(file: Path) -> str:
 class UploadWriter:
     """Takes an upload chunk by chunk; it is there when ``finish`` returns, or not at all.
 
+    Args:
+        settings: Where it will lie, and how large it may be.
+        name: As it is sent.
+        by: Who sends it.
+        declared: How many bytes its sender says that it has; 0: nobody says.
+
     Raises:
+        TooLargeError: Its sender may not have so much, here and while it is written.
         StorageError: The disk refuses, here and in each method.
     """
 
-    def __init__(self, settings: Settings, name: str):
-        self._settings, self._name = settings, safe_name(name)
+    def __init__(self, settings: Settings, name: str, *, by: str | None = None, declared: int = 0):
+        self._settings, self._name, self._by = settings, safe_name(name), by
         self._folder = settings.uploads / f"{uuid.uuid4().hex}{PART}"
         self._digest = UploadDigest(self._name)
+        self._quota = quota_of(settings) if by else None
+        self._reserved = 0
         self.bytes = 0
+        if self._quota is None:
+            self._open()
+        else:
+            self._reserve(declared, self._quota)
+
+    def _reserve(self, size: int, quota: int) -> None:
+        """Reserve so many bytes of the sender's quota, or some more where nobody says how many come."""
+        by = self._by or ""
+        with _writing(self._settings):
+            used = used_bytes(self._settings, by, but=self._folder)
+            require_room(self._settings, size, quota, used)
+            more = 0 if size > self.bytes else _STEP
+            self._reserved = min(size + more, quota - used)
+            if not self._folder.exists():
+                self._open()
+            # Without an id it is none that is listed; ``finish`` writes the one that counts.
+            draft = Upload("", self._name, self._reserved, now(), by=(by,))
+            with _reported():
+                _write_record(self._folder, draft)
+
+    def _open(self) -> None:
         with _reported():
+            settings = self._settings
             _make_folder(settings)
             content = self._folder / _CONTENT
             content.mkdir(mode=0o700, parents=True)
@@ -284,22 +318,21 @@ class UploadWriter:
         """Add some bytes.
 
         Raises:
-            TooLargeError: It is longer than the settings allow.
+            TooLargeError: It is longer than the settings, or the quota of its sender, allow.
         """
         self.bytes += len(chunk)
         require_size(self._settings, self.bytes)
+        if self._quota is not None and self.bytes > self._reserved:
+            self._reserve(self.bytes, self._quota)
         self._digest.update(chunk)
         with _reported():
             self._file.write(chunk)
 
-    def finish(
-        self, guess: Callable[[Path], str | None] = lambda path: None, *, by: str | None = None
-    ) -> Upload:
+    def finish(self, guess: Callable[[Path], str | None] = lambda path: None) -> Upload:
         """Make it an upload.
 
         Args:
             guess: From the file to the format that it most likely has.
-            by: Who sends it.
 
         Raises:
             InputError: Nothing was sent.
@@ -312,6 +345,7 @@ class UploadWriter:
             os.fsync(self._file.fileno())
             self._file.close()
         upload = Upload(self._digest.id, self._name, self.bytes, now())
+        by = self._by
         shared = _shared(self._settings, upload.id, by)
         if shared is not None:
             self.abort()

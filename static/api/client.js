@@ -156,7 +156,7 @@ export function preview(id, body, signal) {
 	return request(`/groups/${id}/preview`, { method: 'POST', body, signal });
 }
 
-/** @typedef {{dataset: string, format: string, all: boolean, boxes: string, images?: string, views?: string, version?: string | null}} ExportRequest */
+/** @typedef {{dataset: string, format: string, all: boolean, boxes: string, images?: string, views?: string, version?: string | number | null}} ExportRequest */
 
 /**
  * @param {ExportRequest} body

@@ -6,10 +6,10 @@
 import { signal } from '@preact/signals';
 import { readStream } from './shared_stream.js';
 
-/** @typedef {'group' | 'job' | 'dataset' | 'work'} EventKind */
+/** @typedef {'group' | 'job' | 'dataset' | 'work' | 'maintenance'} EventKind */
 /** @typedef {{heard: (data: any) => void, missed: () => void}} Listener */
 
-const KINDS = /** @type {const} */ (['group', 'job', 'dataset', 'work']);
+const KINDS = /** @type {const} */ (['group', 'job', 'dataset', 'work', 'maintenance']);
 
 /** Whether the server can tell; where it cannot, ask. Left as it is while nobody looks. */
 export const connected = signal(false);

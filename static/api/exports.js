@@ -8,9 +8,10 @@ import { queryText, request } from './client.js';
 /**
  * @typedef {object} ExportRow
  * @property {string} id
- * @property {'waiting' | 'running' | 'ready' | 'failed' | 'cancelled' | 'gone'} status
+ * @property {'waiting' | 'running' | 'ready' | 'failed' | 'cancelled' | 'gone' | 'expired'} status
  * @property {{dataset: string, format: string, all: boolean, version: string | number | null, boxes: string, images: string}} request
  * @property {string} created
+ * @property {string | null} expires when its file is deleted
  * @property {string | null} content
  * @property {number | null} bytes
  * @property {Counts | null} counts

@@ -1,17 +1,20 @@
 // @ts-check
 /** Who is logged in, their sessions, and everybody who has an account. */
 
-import { request } from './client.js';
+import { queryText, request } from './client.js';
 
 /** @typedef {'none' | 'viewer' | 'annotator' | 'reviewer' | 'lead' | 'admin'} Role */
 /** @typedef {{id: number, dataset: string, role: Role}} SingleRole   what somebody is in one dataset */
 /** @typedef {{id: number, name: string, role: Role, everywhere: Role, single: Role | null}} MemberJson */
 /** @typedef {'account' | 'read' | 'describe' | 'annotate' | 'review' | 'export' | 'lead' | 'administer'} Action */
 /** @typedef {{password: boolean, sign_on: string | null}} WaysIn   how people log in */
-/** @typedef {{team: boolean, name: string | null, role: Role | null, enrol: boolean, way?: 'password' | 'passkey' | 'sign_on' | null, ways?: WaysIn | null, moment: string | null, may: Action[], datasets: SingleRole[], allows: Record<Role, Action[]>}} SessionJson */
+/** @typedef {{team: boolean, name: string | null, role: Role | null, enrol: boolean, way?: 'password' | 'passkey' | 'sign_on' | null, ways?: WaysIn | null, moment: string | null, maintenance?: import('./maintenance.js').BannerJson | null, may: Action[], datasets: SingleRole[], allows: Record<Role, Action[]>}} SessionJson */
 /** @typedef {{id: number, this: boolean, browser: string, address: string, created: string, seen: string, expires: string}} OpenSessionJson */
 /** @typedef {{id: number, name: string, role: Role, disabled: boolean, joined: boolean, invited: boolean, created: string, created_by: string, seen: string | null, second_factor: boolean, tokens: number, sign_on: string | null, datasets: SingleRole[]}} UserJson */
-/** @typedef {{user: UserJson, link: string, expires: string}} UserWithLink */
+/** @typedef {{user: UserJson, link: string | null, expires: string, mailed: boolean, problem: string | null}} UserWithLink   link: null where it went by mail */
+/** @typedef {{name: string, role: string, email: string | null}} InvitedPerson */
+/** @typedef {{row: number, name: string, role: string, state: 'invited' | 'possible' | 'refused', link: string | null, expires: string | null, mailed: boolean, problem: string | null}} InvitationRow */
+/** @typedef {{items: InvitationRow[], dry_run: boolean, invited: number, refused: number, mailed: number}} InvitationReport */
 
 /** @returns {Promise<SessionJson>} */
 export const getSession = () => request('/session');
@@ -61,11 +64,14 @@ export const lookAtLink = (token) => request('/links/look', { method: 'POST', bo
 /** @param {{token: string, password: string, name?: string}} body @returns {Promise<SessionJson>} */
 export const postLink = (body) => request('/links/use', { method: 'POST', body });
 
-/** @returns {Promise<{items: UserJson[], adopted_by: string | null}>} */
+/** @returns {Promise<{items: UserJson[], adopted_by: string | null, mail: boolean}>} */
 export const getUsers = () => request('/users');
 
-/** @param {string} name @param {Role} role @returns {Promise<UserWithLink>} */
-export const postUser = (name, role) => request('/users', { method: 'POST', body: { name, role } });
+/** @param {string} name @param {Role} role @param {string} [email] where the link goes by mail @returns {Promise<UserWithLink>} */
+export const postUser = (name, role, email = '') => request('/users', { method: 'POST', body: { name, role, ...(email ? { email } : {}) } });
+
+/** @param {InvitedPerson[]} people @param {boolean} dryRun @returns {Promise<InvitationReport>} */
+export const postInvitations = (people, dryRun) => request(`/users/invitations${queryText({ dry_run: dryRun ? 'true' : '' })}`, { method: 'POST', body: { people } });
 
 /** @param {number} id @param {{role?: Role, disabled?: boolean}} body @returns {Promise<UserJson>} */
 export const patchUser = (id, body) => request(`/users/${id}`, { method: 'PATCH', body });

@@ -6,6 +6,7 @@ import { computed, effect, signal, untracked } from '@preact/signals';
 import { cameIn, forbidden, loggedOut } from '../api/client.js';
 import { connected } from '../api/events.js';
 import { deleteSession, getSession } from '../api/people.js';
+import { tellBanner } from './maintenance.js';
 import { inform } from './notice.js';
 
 /** @import {Action, SessionJson, WaysIn} from '../api/people.js' */
@@ -64,7 +65,8 @@ export function startRights() {
 export async function askWhoIsThere() {
 	const session = await getSession().catch(() => null);
 	if (session?.ways) ways.value = session.ways;
-	if (session?.name) welcome({ ...session, ways: null, moment: null });
+	tellBanner(session?.maintenance);
+	if (session?.name) welcome({ ...session, ways: null, moment: null, maintenance: null });
 	return session;
 }
 

@@ -7,6 +7,7 @@ import { plural } from '../lib/format.js';
 import { announced, dismiss, notice } from '../state/notice.js';
 import { barred, discard } from '../state/outbox.js';
 import { tryBarred } from '../state/sending.js';
+import { MaintenanceBar } from './maintenance_bar.js';
 
 /** What waits here because the person may not do it. */
 function BarredBar() {
@@ -22,7 +23,7 @@ function BarredBar() {
 }
 
 export function NoticeBar() {
-	return html`<${BarredBar} /><${Notice} />`;
+	return html`<${MaintenanceBar} /><${BarredBar} /><${Notice} />`;
 }
 
 function Notice() {

@@ -4,6 +4,7 @@
 import { html } from 'htm/preact';
 import { useEffect, useState } from 'preact/hooks';
 
+import { postExport } from '../api/client.js';
 import { listen } from '../api/events.js';
 import { deleteExport, getExports } from '../api/exports.js';
 import { useAttempt } from '../lib/attempt.js';
@@ -20,6 +21,9 @@ import { When } from './when.js';
 /** @import {ExportRow} from '../api/exports.js' */
 /** @import {JobJson} from '../api/jobs.js' */
 
+/** @param {string} at */
+const dayText = (at) => new Date(at).toLocaleDateString('en-GB', { day: 'numeric', month: 'short', year: 'numeric' });
+
 /** What is in it, in words. @param {ExportRow} row */
 function contents({ request, counts }) {
 	const what = request.version ? `version ${request.version}` : request.all ? 'all groups' : 'accepted groups';
@@ -27,8 +31,8 @@ function contents({ request, counts }) {
 	return [what, `${request.boxes} boxes`, ...numbers].join(' · ');
 }
 
-/** @param {{row: ExportRow, remove: () => void}} props */
-function Row({ row, remove }) {
+/** @param {{row: ExportRow, remove: () => void, again: () => void}} props */
+function Row({ row, remove, again }) {
 	const left = Object.entries(row.left_out ?? {});
 	const open = row.status === 'waiting' || row.status === 'running';
 	return html`
@@ -39,11 +43,12 @@ function Row({ row, remove }) {
 				${row.incomplete ? html`<small>${row.incomplete}</small>` : null}
 				${row.missing_images?.length ? html`<small>${plural(row.missing_images.length, 'frame')} missing</small>` : null}
 				${row.error ? html`<small class="form__error">${row.error}</small>` : null}</td>
-			<td>${row.incomplete ? html`<span class="pill" data-status="deferred" title=${row.incomplete}>incomplete</span>` : html`<span class="pill" data-state=${row.status}>${row.status}</span>`}</td>
+			<td>${row.incomplete && row.status === 'ready' ? html`<span class="pill" data-status="deferred" title=${row.incomplete}>incomplete</span>` : html`<span class="pill" data-state=${row.status}>${row.status}</span>`}${row.expires ? html`<small>until ${dayText(row.expires)}</small>` : null}</td>
 			<td data-numeric="true">${row.bytes === null ? '–' : sizeText(row.bytes)}</td>
 			<td><${When} at=${row.created} /></td>
 			<td><span class="table__actions">
 				${row.content ? html`<a class="button button--small" href=${row.content} download>Download<span class="hidden-text"> export ${row.id}</span></a>` : null}
+				${row.status === 'expired' ? html`<button class="button button--small" type="button" data-needs="review" data-of=${row.request.dataset} title="Its file was deleted after some days. This writes it again, as the dataset is now" onClick=${again}>Export again<span class="hidden-text">: export ${row.id}</span></button>` : null}
 				${open ? html`<a class="button button--small" href="/jobs">Job<span class="hidden-text"> of export ${row.id}</span></a>` : ['ready', 'failed', 'cancelled'].includes(row.status) ? html`<button class="button button--small" type="button" data-needs="lead" data-of=${row.request.dataset} onClick=${remove}>Delete<span class="hidden-text"> export ${row.id}</span></button>` : null}
 			</span></td>
 		</tr>
@@ -61,6 +66,8 @@ export function ExportsPage() {
 	}, []);
 	/** @param {ExportRow} row */
 	const remove = (row) => attempt(deleteExport(row.id), exports.reload);
+	/** @param {ExportRow} row */
+	const again = (row) => attempt(postExport(row.request), exports.reload);
 	const items = exports.value?.items ?? [];
 	return html`
 		<${PageFrame}
@@ -75,7 +82,7 @@ export function ExportsPage() {
 				<section class="card card--flush" aria-label="Exports">
 					<table class="table">
 						<thead><tr><th>dataset and format</th><th>what is in it</th><th>state</th><th data-numeric="true">size</th><th>made</th><td></td></tr></thead>
-						<tbody>${items.map((row) => html`<${Row} key=${row.id} row=${row} remove=${() => remove(row)} />`)}</tbody>
+						<tbody>${items.map((row) => html`<${Row} key=${row.id} row=${row} remove=${() => remove(row)} again=${() => again(row)} />`)}</tbody>
 					</table>
 				</section>` : null}
 			${asking && one ? html`<${ExportDialog} one=${one} onClose=${() => { setAsking(false); exports.reload(); }} />` : null}

@@ -12,6 +12,7 @@ import { navigate } from '../lib/router.js';
 import { ways } from '../state/me.js';
 import { FormError } from './form_error.js';
 import { useSessionForm } from './login.js';
+import { MaintenanceBar } from './maintenance_bar.js';
 import { SignOnButton } from './sign_on_button.js';
 
 /** @typedef {{name: string | null, joined: boolean}} Meant */
@@ -72,6 +73,7 @@ export function JoinPage() {
 	return html`
 		<main class="login">
 			<section class="card" aria-labelledby="join-title">
+				<${MaintenanceBar} />
 				<p class="login__brand">Touchline</p>
 				<h1 id="join-title">${meant ? titleOf(meant) : 'Choose a password'}</h1>
 				${meant ? html`<${Ways} meant=${meant} token=${token} />` : null}

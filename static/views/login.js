@@ -10,12 +10,16 @@ import { ApiError } from '../api/problem.js';
 import { beginSignOn } from '../api/sign_on.js';
 import { withForm } from '../lib/field.js';
 import { outbox } from '../state/outbox.js';
-import { me, ways, welcome } from '../state/me.js';
+import { askWhoIsThere, me, ways, welcome } from '../state/me.js';
 import { plural } from '../lib/format.js';
 import { FormError } from './form_error.js';
+import { MaintenanceBar } from './maintenance_bar.js';
 import { SignOnButton } from './sign_on_button.js';
 
 /** @import {SessionJson} from '../api/people.js' */
+
+/** Milliseconds. */
+const ASK_AGAIN = 60_000;
 
 /**
  * A form whose answer is a session.
@@ -101,10 +105,14 @@ export function LoginPage() {
 	useEffect(() => {
 		document.title = 'Log in · Touchline';
 		/** @type {HTMLElement | null | undefined} */ (main.current?.querySelector('input') ?? main.current?.querySelector('button'))?.focus();
+		// Before anybody has logged in no stream tells of another notice of maintenance.
+		const timer = setInterval(askWhoIsThere, ASK_AGAIN);
+		return () => clearInterval(timer);
 	}, []);
 	return html`
 		<main class="login" ref=${main}>
 			<section class="card" aria-labelledby="login-title">
+				<${MaintenanceBar} />
 				<p class="login__brand">Touchline</p>
 				<h1 id="login-title">Log in</h1>
 				<${LoginForm} />

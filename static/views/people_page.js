@@ -16,6 +16,8 @@ import { datasets } from '../state/datasets.js';
 import { myName } from '../state/me.js';
 import { CopyField } from './copy_field.js';
 import { FormError } from './form_error.js';
+import { InviteManyCard } from './invite_many_card.js';
+import { MaintenanceCard } from './maintenance_bar.js';
 import { MembersCard } from './members_card.js';
 import { Loading, PageFrame, Trouble } from './page_frame.js';
 import { TokenTable } from './token_table.js';
@@ -46,11 +48,21 @@ function cameBy({ name, created_by: by, sign_on: identity }) {
 	return identity ? 'came by single sign-on' : 'first admin of this server';
 }
 
-/** A link that is shown once. @param {{made: UserWithLink, close: () => void}} props */
+/** A link that is shown once, or was sent by mail. @param {{made: UserWithLink, close: () => void}} props */
 function LinkCard({ made, close }) {
+	if (made.link === null) {
+		return html`
+			<section class="card" role="status" aria-labelledby="people-link">
+				<h2 id="people-link">${made.user.name} is invited</h2>
+				<p>The link was sent by mail. Did it not arrive? <em>New link</em> below makes another one.</p>
+				<p class="buttons"><button class="button" type="button" onClick=${close}>Done</button></p>
+			</section>
+		`;
+	}
 	return html`
 		<section class="card" role="status" aria-labelledby="people-link">
 			<h2 id="people-link">Send this link to ${made.user.name}</h2>
+			${made.problem ? html`<p class="form__error">It was not sent by mail: ${made.problem}.</p>` : null}
 			<p>It sets their password, works once, until ${new Date(made.expires).toLocaleString('en-GB', { day: 'numeric', month: 'short', hour: '2-digit', minute: '2-digit' })}, and is not shown again.</p>
 			<${CopyField} label="Link" text=${made.link} close=${close} />
 		</section>
@@ -94,10 +106,10 @@ function TokensCard({ of, act, close }) {
 	`;
 }
 
-/** @param {{invite: (name: string, role: Role) => Promise<boolean>, error: ApiError | null}} props */
-function InviteCard({ invite, error }) {
+/** @param {{invite: (name: string, role: Role, email: string) => Promise<boolean>, mail: boolean, error: ApiError | null}} props */
+function InviteCard({ invite, mail, error }) {
 	const send = withForm(async (said, form) => {
-		if (await invite(String(said.get('name')), /** @type {Role} */ (said.get('role')))) form.reset();
+		if (await invite(String(said.get('name')), /** @type {Role} */ (said.get('role')), String(said.get('email') ?? ''))) form.reset();
 	});
 	return html`
 		<section class="card" aria-labelledby="people-invite">
@@ -106,9 +118,10 @@ function InviteCard({ invite, error }) {
 				<div class="form__columns">
 					<div class="form__row"><label for="people-name">Name</label><input class="field" id="people-name" name="name" required maxlength="40" autocomplete="off" autocapitalize="none" spellcheck=${false} /><small>Small letters and digits; the history keeps it permanently.</small></div>
 					<div class="form__row"><label for="people-role">Role</label><select class="field" id="people-role" name="role">${ROLES.map(({ name, note }) => html`<option key=${name} value=${name} defaultSelected=${name === 'reviewer'}>${name}: ${note}</option>`)}</select><small>Each role includes the rights of those above it.</small></div>
+					${mail ? html`<div class="form__row"><label for="people-email">E-mail (optional)</label><input class="field" id="people-email" name="email" type="email" maxlength="254" autocomplete="off" /><small>The link is sent there. The address is not stored.</small></div>` : null}
 				</div>
 				<${FormError} error=${error} />
-				<p><button class="button button--primary" type="submit">Make a link</button></p>
+				<p><button class="button button--primary" type="submit">${mail ? 'Invite' : 'Make a link'}</button></p>
 			</form>
 		</section>
 	`;
@@ -203,7 +216,8 @@ export function PeoplePage() {
 			${made ? html`<${LinkCard} key=${made.link} made=${made} close=${() => setMade(null)} />` : null}
 			${shown ? html`<${TokensCard} of=${shown} act=${act} close=${() => setShown(null)} />` : null}
 			${people ? html`
-				<${InviteCard} error=${error} invite=${(/** @type {string} */ name, /** @type {Role} */ role) => act(postUser(name, role), setMade)} />
+				<${InviteCard} error=${error} mail=${found.value?.mail ?? false} invite=${(/** @type {string} */ name, /** @type {Role} */ role, /** @type {string} */ email) => act(postUser(name, role, email), setMade)} />
+				<${InviteManyCard} mail=${found.value?.mail ?? false} invited=${found.reload} />
 				<section class="card card--flush" aria-labelledby="people-all">
 					<h2 id="people-all">Everybody</h2>
 					<div class="table__scroll"><table class="table">
@@ -217,6 +231,7 @@ export function PeoplePage() {
 					</table></div>
 					<${FactorRule} act=${act} />
 				</section>
+				<${MaintenanceCard} />
 				<${InOneDataset} key=${String(people.length)} />
 				<${LocalWork} people=${people} adoptedBy=${found.value?.adopted_by ?? null} give=${(/** @type {number} */ id) => act(postAdoption(id))} />` : null}
 		<//>

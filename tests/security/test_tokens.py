@@ -191,6 +191,11 @@ class TestTokens:
         me = f"{API}/users/{find_person(team.store, 'admin').id}"
         for method, target, body in (
             ("POST", f"{API}/users", {"name": "friend", "role": "admin"}),
+            (
+                "POST",
+                f"{API}/users/invitations",
+                {"people": [{"name": "friend", "role": "admin"}]},
+            ),
             ("PATCH", viewer, {"role": "admin"}),
             ("PATCH", viewer, {"disabled": True}),
             ("PATCH", me, {"disabled": True}),

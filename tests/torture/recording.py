@@ -44,9 +44,9 @@ for number in range(int(sys.argv[2])):
     ball = BallAnnotation(box=Box(100.0 + number, 200.0, 12.0, 12.0))
     state = submit(store, 1, SetBall(view, ball), if_match=state.etag, actor="ann")
     acknowledge()
-    writer = UploadWriter(settings, f"{number}.csv")
+    writer = UploadWriter(settings, f"{number}.csv", by="ann")
     writer.write(b"x,y,w,h\\n" * 200)
-    acknowledge(writer.finish(by="ann").id)
+    acknowledge(writer.finish().id)
 store.close()
 """
 _CALL = re.compile(r"^\d+\s+(\w+)\((.*)\)\s+= (-?\d+|\?)")

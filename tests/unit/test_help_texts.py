@@ -37,6 +37,7 @@ PLAIN_WORDS = """
     attempts lived processes shared sharing short shown web
     addresses messages sender signing
     challenges enrol task
+    invitation invitations invite mail maintenance quota
     joined turns
     proof provider identities sign
     access account join links login logins passwords roles team tokens

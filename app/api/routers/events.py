@@ -134,7 +134,8 @@ async def listen(
     """What changes, as it changes: by anybody, in a browser or on the command line.
 
     `group`: a group has another ETag. `dataset`: a dataset changed as a whole. `job`: a job began,
-    went on or ended. `work`: who has a group of a batch open. The stream begins with the jobs that are under way.
+    went on or ended. `work`: who has a group of a batch open. `maintenance`: another
+    notice is shown to everybody. The stream begins with the jobs that are under way.
     """
 
     async def told() -> AsyncIterator[bytes]:

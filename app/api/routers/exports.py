@@ -115,7 +115,8 @@ def list_exports(
         sight=sight,
     )
     more = str(jobs[limit - 1].id) if len(jobs) > limit else None
-    items = [ExportDocument.of_job(job, services.exports.find(str(job.id))) for job in jobs[:limit]]
+    days, find = services.settings.export_days, services.exports.find
+    items = [ExportDocument.of_job(job, find(str(job.id)), days) for job in jobs[:limit]]
     return ExportPage(items=items, next=more)
 
 
@@ -176,6 +177,14 @@ def get_content(
     entry = services.exports.find(export)
     if entry is not None and entry.stored is not None:
         return stored_file(services.settings, entry.stored, _file_name(document), request)
+    if document.state == "expired":
+        days = services.settings.export_days
+        raise NotFoundError(
+            "the file of this export has expired",
+            hint=f"Files of exports are kept for {days} days here. Make the export again."
+            if days
+            else "Make the export again.",
+        )
     path = services.exports.content(document.id)
     if document.state == "gone" or (document.state == "done" and not path.is_file()):
         raise NotFoundError("the file of this export is gone", hint="Make the export again.")
@@ -199,13 +208,13 @@ def _document(services: Services, export: str) -> ExportDocument:
     Raises:
         NotFoundError: There is none of that id.
     """
-    entry = services.exports.find(export)
+    entry, days = services.exports.find(export), services.settings.export_days
     if entry is not None:
-        return ExportDocument.of(entry)
+        return ExportDocument.of(entry, days)
     if _is_id(export):
         job = services.jobs.get(int(export))
         if job.kind == KIND:
-            return ExportDocument.of_job(job, None)
+            return ExportDocument.of_job(job, None, days)
     raise NotFoundError("there is no such export")
 
 

@@ -10,6 +10,7 @@ from fastapi import APIRouter, Depends, Request, Response
 from app.api.deps import AppServices, AppStore, Id
 from app.api.paging import paged
 from app.api.problem import responses
+from app.api.schemas.maintenance import BannerDocument
 from app.api.schemas.people import (
     LinkLook,
     LinkMeaning,
@@ -28,6 +29,7 @@ from app.api.team import AppTeam, Team
 from app.errors import NotLoggedInError
 from app.review.people import links
 from app.review.people.logins import Login
+from app.review.people.maintenance import read_banner
 from app.review.people.members import read_single_roles
 from app.review.people.roles import SCOPES, Action, Role, may
 from app.soccer.actors import LOCAL_USER
@@ -86,6 +88,7 @@ def get_session(request: Request, services: AppServices) -> SessionDocument:
             name=LOCAL_USER,
             role=Role.ADMIN,
             moment=services.events.moment(),
+            maintenance=_banner(services.store),
             may=every,
             allows=ALLOWS,
         )
@@ -95,7 +98,13 @@ def get_session(request: Request, services: AppServices) -> SessionDocument:
     rules = team.sign_on and team.sign_on.rules
     ways = WaysIn(password=not (rules and rules.only), sign_on=rules.label if rules else None)
     moment = None if login is None or login.roles.blind else services.events.moment()
-    return found.model_copy(update={"ways": ways, "moment": moment})
+    more = {"ways": ways, "moment": moment, "maintenance": _banner(services.store)}
+    return found.model_copy(update=more)
+
+
+def _banner(store: Store) -> BannerDocument | None:
+    banner = read_banner(store)
+    return None if banner is None else BannerDocument.model_validate(banner)
 
 
 @router.post("/session", operation_id="createSession", responses=responses(401, 409, 413, 415, 429))

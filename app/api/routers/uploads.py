@@ -27,6 +27,8 @@ from app.review.importing.receiving import (
     find_upload,
     finish_upload,
     own_uploads,
+    quota_of,
+    used_bytes,
 )
 
 router = APIRouter(prefix="/uploads", tags=["imports"])
@@ -78,7 +80,7 @@ async def upload_file(
 
 async def _receive(request: Request, services: Services, name: str, actor: str) -> Upload:
     """Write what comes, off the event loop; nothing stays of what does not come whole."""
-    writer = await _on_disk(begin_upload, services.settings, name, _declared(request))
+    writer = await _on_disk(begin_upload, services.settings, name, _declared(request), actor)
     writing = asyncio.ensure_future(_write(request, writer))
     try:
         while not writing.done():
@@ -88,7 +90,7 @@ async def _receive(request: Request, services: Services, name: str, actor: str) 
                     "the server is shutting down", hint="Send the file again in a moment."
                 )
         writing.result()
-        return await _on_disk(finish_upload, writer, actor)
+        return await _on_disk(finish_upload, writer)
     except BaseException as error:
         with CancelScope(shield=True):
             writing.cancel()
@@ -128,13 +130,18 @@ async def _on_disk(work: Callable[..., T], *arguments: Any) -> T:
 
 @router.get("", operation_id="listUploads", responses=responses())
 @paged()
-def get_uploads(services: AppServices, sight: Sees) -> UploadList:
-    """Every file of one's own that is still here; an admin is shown everybody's."""
+def get_uploads(services: AppServices, sight: Sees, actor: Actor) -> UploadList:
+    """Every file of one's own that is still here; an admin is shown everybody's.
+
+    `used_bytes` and `quota_bytes` are of whoever asks.
+    """
     settings = services.settings
     return UploadList(
         items=own_uploads(settings, sight),
         max_bytes=settings.max_upload_bytes,
         days=settings.upload_days,
+        used_bytes=used_bytes(settings, actor),
+        quota_bytes=quota_of(settings),
     )
 
 

@@ -4,17 +4,28 @@ from __future__ import annotations
 
 from fastapi import APIRouter, Request
 
-from app.api.deps import AppStore, Id
+from app.api.deps import AppStore, DryRun, Id
 from app.api.paging import paged
 from app.api.problem import responses
 from app.api.routers.sessions import Me
 from app.api.schemas.access_token import AccessTokenList
-from app.api.schemas.people import NewUser, UserDocument, UserEdit, UserList, UserWithLink
+from app.api.schemas.people import (
+    InvitationDocument,
+    InvitationList,
+    InvitationReport,
+    NewUser,
+    UserDocument,
+    UserEdit,
+    UserList,
+    UserWithLink,
+)
 from app.api.team import AppTeam, Team
 from app.review.people import people
+from app.review.people.invitations import Post, Wanted, invite_many, invite_one
 from app.review.people.links import Link
 from app.review.people.local_deeds import adopt, adopted_by
 from app.review.people.people import Person
+from app.store.store import Store
 
 router = APIRouter(prefix="/users", tags=["users"])
 
@@ -26,9 +37,14 @@ def _with_link(team: Team, request: Request, person: Person, link: Link) -> User
 
 @router.get("", operation_id="listUsers", responses=responses(401, 409))
 @paged()
-def list_users(store: AppStore, _team: AppTeam, _me: Me) -> UserList:
+def list_users(store: AppStore, team: AppTeam, _me: Me) -> UserList:
     """Everybody with an account, disabled ones too."""
-    return UserList(items=people.list_people(store), adopted_by=adopted_by(store))
+    return _list(store, team)
+
+
+def _list(store: Store, team: Team) -> UserList:
+    by_mail = team.mail is not None and team.url is not None
+    return UserList(items=people.list_people(store), adopted_by=adopted_by(store), mail=by_mail)
 
 
 @router.post(
@@ -40,9 +56,54 @@ def list_users(store: AppStore, _team: AppTeam, _me: Me) -> UserList:
 def invite_user(
     new: NewUser, request: Request, store: AppStore, team: AppTeam, me: Me
 ) -> UserWithLink:
-    """Make an account; the link with which its person chooses a password is shown this once."""
-    person, link = people.invite(store, new.name, new.role, actor=me.actor)
-    return _with_link(team, request, person, link)
+    """Make an account; the link with which its person chooses a password is shown this once.
+
+    With an `email`, and where the server sends mail, the link goes there and is not shown. Where it
+    cannot be sent, it is shown with the reason.
+    """
+    post = _post(team, request)
+    person, row = invite_one(store, new.name, new.role, new.email, post, actor=me.actor)
+    return UserWithLink(
+        user=UserDocument.model_validate(person),
+        link=row.link,
+        expires=row.expires,
+        mailed=row.mailed,
+        problem=row.problem,
+    )
+
+
+@router.post(
+    "/invitations",
+    operation_id="inviteUsers",
+    responses=responses(401, 409, 413, 415),
+)
+def invite_users(
+    wanted: InvitationList,
+    request: Request,
+    store: AppStore,
+    team: AppTeam,
+    me: Me,
+    dry_run: DryRun = False,
+) -> InvitationReport:
+    """Make many accounts at once, and report what became of each row; `dry_run` makes none.
+
+    A row that is refused keeps no other from being invited. Links go by mail or are shown, as by
+    `POST /users`.
+    """
+    rows = [Wanted(number, **one.model_dump()) for number, one in enumerate(wanted.people, 1)]
+    items = invite_many(store, rows, _post(team, request), actor=me.actor, dry_run=dry_run)
+    refused = sum(item.state == "refused" for item in items)
+    return InvitationReport(
+        items=[InvitationDocument.model_validate(item) for item in items],
+        dry_run=dry_run,
+        invited=len(items) - refused,
+        refused=refused,
+        mailed=sum(item.mailed for item in items),
+    )
+
+
+def _post(team: Team, request: Request) -> Post:
+    return Post(team.mail, team.url, team.base(request))
 
 
 @router.patch(
@@ -80,13 +141,13 @@ def renew_link(user: Id, request: Request, store: AppStore, team: AppTeam, me: M
     operation_id="adoptLocalWork",
     responses=responses(401, 404, 409),
 )
-def adopt_work(user: Id, store: AppStore, _team: AppTeam, me: Me) -> UserList:
+def adopt_work(user: Id, store: AppStore, team: AppTeam, me: Me) -> UserList:
     """Show what was done before there were accounts, under the name `local`, as somebody's; once.
 
     The log is not changed: its entries keep their name, and this becomes an entry of its own.
     """
     adopt(store, user, actor=me.actor)
-    return UserList(items=people.list_people(store), adopted_by=adopted_by(store))
+    return _list(store, team)
 
 
 @router.get("/{user}/tokens", operation_id="listTokensOfUser", responses=responses(401, 404, 409))

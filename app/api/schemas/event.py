@@ -8,6 +8,7 @@ from pydantic import BaseModel, Field
 
 from app.api.schemas.document import Document
 from app.api.schemas.job import JobDocument
+from app.api.schemas.maintenance import BannerDocument
 
 
 class GroupEvent(BaseModel):
@@ -46,10 +47,17 @@ class WorkEvent(BaseModel):
     here: list[PresenceDocument] = Field(description="Everybody who has the group open now.")
 
 
+class MaintenanceEvent(BaseModel):
+    """The notice of maintenance is another one."""
+
+    banner: BannerDocument | None = Field(description="Null: it was taken away.")
+
+
 EVENTS: dict[str, type[BaseModel]] = {
     "group": GroupEvent,
     "dataset": DatasetEvent,
     "job": JobDocument,
     "work": WorkEvent,
+    "maintenance": MaintenanceEvent,
 }
 """What the data of each kind of event is."""

@@ -77,15 +77,21 @@ class ExportDocument(BaseModel):
     """An export: what was asked for, how far it is, and, once it is ready, what came of it."""
 
     id: str
-    state: Literal[JobState, "gone"] = Field(
-        description="As of its job; `gone`: it was written, and its file is deleted."
+    state: Literal[JobState, "gone", "expired"] = Field(
+        description="As of its job; `gone`: it was written, and somebody deleted its file; "
+        "`expired`: the server deleted its file after some days."
     )
-    status: Literal["waiting", "running", "ready", "failed", "cancelled", "gone"] = Field(
-        description="The same in other words: `ready` is `done`. Read `state`.",
-        json_schema_extra={"deprecated": True},
+    status: Literal["waiting", "running", "ready", "failed", "cancelled", "gone", "expired"] = (
+        Field(
+            description="The same in other words: `ready` is `done`. Read `state`.",
+            json_schema_extra={"deprecated": True},
+        )
     )
     request: ExportRequest
     created: datetime
+    expires: datetime | None = Field(
+        description="When the server deletes its file; null: never, or there is none."
+    )
     content: str | None = Field(description="Address of the zip, once it is ready.")
     bytes: int | None
     counts: dict[str, int] | None = Field(
@@ -101,26 +107,35 @@ class ExportDocument(BaseModel):
     error: str | None = Field(description="Why it failed.")
 
     @staticmethod
-    def of(entry: ExportEntry) -> ExportDocument:
-        """The document of a finished export."""
+    def of(entry: ExportEntry, days: int) -> ExportDocument:
+        """The document of a finished export; files are kept for so many days (0: for good)."""
         return ExportDocument.model_validate(
             {
                 **vars(entry),
-                "state": "done",
-                "status": "ready",
+                "state": "expired" if entry.expired else "done",
+                "status": "expired" if entry.expired else "ready",
                 "incomplete": entry.incomplete,
-                "content": f"/api/v1/exports/{entry.id}/content",
+                "content": None if entry.expired else f"/api/v1/exports/{entry.id}/content",
+                "expires": entry.expires(days),
                 "error": None,
             }
         )
 
     @staticmethod
-    def of_job(job: Job, entry: ExportEntry | None) -> ExportDocument:
+    def of_job(job: Job, entry: ExportEntry | None, days: int) -> ExportDocument:
         """The document of an export by its job; ``entry`` is what it left behind, if anything."""
         if entry is not None:
-            return ExportDocument.of(entry)
+            return ExportDocument.of(entry, days)
         nothing = dict.fromkeys(
-            ("content", "bytes", "counts", "left_out", "missing_images", "incomplete")
+            (
+                "expires",
+                "content",
+                "bytes",
+                "counts",
+                "left_out",
+                "missing_images",
+                "incomplete",
+            )
         )
         return ExportDocument.model_validate(
             {

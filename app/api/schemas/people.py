@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from datetime import datetime
-from typing import Annotated
+from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, StrictBool
 from pydantic.config import JsonDict
 
 from app.api.schemas.document import Document, ListDocument
+from app.api.schemas.maintenance import BannerDocument
+from app.review.people.invitations import MOST
 from app.review.people.logins import Way
 from app.review.people.roles import Action, Role
 
@@ -167,6 +169,9 @@ class SessionDocument(Document):
         description="How things stand, for `since` of the events: what comes after this answer is "
         "told then. Null: nobody is logged in, or they have just come.",
     )
+    maintenance: BannerDocument | None = Field(
+        default=None, description="The notice that everybody is shown; null: there is none."
+    )
     may: list[Action] = Field(description="What the role lets them do.")
     datasets: list[SingleRoleDocument] = Field(
         default=[], description="Where they are something else."
@@ -201,6 +206,69 @@ class NewUser(BaseModel):
 
     name: Annotated[str, Field(min_length=1, max_length=40)]
     role: Role
+    email: Annotated[str, Field(max_length=320)] | None = Field(
+        default=None,
+        description="Where the link goes by mail, if the server sends mail. It is not stored.",
+    )
+
+
+class InvitedPerson(BaseModel):
+    """A row of a list of people to invite; what is wrong with it, the report says."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    name: Annotated[str, Field(max_length=200)]
+    role: Annotated[str, Field(max_length=200)]
+    email: Annotated[str, Field(max_length=320)] | None = None
+
+
+class InvitationList(BaseModel):
+    """People who shall have an account."""
+
+    model_config = ConfigDict(
+        extra="forbid",
+        json_schema_extra={
+            "examples": [
+                {
+                    "people": [
+                        {"name": "anna", "role": "reviewer", "email": "anna@example.org"},
+                        {"name": "ben", "role": "annotator"},
+                    ]
+                }
+            ]
+        },
+    )
+
+    people: Annotated[list[InvitedPerson], Field(min_length=1, max_length=MOST)]
+
+
+class InvitationDocument(Document):
+    """What became of one row."""
+
+    row: int = Field(description="Which of the list, from 1.")
+    name: str
+    role: str
+    state: Literal["invited", "possible", "refused"] = Field(
+        description="`possible`: they would be invited, says a dry run."
+    )
+    link: str | None = Field(
+        description="For whoever invites to hand over, shown this once; null: it went by mail, or "
+        "there is none."
+    )
+    expires: datetime | None = Field(description="Until when the link is good.")
+    mailed: bool = Field(description="The mail server has taken the letter with the link.")
+    problem: str | None = Field(
+        description="Why the row was refused, or its letter not sent; the link is then shown."
+    )
+
+
+class InvitationReport(ListDocument[InvitationDocument]):
+    """What became of each row, in the order of the list."""
+
+    dry_run: bool = Field(description="Nothing was done.")
+    invited: int = Field(description="Accounts that were made, or would be.")
+    refused: int = Field(description="Rows that were refused.")
+    mailed: int = Field(description="Letters that the mail server has taken.")
 
 
 class UserEdit(BaseModel):
@@ -244,14 +312,21 @@ class UserList(ListDocument[UserDocument]):
         default=None,
         description="As whose that is shown which was done before there were accounts.",
     )
+    mail: bool = Field(default=False, description="Invitations can go by mail here.")
 
 
 class UserWithLink(Document):
     """Somebody, and the link to hand to them: it is shown this once."""
 
     user: UserDocument
-    link: str
+    link: str | None = Field(description="Null: it went by mail.")
     expires: datetime
+    mailed: bool = Field(
+        default=False, description="The mail server has taken the letter with the link."
+    )
+    problem: str | None = Field(
+        default=None, description="Why the letter was not sent; the link is then shown."
+    )
 
 
 class MemberEdit(BaseModel):

@@ -25,3 +25,9 @@ class UploadList(ListDocument[UploadDocument]):
 
     max_bytes: int = Field(description="Largest file that is taken.")
     days: int = Field(description="After so many days an upload expires.")
+    used_bytes: int = Field(
+        description="What one's own uploads have together, with those that are on their way."
+    )
+    quota_bytes: int | None = Field(
+        description="What they may have together; null: there is no limit."
+    )

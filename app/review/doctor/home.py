@@ -11,6 +11,7 @@ import pysqlite3.dbapi2
 
 from app.config import Settings
 from app.errors import ConflictError, InputError, StorageError
+from app.mail import read_mail_server
 from app.review.doctor.check import Check
 from app.review.doctor.stores import examine_stores
 from app.review.people.identities import linked_admins
@@ -34,7 +35,7 @@ _FORMATS = (".jpg", ".png", ".webp")
 
 def examine_home(settings: Settings) -> list[Check]:
     """What can be said of a home without its database."""
-    examined = (_settings, _permissions, _room, _anchor, _sign_on)
+    examined = (_settings, _permissions, _room, _anchor, _sign_on, _mail)
     return [*(examine(settings) for examine in examined), _versions(), *examine_stores(settings)]
 
 
@@ -77,6 +78,20 @@ def _sign_on(settings: Settings) -> Check:
         return Check(
             name, False, error.message, error.hint if isinstance(error, InputError) else mend
         )
+
+
+def _mail(settings: Settings) -> Check:
+    """Whether the mail server takes us; it is sent nothing."""
+    try:
+        server = read_mail_server(settings)
+        if server is None:
+            return Check("mail", True, "not set up")
+        found = server.examine()
+    except InputError as error:
+        return Check("mail", False, error.message, error.hint)
+    if settings.url is None:
+        return Check("mail", False, f"{found}; letters need TOUCHLINE_URL", "Set TOUCHLINE_URL.")
+    return Check("mail", True, found)
 
 
 def _linked_admins(store: Store) -> Check | None:

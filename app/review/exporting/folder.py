@@ -8,7 +8,8 @@ import secrets
 import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
 
@@ -39,6 +40,15 @@ class ExportEntry:
     bytes: int
     stored: str | None = None
     """Where in an object store the zip lies, and what its content is called; None: here."""
+    expired: bool = False
+    """The zip was deleted because it was old; what it held is still known."""
+
+    def expires(self, days: int) -> datetime | None:
+        """When the zip is deleted where zips are kept for so many days (0: for good); None: never,
+        or it is gone."""
+        if not days or self.expired or self.stored is not None:
+            return None
+        return datetime.fromisoformat(self.created) + timedelta(days=days)
 
     @property
     def incomplete(self) -> str | None:
@@ -89,7 +99,7 @@ class ExportFolder:
             bytes=self.content(name).stat().st_size if stored is None else stored.size,
             stored=None if stored is None else stored.sealed(),
         )
-        replace_file(self._record(name), json_text(asdict(entry), ascii_=True).encode())
+        self._write(entry)
         return entry
 
     def find(self, name: str) -> ExportEntry | None:
@@ -122,6 +132,30 @@ class ExportFolder:
             self._record(name).unlink(missing_ok=True)
             self.content(name).unlink(missing_ok=True)
 
+    def expire(self, days: int) -> int:
+        """Delete zips that were finished so many days ago (0: none), and say how many.
+
+        Their records stay, and say that they expired. What was delivered to an object store stays.
+        """
+        at, gone = datetime.now(UTC), 0
+        for name in [path.stem for path in self.folder.glob("*.json")]:
+            try:
+                entry = self.find(name)
+            except (ValueError, TypeError):
+                # A record that is none of ours says nothing of its age.
+                entry = None
+            if entry is None:
+                continue
+            expires = entry.expires(days)
+            if expires is not None and expires < at:
+                # The record first: what is listed as ready has a file.
+                entry = replace(entry, expired=True)
+                self._write(entry)
+                gone += 1
+            if entry.expired:
+                self.content(name).unlink(missing_ok=True)
+        return gone
+
     def forget_unfinished(self) -> int:
         """Delete zips that never got their record, or lost it, and say how many: nothing lists them.
 
@@ -135,6 +169,9 @@ class ExportFolder:
                 path.unlink(missing_ok=True)
                 gone += 1
         return gone
+
+    def _write(self, entry: ExportEntry) -> None:
+        replace_file(self._record(entry.id), json_text(asdict(entry), ascii_=True).encode())
 
     def _clear(self, name: str) -> None:
         for path in self.folder.glob(f".{name}.*{PARTIAL}"):

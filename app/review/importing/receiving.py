@@ -13,6 +13,8 @@ from app.review.answers.saved_progress import SavedProgress
 from app.review.people.roles import Sight
 from app.store.store import Store
 from app.store.stored_json import Json
+from app.store.upload_quota import quota_of as quota_of
+from app.store.upload_quota import used_bytes as used_bytes
 from app.store.uploads import Upload as Upload
 from app.store.uploads import UploadWriter as UploadWriter
 from app.store.uploads import (
@@ -24,26 +26,26 @@ from app.store.uploads import (
 )
 
 
-def begin_upload(settings: Settings, name: str, declared: int) -> UploadWriter:
+def begin_upload(settings: Settings, name: str, declared: int, actor: str) -> UploadWriter:
     """Begin to take a file of which its sender says how many bytes it has; 0: it says nothing.
 
     Raises:
-        TooLargeError: It is longer than the settings allow.
+        TooLargeError: It is longer than the settings, or the quota of its sender, allow.
         InputError: The name is none that a file can have.
         StorageError: The disk refuses.
     """
     require_size(settings, declared)
-    return UploadWriter(settings, name)
+    return UploadWriter(settings, name, by=actor, declared=declared)
 
 
-def finish_upload(writer: UploadWriter, actor: str) -> Upload:
+def finish_upload(writer: UploadWriter) -> Upload:
     """Make what was taken an upload of its sender's, and see what it most likely holds.
 
     Raises:
         InputError: Nothing was sent.
         StorageError: The disk refuses.
     """
-    return writer.finish(guess_format, by=actor)
+    return writer.finish(guess_format)
 
 
 def find_upload(settings: Settings, upload_id: str) -> Upload:

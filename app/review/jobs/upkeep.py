@@ -46,6 +46,7 @@ class Tidied:
     cached: int = 0
     leftovers: int = 0
     exports: int = 0
+    expired_exports: int = 0
     calibrations: int = 0
     deliveries: int = 0
 
@@ -68,6 +69,7 @@ def tidy(store: Store, wanted: Callable[[], bool] = lambda: True) -> Tidied:
         "cached": lambda: expire_cache(settings),
         "leftovers": lambda: delete_leftovers(settings),
         "exports": lambda: ExportFolder(settings.exports).forget_unfinished(),
+        "expired_exports": lambda: ExportFolder(settings.exports).expire(settings.export_days),
         "calibrations": lambda: delete_spare_calibrations(store, wanted),
         "deliveries": lambda: forget_old_deliveries(store),
     }

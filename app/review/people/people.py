@@ -113,10 +113,15 @@ def invite(store: Store, name: str, role: Role, *, actor: str) -> tuple[Person, 
             raise ConflictError(
                 f"there is a {name} already", hint="A new link for them: reset their password."
             )
-        person = insert_person(session, name, role, by=actor)
-        note(session, actor, name, "invited", role)
-        link = insert_new(session, person, by=actor, at=datetime.now(UTC))
+        person, link = insert_invited(session, name, role, actor=actor)
         return _read(session, person), link
+
+
+def insert_invited(session: Session, name: str, role: Role, *, actor: str) -> tuple[int, Link]:
+    """Make the account of a checked name that nobody has, in the caller's transaction; id and link."""
+    person = insert_person(session, name, role, by=actor)
+    note(session, actor, name, "invited", role)
+    return person, insert_new(session, person, by=actor, at=datetime.now(UTC))
 
 
 def renew_link(store: Store, person_id: int, *, actor: str) -> tuple[Person, Link]:

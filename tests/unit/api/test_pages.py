@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+from html import unescape
 from pathlib import Path
 
 import pytest
@@ -64,6 +65,22 @@ class TestPages:
         now[0] = "13-3"
         again = client.get("/", headers=known)
         assert (again.status_code, again.text[:24]) == (200, '<html data-moment="13-3"')
+
+    def test_a_page_has_the_notice_of_maintenance_and_is_another_one_once_that_changes(
+        self, plain_app, client_of, static_folder: Path
+    ) -> None:
+        (static_folder / "index.html").write_text('<html lang="en"><p>')
+        banner = ['{"text":"<b> \'""}']
+        install_pages(plain_app, Site(static_folder), lambda: "1-2", lambda: banner[0])
+        client = client_of(plain_app)
+        first = client.get("/")
+        (told,) = re.findall('data-banner="([^"]*)" ', first.text)
+        assert unescape(told) == banner[0]
+        assert "<b>" not in first.text
+        known = {"If-None-Match": first.headers["etag"]}
+        assert client.get("/", headers=known).status_code == 304
+        banner[0] = ""
+        assert client.get("/", headers=known).text == '<html data-moment="1-2" lang="en"><p>'
 
     def test_modules_are_asked_for_below_their_version_and_kept_for_good(
         self, pages_client, static_folder: Path

@@ -22,11 +22,13 @@ from app.review.people import links, passwords
 from app.review.people.access_tokens import AccessTokens
 from app.review.people.audit import read_audit
 from app.review.people.logins import Login, Logins
+from app.review.people.people import list_people
 from app.review.people.roles import EVERYTHING, Role, Scope
 from app.review.people.second_factor import SecondFactors
 from app.store.audit import AuditQuery
 from app.store.identities import put_identity
 from app.store.store import Store
+from tests.smtp import MailBox, serving
 
 SECRET = "three plain words"
 
@@ -72,6 +74,37 @@ class TestUsers:
         login = logins.find(logins.log_in("anna", SECRET))
         assert login is not None
         assert login.role is Role.LEAD
+
+    def test_a_link_goes_by_mail_where_an_address_is_given(
+        self, store: Store, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        assert list_people(store) == []
+        with serving(MailBox()) as box:
+            for name, value in {
+                "URL": "https://touchline.example.org",
+                "SMTP_HOST": "127.0.0.1",
+                "SMTP_PORT": str(box.port),
+                "SMTP_SECURITY": "none",
+                "SMTP_FROM": "box@example.org",
+            }.items():
+                monkeypatch.setenv(f"TOUCHLINE_{name}", value)
+            done = run("users", "add", "anna", "--email", "anna@example.org", "--json")
+        told = json.loads(done.stdout)
+        assert told["mailed"] is True
+        assert "link" not in told
+        assert [to for _, to in box.envelopes] == ["anna@example.org"]
+
+    def test_many_are_invited_from_a_file(self, tmp_path: Path, store: Store) -> None:
+        file = tmp_path / "people.csv"
+        file.write_text("name,role,email\nanna,lead,\nbob,boss,\n")
+        dry = run("users", "invite-many", str(file), "--dry-run")
+        assert dry.exit_code == 1
+        assert "1 possible, 1 refused" in dry.stdout
+        assert json.loads(run("users", "list", "--json").stdout) == []
+        done = run("users", "invite-many", str(file))
+        assert '"boss" is no role' in done.stdout
+        links.use(store, token_in(done.stdout), SECRET)
+        assert found(Logins(store), "anna").role is Role.LEAD
 
     def test_the_list_says_where_everybody_is(self, store: Store) -> None:
         for name in ("anna", "bob"):

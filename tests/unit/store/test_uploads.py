@@ -39,10 +39,10 @@ def settings(tmp_path: Path) -> Settings:
 def send(
     settings: Settings, name: str = "a.zip", content: bytes = b"content", by: str | None = None
 ) -> Upload:
-    writer = UploadWriter(settings, name)
+    writer = UploadWriter(settings, name, by=by)
     for start in range(0, len(content), 3):
         writer.write(content[start : start + 3])
-    return writer.finish(by=by)
+    return writer.finish()
 
 
 def files(settings: Settings) -> list[str]:

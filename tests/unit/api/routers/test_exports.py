@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import io
+import json
 import threading
 import zipfile
 from dataclasses import replace
+from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +20,7 @@ from app.review.exporting.formats import FORMATS
 from app.review.importing.ingest import ingest
 from app.review.jobs import child as job_child
 from app.review.jobs.jobs import Jobs
+from app.review.jobs.upkeep import tidy
 from app.review.versions.freeze import FreezeRequest, freeze
 from app.soccer.frames import ImageSize
 from app.soccer.group import Group, Station, View
@@ -257,6 +260,33 @@ class TestDeleteExport:
     def test_deleting_an_export_that_is_being_written_is_409(self, api, busy) -> None:
         job = api.post(API, json=ORDER).json()
         assert api.delete(f"{API}/{job['id']}").status_code == 409
+
+
+class TestExpiry:
+    def test_an_expired_export_stays_listed_says_so_and_can_be_made_again(self, app, api) -> None:
+        job = api.post(API, json=ORDER).json()
+        assert api.get(job["content"]).status_code == 200
+        ready = api.get(f"{API}/{job['id']}").json()
+        lasts = datetime.fromisoformat(ready["expires"]) - datetime.fromisoformat(ready["created"])
+        assert timedelta(days=30) <= lasts < timedelta(days=30, minutes=1)
+
+        exports = app.state.services.exports
+        record = exports.folder / f"{job['id']}.json"
+        values = {**json.loads(record.read_bytes()), "created": "2020-01-01T00:00:00.000+00:00"}
+        record.write_text(json.dumps(values))
+        assert tidy(app.state.services.store).expired_exports == 1
+        (row,) = api.get(API).json()["items"]
+        assert (row["state"], row["status"]) == ("expired", "expired")
+        assert (row["content"], row["expires"]) == (None, None)
+        assert row["counts"] == ready["counts"]
+        gone = api.get(job["content"])
+        assert gone.status_code == 404
+        assert gone.json()["detail"] == "the file of this export has expired"
+        assert gone.json()["hint"] == (
+            "Files of exports are kept for 30 days here. Make the export again."
+        )
+        again = api.post(API, json=row["request"]).json()
+        assert api.get(again["content"]).status_code == 200
 
 
 class TestRestart:

@@ -51,6 +51,24 @@ class TestUploadFile:
         folder = app.state.services.settings.uploads
         assert list(folder.rglob("*")) == []
 
+    def test_bytes_beyond_the_quota_are_413_and_the_list_says_used_and_allowed(
+        self, app, api
+    ) -> None:
+        listed = api.get(API).json()
+        assert (listed["used_bytes"], listed["quota_bytes"]) == (0, None)
+        settings = app.state.services.settings
+        object.__setattr__(settings, "team", True)
+        object.__setattr__(settings, "upload_quota_bytes", 1000)
+        try:
+            assert send(api, b"x" * 700).status_code == 201
+            refused = send(api, b"y" * 400, "other.json")
+            listed = api.get(API).json()
+        finally:
+            object.__setattr__(settings, "team", False)
+        assert refused.status_code == 413
+        assert "700 are used, and this file needs 400" in refused.json()["detail"]
+        assert (listed["used_bytes"], listed["quota_bytes"]) == (700, 1000)
+
     def test_only_bytes_with_a_name_are_taken(self, api) -> None:
         for kind in ("application/json", "text/plain", "multipart/form-data; boundary=x"):
             answer = send(api, **{"Content-Type": kind})

@@ -23,6 +23,7 @@ from app.store.store import Store
 from app.store.uploads import UploadWriter, keep_upload
 from tests.databases import said_for_sqlite
 from tests.provider import CLIENT, SECRET, providing, tell
+from tests.smtp import MailBox, serving
 
 
 @pytest.fixture
@@ -37,6 +38,27 @@ def faults(settings: Settings) -> dict[str, Check]:
 
 
 SIGN_ON = {"sso_client_id": CLIENT, "sso_client_secret": SECRET}
+
+
+class TestMail:
+    def test_a_mail_server_that_takes_us_is_no_fault_and_is_sent_nothing(
+        self, tmp_path: Path
+    ) -> None:
+        said = {"smtp_security": "none", "smtp_from": "box@example.org", "smtp_host": "127.0.0.1"}
+        with serving(MailBox()) as box:
+            said |= {"smtp_port": box.port}
+            home = tmp_path / "home"
+            make_home(settings := Settings(home=home, url="https://club.example", **said))
+            found = {one.name: one for one in examine_home(settings)}["mail"]
+            assert found.ok
+            assert found.sentence == f"127.0.0.1:{box.port} answers (none); nothing was sent"
+            assert "TOUCHLINE_URL" in faults(Settings(home=home, **said))["mail"].sentence
+            assert box.letters == []
+        assert "cannot be reached" in faults(settings)["mail"].sentence
+        assert "SMTP_FROM" in faults(Settings(home=home, smtp_host="x.example"))["mail"].sentence
+
+    def test_without_one_nothing_is_asked(self, settings: Settings) -> None:
+        assert "mail" not in faults(settings)
 
 
 class TestSignOn:

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import json
 from contextlib import ExitStack
+from dataclasses import asdict, replace
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import pytest
@@ -29,6 +32,13 @@ def keep(folder: ExportFolder, name: str) -> ExportEntry:
     return folder.keep(name, REQUEST, report)
 
 
+def age(folder: ExportFolder, entry: ExportEntry, days: int) -> None:
+    """Let an export have been finished so many days ago."""
+    created = (datetime.now(UTC) - timedelta(days=days)).isoformat()
+    record = folder.folder / f"{entry.id}.json"
+    record.write_text(json.dumps({**asdict(entry), "created": created}))
+
+
 class TestKeep:
     def test_a_finished_export_is_found_again(self, folder: ExportFolder) -> None:
         entry = keep(folder, "12")
@@ -39,6 +49,53 @@ class TestKeep:
     def test_a_zip_without_its_record_is_not_found(self, folder: ExportFolder) -> None:
         folder.content("12").write_bytes(b"PK")
         assert folder.find("12") is None
+
+
+class TestExpire:
+    def test_zips_of_so_many_days_ago_go_and_their_records_say_so(
+        self, folder: ExportFolder
+    ) -> None:
+        for name, days in (("12", 31), ("13", 29)):
+            age(folder, keep(folder, name), days)
+        assert folder.expire(30) == 1
+        old, young = folder.get("12"), folder.get("13")
+        assert (old.expired, young.expired) == (True, False)
+        assert (old.counts, old.bytes) == ({"cameras": 2}, 22)
+        assert [folder.content(name).exists() for name in ("12", "13")] == [False, True]
+        assert folder.expire(30) == 0
+
+    def test_none_expires_where_exports_are_kept_for_good(self, folder: ExportFolder) -> None:
+        age(folder, keep(folder, "12"), 4000)
+        assert folder.expire(0) == 0
+        assert folder.content("12").exists()
+        assert folder.get("12").expires(0) is None
+
+    def test_a_zip_whose_deletion_was_interrupted_goes_the_next_time(
+        self, folder: ExportFolder
+    ) -> None:
+        age(folder, replace(keep(folder, "12"), expired=True), 31)
+        folder.expire(30)
+        assert not folder.content("12").exists()
+
+    def test_what_was_delivered_to_an_object_store_never_expires(
+        self, folder: ExportFolder
+    ) -> None:
+        age(folder, replace(keep(folder, "12"), stored="s3://exports/12.zip"), 31)
+        assert folder.expire(30) == 0
+        assert folder.get("12").expired is False
+
+    def test_a_record_that_cannot_be_read_keeps_no_other_from_expiring(
+        self, folder: ExportFolder
+    ) -> None:
+        (folder.folder / "11.json").write_text("x")
+        age(folder, keep(folder, "12"), 31)
+        assert folder.expire(30) == 1
+
+    def test_a_record_of_an_earlier_version_is_read(self, folder: ExportFolder) -> None:
+        values = asdict(keep(folder, "12"))
+        del values["expired"]
+        (folder.folder / "12.json").write_text(json.dumps(values))
+        assert folder.get("12").expired is False
 
 
 class TestGet:

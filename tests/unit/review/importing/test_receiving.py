@@ -25,15 +25,15 @@ def settings(tmp_path: Path) -> Settings:
 
 
 def send(settings: Settings, content: bytes, actor: str) -> Upload:
-    writer = begin_upload(settings, "labels.json", len(content))
+    writer = begin_upload(settings, "labels.json", len(content), actor)
     writer.write(content)
-    return finish_upload(writer, actor)
+    return finish_upload(writer)
 
 
 class TestBeginUpload:
     def test_what_says_that_it_is_too_long_leaves_nothing(self, settings: Settings) -> None:
         with pytest.raises(TooLargeError):
-            begin_upload(settings, "labels.json", 101)
+            begin_upload(settings, "labels.json", 101, "ann")
         assert not settings.uploads.exists()
 
 

@@ -1,0 +1,28 @@
+"""The banner for maintenance, among what admins have said for everybody."""
+
+from __future__ import annotations
+
+import json
+
+from sqlalchemy import delete, insert, select
+
+from app.store.session import Session
+from app.store.stored_json import Json
+from app.store.tables.people import TeamSettingModel
+
+_NAME = "maintenance"
+
+
+def find_banner(session: Session) -> Json | None:
+    """What was put last; None: nothing, or it was taken away."""
+    statement = select(TeamSettingModel.value).where(TeamSettingModel.name == _NAME)
+    text = session.scalar(statement)
+    return None if text is None else json.loads(text)
+
+
+def put_banner(session: Session, banner: Json | None) -> None:
+    """Put another one in its place; None: take it away."""
+    session.execute(delete(TeamSettingModel).where(TeamSettingModel.name == _NAME))
+    if banner is not None:
+        values = {"name": _NAME, "value": json.dumps(banner)}
+        session.execute(insert(TeamSettingModel), values)
