@@ -248,7 +248,6 @@ PROPERTIES: Mapping[str, str] = {
     "Changelog.lines": "What is new, line by line.",
     "NoiseDocument.lines": "Noise of the annotated lines; null where it cannot be estimated.",
     "ViewDistanceDocument.lines": "How far the lines lie apart, by marking.",
-    "link": "Address under which the password is set, good once.",
     "lost": "How many only the first one has.",
     "low": "Lower bound; null: none.",
     "SeriesDocument.low": "Lower end of each bar.",

@@ -219,7 +219,9 @@ class InvitedPerson(BaseModel):
 
     name: Annotated[str, Field(max_length=200)]
     role: Annotated[str, Field(max_length=200)]
-    email: Annotated[str, Field(max_length=320)] | None = None
+    email: Annotated[str, Field(max_length=320)] | None = Field(
+        default=None, description="Where the link is sent, where mail is set up; it is not stored."
+    )
 
 
 class InvitationList(BaseModel):

@@ -54,7 +54,7 @@ class TestDocument:
     def test_types_the_data_of_every_event(self, document) -> None:
         stream = document["paths"]["/api/v1/events"]["get"]["responses"]["200"]["content"]
         kinds = stream["text/event-stream"]["x-events"]
-        assert set(kinds) == {"group", "dataset", "job", "work"}
+        assert set(kinds) == {"group", "dataset", "job", "work", "maintenance"}
         for reference in kinds.values():
             assert reference["$ref"].rpartition("/")[2] in document["components"]["schemas"]
 

@@ -263,7 +263,17 @@ class TestDeleteExport:
 
 
 class TestExpiry:
-    def test_an_expired_export_stays_listed_says_so_and_can_be_made_again(self, app, api) -> None:
+    def test_they_stay_where_nothing_is_set(self, app, api) -> None:
+        job = api.post(API, json=ORDER).json()
+        assert api.get(f"{API}/{job['id']}").json()["expires"] is None
+        assert tidy(app.state.services.store).expired_exports == 0
+        assert api.get(job["content"]).status_code == 200
+
+    def test_an_expired_export_stays_listed_says_so_and_can_be_made_again(
+        self, app, api, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        for settings in (app.state.services.settings, app.state.services.store.settings):
+            monkeypatch.setattr(settings, "export_days", 30)
         job = api.post(API, json=ORDER).json()
         assert api.get(job["content"]).status_code == 200
         ready = api.get(f"{API}/{job['id']}").json()

@@ -279,7 +279,7 @@ class TestChangePerson:
 
     def test_nobody_changes_their_own_rights(self, home) -> None:
         join(home, "anna", Role.ADMIN)
-        with pytest.raises(ForbiddenError, match="their own rights"):
+        with pytest.raises(ForbiddenError, match="your own role"):
             change_person(home, find_person(home, "anna").id, actor="anna", role=Role.VIEWER)
 
     def test_the_last_admin_cannot_go(self, home) -> None:
