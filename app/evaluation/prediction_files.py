@@ -26,6 +26,7 @@ from pathlib import Path, PurePosixPath
 from typing import Any, get_args
 
 from app.datasets import fields
+from app.datasets.ball_names import is_ball
 from app.datasets.cameras_reader import read_cameras
 from app.datasets.file_tree import DEFAULT_LIMITS, FileTree, Limits
 from app.datasets.json_document import json_kind
@@ -39,7 +40,6 @@ from app.evaluation.prediction_run import (
     PredictionRun,
     ReadPredictions,
     in_field,
-    is_ball,
     noted,
     read_field,
 )

@@ -247,6 +247,21 @@ class TestCoco:
         with pytest.raises(InputError, match=r"no class called ball; its classes are 1 \(player\)"):
             read_predictions(path, "coco", names, images=images)
 
+    @pytest.mark.parametrize("name", ["ballon", "pelota", "sportsball", "footballs", "ball_1"])
+    def test_the_ball_of_predictions_has_the_names_that_it_has_in_datasets(
+        self, tmp_path, names, name: str
+    ) -> None:
+        other = ("ball boy", "ball_carrier", "basket ball", "tennis ball", "Balloon")
+        listed = [{"id": at, "name": text} for at, text in enumerate((*other, name))]
+        images = write(tmp_path / "t" / "t.json", {"images": [], "categories": listed})
+        results = [result(category_id=at, score=at / 10) for at in range(len(listed))]
+        path = write(tmp_path / "r.json", results)
+        found = read_predictions(path, "coco", names, images=images)
+        assert [item.score for item in found.detections[1]] == [0.5]
+        rows = "".join(f"7.png,1,2,8,9,{text}\n" for text in (*other, name))
+        path = write(tmp_path / "r.csv", f"image,x,y,w,h,class\n{rows}")
+        assert read_predictions(path, "csv", names).boxes == 1
+
     def test_a_number_that_is_none_costs_its_own_result_alone(self, tmp_path, names) -> None:
         text = json.dumps([result(), result(score=0.25)]).replace("0.25", "NaN")
         found = read_predictions(write(tmp_path / "r.json", text), "coco", names)
