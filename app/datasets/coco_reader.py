@@ -17,6 +17,7 @@ from app.datasets.coco_joins import Annotation, Joined, spelt
 from app.datasets.corner_origin import box_from_corner
 from app.datasets.file_tree import DEFAULT_LIMITS, FileTree, Limits, Root
 from app.datasets.frame_names import UNASSIGNED
+from app.datasets.json_document import is_gamestate, json_kind
 from app.datasets.json_text import read_json
 from app.datasets.picture_finder import Home, PictureFinder
 from app.datasets.picture_names import picture_parts
@@ -101,19 +102,12 @@ def _value(tree: FileTree, name: str, report: Report, limits: Limits) -> dict[st
         report.skip(error)
         return None
     if isinstance(value, dict) and isinstance(value.get("images"), list):
-        if not _is_gamestate(value.get("annotations")):
+        if not is_gamestate(value.get("annotations")):
             return value
-        report.note(shown, None, None, "is a file of sn-gamestate: import it as gamestate")
+        report.note(shown, None, None, json_kind(value))
         return None
     report.remark(f"{shown}: is no COCO file (it has no list of images) and was not read")
     return None
-
-
-def _is_gamestate(annotations: Any) -> bool:
-    """Whether annotations are those of sn-gamestate, whose files are alike but for their boxes."""
-    listed = annotations[:100] if isinstance(annotations, list) else []
-    names = {name for item in listed if isinstance(item, dict) for name in item}
-    return "bbox_image" in names and "bbox" not in names
 
 
 def _tell_balls(files: list[_File], report: Report) -> None:
