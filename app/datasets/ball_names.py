@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import unicodedata
 
-_WORD = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|[^\W\d_A-Za-z]+|\d+")
+_WORD = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|[^\W\d_A-Za-z]+")
 _BALLS = frozenset(
     {"ball", "fussball", "voetbal", "ballon", "balon", "pelota", "bola", "pallone", "pilka"}
     | {"мяч", "足球", "ボール", "サッカーボール", "공", "축구공"}
@@ -17,10 +17,10 @@ _OF_SOCCER = frozenset(
 
 
 def is_ball(name: str) -> bool:
-    """Whether a name means the ball of a football match, whatever its case, separators and number.
+    """Whether a name means the ball of a football match, whatever its case, separators and digits.
 
     Example:
-        >>> [is_ball(name) for name in ("Sports_Ball", "soccer-balls", "football", "basketball")]
+        >>> [is_ball(name) for name in ("Sports_Ball", "soccer-balls", "ball_1", "basketball")]
         [True, True, True, False]
     """
     words = [word for part in _WORD.findall(plain(name)) for word in _parts(part.lower())]

@@ -19,6 +19,8 @@ _SHAPES = {"K": (3, 3), "R": (3, 3), "t": (3,)}
 _DISTORTION = "k"
 _MAX_HEADER = 10_000
 _MAX_YAML = 1024 * 1024
+_TEXT = "tag:yaml.org,2002:str"
+_MERGE = "tag:yaml.org,2002:merge"
 
 
 def cameras_of_arrays(
@@ -39,6 +41,8 @@ def cameras_of_arrays(
     parts = {name: _rows(arrays[name], shape, name, path) for name, shape in _SHAPES.items()}
     if _DISTORTION in arrays:
         found = arrays[_DISTORTION]
+        if found.size == 0:
+            raise DatasetFormatError(path, None, _DISTORTION, "is empty; leave it out instead")
         parts[_DISTORTION] = np.atleast_2d(found.reshape(-1, found.shape[-1] if found.ndim else 1))
     counts = {len(part) for part in parts.values()}
     count = max(counts)
@@ -60,7 +64,8 @@ def _rows(
     """An array as a row a camera."""
     if shape == (3,) and array.ndim > 1 and array.shape[-1] == 1:
         array = array[..., 0]
-    if array.size == 0 or array.shape not in (shape, (len(array), *shape)):
+    frames = array.shape[: array.ndim - len(shape)]
+    if array.size == 0 or len(frames) > 1 or array.shape != (*frames, *shape):
         wanted = " x ".join(map(str, ("frames", *shape)))
         found = " x ".join(map(str, array.shape)) or "one number"
         raise DatasetFormatError(path, None, name, f"has the shape {found}, not {wanted}")
@@ -80,7 +85,7 @@ def _arrays(content: bytes, path: str, limits: Limits) -> dict[str, npt.NDArray[
                 raw = archive.read(item)
                 if item.filename.endswith(".npy"):
                     found[item.filename.removesuffix(".npy")] = _array(raw)
-    except ValueError as error:
+    except (ValueError, OverflowError) as error:
         raise DatasetFormatError(path, None, None, f"is no file of numpy's ({error})") from error
     except BROKEN as error:
         raise DatasetFormatError(path, None, None, "is no file of numpy's, or damaged") from error
@@ -103,7 +108,17 @@ def _array(raw: bytes) -> npt.NDArray[Any]:
 
 
 class _StorageLoader(yaml.SafeLoader):
-    """Plain YAML with OpenCV's matrices, without anchors: they could make a small file huge."""
+    """Plain YAML with OpenCV's matrices, without anchors: they could make a small file huge.
+
+    Keys are text, as JSON's are, whatever YAML takes them for: ``1``, ``2026-11-28``, ``on``.
+    """
+
+    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
+        """An object whose keys are as the file spells them."""
+        for key, _ in node.value:
+            if isinstance(key, yaml.ScalarNode) and key.tag != _MERGE:
+                key.tag = _TEXT
+        return super().construct_mapping(node, deep)
 
     def compose_node(self, parent: Any, index: Any) -> Any:
         if self.check_event(yaml.AliasEvent):
@@ -119,6 +134,13 @@ for _kind in ("matrix", "nd-matrix"):
     _StorageLoader.add_constructor(f"tag:yaml.org,2002:opencv-{_kind}", _matrix)
 
 
+# A tag with a value that it does not fit (!!int x, !!timestamp x) ends in one of Python's own errors.
+_NO_YAML = (
+    yaml.YAMLError, ValueError, RecursionError, LookupError, AttributeError, TypeError,
+    ArithmeticError,
+)  # fmt: skip
+
+
 def opencv_storage(content: bytes, path: str) -> Any:
     """The value of a YAML file that OpenCV's FileStorage wrote.
 
@@ -131,5 +153,5 @@ def opencv_storage(content: bytes, path: str) -> Any:
         # OpenCV writes "%YAML:1.0", which is no directive of YAML.
         text = re.sub(r"\A%YAML:[^\n]*\n", "", content.decode("utf-8-sig"))
         return yaml.load(text, _StorageLoader)
-    except (yaml.YAMLError, ValueError, RecursionError) as error:
+    except _NO_YAML as error:
         raise DatasetFormatError(path, None, None, "is no YAML of OpenCV's FileStorage") from error

@@ -62,11 +62,6 @@ class Joined:
                 f"{path}: {shared:,} annotations have the id of another one; all are read"
             )
 
-    def of_id(self, value: Any) -> list[Mapping[str, Any]]:
-        """The annotations of the image of an id."""
-        found = self._ids.find(value)
-        return [] if found is None else [item for _, item in self.of_image[found]]
-
     def is_alone(self, name: str) -> bool:
         """Whether one image alone has a name, as the last part of its own."""
         return len(self._names.get(name, [])) == 1

@@ -13,10 +13,11 @@ from app.datasets.coco import CAMERA, CORNER, ORIGIN, OUTSIDE, PREFIX, STATE
 from app.datasets.coco_annotation import NoPlaceError, ball_of, box_of
 from app.datasets.coco_categories import Categories, Category
 from app.datasets.coco_frames import Frame, FrameFile, groups_of, split_of_folders
-from app.datasets.coco_joins import Joined, spelt
+from app.datasets.coco_joins import Annotation, Joined, spelt
 from app.datasets.corner_origin import box_from_corner
 from app.datasets.file_tree import DEFAULT_LIMITS, FileTree, Limits, Root
 from app.datasets.frame_names import UNASSIGNED
+from app.datasets.json_document import is_gamestate, json_kind
 from app.datasets.json_text import read_json
 from app.datasets.picture_finder import Home, PictureFinder
 from app.datasets.picture_names import picture_parts
@@ -101,19 +102,12 @@ def _value(tree: FileTree, name: str, report: Report, limits: Limits) -> dict[st
         report.skip(error)
         return None
     if isinstance(value, dict) and isinstance(value.get("images"), list):
-        if not _is_gamestate(value.get("annotations")):
+        if not is_gamestate(value.get("annotations")):
             return value
-        report.note(shown, None, None, "is a file of sn-gamestate: import it as gamestate")
+        report.note(shown, None, None, json_kind(value))
         return None
     report.remark(f"{shown}: is no COCO file (it has no list of images) and was not read")
     return None
-
-
-def _is_gamestate(annotations: Any) -> bool:
-    """Whether annotations are those of sn-gamestate, whose files are alike but for their boxes."""
-    listed = annotations[:100] if isinstance(annotations, list) else []
-    names = {name for item in listed if isinstance(item, dict) for name in item}
-    return "bbox_image" in names and "bbox" not in names
 
 
 def _tell_balls(files: list[_File], report: Report) -> None:
@@ -179,7 +173,7 @@ class _File:
             try:
                 image = StateReader(item, self.path, record)
                 if STATE in image.value:
-                    yield self._ours(image)
+                    yield self._ours(image, index)
                 else:
                     self.frames.frames.append(self._theirs(image, index))
             except DatasetFormatError as error:
@@ -194,51 +188,59 @@ class _File:
         problem = f"{error.problem}; left out with {count} {annotations}"
         return DatasetFormatError(error.path, error.record, error.field, problem)
 
-    def _ours(self, image: StateReader) -> PlacedView:
+    def _ours(self, image: StateReader, index: int) -> PlacedView:
         state = StateReader(image.value[STATE], self.path, image.record)
         view = state.view(image.size(), Extras())
-        changed = self._changed(image, view, state.value.get(ORIGIN) == CORNER)
+        changed = self._changed(index, view, state.value.get(ORIGIN) == CORNER)
         media = self._media(image.text("file_name", ""))
         view = replace(view, balls=changed, media=media)
         return PlacedView(state.head(), state.count("position"), view)
 
-    def _changed(
-        self, image: StateReader, view: View, from_corner: bool
-    ) -> tuple[BallAnnotation, ...]:
-        """The balls, with the boxes that somebody changed after they were written.
+    def _changed(self, index: int, view: View, from_corner: bool) -> tuple[BallAnnotation, ...]:
+        """The balls, with the boxes that somebody changed or added after they were written.
 
         Args:
-            image: Its annotations are looked at.
+            index: Of the image, whose annotations are looked at.
             view: As it was when it was written.
             from_corner: Whether boxes are measured from the corner of the first pixel; those of
                 our files of before are in our own frame.
         """
+        annotations = self._joined.of_image[index]
+        added = self._added(annotations)
         if not view.balls:
-            return self._drawn(image, from_corner)
+            boxes = [self._box(item, record) for record, item in added]
+            found = [box for box in boxes if box is not None]
+            return tuple(
+                BallAnnotation(box=box_from_corner(box) if from_corner else box) for box in found
+            )
+        # A tool that drops fields that it does not know hands the written box on as a new one.
+        if len(added) < len(annotations) or not any(ball.box for ball in view.balls):
+            for record, _ in added:
+                self._note(record, "bbox", "adds a ball to a view that has one; left out")
         if len(view.balls) != 1:
             return view.balls
-        for item in self._annotations(image):
+        for record, item in annotations:
             if item.get("bbox") != item.get("written_bbox", item.get("bbox")):
-                box = self._box(item, image.record)
+                box = self._box(item, record)
                 if box is not None:
                     box = box_from_corner(box) if from_corner else box
                     return (replace(view.balls[0], box=box, point=None),)
         return view.balls
 
-    def _drawn(self, image: StateReader, from_corner: bool) -> tuple[BallAnnotation, ...]:
-        """A ball that somebody has drawn since on a view that had none when it was written."""
-        boxes = [
-            self._box(item, image.record)
-            for item in self._annotations(image)
-            if "written_bbox" not in item
-        ]
-        found = [box for box in boxes if box is not None]
-        return tuple(
-            BallAnnotation(box=box_from_corner(box) if from_corner else box) for box in found
-        )
-
-    def _annotations(self, image: StateReader) -> list[Mapping[str, Any]]:
-        return self._joined.of_id(image.value.get("id"))
+    def _added(self, annotations: list[Annotation]) -> list[Annotation]:
+        """The balls among the annotations that were added since; anything else is reported."""
+        balls = []
+        for record, item in annotations:
+            if "written_bbox" in item:
+                continue
+            category = self.categories.find(item.get("category_id"))
+            if category is None or not category.ball:
+                shown = spelt(item.get("category_id")) if category is None else category.shown
+                problem = f"is {shown}: of boxes added to an export only the ball is read; left out"
+                self._note(record, "category_id", problem)
+            elif not self._is_crowd(item, record):
+                balls.append((record, item))
+        return balls
 
     def _box(self, item: Mapping[str, Any], record: str) -> Box | None:
         try:
@@ -298,8 +300,7 @@ class _File:
     def _add_ball(
         self, frame: Frame, item: Mapping[str, Any], category: Category, record: str
     ) -> None:
-        if item.get("iscrowd") in (1, "1"):
-            self._note(record, "iscrowd", "is 1: a crowd is not one ball; left out")
+        if self._is_crowd(item, record):
             return
         ball = ball_of(item, category.keypoints)
         if ball in frame.balls:
@@ -307,6 +308,13 @@ class _File:
             return
         frame.balls.append(ball)
         self.categories.count(category)
+
+    def _is_crowd(self, item: Mapping[str, Any], record: str) -> bool:
+        """Whether an annotation is a crowd, which is reported: it is not one ball."""
+        crowd = item.get("iscrowd") in (1, "1")
+        if crowd:
+            self._note(record, "iscrowd", "is 1: a crowd is not one ball; left out")
+        return crowd
 
     def _camera(self, image: StateReader) -> Camera | None:
         """The camera that a file of somebody else gives; one that is none is reported."""

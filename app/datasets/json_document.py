@@ -8,6 +8,8 @@ from app.datasets.camera_matrix import holds_homography, holds_matrices
 from app.finite import quoted
 from app.soccer.pitch import marking_like
 
+EVALUATE = "touchline evaluate"
+EXPORT = "export it as COCO from your tool and import that"
 _KEYS = 4
 """Keys that are named of an object that is nothing known."""
 
@@ -38,18 +40,27 @@ def is_camera(value: Any) -> bool:
     return "pan_degrees" in value or "cam_params" in value or holds_matrices(value)
 
 
+def is_gamestate(annotations: Any) -> bool:
+    """Whether annotations are those of sn-gamestate, whose files are COCO's but for their boxes."""
+    listed = annotations[:100] if isinstance(annotations, list) else []
+    names = {name for item in listed if isinstance(item, dict) for name in item}
+    return "bbox_image" in names and "bbox" not in names
+
+
 def _kind_of_list(value: list[Any]) -> str:
     first = next((item for item in value if isinstance(item, dict)), None)
     if first is None:
         return f"is a list of {len(value)} values"
     if "bbox" in first and "image_id" in first:
-        return "holds COCO results, boxes that a detector predicted: evaluate them (touchline evaluate)"
+        return f"holds COCO results, boxes that a detector predicted: evaluate them ({EVALUATE})"
     if is_camera(first):
         return "holds cameras: import it as cameras"
     return f"is a list of objects with {_names(first)}"
 
 
 def _kind_of_object(value: dict[str, Any]) -> str:
+    if is_gamestate(value.get("annotations")):
+        return "is a file of sn-gamestate: import it as gamestate"
     if "images" in value and ("annotations" in value or "categories" in value):
         return "is a COCO document: import it as coco"
     if is_camera(value):
@@ -60,7 +71,7 @@ def _kind_of_object(value: dict[str, Any]) -> str:
     if "actions" in value or "replays" in value:
         return "holds the labels of a match: import it as soccernet-v3 or soccernet-v3d"
     if "shapes" in value and "imagePath" in value:
-        return "is an annotation of LabelMe"
+        return f"is an annotation of LabelMe: {EXPORT}"
     if any(map(is_camera, value.values())):
         return "holds cameras: import it as cameras"
     if any(map(marking_like, value)):

@@ -11,6 +11,7 @@ from pathlib import PurePosixPath
 from app.datasets.file_tree import BROKEN, FileTree, Root
 from app.datasets.frame_names import IMAGE_SUFFIXES, VIDEO_SUFFIXES
 from app.datasets.guess_format import guess_format
+from app.datasets.json_document import EVALUATE, EXPORT
 from app.datasets.report import Report
 from app.datasets.trees import opened_tree
 from app.errors import ReviewError
@@ -18,13 +19,10 @@ from app.errors import ReviewError
 MAX_FILES = 40
 """Files of which the beginning is read."""
 HEAD_BYTES = 64 * 1024
-CONVERT = "Touchline does not import that; export it as COCO from your tool and import that"
-YOLO = (
-    "they hold no cameras and no groups; export COCO from your tool, or give predictions to "
-    "touchline evaluate"
-)
+CONVERT = f"Touchline does not import that; {EXPORT}"
+YOLO = f"they hold no cameras and no groups; {EXPORT}, or give predictions to {EVALUATE}"
 NO_PLACES = "it holds no places in pictures"
-PREDICTED = "it holds predictions, not annotations; give it to touchline evaluate"
+PREDICTED = f"it holds predictions, not annotations; give it to {EVALUATE}"
 
 
 @dataclass(frozen=True)
@@ -47,6 +45,12 @@ class Look:
         if self.format is None:
             return f"It looks like {self.name}: {self.advice}."
         return f"It looks like {self.format}: choose that format and import it again."
+
+    def is_said(self, problem: str) -> bool:
+        """Whether a problem says already what to do about such files, as ``json_kind`` does."""
+        if self.format is not None:
+            return f"import it as {self.format}" in problem
+        return any(advice in self.advice and advice in problem for advice in (EVALUATE, EXPORT))
 
 
 def _keys(*names: str) -> tuple[re.Pattern[bytes], ...]:
@@ -124,8 +128,8 @@ def looks_like(path: Root, format_: str) -> Look | None:
             found = None if tree is None else _of_tree(tree)
     except (*BROKEN, ReviewError, ValueError):
         found = None
-    if found is not None and found.format != format_:
-        return found
+    if found is not None:
+        return None if found.format == format_ else found
     guess = guess_format(path)
     return None if guess is None or guess == format_ else Look(guess, guess)
 

@@ -79,11 +79,13 @@ class Found:
         place: The picture's name in its tree; None where there is none, or no single one.
         parts: How many parts of the name it has at its end.
         rivals: Pictures that fit equally well, where there are several.
+        folded: Whether it fits in another case alone.
     """
 
     place: str | None = None
     parts: int = 0
     rivals: tuple[str, ...] = ()
+    folded: bool = False
 
 
 @dataclass
@@ -157,14 +159,14 @@ class PictureFinder:
         best = max(ranks)
         if len(ranks[best]) > 1:
             return Found(rivals=tuple(ranks[best][:3]))
-        return Found(ranks[best][0], best[0])
+        return Found(ranks[best][0], best[0], folded=fold)
 
 
 def own_pictures(found: Mapping[Name, Found]) -> dict[Name, Found]:
     """What was found for each name, without pictures that fit another name better or as well.
 
     Two pictures of a file are two pictures: ``clip1/1.jpg`` is not ``clip2/1.jpg``, where that
-    alone is there.
+    alone is there. A name in the picture's own case fits better than one in another.
     """
     claims: dict[str, list[Name]] = {}
     for name, item in found.items():
@@ -172,8 +174,9 @@ def own_pictures(found: Mapping[Name, Found]) -> dict[Name, Found]:
             claims.setdefault(item.place, []).append(name)
     own = dict(found)
     for place, names in claims.items():
-        longest = max(found[name].parts for name in names)
-        best = [name for name in names if found[name].parts == longest]
+        ranks = {name: (not found[name].folded, found[name].parts) for name in names}
+        highest = max(ranks.values())
+        best = [name for name in names if ranks[name] == highest]
         for name in names:
             if len(names) > 1 and (len(best) > 1 or name not in best):
                 own[name] = Found(rivals=(place,))

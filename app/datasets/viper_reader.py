@@ -16,6 +16,7 @@ from defusedxml import DefusedXmlException
 from defusedxml.ElementTree import iterparse
 
 from app.datasets import fields
+from app.datasets.ball_names import is_ball
 from app.datasets.file_tree import DEFAULT_LIMITS, FileTree, Limits
 from app.datasets.report import Report
 from app.errors import DatasetFormatError
@@ -35,8 +36,6 @@ MAX_QUIET = 1_000_000
 """Most bytes between two elements; an entry has a hundred."""
 
 _SPAN = re.compile(r"(\d{1,9}):(\d{1,9})", re.ASCII)
-_BALLS = frozenset({"ball", "football", "soccerball", "sportsball", "matchball"})
-"""Names of objects that are the ball, by their letters alone: BALL, Soccer-Ball, ball_1."""
 _PERSONS = frozenset({"person"})
 _SHAPES = "balls are read as point, bbox or circle, people as bbox of an object Person"
 _SIZES = ("H-FRAME-SIZE", "V-FRAME-SIZE")
@@ -44,6 +43,7 @@ _MAX_SIDE = 65_535
 _MAX_KINDS = 100
 """Kinds of entries left out that are named each for itself."""
 _HEAD = 64 * 1024
+_is_ball = lru_cache(maxsize=100)(is_ball)
 _BROKEN = (EOFError, zlib.error, zipfile.BadZipFile, RuntimeError, OSError)
 
 
@@ -200,18 +200,17 @@ class _Reader:
         if _local(owner) != "object":
             return
         kind, identity = owner.get("name", "").strip()[:80], owner.get("id", "?")[:20]
-        letters = _letters(kind)
-        is_ball, shape = letters in _BALLS, _local(item)
+        ball, shape = _is_ball(kind), _local(item)
         # What has no framespan of its own holds as long as its object does.
         span = item.get("framespan", owner.get("framespan"))
         try:
-            if is_ball and shape in ("point", "bbox", "circle"):
+            if ball and shape in ("point", "bbox", "circle"):
                 self._add_ball(_ball(item, shape), self._counted(span))
-            elif is_ball and "value" in item.attrib:
+            elif ball and "value" in item.attrib:
                 for frame in self._counted(span):
                     notes = self.tracks[-1].ball_notes.setdefault(frame, {})
                     notes[name[:80]] = item.get("value", "")[:200]
-            elif letters in _PERSONS and shape == "bbox":
+            elif _letters(kind) in _PERSONS and shape == "bbox":
                 box, frames = _box(item), self._counted(span)
                 for frame in frames:
                     self.tracks[-1].persons.setdefault(frame, []).append((identity, *box))

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from app.datasets.export_names import key_in_group, named
 from app.datasets.frame_names import flat_frame, match_frame
 from app.datasets.gamestate import sequence_frame
+from app.datasets.record_ids import id_text
 from app.datasets.sn_calibration import line_frame
 from app.soccer.frames import ImageSize
 from app.soccer.group import Group, Station, View
@@ -108,13 +109,13 @@ class FrameNames:
 
     def find_number(self, text: str) -> NamedFrame | None:
         """The one frame whose view or picture has a number for its name, ``4`` for ``0004.jpg``."""
-        bare = text.removesuffix(".0")
+        bare = id_text(text) or ""
         identity = self._numbered.get(int(bare)) if bare.isascii() and bare.isdigit() else None
         return self.frames[identity] if identity is not None and identity != _SEVERAL else None
 
     def why_not_number(self, text: str) -> str:
         """Why ``find_number`` found nothing, in words."""
-        bare = text.removesuffix(".0")
+        bare = id_text(text) or ""
         if bare.isascii() and bare.isdigit() and int(bare) in self._numbered:
             return "is the number of several frames of the dataset; name the picture or the camera, too"
         return "is no number in the name of a picture of the dataset"

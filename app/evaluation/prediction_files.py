@@ -26,10 +26,12 @@ from pathlib import Path, PurePosixPath
 from typing import Any, get_args
 
 from app.datasets import fields
+from app.datasets.ball_names import is_ball
 from app.datasets.cameras_reader import read_cameras
 from app.datasets.file_tree import DEFAULT_LIMITS, FileTree, Limits
 from app.datasets.json_document import json_kind
 from app.datasets.json_text import read_json, read_json_lines
+from app.datasets.record_ids import IdIndex, id_text
 from app.datasets.report import Report
 from app.datasets.trees import opened_tree
 from app.errors import DatasetFormatError, InputError
@@ -39,11 +41,11 @@ from app.evaluation.prediction_run import (
     PredictionRun,
     ReadPredictions,
     in_field,
-    is_ball,
     noted,
     read_field,
 )
 from app.evaluation.prediction_table import is_mot, read_table
+from app.finite import quoted
 from app.geometry.camera import Camera
 from app.soccer.camera_size import other_size
 from app.soccer.choices import PredictionFormat
@@ -117,7 +119,7 @@ def read_predictions(
             raise _unused("size", "a size: its numbers are shares of the image", kind)
         if kind == "coco":
             beside = [] if images is None else _document(images, run, limits)
-            _read_coco(_json_documents(tree, path), run, beside)
+            _read_coco(_json_documents(tree, path, run.found.report), run, beside)
         elif kind == "yolo":
             _read_yolo(tree, path, run)
         else:
@@ -203,11 +205,12 @@ def _document(path: Path, run: PredictionRun, limits: Limits) -> Documents:
     with opened_tree(path, run.found.report, limits) as tree:
         if tree is None:
             raise run.found.report.problems[0]
-        return _json_documents(tree, path)
+        return _json_documents(tree, path, run.found.report)
 
 
 def _read_coco(documents: Documents, run: PredictionRun, beside: Documents) -> None:
-    known = _CocoImages.of([*documents, *beside], run.found.report)
+    # What was handed over counts before what lies beside the results.
+    known = _CocoImages.of([*beside, *documents], run.found.report)
     several = any(isinstance(value, list) for _name, value in documents)
     for shown, value in documents:
         # Beside results, a document with annotations is the truth that they belong to.
@@ -222,7 +225,7 @@ def _read_coco(documents: Documents, run: PredictionRun, beside: Documents) -> N
                 _add_coco(run, item, known)
 
 
-def _json_documents(tree: FileTree, path: Path) -> Documents:
+def _json_documents(tree: FileTree, path: Path, report: Report) -> Documents:
     found = []
     other = None
     for name in tree.names():
@@ -232,7 +235,7 @@ def _json_documents(tree: FileTree, path: Path) -> Documents:
         try:
             value = read_json(content, shown, nan="keep")
         except DatasetFormatError:
-            value = read_json_lines(content, shown, Report())
+            value = read_json_lines(content, shown, report)
             if value is None:
                 raise
         if not isinstance(value, (list, dict)):
@@ -258,37 +261,59 @@ class _CocoImages:
     """Images and classes of COCO documents.
 
     Attributes:
-        names: Name of the file by id; numbers that are equal are one id, however they are written.
+        names: Name of the file by id.
         sizes: Size by name of the file, where the document says it.
-        classes: Name by number; empty where no class is called ball.
+        classes: Name by id; empty where no class is called ball.
     """
 
-    names: Mapping[str, str]
+    names: IdIndex[str]
     sizes: Mapping[str, ImageSize]
-    classes: Mapping[int, str]
+    classes: IdIndex[str]
 
     @staticmethod
     def of(documents: Documents, report: Report) -> _CocoImages:
-        names: dict[str, str] = {}
+        names, classes = IdIndex[str](), IdIndex[str]()
         sizes: dict[str, ImageSize] = {}
-        classes: dict[int, str] = {}
+        balls = False
         for shown, value in documents:
-            listed = value.get("images", []) if isinstance(value, dict) else []
-            for number, item in enumerate(listed if isinstance(listed, list) else []):
-                try:
+            for number, item in enumerate(_listed(value, "images")):
+                with noted(report, shown, f"image {number}"):
                     image = fields.mapping(item)
                     name = str(image.get("file_name", ""))
-                    names[_identity(image.get("id"))] = name
-                    if image.get("width") and image.get("height"):
-                        width, height = fields.whole(image["width"]), fields.whole(image["height"])
-                        sizes[name] = ImageSize(width, height)
-                except ValueError as error:
-                    report.note(shown, f"image {number}", None, str(error))
-            listed = value.get("categories", []) if isinstance(value, dict) else []
-            for item in listed if isinstance(listed, list) else []:
-                if isinstance(item, dict) and isinstance(item.get("id"), int):
-                    classes[item["id"]] = str(item.get("name", ""))
-        return _CocoImages(names, sizes, classes if any(map(is_ball, classes.values())) else {})
+                    with noted(report, shown, f"image {number}"):
+                        if image.get("width") and image.get("height"):
+                            sides = (
+                                read_field(image, side, fields.whole)
+                                for side in ("width", "height")
+                            )
+                            sizes[name] = ImageSize(*sides)
+                    _add_id(names, image, name)
+            for number, item in enumerate(_listed(value, "categories")):
+                with noted(report, shown, f"category {number}"):
+                    category = fields.mapping(item)
+                    name = str(category.get("name", ""))
+                    _add_id(classes, category, name)
+                    balls = balls or is_ball(name)
+        return _CocoImages(names, sizes, classes if balls else IdIndex())
+
+
+def _listed(value: Any, name: str) -> list[Any]:
+    found = value.get(name) if isinstance(value, dict) else None
+    return found if isinstance(found, list) else []
+
+
+def _add_id(index: IdIndex[str], item: Mapping[str, Any], name: str) -> None:
+    """Add the name of an image or a class by its id.
+
+    Raises:
+        FieldError: The id is none, or that of another one.
+    """
+    value = item.get("id")
+    if not index.add(value, name) and (known := index.find(value)) != name:
+        known_as = (
+            None if known is None else f"is {id_text(value)}, which is {quoted(known)} already"
+        )
+        raise FieldError("id", f"{known_as or 'is missing or no id'}; left out")
 
 
 def _identity(value: Any) -> str:
@@ -297,11 +322,24 @@ def _identity(value: Any) -> str:
     Raises:
         ValueError: It is neither a number nor a name.
     """
-    if isinstance(value, str) and value.strip():
-        return value.strip()
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or value % 1:
+    text = id_text(value)
+    if text is None or (isinstance(value, float) and not value.is_integer()):
         raise ValueError("is missing or neither a number nor a name")
-    return str(int(value))
+    return text
+
+
+def _class_of(value: Mapping[str, Any], known: _CocoImages) -> tuple[int | str, str]:
+    """The id of the class of a result, and what a document calls it."""
+    if "category_id" not in value:
+        return 1, known.classes.find(1) or ""
+    label, text = known.classes.find(value["category_id"]), id_text(value["category_id"])
+    try:
+        return read_field(value, "category_id", fields.whole), label or ""
+    except FieldError:
+        # A class may be called by a word, where the document lists it so.
+        if label is None or text is None:
+            raise
+        return text, label
 
 
 def _add_coco(run: PredictionRun, item: Any, known: _CocoImages) -> None:
@@ -313,10 +351,9 @@ def _add_coco(run: PredictionRun, item: Any, known: _CocoImages) -> None:
             identity = _identity(value.get("image_id"))
     box = read_field(value, "bbox", lambda item: Box(*fields.numbers(item, 4)))
     score = read_field(value, "score", fields.number) if "score" in value else None
-    category = read_field(value, "category_id", fields.whole) if "category_id" in value else 1
-    if not run.wants(category, known.classes.get(category, "")):
+    if not run.wants(*_class_of(value, known)):
         return
-    named = known.names.get(identity, "")
+    named = known.names.find(identity) or ""
     if own:
         frame = run.frame(own)
         if problem := _contradiction(run, own, identity, named, frame):
@@ -337,7 +374,7 @@ def _contradiction(
     """Why the name and the number of a result mean two frames, in words; None where they do not."""
     # Ultralytics' number is that of the name, and no id of a document.
     stem = PurePosixPath(own.replace("\\", "/")).stem
-    if frame is None or not identity or identity == stem or identity == stem.lstrip("0"):
+    if frame is None or not identity or identity.lstrip("0") == stem.lstrip("0"):
         return None
     other = run.names.find(named or identity)
     if other is None or other.id == frame.id:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import re
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar
 
+from app.datasets.ball_names import is_ball
 from app.datasets.corner_origin import box_from_corner, box_to_corner
 from app.datasets.report import Report
 from app.errors import InputError
@@ -178,18 +178,6 @@ class PredictionRun:
             f"{name} ({self.labels[name]})" if self.labels.get(name, name) != name else f"{name}"
             for name in names[:20]
         )
-
-
-def is_ball(label: str) -> bool:
-    """Whether the name of a class is that of a ball.
-
-    Example:
-        >>> is_ball("sports ball"), is_ball("soccer-ball"), is_ball("Balloon")
-        (True, True, False)
-    """
-    return not {"ball", "balls", "football", "soccerball"}.isdisjoint(
-        re.split(r"[^a-z]+", label.lower())
-    )
 
 
 def box_problem(box: Box, size: ImageSize) -> str | None:

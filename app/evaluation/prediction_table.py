@@ -13,6 +13,7 @@ from pathlib import Path
 from app.datasets import fields
 from app.datasets.csv_text import is_missing, numbers_in, read_rows
 from app.datasets.file_tree import FileTree, Limits
+from app.datasets.record_ids import id_text
 from app.errors import DatasetFormatError
 from app.evaluation.frame_names import NamedFrame
 from app.evaluation.prediction_run import FieldError, PredictionRun, in_field, noted, read_field
@@ -194,14 +195,15 @@ def _row_frame(run: PredictionRun, cells: Mapping[str, str]) -> NamedFrame | Non
         parts = [cells.get(name, "").strip() for name in ("league", "season", "match")]
         return run.frame("/".join([part for part in parts if part] + [image]))
     if number is not None and not is_missing(cells.get("camera")):
-        camera = (cells["camera"] or "").strip().removeprefix("cam")
-        return run.frame(f"cam{camera}/{cells[number].strip().removesuffix('.0')}")
+        camera = id_text((cells["camera"] or "").strip().removeprefix("cam"))
+        return run.frame(f"cam{camera}/{id_text(cells[number])}")
     # The name of a picture says more than a number, which tools count from where they like. Beside
     # a class, "name" is that of the class.
     named = any(name in cells for name in _CLASSES)
     for name in _NAMES:
         if not is_missing(cells.get(name)) and not (named and name == "name"):
-            return run.frame(cells[name].strip())
+            text = cells[name].strip()
+            return run.frame(id_text(text) or text if name == "image_id" else text)
     if number is not None:
         return run.numbered(cells[number].strip())
     raise FieldError("frame", "is missing, and so is every other name of the frame")

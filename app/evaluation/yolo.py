@@ -15,6 +15,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from app.datasets.ball_names import is_ball
 from app.errors import InputError
 from app.evaluation.frame import Detection
 from app.geometry.arrays import FloatArray
@@ -125,7 +126,7 @@ def ball_category(names: Sequence[str]) -> int | None:
     """
     if len(names) == 1:
         return 0
-    balls = [place for place, name in enumerate(names) if "ball" in name.lower().split()]
+    balls = [place for place, name in enumerate(names) if is_ball(name)]
     return balls[0] if len(balls) == 1 else None
 
 

@@ -204,7 +204,7 @@ class Imported:
             sentence += f". The first of {len(problems)} problems: " if problems[1:] else ": "
             sentence += first
         look = looks_like(source.path, source.format)
-        if look is not None:
+        if look is not None and not (problems and look.is_said(problems[0])):
             return sentence, look.sentence
         if self.report.read:
             return sentence, "Every record was left out; the report names each with its reason."

@@ -34,6 +34,9 @@ BALLS = [
     "pallone",
     "ball/ball",
     "мяч",
+    "ball_1",
+    "Ball 2",
+    "ball1",
 ]
 OTHERS = [
     "basketball",
@@ -55,6 +58,9 @@ OTHERS = [
     "sport",
     "game",
     "balls_out",
+    "1",
+    "player_1",
+    "basketball_1",
 ]
 
 

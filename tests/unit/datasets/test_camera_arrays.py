@@ -45,6 +45,12 @@ class TestCamerasOfArrays:
             ({"R": np.zeros((2, 3, 3))}, "arrays of different lengths"),
             ({"t": np.zeros((3, 4))}, "t: has the shape"),
             ({"K": np.array([{"a": 1}], dtype=object)}, "something else than numbers"),
+            ({"K": np.array(3.0)}, "K: has the shape one number"),
+            ({"R": np.array(3.0)}, "R: has the shape one number"),
+            ({"t": np.array(3.0)}, "t: has the shape one number"),
+            ({"t": np.zeros((2, 3, 3, 3))}, "t: has the shape"),
+            ({"k": np.zeros(0)}, "k: is empty"),
+            ({"k": np.zeros((3, 0))}, "k: is empty"),
         ],
     )
     def test_arrays_that_do_not_fit_are_refused(
@@ -66,6 +72,18 @@ class TestCamerasOfArrays:
         assert read_cameras(tmp_path, report) == {}
         assert "another size than it says" in str(report.problems[0])
 
+    def test_an_empty_array_that_says_to_be_endless_is_refused(
+        self, tmp_path: Path, report: Report
+    ) -> None:
+        buffer = io.BytesIO()
+        np.lib.format.write_array_header_1_0(
+            buffer, {"descr": "<f8", "fortran_order": False, "shape": (0, 10**30)}
+        )
+        with zipfile.ZipFile(tmp_path / "a.npz", "w") as archive:
+            archive.writestr("K.npy", buffer.getvalue())
+        assert read_cameras(tmp_path, report) == {}
+        assert "no file of numpy's" in str(report.problems[0])
+
 
 class TestOpencvStorage:
     def test_matrices_of_a_yaml_file_are_a_camera(
@@ -82,7 +100,17 @@ class TestOpencvStorage:
         assert np.allclose(found["north"].position, camera.position), report.problems
 
     @pytest.mark.parametrize(
-        "text", ["a: &a [1]\nb: *a\n", "a: !!python/object:os.system x", "a: ["]
+        "text",
+        [
+            "a: &a [1]\nb: *a\n",
+            "a: !!python/object:os.system x",
+            "a: [",
+            "a: !!timestamp x",
+            "a: !!bool x",
+            "a: !!int ''",
+            "? [a, b]\n: 1",
+            "? !!binary é\n: 1\na: !!int [1]",
+        ],
     )
     def test_anything_but_plain_matrices_is_refused(
         self, tmp_path: Path, report: Report, text: str
@@ -90,3 +118,21 @@ class TestOpencvStorage:
         (tmp_path / "x.yaml").write_text(text)
         assert read_cameras(tmp_path, report) == {}
         assert "no YAML of OpenCV" in str(report.problems[0])
+
+    @pytest.mark.parametrize(
+        ("text", "key"),
+        [
+            ("1: {K: 3}", '"1"'),
+            ("2026-11-28: {K: 3}", '"2026-11-28"'),
+            ("on: 3", '"on"'),
+            ("null: 3", '"null"'),
+            ("1.5: {2: {3: 4}}", '"1.5"'),
+            ("1: !!opencv-matrix {rows: 3, 2: 3}", '"1"'),
+        ],
+    )
+    def test_keys_that_are_no_text_are_named_as_they_are_written(
+        self, tmp_path: Path, report: Report, text: str, key: str
+    ) -> None:
+        (tmp_path / "x.yml").write_text(text)
+        assert read_cameras(tmp_path, report) == {}
+        assert f"is an object with {key}" in str(report.problems[0])

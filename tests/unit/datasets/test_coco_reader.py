@@ -99,6 +99,47 @@ class TestReadCoco:
         boxes = [ball.box for view in again.views for ball in view.balls]
         assert Box(599.5, 300.5, 20.0, 21.0) in boxes and len(boxes) == 2
 
+    @pytest.mark.parametrize(
+        ("added", "field"),
+        [
+            ({"category_id": 2}, 'category_id: is "Player"'),
+            ({"category_id": 9}, "category_id: is 9"),
+            ({"category_id": 1, "iscrowd": 1}, "iscrowd: is 1"),
+        ],
+    )
+    @pytest.mark.parametrize("bare", [True, False])
+    def test_a_box_added_to_an_export_that_is_no_ball_is_named_and_no_ball(
+        self, tmp_path: Path, solved: Solved, soccer_group: Make, report: Report, added: dict,
+        field: str, bare: bool,
+    ) -> None:  # fmt: skip
+        group = soccer_group(replays=0)
+        view = replace(group.views[0], balls=()) if bare else group.views[0]
+        write_coco(tmp_path, [solved(replace(group, views=(view,)), ball=False)], everything=True)
+        path = tmp_path / "annotations/instances_train.json"
+        value = json.loads(path.read_text())
+        value["categories"].append({"id": 2, "name": "Player"})
+        items = value["annotations"]
+        items.append({"id": 98, "image_id": 1, "bbox": [600, 301, 20, 21]} | added)
+        path.write_text(json.dumps(value))
+        (again,) = read_coco(tmp_path, report)
+        assert again.views[0].balls == view.balls
+        (problem,) = map(str, report.problems)
+        assert f"annotations[{len(items) - 1}], {field}" in problem
+
+    def test_a_second_ball_added_to_a_view_is_named(
+        self, tmp_path: Path, solved: Solved, soccer_group: Make, report: Report
+    ) -> None:
+        write_coco(tmp_path, [solved(soccer_group(replays=0), ball=False)], everything=True)
+        path = tmp_path / "annotations/instances_train.json"
+        value = json.loads(path.read_text())
+        value["annotations"].append(ball(1, 98, bbox=[600, 301, 20, 21]))
+        path.write_text(json.dumps(value))
+        (group,) = read_coco(tmp_path, report)
+        assert len(group.views[0].balls) == 1
+        assert [problem.problem for problem in report.problems] == [
+            "adds a ball to a view that has one; left out"
+        ]
+
     def test_an_export_of_ours_that_says_no_origin_has_its_boxes_in_our_frame(
         self, tmp_path: Path, solved: Solved, soccer_group: Make, report: Report
     ) -> None:

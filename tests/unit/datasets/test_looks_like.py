@@ -58,6 +58,13 @@ class TestLooksLike:
         assert looks_like(write(tmp_path / "y", {"notes.md": "x"}), "coco") is None
         assert looks_like(tmp_path / "none", "coco") is None
 
+    @pytest.mark.parametrize("name", ["camera_1.json", "0001.json", "Labels-v3.json"])
+    def test_what_a_file_holds_counts_before_its_name(self, tmp_path: Path, name: str) -> None:
+        assert looks_like(write(tmp_path, {name: coco()}), "coco") is None
+        look = looks_like(tmp_path, "issia")
+        assert look is not None
+        assert look.format == "coco"
+
     def test_one_file_and_a_large_one_are_told_alike(self, tmp_path: Path) -> None:
         value = coco()
         value["annotations"] *= HEAD_BYTES // 10

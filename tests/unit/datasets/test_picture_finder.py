@@ -93,3 +93,20 @@ class TestOwnPictures:
         one, two = ("x", "clip1", "a.jpg"), ("x", "clip2", "a.jpg")
         found = own_pictures({one: Found("a.jpg", 1), two: Found("a.jpg", 1)})
         assert [item.place for item in found.values()] == [None, None]
+
+    @pytest.mark.parametrize("places", ["images/a.jpg", "deep/down/a.jpg"])
+    def test_a_name_in_its_own_case_goes_before_one_in_another(self, places: str) -> None:
+        names = [("A.JPG",), ("a.jpg",), ("clip", "A.jpg")]
+        found = own_pictures({name: find(places, "/".join(name)) for name in names})
+        assert found[("a.jpg",)].place == places
+        assert [found[name].rivals for name in (names[0], names[2])] == [(places,)] * 2
+
+    def test_names_that_fit_in_another_case_alone_have_none(self) -> None:
+        names = [("A.JPG",), ("A.jpg",)]
+        found = own_pictures({name: find("images/a.jpg", "/".join(name)) for name in names})
+        assert [item.place for item in found.values()] == [None, None]
+
+    def test_a_longer_end_in_another_case_does_not_go_before_the_whole_name(self) -> None:
+        names = [("a.jpg",), ("images", "A.JPG")]
+        found = own_pictures({name: find("images/a.jpg", "/".join(name)) for name in names})
+        assert [item.place for item in found.values()] == ["images/a.jpg", None]

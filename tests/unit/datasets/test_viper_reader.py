@@ -265,7 +265,10 @@ class TestShapes:
         text = ball_as("".join(reversed(entries) if boxed_first else entries))
         assert _read(tmp_path, text, report).balls == {9: [ImagePoint(640, 319)]}
 
-    @pytest.mark.parametrize("name", ["BALL", "Football", "soccer ball", "Soccer-Ball", "ball_1"])
+    @pytest.mark.parametrize(
+        "name",
+        ["BALL", "Football", "soccer ball", "Soccer-Ball", "ball_1", "BALLS", "Ballon", "pelota"],
+    )
     def test_a_ball_has_several_names(self, tmp_path: Path, report: Report, name: str) -> None:
         text = ball_as('<data:point framespan="9:9" x="1" y="2"/>', name)
         assert _read(tmp_path, text, report).ball_points == 1
@@ -277,6 +280,7 @@ class TestShapes:
             ("BALL", f'<data:obox {BOX} rotation="3"/>', "obox"),
             ("BALL", f"<data:ellipse {BOX}/>", "ellipse"),
             ("Person", '<data:point x="1" y="2"/>', "point"),
+            ("Basketball", '<data:point x="1" y="2"/>', "point"),
             ("Ballboy", '<data:point x="1" y="2"/>', "point"),
             ("FRAME", '<data:bvalue value="true"/>', "bvalue"),
         ],

@@ -218,11 +218,58 @@ class TestCoco:
         assert (record, where, found.boxes) == ("result 1", "file_name", 1)
         assert words in problem
 
-    @pytest.mark.parametrize("identity", [5, 5.0, "5"])
+    @pytest.mark.parametrize("identity", [5, 5.0, "5", "5.0", "005", " 5 "])
     def test_numbers_that_are_equal_are_one_image(self, tmp_path, names, identity) -> None:
         document = write(tmp_path / "t.json", {"images": [{"id": 5.0, "file_name": "7_1.png"}]})
         path = write(tmp_path / "r" / "r.json", [result(identity)])
         assert list(read_predictions(path, "coco", names, images=document).detections) == [2]
+
+    def test_ids_that_a_document_writes_as_text_are_numbers_too(self, tmp_path, names) -> None:
+        images = [{"id": "0011", "file_name": "7_1.png"}, {"id": "0012", "file_name": "7.png"}]
+        document = write(tmp_path / "t" / "t.json", {"images": images})
+        for identity in (11, "11.0", "011"):
+            path = write(tmp_path / "r.json", [result(identity)])
+            assert list(read_predictions(path, "coco", names, images=document).detections) == [2]
+
+    @pytest.mark.parametrize(("own", "other"), [(2.0, 1.0), ("2", "1"), ("02", "01"), ("b", "p")])
+    def test_ids_of_classes_are_those_of_the_document_however_they_are_written(
+        self, tmp_path, names, own, other
+    ) -> None:
+        listed = [{"id": other, "name": "player"}, {"id": own, "name": "ball"}]
+        document = write(tmp_path / "t" / "t.json", {"images": [], "categories": listed})
+        numbered = [own, other] if own == "b" else [2, 1]
+        for written in (numbered, [own, other]):
+            results = [result(category_id=item, score=0.5) for item in written]
+            path = write(tmp_path / "r.json", results)
+            assert read_predictions(path, "coco", names, images=document).boxes == 1
+
+    def test_what_a_document_cannot_mean_is_named(self, tmp_path, names) -> None:
+        images = [
+            {"id": 5, "file_name": "7.png"},
+            {"id": "5.0", "file_name": "7_1.png"},
+            {"file_name": "a.png"},
+        ]
+        listed = [{"id": 1, "name": "ball"}, {"name": "player"}, {"id": 1.0, "name": "player"}]
+        document = write(tmp_path / "t" / "t.json", {"images": images, "categories": listed})
+        path = write(tmp_path / "r.json", [result(5)])
+        found = read_predictions(path, "coco", names, images=document)
+        assert list(found.detections) == [1]
+        assert [(record, field) for record, field, _ in problems(found)] == [
+            ("image 1", "id"),
+            ("image 2", "id"),
+            ("category 1", "id"),
+            ("category 2", "id"),
+        ]
+
+    def test_the_document_that_was_handed_over_says_what_an_id_means(self, tmp_path, names) -> None:
+        other = {"images": [{"id": 5, "file_name": "7.png"}]}
+        write(tmp_path / "r" / "other.json", other)
+        write(tmp_path / "r" / "r.json", [result(5)])
+        given = {"images": [{"id": 5, "file_name": "7_1.png"}]}
+        document = write(tmp_path / "t.json", given)
+        found = read_predictions(tmp_path / "r", "coco", names, images=document)
+        assert list(found.detections) == [2]
+        assert "is 5, which is" in problems(found)[0][2]
 
     def test_a_class_that_the_file_does_not_have_is_refused_with_those_that_it_has(
         self, tmp_path, names
@@ -247,6 +294,21 @@ class TestCoco:
         with pytest.raises(InputError, match=r"no class called ball; its classes are 1 \(player\)"):
             read_predictions(path, "coco", names, images=images)
 
+    @pytest.mark.parametrize("name", ["ballon", "pelota", "sportsball", "footballs", "ball_1"])
+    def test_the_ball_of_predictions_has_the_names_that_it_has_in_datasets(
+        self, tmp_path, names, name: str
+    ) -> None:
+        other = ("ball boy", "ball_carrier", "basket ball", "tennis ball", "Balloon")
+        listed = [{"id": at, "name": text} for at, text in enumerate((*other, name))]
+        images = write(tmp_path / "t" / "t.json", {"images": [], "categories": listed})
+        results = [result(category_id=at, score=at / 10) for at in range(len(listed))]
+        path = write(tmp_path / "r.json", results)
+        found = read_predictions(path, "coco", names, images=images)
+        assert [item.score for item in found.detections[1]] == [0.5]
+        rows = "".join(f"7.png,1,2,8,9,{text}\n" for text in (*other, name))
+        path = write(tmp_path / "r.csv", f"image,x,y,w,h,class\n{rows}")
+        assert read_predictions(path, "csv", names).boxes == 1
+
     def test_a_number_that_is_none_costs_its_own_result_alone(self, tmp_path, names) -> None:
         text = json.dumps([result(), result(score=0.25)]).replace("0.25", "NaN")
         found = read_predictions(write(tmp_path / "r.json", text), "coco", names)
@@ -255,6 +317,14 @@ class TestCoco:
     def test_json_lines_are_read(self, tmp_path, names) -> None:
         text = "\n".join(map(json.dumps, [result(), result("7_1.png")]))
         assert read_predictions(write(tmp_path / "r.json", text), "coco", names).boxes == 2
+
+    def test_a_line_that_cannot_be_read_is_named_and_the_others_are_read(
+        self, tmp_path, names
+    ) -> None:
+        good = json.dumps(result())
+        path = write(tmp_path / "r.jsonl", f"{good}\n{good[:-20]}\n{good}\n")
+        found = read_predictions(path, "coco", names)
+        assert (found.boxes, [record for record, _, _ in problems(found)]) == (2, ["line 2"])
 
 
 class TestYolo:
@@ -342,6 +412,18 @@ class TestCsv:
         assert found.detections[1][0].box == Box(20.5, 40.5, 16, 18)
         assert found.detections[2][0].box == Box(10, 20, 8, 9)
         assert (found.boxes, found.without_score) == (2, 1)
+
+    @pytest.mark.parametrize(
+        "text",
+        [
+            "camera,frame,x,y,w,h\n3.0,358.0,10,20,8,9\n",
+            "camera,frame,x,y,w,h\ncam3,358.00,10,20,8,9\n",
+            "frame,x,y,w,h\n358.00,10,20,8,9\n",
+        ],
+    )
+    def test_a_number_with_a_point_is_that_number(self, tmp_path, names, text: str) -> None:
+        found = read_predictions(write(tmp_path / "p.csv", text), "csv", names)
+        assert list(found.detections) == [9]
 
     def test_reads_cameras_and_frames(self, tmp_path, names) -> None:
         text = "camera,frame,x,y,w,h,confidence\n3,358,10,20,8,9,0.25\ncam3,358.0,1,2,3,4,0.5\n"

@@ -90,5 +90,6 @@ class TestBallCategory:
         assert ball_category(["person", "sports ball"]) == 1
         assert ball_category(["anything"]) == 0
         assert ball_category(["ball", "sports ball"]) is None
+        assert ball_category(["tennis ball", "player", "Football", "ball boy"]) == 2
         assert ball_category(["person", "balloon"]) is None
         assert ball_category([]) is None

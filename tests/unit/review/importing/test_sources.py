@@ -386,6 +386,25 @@ class TestRemarks:
         imported = import_source(store, "x", Source("coco", tmp_path), store.settings)
         assert imported.nothing_read()[1].startswith("It looks like LabelMe")
 
+    @pytest.mark.parametrize(
+        ("value", "advice"),
+        [
+            ({"images": [], "annotations": []}, "import it as coco"),
+            ({"images": [], "annotations": [{"bbox_image": {}}]}, "import it as gamestate"),
+            ({"pan_degrees": 1.0}, "import it as cameras"),
+            ({"actions": {"1.png": {"imageMetadata": {}}}}, "import it as soccernet-v3"),
+            ([{"image_id": 1, "bbox": [1, 2, 3, 4], "score": 1}], "touchline evaluate"),
+            ({"shapes": [], "imagePath": "a.jpg"}, "export it as COCO"),
+        ],
+    )
+    def test_what_files_are_is_said_once(
+        self, store: Store, tmp_path: Path, value: object, advice: str
+    ) -> None:
+        (tmp_path / "x.json").write_text(json.dumps(value))
+        imported = import_source(store, "x", Source("sn-calibration", tmp_path), store.settings)
+        sentence, hint = imported.nothing_read()
+        assert (advice in sentence, "looks like" in hint) == (True, False)
+
 
 class TestCheck:
     @pytest.mark.parametrize("form", FORMATS)
