@@ -366,10 +366,7 @@ def _video_frame(media: Media, settings: Settings) -> Any:
     times = video_times(media, settings)
     if not 0 <= number < len(times):
         raise NotFoundError(f"{path.name} has no frame {number}; it has {len(times):,} frames")
-    with open_video(path) as video:
-        if not video.isOpened():
-            raise ImageError(f"{path.name} is no video that can be read")
-        picture = frame_at(video, number, times)
+    picture = frame_at(path, number, times)
     if picture is None:
         raise NotFoundError(f"frame {number} of {path.name} cannot be decoded")
     # A stream may change its size on the way.

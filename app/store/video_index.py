@@ -7,7 +7,8 @@ by a frame rate: with a variable rate, a start after zero or frames that are dro
 from __future__ import annotations
 
 import hashlib
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -64,23 +65,36 @@ def kept_index(stamp: str, settings: Settings) -> Times | None:
     return None
 
 
-def frame_at(video: cv2.VideoCapture, number: int, times: Times) -> Any:
+def frame_at(path: Path, number: int, times: Times) -> Any:
     """The frame of that number, or None where it cannot be decoded.
 
     Args:
-        video: Just opened.
+        path: The video.
         number: From 0, below ``len(times)``.
         times: Index of the video.
+
+    Raises:
+        ImageError: It is no video that can be read.
     """
-    for margin in _MARGINS:
-        if number > margin and _jump(video, number - margin, number, times):
-            return _retrieved(video)
     if number > _MARGINS[0]:
-        video.set(cv2.CAP_PROP_POS_FRAMES, 0)
-    for _ in range(number + 1):
-        if not video.grab():
-            return None
-    return _retrieved(video)
+        with _opened(path) as video:
+            for margin in _MARGINS:
+                if number > margin and _jump(video, number - margin, number, times):
+                    return _retrieved(video)
+    # Opened anew: sent back to its start, a decoder may land behind the first frame.
+    with _opened(path) as video:
+        for _ in range(number + 1):
+            if not video.grab():
+                return None
+        return _retrieved(video)
+
+
+@contextmanager
+def _opened(path: Path) -> Iterator[cv2.VideoCapture]:
+    with open_video(path) as video:
+        if not video.isOpened():
+            raise ImageError(f"{path.name} is no video that can be read")
+        yield video
 
 
 def _jump(video: cv2.VideoCapture, start: int, number: int, times: Times) -> bool:
@@ -105,9 +119,7 @@ def _retrieved(video: cv2.VideoCapture) -> Any:
 
 def _decode_times(path: Path) -> Times:
     times: list[float] = []
-    with open_video(path) as video:
-        if not video.isOpened():
-            raise ImageError(f"{path.name} is no video that can be read")
+    with _opened(path) as video:
         while video.grab():
             times.append(video.get(cv2.CAP_PROP_POS_MSEC))
             if len(times) > MAX_FRAMES:
