@@ -7,7 +7,7 @@ by a frame rate: with a variable rate, a start after zero or frames that are dro
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from io import BytesIO
 from pathlib import Path
@@ -24,6 +24,8 @@ from app.store.video import open_video
 
 MAX_FRAMES = 2_000_000
 """Frames of one video; eleven hours at 50 a second."""
+_A_WORD = 250
+"""Frames between two words of how far the decoding is: about a second of 1080p."""
 _VERSION = 1
 _MARGINS = (32, 256)
 """Frames before the one that is sought from which decoding starts: behind a jump some decoders return
@@ -33,19 +35,22 @@ Times = npt.NDArray[np.float64]
 """Presentation time of each frame as the decoder returns them, milliseconds, shape (N,)."""
 
 
-def make_index(path: Path, stamp: str, settings: Settings) -> Times:
+def make_index(
+    path: Path, stamp: str, settings: Settings, tell: Callable[[int], None] | None = None
+) -> Times:
     """When each frame of a video is shown: decodes it all, and keeps the index in the cache.
 
     Args:
         path: The video.
         stamp: Name of its content: another video under the same path has another one.
         settings: The folder of the cache.
+        tell: Called every now and then with how many frames are decoded; what it raises ends it.
 
     Raises:
         ImageError: It is no video that can be read.
         TooLargeError: It has more frames than ``MAX_FRAMES``.
     """
-    times = _decode_times(path)
+    times = _decode_times(path, tell)
     content = BytesIO()
     np.save(content, times, allow_pickle=False)
     place = _place(stamp, settings)
@@ -117,13 +122,15 @@ def _retrieved(video: cv2.VideoCapture) -> Any:
     return picture if done else None
 
 
-def _decode_times(path: Path) -> Times:
+def _decode_times(path: Path, tell: Callable[[int], None] | None) -> Times:
     times: list[float] = []
     with _opened(path) as video:
         while video.grab():
             times.append(video.get(cv2.CAP_PROP_POS_MSEC))
             if len(times) > MAX_FRAMES:
                 raise TooLargeError(f"{path.name} has more than {MAX_FRAMES:,} frames")
+            if tell is not None and len(times) % _A_WORD == 0:
+                tell(len(times))
     return np.array(times)
 
 
