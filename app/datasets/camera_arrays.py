@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import math
 import re
 import zipfile
 from typing import Any
@@ -17,6 +18,11 @@ from app.errors import DatasetFormatError
 _SHAPES = {"K": (3, 3), "R": (3, 3), "t": (3,)}
 """Arrays that must be there, each with the shape of one camera's part."""
 _DISTORTION = "k"
+MOST_CAMERAS = 100_000
+"""Of one file: half a match has 75,000 frames at 25 a second. Each camera takes 1.5 KiB and 0.06 ms
+however well its numbers are compressed, so a file of a kilobyte could hold millions."""
+_NUMBERS = {"K": 9, "R": 9, "t": 3, _DISTORTION: 14}
+"""Most numbers that one camera has in each array; OpenCV's longest distortion has 14."""
 _MAX_HEADER = 10_000
 _MAX_YAML = 1024 * 1024
 _TEXT = "tag:yaml.org,2002:str"
@@ -31,7 +37,8 @@ def cameras_of_arrays(
     Frame i of ``MATCH.npz`` is called ``MATCH/i``; a camera that never moves like the file alone.
 
     Raises:
-        DatasetFormatError: It is damaged or too large, or K, R and t do not fit together.
+        DatasetFormatError: It is damaged, too large or of too many cameras, or K, R and t do not
+            fit together.
     """
     arrays = _arrays(content, path, limits)
     missing = [name for name in _SHAPES if name not in arrays]
@@ -51,6 +58,9 @@ def cameras_of_arrays(
         raise DatasetFormatError(path, None, None, f"has arrays of different lengths ({sizes})")
     if all((part == part[0]).all() for part in parts.values()):
         count = 1
+    if count > MOST_CAMERAS:
+        longest = max(parts, key=lambda name: len(parts[name]))
+        raise _too_many(path, longest, f"has {count:,} rows")
     objects = [
         {name: part[min(at, len(part) - 1)].tolist() for name, part in parts.items()}
         for at in range(count)
@@ -73,7 +83,10 @@ def _rows(
 
 
 def _arrays(content: bytes, path: str, limits: Limits) -> dict[str, npt.NDArray[Any]]:
-    """The arrays of numbers by name; nothing is unpickled, and no header is believed about its size."""
+    """The arrays of numbers by name; nothing is unpickled, and no header is believed about its size.
+
+    Arrays that say nothing of cameras are named, and not read: they stay empty.
+    """
     found = {}
     try:
         with zipfile.ZipFile(io.BytesIO(content)) as archive:
@@ -82,9 +95,13 @@ def _arrays(content: bytes, path: str, limits: Limits) -> dict[str, npt.NDArray[
                     path, None, None, f"is longer than {limits.file_bytes:,} bytes"
                 )
             for item in archive.infolist():
-                raw = archive.read(item)
-                if item.filename.endswith(".npy"):
-                    found[item.filename.removesuffix(".npy")] = _array(raw)
+                name = item.filename.removesuffix(".npy")
+                if name == item.filename:
+                    continue
+                if name not in _NUMBERS:
+                    found[name] = np.empty(0)
+                    continue
+                found[name] = _array(archive, item, name, path)
     except (ValueError, OverflowError) as error:
         raise DatasetFormatError(path, None, None, f"is no file of numpy's ({error})") from error
     except BROKEN as error:
@@ -92,19 +109,33 @@ def _arrays(content: bytes, path: str, limits: Limits) -> dict[str, npt.NDArray[
     return found
 
 
-def _array(raw: bytes) -> npt.NDArray[Any]:
-    file = io.BytesIO(raw)
-    version = np.lib.format.read_magic(file)
-    read = np.lib.format.read_array_header_1_0
-    if version != (1, 0):
-        read = np.lib.format.read_array_header_2_0
-    shape, fortran, kind = read(file, max_header_size=_MAX_HEADER)
-    body = raw[file.tell() :]
-    if kind.hasobject or kind.kind not in "fiu":
-        raise ValueError("holds something else than numbers")
-    if len(body) != int(np.prod(shape, dtype=object)) * kind.itemsize:
-        raise ValueError("holds an array of another size than it says")
+def _array(
+    archive: zipfile.ZipFile, item: zipfile.ZipInfo, name: str, path: str
+) -> npt.NDArray[Any]:
+    """An array, whose header and length are looked at before its numbers are unpacked."""
+    with archive.open(item) as file:
+        read = np.lib.format.read_array_header_1_0
+        if np.lib.format.read_magic(file) != (1, 0):
+            read = np.lib.format.read_array_header_2_0
+        shape, fortran, kind = read(file, max_header_size=_MAX_HEADER)
+        if kind.hasobject or kind.kind not in "fiu":
+            raise ValueError("holds something else than numbers")
+        numbers = math.prod(shape)
+        if numbers * kind.itemsize != item.file_size - file.tell():
+            raise ValueError("holds an array of another size than it says")
+        if numbers > MOST_CAMERAS * _NUMBERS[name]:
+            raise _too_many(path, name, f"holds {numbers:,} numbers")
+        body = file.read()
     return np.frombuffer(body, kind).reshape(shape, order="F" if fortran else "C").astype(float)
+
+
+def _too_many(path: str, name: str, problem: str) -> DatasetFormatError:
+    return DatasetFormatError(
+        path,
+        None,
+        name,
+        f"{problem}; a file may hold {MOST_CAMERAS:,} cameras: split it into several files",
+    )
 
 
 class _StorageLoader(yaml.SafeLoader):

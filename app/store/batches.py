@@ -58,10 +58,14 @@ class StoredBulkVerdict:
         return self.undone is not None or self.undo_spans is not None
 
 
-def read_batches(session: Session, dataset_id: int, limit: int) -> list[StoredBulkVerdict]:
-    """The batches of a dataset, the newest first."""
+def read_batches(
+    session: Session, dataset_id: int, limit: int, before: int | None = None
+) -> list[StoredBulkVerdict]:
+    """The batches of a dataset, the newest first; only those before an id where there is one."""
     model = VerdictBatchModel
     statement = _BATCHES.where(model.dataset_id == dataset_id).order_by(model.id.desc())
+    if before is not None:
+        statement = statement.where(model.id < before)
     return [_batch(row) for row in session.execute(statement.limit(limit))]
 
 

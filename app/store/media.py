@@ -6,6 +6,7 @@ import contextlib
 import hashlib
 import os
 import stat
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -172,8 +173,15 @@ def frame_name(media: Media) -> str:
     return f"frame {file}" if media.frame is None else f"frame {media.frame} of {file}"
 
 
-def video_times(media: Media, settings: Settings) -> Times:
+def video_times(
+    media: Media, settings: Settings, tell: Callable[[int], None] | None = None
+) -> Times:
     """When each frame of a view's video is shown; decoded where no index is kept.
+
+    Args:
+        media: A frame of the video.
+        settings: Limits, and where indices are kept.
+        tell: Called every now and then with how many frames are decoded; what it raises ends it.
 
     Raises:
         NotFoundError: The video is not there.
@@ -186,7 +194,7 @@ def video_times(media: Media, settings: Settings) -> Times:
     if known is not None:
         return known
     check_size(_video_header(path), settings, path.name)
-    return make_index(path, stamp, settings)
+    return make_index(path, stamp, settings, tell)
 
 
 def video_length(media: Media) -> int:
@@ -366,10 +374,7 @@ def _video_frame(media: Media, settings: Settings) -> Any:
     times = video_times(media, settings)
     if not 0 <= number < len(times):
         raise NotFoundError(f"{path.name} has no frame {number}; it has {len(times):,} frames")
-    with open_video(path) as video:
-        if not video.isOpened():
-            raise ImageError(f"{path.name} is no video that can be read")
-        picture = frame_at(video, number, times)
+    picture = frame_at(path, number, times)
     if picture is None:
         raise NotFoundError(f"frame {number} of {path.name} cannot be decoded")
     # A stream may change its size on the way.

@@ -7,7 +7,8 @@ by a frame rate: with a variable rate, a start after zero or frames that are dro
 from __future__ import annotations
 
 import hashlib
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -23,6 +24,8 @@ from app.store.video import open_video
 
 MAX_FRAMES = 2_000_000
 """Frames of one video; eleven hours at 50 a second."""
+_A_WORD = 250
+"""Frames between two words of how far the decoding is: about a second of 1080p."""
 _VERSION = 1
 _MARGINS = (32, 256)
 """Frames before the one that is sought from which decoding starts: behind a jump some decoders return
@@ -32,19 +35,22 @@ Times = npt.NDArray[np.float64]
 """Presentation time of each frame as the decoder returns them, milliseconds, shape (N,)."""
 
 
-def make_index(path: Path, stamp: str, settings: Settings) -> Times:
+def make_index(
+    path: Path, stamp: str, settings: Settings, tell: Callable[[int], None] | None = None
+) -> Times:
     """When each frame of a video is shown: decodes it all, and keeps the index in the cache.
 
     Args:
         path: The video.
         stamp: Name of its content: another video under the same path has another one.
         settings: The folder of the cache.
+        tell: Called every now and then with how many frames are decoded; what it raises ends it.
 
     Raises:
         ImageError: It is no video that can be read.
         TooLargeError: It has more frames than ``MAX_FRAMES``.
     """
-    times = _decode_times(path)
+    times = _decode_times(path, tell)
     content = BytesIO()
     np.save(content, times, allow_pickle=False)
     place = _place(stamp, settings)
@@ -64,23 +70,36 @@ def kept_index(stamp: str, settings: Settings) -> Times | None:
     return None
 
 
-def frame_at(video: cv2.VideoCapture, number: int, times: Times) -> Any:
+def frame_at(path: Path, number: int, times: Times) -> Any:
     """The frame of that number, or None where it cannot be decoded.
 
     Args:
-        video: Just opened.
+        path: The video.
         number: From 0, below ``len(times)``.
         times: Index of the video.
+
+    Raises:
+        ImageError: It is no video that can be read.
     """
-    for margin in _MARGINS:
-        if number > margin and _jump(video, number - margin, number, times):
-            return _retrieved(video)
     if number > _MARGINS[0]:
-        video.set(cv2.CAP_PROP_POS_FRAMES, 0)
-    for _ in range(number + 1):
-        if not video.grab():
-            return None
-    return _retrieved(video)
+        with _opened(path) as video:
+            for margin in _MARGINS:
+                if number > margin and _jump(video, number - margin, number, times):
+                    return _retrieved(video)
+    # Opened anew: sent back to its start, a decoder may land behind the first frame.
+    with _opened(path) as video:
+        for _ in range(number + 1):
+            if not video.grab():
+                return None
+        return _retrieved(video)
+
+
+@contextmanager
+def _opened(path: Path) -> Iterator[cv2.VideoCapture]:
+    with open_video(path) as video:
+        if not video.isOpened():
+            raise ImageError(f"{path.name} is no video that can be read")
+        yield video
 
 
 def _jump(video: cv2.VideoCapture, start: int, number: int, times: Times) -> bool:
@@ -103,15 +122,15 @@ def _retrieved(video: cv2.VideoCapture) -> Any:
     return picture if done else None
 
 
-def _decode_times(path: Path) -> Times:
+def _decode_times(path: Path, tell: Callable[[int], None] | None) -> Times:
     times: list[float] = []
-    with open_video(path) as video:
-        if not video.isOpened():
-            raise ImageError(f"{path.name} is no video that can be read")
+    with _opened(path) as video:
         while video.grab():
             times.append(video.get(cv2.CAP_PROP_POS_MSEC))
             if len(times) > MAX_FRAMES:
                 raise TooLargeError(f"{path.name} has more than {MAX_FRAMES:,} frames")
+            if tell is not None and len(times) % _A_WORD == 0:
+                tell(len(times))
     return np.array(times)
 
 

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from functools import partial
+from typing import Annotated
 
-from fastapi import APIRouter, Response
+from fastapi import APIRouter, Query, Response
 from starlette.background import BackgroundTasks
 
+from app.api.cursor import parse_cursor
 from app.api.deps import Actor, AppServices, AppStore, DatasetPath, DryRun, Id, IfMatch
-from app.api.paging import paged
+from app.api.paging import MAX_ITEMS, Cursor
 from app.api.problem import responses
 from app.api.reply import AskedUnder, Reply, document
 from app.api.routers.groups import CHANGED, CONFLICTS, change_group, load_document
@@ -141,11 +143,17 @@ def post_verdicts(
     operation_id="listVerdictBatches",
     responses=responses(404),
 )
-@paged(default=20)
-def list_batches(dataset: DatasetPath, store: AppStore) -> BatchList:
+def list_batches(
+    dataset: DatasetPath,
+    store: AppStore,
+    limit: Annotated[int, Query(ge=1, le=MAX_ITEMS, description="Items a page.")] = 20,
+    cursor: Cursor = None,
+) -> BatchList:
     """The newest bulk verdicts of a dataset."""
-    batches = bulk.list_batches(store, dataset_id(store, dataset), bulk.ALL_BATCHES)
-    return BatchList(items=batches)
+    found = dataset_id(store, dataset)
+    batches = bulk.list_batches(store, found, limit + 1, parse_cursor(cursor))
+    more = str(batches[limit - 1].id) if len(batches) > limit else None
+    return BatchList(items=batches[:limit], next=more)
 
 
 @router.post(

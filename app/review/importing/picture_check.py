@@ -10,6 +10,7 @@ from app.config import Settings
 from app.datasets.report import Report
 from app.errors import ImageError, NotFoundError, StorageError, TooLargeError
 from app.paint.picture_scale import SHAPES_APART
+from app.progress import TellProgress
 from app.soccer.frames import ImageSize
 from app.soccer.group import Group, View
 from app.soccer.media import Media
@@ -45,6 +46,7 @@ class PictureCheck:
     Attributes:
         report: Counts pictures that EXIF turns.
         settings: Where indices of videos are kept, which are made here.
+        progress: Hears how far a video is decoded, which takes minutes.
         shapes: Views whose picture has another shape than the file declares.
         outside: Views with annotations that lie outside their picture.
         beyond: Views whose video has no frame of their number.
@@ -52,18 +54,21 @@ class PictureCheck:
 
     report: Report
     settings: Settings
+    progress: TellProgress | None = None
     shapes: list[str] = field(default_factory=list)
     outside: list[str] = field(default_factory=list)
     beyond: list[str] = field(default_factory=list)
     _stations: set[str] = field(default_factory=set)
     """Static cameras whose lines were looked at: every group brings them again."""
     _videos: dict[str, _Video] = field(default_factory=dict)
+    _passed: int = 0
 
     def watch(self, groups: Iterable[Group]) -> Iterator[Group]:
         """The groups, each compared as it passes."""
         for group in groups:
             for view in group.views:
                 self._compare(group, view)
+            self._passed += 1
             yield group
 
     def remarks(self) -> list[str]:
@@ -121,9 +126,25 @@ class PictureCheck:
         try:
             if video_length(media) > LONGEST:
                 return _Video(header, None)
-            return _Video(header, len(video_times(media, self.settings)))
+            return _Video(header, self._count(media))
         except (NotFoundError, ImageError, StorageError, TooLargeError) as error:
             return _Video(header, None, error.message)
+
+    def _count(self, media: Media) -> int:
+        """How many frames a video has; said while they are counted, which may take minutes."""
+        name = PurePosixPath(media.path).name
+
+        def tell(frames: int) -> None:
+            self._tell(f"Counting the frames of {name}: {frames:,} so far.")
+
+        tell(0)
+        count = len(video_times(media, self.settings, tell))
+        self._tell("Reading the groups.")
+        return count
+
+    def _tell(self, sentence: str) -> None:
+        if self.progress is not None:
+            self.progress(self._passed, None, sentence)
 
     def _outside(self, view: View) -> Iterator[str]:
         """Annotations of a view that are outside its picture."""

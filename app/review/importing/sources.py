@@ -323,7 +323,7 @@ def import_source(
     groups = _groups(source, settings, report, limits) if folder is None else folder.groups()
     if source.frames is not None:
         groups = read_frame_list(source.frames, settings, report, limits).placed(iter(groups))
-    tally, check = BallTally(), PictureCheck(report, settings)
+    tally, check = BallTally(), PictureCheck(report, settings, progress)
     result = ingest(
         store,
         dataset,

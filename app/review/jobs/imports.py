@@ -176,8 +176,9 @@ def _following(
 
 
 def _step(progress: JobProgress, sentence: str) -> TellProgress:
-    def step(done: int, _total: int | None = None, _sentence: str = "") -> None:
-        progress(done, None, f"{sentence} {done:,} groups so far.")
+    def step(done: int, _total: int | None = None, said: str = "") -> None:
+        more = f" {said}" if said else ""
+        progress(done, None, f"{sentence}{more} {done:,} groups so far.")
 
     return step
 

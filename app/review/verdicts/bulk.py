@@ -215,19 +215,28 @@ def _require_expected(found: SortedOut, expected: int | None) -> None:
         )
 
 
-ALL_BATCHES = 1_000_000
-"""More bulk verdicts than a dataset ever has."""
-
-
-def list_batches(store: Store, dataset_id: int, limit: int = 20) -> list[StoredBulkVerdict]:
+def list_batches(
+    store: Store, dataset_id: int, limit: int = 20, before: int | None = None
+) -> list[StoredBulkVerdict]:
     """The newest bulk verdicts of a dataset, the newest first.
 
     Those whose query asks what is for reviewers alone are told to these alone: they say how many
     groups it found.
+
+    Args:
+        store: The database.
+        dataset_id: The dataset.
+        limit: As many at most.
+        before: Only those before this id; None: from the newest.
     """
+    found: list[StoredBulkVerdict] = []
     with store.read() as session:
-        found = read_batches(session, dataset_id, limit)
-    return [one for one in found if judges_in(dataset_id) or not asks_blind(one.query)]
+        while some := read_batches(session, dataset_id, limit, before):
+            found += [one for one in some if judges_in(dataset_id) or not asks_blind(one.query)]
+            if len(some) < limit or len(found) >= limit:
+                break
+            before = some[-1].id
+    return found[:limit]
 
 
 @dataclass(frozen=True)

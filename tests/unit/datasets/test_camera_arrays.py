@@ -8,6 +8,8 @@ import cv2
 import numpy as np
 import pytest
 
+from app.datasets import cameras_reader
+from app.datasets.camera_arrays import MOST_CAMERAS
 from app.datasets.cameras_reader import read_cameras
 from app.datasets.report import Report
 from app.geometry.camera import Camera
@@ -59,6 +61,40 @@ class TestCamerasOfArrays:
         np.savez(tmp_path / "a.npz", **(arrays | changes))
         assert read_cameras(tmp_path, report) == {}
         assert problem in str(report.problems[0])
+
+    @pytest.mark.parametrize(
+        ("arrays", "problem"),
+        [
+            ({"t": np.zeros((MOST_CAMERAS + 1, 3), np.uint8)}, "t: holds 300,003 numbers"),
+            ({"K": np.zeros((MOST_CAMERAS + 1, 3, 3), "u1")}, "K: holds 900,009 numbers"),
+            ({"k": np.arange(2.0 * MOST_CAMERAS)[:, None]}, "k: has 200,000 rows"),
+        ],
+    )
+    def test_more_cameras_than_a_file_may_hold_are_refused_before_they_are_made(
+        self,
+        tmp_path: Path,
+        report: Report,
+        camera: Camera,
+        arrays: dict[str, np.ndarray],
+        problem: str,
+        monkeypatch: pytest.MonkeyPatch,
+    ) -> None:
+        one = {"K": K, "R": camera.rotation, "t": np.zeros(3)}
+        np.savez_compressed(tmp_path / "a.npz", **(one | arrays))
+        monkeypatch.setattr(
+            cameras_reader, "_camera", lambda *_: pytest.fail("a camera was made of it")
+        )
+        assert read_cameras(tmp_path, report) == {}
+        (said,) = map(str, report.problems)
+        assert "a.npz" in said and problem in said
+        assert "a file may hold 100,000 cameras: split it into several files" in said
+
+    def test_what_says_nothing_of_cameras_is_not_unpacked(
+        self, tmp_path: Path, report: Report, arrays: dict[str, np.ndarray]
+    ) -> None:
+        more = {"frames": np.array(["a.png", "b.png", "c.png"]), "depth": np.zeros((10**6, 9))}
+        np.savez_compressed(tmp_path / "north.npz", **arrays, **more)
+        assert list(read_cameras(tmp_path, report)) == ["north"], report.problems
 
     def test_a_header_that_lies_about_its_size_takes_no_memory(
         self, tmp_path: Path, report: Report

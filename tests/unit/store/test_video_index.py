@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import random
 from pathlib import Path
+from typing import Any, ClassVar
 
 import cv2
 import numpy as np
@@ -15,8 +16,6 @@ from app.store import video_index
 from app.store.frames import Frames
 from app.store.media import decode_frame, has_index, read_frame, video_times
 from app.store.neighbours import neighbours
-from app.store.video import open_video
-from app.store.video_index import frame_at
 from tests.videos import delay_start, number_of, vary_times, write_video
 
 TICK = 512
@@ -56,6 +55,27 @@ def wrong(path: Path, settings: Settings, step: int = 7) -> list[tuple[int, int]
     return found
 
 
+_CAPTURE = cv2.VideoCapture
+
+
+class Astray:
+    """A decoder that jumps too far, and that lands behind the first frame when it is sent back."""
+
+    jumps: ClassVar[list[float]] = []
+
+    def __init__(self, *arguments: Any):
+        self._video = _CAPTURE(*arguments)
+
+    def set(self, what: int, value: float) -> bool:
+        if what == cv2.CAP_PROP_POS_MSEC:
+            self.jumps.append(value)
+            value += 1000.0
+        return bool(self._video.set(what, value + 5 if what == cv2.CAP_PROP_POS_FRAMES else value))
+
+    def __getattr__(self, name: str) -> object:
+        return getattr(self._video, name)
+
+
 class TestFrameAt:
     @pytest.mark.parametrize(("suffix", "codec"), CODECS)
     def test_every_frame_of_a_constant_rate_shows_its_number(
@@ -79,28 +99,14 @@ class TestFrameAt:
         assert wrong(delay_start(path, 1700), settings) == []
 
     def test_a_jump_that_leads_elsewhere_is_not_believed(
-        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+        self, tmp_path: Path, settings: Settings, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        class Astray:
-            """Jumps too far, and then to where nothing says which frame it is."""
-
-            def __init__(self, video: cv2.VideoCapture):
-                self._video, self.jumps = video, 0
-
-            def set(self, what: int, value: float) -> bool:
-                if what == cv2.CAP_PROP_POS_MSEC:
-                    self.jumps += 1
-                    value += 1000.0
-                return bool(self._video.set(what, value))
-
-            def __getattr__(self, name: str) -> object:
-                return getattr(self._video, name)
-
         path = write_video(tmp_path / "cam1.mp4", "mp4v", 100)
-        with open_video(path) as video:
-            astray = Astray(video)
-            picture = frame_at(astray, 60, np.arange(100) * 40.0)
-        assert astray.jumps == 1
+        video_times(Media(str(path), frame=60), settings)
+        monkeypatch.setattr(cv2, "VideoCapture", Astray)
+        monkeypatch.setattr(Astray, "jumps", [])
+        picture = decode_frame(Media(str(path), frame=60), False, settings)
+        assert Astray.jumps == [pytest.approx(1120.0)]
         assert number_of(picture) == 60
 
 

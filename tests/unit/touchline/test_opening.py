@@ -7,13 +7,16 @@ import shutil
 import zipfile
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from PIL import Image
+from PIL.PngImagePlugin import PngInfo
 
 import touchline
 from app.datasets.export_record import ExportRecord
+from app.store.image_header import read_header
 from tests.unit.touchline.conftest import HASH, write_export, zipped
 from touchline.errors import DataError, HashError
 from touchline.frames import FileFrames
@@ -136,6 +139,30 @@ class TestFrames:
         Image.fromarray(stored).save(target, exif=exif.tobytes())
         found = touchline.open(tmp_path / "bare", frames=tmp_path / "frames").views[0]
         assert np.abs(found.image(resize=False).astype(int) - upright).max() < 30
+
+    @pytest.mark.parametrize("suffix", ["jpg", "png"])
+    @pytest.mark.parametrize("stored", [None, 1, 6])
+    def test_xmp_turns_no_frame_as_it_turns_none_on_the_server(
+        self, records: list[ExportRecord], tmp_path: Path, stored: int | None, suffix: str
+    ) -> None:
+        view = touchline.open(write_export(tmp_path / "bare", records, images=False)).views[0]
+        xmp = b'<x:xmpmeta><rdf:Description tiff:Orientation="6"/></x:xmpmeta>'
+        options: dict[str, Any] = {"xmp": xmp}
+        if suffix == "png":
+            options = {"pnginfo": PngInfo()}
+            options["pnginfo"].add_itxt("XML:com.adobe.xmp", xmp.decode())
+        if stored is not None:
+            exif = Image.Exif()
+            exif[0x0112] = stored
+            options["exif"] = exif.tobytes()
+        target = tmp_path / "frames" / view.file_name
+        target.parent.mkdir(parents=True)
+        kind = "JPEG" if suffix == "jpg" else "PNG"
+        Image.new("RGB", (40, 20)).save(target, kind, **options)
+        header = read_header(target.read_bytes())
+        found = touchline.open(tmp_path / "bare", frames=tmp_path / "frames").views[0]
+        assert found.image(resize=False).shape == (header.height, header.width, 3)
+        assert (header.width, header.height) == ((20, 40) if stored == 6 else (40, 20))
 
     def test_a_larger_frame_is_shown_at_the_annotated_size(self, export: Path) -> None:
         view = touchline.open(export).views[1]

@@ -83,6 +83,36 @@ class TestPostVerdicts:
         assert [row["status"] for row in after] == ["deferred", "unreviewed", "deferred"]
 
 
+class TestListBatches:
+    def test_a_page_reads_no_more_rows_than_it_shows_and_one(
+        self, api, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        for number in range(5):
+            api.post(VERDICTS, json={"state": "deferred", "note": f"round {number}"})
+        asked: list[int] = []
+        read = bulk.read_batches
+
+        def counted(session: Session, dataset_id: int, limit: int, *before: Any) -> Any:
+            asked.append(limit)
+            return read(session, dataset_id, limit, *before)
+
+        monkeypatch.setattr(bulk, "read_batches", counted)
+        pages, cursor = [], None
+        while True:
+            params = {"limit": 2, **({"cursor": cursor} if cursor else {})}
+            page = api.get(f"{DATASET}/verdict-batches", params=params).json()
+            pages.append([item["id"] for item in page["items"]])
+            cursor = page["next"]
+            if cursor is None:
+                break
+        assert pages == [[5, 4], [3, 2], [1]]
+        assert asked == [3, 3, 3]
+
+    def test_a_foreign_cursor_is_refused(self, api) -> None:
+        answer = api.get(f"{DATASET}/verdict-batches", params={"cursor": "19.abc"})
+        assert (answer.status_code, answer.json()["pointer"]) == (400, "/cursor")
+
+
 class TestUndoBatch:
     def test_takes_the_whole_batch_back_and_only_once(self, api) -> None:
         batch = api.post(VERDICTS, json={"state": "deferred"}).json()["batch"]

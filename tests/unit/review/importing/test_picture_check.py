@@ -12,13 +12,16 @@ from PIL import Image
 
 from app.config import Settings
 from app.datasets.report import Report
+from app.errors import JobCancelled
 from app.review.importing.picture_check import NAMED, PictureCheck
 from app.review.importing.sources import Source, import_source
 from app.soccer.annotation import BallAnnotation, make_lines
 from app.soccer.frames import ImagePoint, ImageSize
 from app.soccer.group import Group, Station, View
 from app.soccer.media import Media
+from app.store import video_index
 from app.store.store import Store
+from tests.videos import write_video
 
 SIZE = ImageSize(128, 72)
 Remarks = Callable[..., list[str]]
@@ -107,6 +110,37 @@ class TestShapes:
             "2 views have no frame in the video: group kick-1, view north: frame -1 of 3 "
             "(cam1.avi); group kick-1, view north: frame 3 of 3 (cam1.avi). Check --frame-offset"
         )
+
+    def test_how_far_a_video_is_counted_is_told(
+        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(video_index, "_A_WORD", 10)
+        media = Media(str(write_video(tmp_path / "cam1.mp4", "mp4v", 25)), frame=5)
+        told: list[tuple[int, str]] = []
+        settings = Settings(home=tmp_path / "home")
+        check = PictureCheck(Report(), settings, lambda done, _, said: told.append((done, said)))
+        groups = [group_of(None), group_of(media), group_of(media)]
+        assert list(check.watch(groups)) == groups
+        counting = "Counting the frames of cam1.mp4: {} so far."
+        sentences = [counting.format(frames) for frames in (0, 10, 20)] + ["Reading the groups."]
+        assert told == [(1, sentence) for sentence in sentences]
+
+    def test_an_import_that_is_cancelled_counts_no_further(
+        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(video_index, "_A_WORD", 10)
+        media = Media(str(write_video(tmp_path / "cam1.mp4", "mp4v", 25)), frame=5)
+        told: list[str] = []
+
+        def progress(done: int, total: int | None, sentence: str) -> None:
+            told.append(sentence)
+            if len(told) == 2:
+                raise JobCancelled("cancelled")
+
+        check = PictureCheck(Report(), Settings(home=tmp_path / "home"), progress)
+        with pytest.raises(JobCancelled):
+            list(check.watch([group_of(media)]))
+        assert told[-1] == "Counting the frames of cam1.mp4: 10 so far."
 
     def test_a_video_that_cannot_be_read_is_named(
         self, remarks_of: Remarks, tmp_path: Path

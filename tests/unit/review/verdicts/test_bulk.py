@@ -184,6 +184,17 @@ class TestGiveVerdicts:
         assert (first.changed, again.changed, again.batch) == (4, 0, None)
         assert len(list_batches(store, 1)) == 1
 
+    def test_a_page_is_full_where_batches_between_are_for_reviewers_alone(
+        self, store, ids, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        for number in range(5):
+            asked = "takes<9" if number in (1, 2, 3) else ""
+            give_verdicts(store, 1, asked, "deferred", note=f"round {number}", actor="ben")
+        monkeypatch.setattr(bulk, "judges_in", lambda _: False)
+        shown = list_batches(store, 1, 2)
+        assert [one.id for one in shown] == [5, 1]
+        assert [one.id for one in list_batches(store, 1, 2, before=5)] == [1]
+
     def test_the_same_verdict_with_a_note_of_its_own_is_a_new_one(self, store, ids) -> None:
         give_verdicts(store, 1, "", "deferred", actor="ben")
         again = give_verdicts(store, 1, "", "deferred", note="until Monday", actor="ann")
