@@ -8,13 +8,14 @@ from app.store.listing import Listing
 from app.store.log import DEEDS
 from app.store.order import Order
 from app.store.session import Session
+from app.store.solutions import is_solved
 from app.store.tables.log import LogModel
 from app.store.tables.queue import QueueModel
 
 _NO_WORD = ("freeze", "comment", *DEEDS)
 _ACCEPTED = QueueModel.status == "accepted"
 _CURRENT = not_(QueueModel.stale)
-_SOLVED = QueueModel.solved.is_(True)
+_SOLVED = is_solved()
 _OVERRIDDEN = func.coalesce(QueueModel.override == QueueModel.gate, false())
 """An override speaks of the gate that failed then, of no other that fails now."""
 _QUALIFIES = or_(QueueModel.passes.is_(True), _OVERRIDDEN)

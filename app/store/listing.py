@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from sqlalchemy import Column, ColumnElement, Select, case, func, select
+from sqlalchemy import Column, ColumnElement, Select, case, func, not_, select
 from sqlalchemy.sql.visitors import iterate
 
 from app.store.conditions import Condition
@@ -14,6 +14,7 @@ from app.store.order import SORTED, Key, Order
 from app.store.policies import judged_since
 from app.store.reader import seen_anywhere, seen_in
 from app.store.session import Session
+from app.store.solutions import is_solved
 from app.store.tables.queue import QUEUE_SCANNED, QueueModel
 
 _TABLE = QueueModel.__table__
@@ -204,7 +205,7 @@ def count_unsolved(session: Session) -> tuple[int, int, str | None]:
     total = session.scalar(select(func.count()).select_from(QueueModel)) or 0
     statement = (
         select(QueueModel.dataset_id, func.count(), func.min(QueueModel.changed))
-        .where(QueueModel.solved.is_(False))
+        .where(not_(is_solved()))
         .group_by(QueueModel.dataset_id)
     )
     rows = session.execute(statement).all()

@@ -29,9 +29,10 @@ _BATCH = 500
 class Entry:
     """One thing that was said.
 
-    ``kind`` is ``dataset``, ``policy``, ``station``, ``import``, ``camera``, ``spare``,
-    ``edit``, ``undo``, ``redo``, the same after ``station_``, ``pitch``, ``position``,
-    ``verdict``, ``comment``, ``freeze``, ``person``,
+    ``kind`` is ``dataset``, ``dataset_deleted``, ``policy``, ``station``, ``import``, ``camera``,
+    ``spare``, ``edit``, ``undo``, ``redo``, the same after ``station_``, ``pitch``, ``position``,
+    ``noise``, ``paint``, ``verdict``, ``verdict_batch``, ``verdict_batch_undo``, ``dismissal``,
+    ``take``, ``agreement``, ``gold``, ``guideline``, ``comment``, ``freeze``, ``work``, ``person``,
     ``job``, or ``deed``; ``body`` is JSON that suffices to do it again.
     """
 

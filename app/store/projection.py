@@ -14,6 +14,7 @@ from app.store.groups import StoredGroup, read_groups
 from app.store.session import Session
 from app.store.stations import StoredStation, stored_station
 from app.store.tables import Base
+from app.store.tables.dismissals import DismissalModel
 from app.store.tables.groups import (
     GroupModel,
     ImportFindingModel,
@@ -43,8 +44,19 @@ def all_groups(session: Session) -> Iterator[StoredGroup]:
 
 def all_verdicts(session: Session) -> Iterator[dict[str, Any]]:
     """Every verdict as values by column but its id, oldest first."""
-    columns = [item for item in VerdictModel.__table__.columns if item.name != "id"]
-    for row in session.execute(select(*columns).order_by(VerdictModel.id)):
+    return _all_said(session, VerdictModel)
+
+
+def all_dismissals(session: Session) -> Iterator[dict[str, Any]]:
+    """Every dismissal of a finding in the same way."""
+    return _all_said(session, DismissalModel)
+
+
+def _all_said(
+    session: Session, model: type[VerdictModel] | type[DismissalModel]
+) -> Iterator[dict[str, Any]]:
+    columns = [item for item in model.__table__.columns if item.name != "id"]
+    for row in session.execute(select(*columns).order_by(model.id)):
         yield dict(row._mapping)
 
 
@@ -64,7 +76,7 @@ def rewrite(
 ) -> None:
     """Put rows in the place of all stations, groups, views and what hangs on them.
 
-    Datasets, verdicts and solutions stay, and so do predictions and proposals of views that are
+    Datasets, verdicts, dismissals and solutions stay, and so do predictions and proposals of views that are
     there afterwards; the queue is the caller's to refresh.
     """
     # Solutions and verdicts refer to groups, which are gone for a moment.

@@ -1,8 +1,8 @@
 """Reader: who asks, as far as it depends on it what an answer counts and shows.
 
-Whoever annotates copies of groups, blind, does not see the originals meanwhile: those of an open batch, those of their own copies, and every gold group of the
-dataset: the picture of a copy is found nowhere else, and nothing tells which copies are of gold
-groups. What was handed back to somebody after it was taken over is theirs to open again.
+Whoever annotates copies of groups, blind, does not see the originals meanwhile: those of an open
+batch, those of their own copies, and every gold group of the dataset. The picture of a copy is
+found nowhere else, and nothing tells which copies are of gold groups. What was handed back to somebody after it was taken over is theirs to open again.
 """
 
 from __future__ import annotations

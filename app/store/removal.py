@@ -20,6 +20,7 @@ from app.store.dialect.statements import DeferReferences, insert_or_replace
 from app.store.session import Session
 from app.store.sight import COPIES
 from app.store.tables import Base
+from app.store.tables.dismissals import DismissalModel
 from app.store.tables.groups import DatasetModel, GroupModel, StationModel
 from app.store.tables.saved_views import COPIES_USED, UsedIdModel
 from app.store.tables.solutions import SolutionModel
@@ -99,11 +100,12 @@ def delete_rows(session: Session, dataset_id: int) -> None:
     """
     session.execute(DeferReferences())
     dataset, groups = _TABLES[DatasetModel.__tablename__], _TABLES[GroupModel.__tablename__]
-    verdicts = _TABLES[VerdictModel.__tablename__]
-    # The database lets verdicts go while their group still tells whose they are.
-    session.execute(delete(verdicts).where(_belongs(verdicts, dataset_id)))
+    # The database lets verdicts and dismissals go while their group still tells whose they are.
+    judged = [_TABLES[model.__tablename__] for model in (VerdictModel, DismissalModel)]
+    for table in judged:
+        session.execute(delete(table).where(_belongs(table, dataset_id)))
     for table in filter(_hangs_on, reversed(Base.metadata.sorted_tables)):
-        if table not in (dataset, groups, verdicts):
+        if table not in (dataset, groups, *judged):
             session.execute(delete(table).where(_belongs(table, dataset_id)))
     session.execute(delete(groups).where(_belongs(groups, dataset_id)))
     session.execute(delete(dataset).where(dataset.c.id == dataset_id))

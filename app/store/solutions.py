@@ -29,6 +29,7 @@ from app.store.session import Session
 from app.store.stored_json import as_written, inflate, parse
 from app.store.summary import SolutionSummary, summarize
 from app.store.tables.groups import DatasetModel, GroupModel
+from app.store.tables.queue import QueueModel
 from app.store.tables.solutions import CalibrationModel, SolutionModel
 
 _ELSEWHERE = Calibration(source="", camera=None)
@@ -61,6 +62,21 @@ def is_current() -> ColumnElement[bool]:
         SolutionModel.inputs_hash == GroupModel.inputs_hash,
         SolutionModel.policy_hash == DatasetModel.policy_hash,
         SolutionModel.solver_version == SOLVER_VERSION,
+    )
+
+
+def is_solved() -> ColumnElement[bool]:
+    """Whether this solver has solved a group as it is, in a statement about rows of the queue.
+
+    ``QueueModel.solved`` says so of any solver: the numbers of an earlier one stay in the row.
+    """
+    return (
+        select(SolutionModel.id)
+        .join(GroupModel, GroupModel.id == SolutionModel.group_id)
+        .join(DatasetModel, DatasetModel.id == GroupModel.dataset_id)
+        .where(GroupModel.id == QueueModel.group_id, is_current())
+        .correlate(QueueModel)
+        .exists()
     )
 
 
@@ -351,13 +367,17 @@ def present_solutions(session: Session, dataset_id: int) -> Sequence[Any]:
     return session.execute(statement).all()
 
 
-def unsolved_groups(session: Session, dataset_id: int) -> list[int]:
-    """Ids of a dataset's groups without a solution for their present state, in order."""
+def unsolved_groups(
+    session: Session, dataset_id: int, among: Collection[int] | None = None
+) -> list[int]:
+    """Ids of a dataset's groups, or of those among some of them, without a solution of this solver
+    for their present state, in order."""
+    some = () if among is None else (GroupModel.id.in_(among),)
     statement = (
         select(GroupModel.id)
         .join(DatasetModel, DatasetModel.id == GroupModel.dataset_id)
         .outerjoin(SolutionModel, is_current())
-        .where(GroupModel.dataset_id == dataset_id, SolutionModel.id.is_(None))
+        .where(GroupModel.dataset_id == dataset_id, SolutionModel.id.is_(None), *some)
         .order_by(GroupModel.number)
     )
     return list(session.scalars(statement))

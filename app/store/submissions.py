@@ -39,6 +39,13 @@ def require_open(take: Any | None) -> None:
         )
 
 
+def _require_person(take: Any, actor: str) -> None:
+    """Raise ForbiddenError where a copy is somebody else's."""
+    # On a server without accounts everybody is the local user.
+    if person_of(actor) not in (take.person, LOCAL_USER):
+        raise ForbiddenError(f"only {take.person} submits and judges this annotation")
+
+
 def submit_copy(
     session: Session, take: Any, *, actor: str, at: str, verdict: str | None = None
 ) -> None:
@@ -48,9 +55,7 @@ def submit_copy(
         ForbiddenError: It is somebody else's.
         ConflictError: It was submitted already.
     """
-    # On a server without accounts everybody is the local user.
-    if person_of(actor) not in (take.person, LOCAL_USER):
-        raise ForbiddenError(f"only {take.person} submits and judges this annotation")
+    _require_person(take, actor)
     require_open(take)
     (stored,) = read_groups(session, [take.copy_id]).values()
     # Of a copy that was returned the verdict stays, unless its person gives another one.
@@ -80,6 +85,7 @@ def judge_copy(session: Session, copy_id: int, state: str, *, actor: str, at: st
     if state != "unreviewed":
         submit_copy(session, take, actor=actor, at=at, verdict=state)
     else:
+        _require_person(take, actor)
         require_open(take)
         update_take(session, take.id, verdict=None)
 

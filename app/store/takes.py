@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Sequence
 from typing import Any
 
-from sqlalchemy import Select, bindparam, exists, func, insert, select, update
+from sqlalchemy import Select, bindparam, exists, func, insert, or_, select, update
 from sqlalchemy.orm import aliased
 
 from app.store.clock import now
@@ -50,6 +50,13 @@ def find_take(session: Session, take_id: int) -> Any | None:
 def take_of_copy(session: Session, copy_id: int) -> Any | None:
     """The take whose copy a group is; None for an ordinary group."""
     return session.execute(_OF_COPY, {"copy": copy_id}).one_or_none()
+
+
+def closed_copies(session: Session, dataset_id: int) -> set[int]:
+    """Ids of the copies in a dataset that were handed in or settled: nothing in them changes."""
+    closed = or_(TakeModel.handed_in.is_not(None), TakeModel.settled.is_not(None))
+    statement = select(TakeModel.copy_id).join(GroupModel, GroupModel.id == TakeModel.copy_id)
+    return set(session.scalars(statement.where(GroupModel.dataset_id == dataset_id, closed)))
 
 
 def takes_of_group(session: Session, group_id: int) -> Sequence[Any]:

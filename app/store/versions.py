@@ -11,6 +11,7 @@ from sqlalchemy import Table, func, insert, select
 from app.store.aliases import columns_shown
 from app.store.group_rows import next_id
 from app.store.session import Session
+from app.store.solutions import is_solved
 from app.store.stored_json import Json, parse, unpack
 from app.store.tables.groups import DatasetModel
 from app.store.tables.queue import QueueModel
@@ -143,10 +144,11 @@ def candidate_rows(session: Session, dataset_id: int) -> Sequence[Any]:
         .group_by(VerdictModel.group_id)
         .subquery()
     )
-    names = ("group_id", "key", "match", "split", "status", "stale", "solved", "passes", "gate")
+    names = ("group_id", "key", "match", "split", "status", "stale", "passes", "gate")
     statement = (
         select(
             *(getattr(QueueModel, name) for name in names),
+            is_solved().label("solved"),
             VerdictModel.reason,
             VerdictModel.note,
             VerdictModel.override,

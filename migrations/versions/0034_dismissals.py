@@ -30,9 +30,22 @@ def upgrade() -> None:
         sa.PrimaryKeyConstraint("id"),
     )
     op.create_index("dismissal_group", "dismissal", ["group_id", "id"])
-    op.execute(
-        "CREATE TRIGGER dismissal_refuses_update BEFORE UPDATE ON dismissal "
-        "BEGIN SELECT RAISE(ABORT, 'dismissals are never changed'); END"
+    refuse("UPDATE")
+    # Dismissals may go with their dataset, once the log says that it was deleted.
+    refuse(
+        "DELETE",
+        "WHEN NOT EXISTS (SELECT 1 FROM groups JOIN log ON log.dataset_id = groups.dataset_id "
+        "WHERE groups.id = OLD.group_id AND log.kind = 'dataset_deleted')",
     )
+    # INSERT OR REPLACE deletes without asking a DELETE trigger.
+    refuse("INSERT", "WHEN NEW.id <= (SELECT max(id) FROM dismissal)")
     dismissed = sa.Column("dismissed", sa.String(), server_default="", nullable=False)
     op.add_column("queue", dismissed)
+
+
+def refuse(verb: str, when: str = "") -> None:
+    """Make the database itself refuse a statement that would rewrite what was dismissed."""
+    op.execute(
+        f"CREATE TRIGGER dismissal_refuses_{verb.lower()} BEFORE {verb} ON dismissal {when} "
+        "BEGIN SELECT RAISE(ABORT, 'rows of dismissal are never changed'); END"
+    )

@@ -29,6 +29,7 @@ const STATES = [
 
 /** Why a group is left alone. */
 const REFUSALS = /** @type {{[reason: string]: string}} */ ({
+	submitted: 'they are independent annotations that were submitted',
 	unsolved: 'they are not solved yet',
 	needs_note: 'they fail a gate, and accepting that needs a note',
 	unusable_ball: 'their ball cannot be used (below the grass, or known to metres only), and accepting that needs a note',

@@ -45,8 +45,8 @@ class BulkVerdict(BaseModel):
 
 
 class RefusalDocument(Document, shows=Refusal):
-    """Groups that are left alone: `unsolved`, `needs_note` (they fail a gate), `unusable_ball`,
-    `no_picture`."""
+    """Groups that are left alone: `submitted` (independent annotations that are closed), `unsolved`,
+    `needs_note` (they fail a gate), `unusable_ball`, `no_picture`."""
 
 
 class SampleDocument(Document, shows=SampleGroup):

@@ -29,7 +29,11 @@ REBUILT = {
     "noticed": "findings of imports",
 }
 """Parts of the ledger that ``rebuild`` writes, with the words for them."""
-KEPT = {"datasets": "datasets", "verdicts": "groups' verdicts"}
+KEPT = {
+    "datasets": "datasets",
+    "verdicts": "groups' verdicts",
+    "dismissals": "dismissed findings",
+}
 """Parts that it leaves as they are."""
 
 

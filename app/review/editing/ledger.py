@@ -16,7 +16,14 @@ from app.store.codecs import extras_from_json, paint_to_json
 from app.store.datasets import dataset_rows, policy_of
 from app.store.digest import group_inputs_hash
 from app.store.groups import StoredGroup
-from app.store.projection import all_groups, all_noticed, all_spare, all_stations, all_verdicts
+from app.store.projection import (
+    all_dismissals,
+    all_groups,
+    all_noticed,
+    all_spare,
+    all_stations,
+    all_verdicts,
+)
 from app.store.session import Session
 from app.store.stored_json import unpack
 
@@ -67,6 +74,7 @@ class Ledger:
 
     Attributes:
         verdicts: By group, oldest first, as logged.
+        dismissals: Of findings, in the same way.
         spare: By dataset, camera and frame.
         noticed: What imports noticed: (group or None, station or None, view, sentence).
     """
@@ -75,6 +83,7 @@ class Ledger:
     stations: dict[int, StationRecord] = field(default_factory=dict)
     groups: dict[int, GroupRecord] = field(default_factory=dict)
     verdicts: dict[int, list[dict[str, Any]]] = field(default_factory=dict)
+    dismissals: dict[int, list[dict[str, Any]]] = field(default_factory=dict)
     spare: dict[tuple[int, str, str], Extras] = field(default_factory=dict)
     noticed: set[tuple[int | None, int | None, str | None, str]] = field(default_factory=set)
 
@@ -110,6 +119,8 @@ def read_ledger(session: Session) -> Ledger:
         ledger.groups[group.id] = _group_record(group)
     for values in all_verdicts(session):
         ledger.verdicts.setdefault(values.pop("group_id"), []).append(values)
+    for values in all_dismissals(session):
+        ledger.dismissals.setdefault(values.pop("group_id"), []).append(values)
     for spare in all_spare(session):
         place = (spare.dataset_id, spare.camera, spare.frame)
         ledger.spare[place] = extras_from_json(unpack(spare.extras))

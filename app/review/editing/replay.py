@@ -27,6 +27,7 @@ from app.store.codecs import (
     view_from_json,
 )
 from app.store.digest import station_digest, view_digest
+from app.store.dismissals import DISMISSAL
 from app.store.group_rows import head_values, station_values, view_values
 from app.store.log import LogEntry, read_log, verify_chain
 from app.store.noise import NOISE
@@ -67,7 +68,7 @@ def apply_entry(ledger: Ledger, entry: LogEntry, number: int = 0) -> None:
 def rebuild(store: Store) -> int:
     """Write groups, views, stations and what belongs to them anew from the log.
 
-    Datasets, verdicts, solutions and the log itself stay, and so do predictions and proposals as
+    Datasets, verdicts, dismissals, solutions and the log itself stay, and so do predictions and proposals as
     far as their views do. Returns the number of groups.
     """
     with store.write() as session:
@@ -216,6 +217,13 @@ def _verdict(ledger: Ledger, entry: LogEntry) -> None:
     ledger.verdicts.setdefault(entry.group_id, []).append(dict(entry.body))
 
 
+def _dismissal(ledger: Ledger, entry: LogEntry) -> None:
+    assert entry.group_id is not None
+    # One that was brought from elsewhere says itself whose it is.
+    said = {"actor": entry.actor, "at": entry.at, **entry.body}
+    ledger.dismissals.setdefault(entry.group_id, []).append(said)
+
+
 def _dataset_deleted(ledger: Ledger, entry: LogEntry) -> None:
     """Everything of the dataset goes; its entries before this one still tell what it was."""
     gone = entry.dataset_id
@@ -226,6 +234,7 @@ def _dataset_deleted(ledger: Ledger, entry: LogEntry) -> None:
     for key in groups:
         del ledger.groups[key]
         ledger.verdicts.pop(key, None)
+        ledger.dismissals.pop(key, None)
     for key in stations:
         del ledger.stations[key]
     for place in [place for place in ledger.spare if place[0] == gone]:
@@ -328,6 +337,7 @@ _STEPS: dict[str, Callable[[Ledger, LogEntry], None]] = {
     "station_redo": _station_edit,
     "camera": _camera,
     "verdict": _verdict,
+    DISMISSAL: _dismissal,
     "spare": _spare,
     # What a batch did stands in the verdicts themselves.
     "verdict_batch": lambda _ledger, _entry: None,
@@ -338,8 +348,6 @@ _STEPS: dict[str, Callable[[Ledger, LogEntry], None]] = {
     "take": lambda _ledger, _entry: None,
     "agreement": lambda _ledger, _entry: None,
     # Gold groups, guidelines, comments, accounts and work that is given out have tables of their own.
-    # Dismissed findings have a table of their own, which stays.
-    "dismissal": lambda _ledger, _entry: None,
     "gold": lambda _ledger, _entry: None,
     "guideline": lambda _ledger, _entry: None,
     "comment": lambda _ledger, _entry: None,

@@ -80,7 +80,7 @@ def live_truth(session: Session, dataset: DatasetHead, rule: str, split: str | N
     if rule not in LIVE_RULES:
         raise unknown_rule(rule)
     candidates = read_candidates(session, dataset.id, "passing" if rule == "all" else rule)
-    require_solved(candidates)
+    require_solved(candidates, dataset.name)
     ids = [item.id for item in candidates if item.why is None or rule == "all"]
     frames: list[Frame] = []
     said: list[list[str]] = []

@@ -177,7 +177,7 @@ def resume_solving(jobs: Jobs, store: Store) -> None:
 def solve_leftovers(jobs: Jobs, store: Store, *, actor: str) -> None:
     """Solve whatever an earlier run, of the server or of a command, left undone."""
     for dataset in list_datasets(store):
-        if dataset.solved < dataset.groups:
+        if stale_groups(store, dataset.id):
             request_solve(jobs, store, dataset.id, actor=actor)
 
 

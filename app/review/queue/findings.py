@@ -13,6 +13,7 @@ from app.soccer.group import Group
 from app.store.conditions import Condition, compares, contains, either, lists
 from app.store.listing import Listing
 from app.store.order import Order
+from app.store.solutions import is_solved
 from app.store.store import Store
 
 BATCH = 100
@@ -50,7 +51,7 @@ def count_groups(
 ) -> int:
     """How many groups of a dataset have findings, of a kind, open or dismissed, where these are named."""
     with store.read() as session:
-        return Listing(session, dataset_id, [_has(kind, dismissed)]).count()
+        return Listing(session, dataset_id, _where(kind, dismissed)).count()
 
 
 def read_findings(
@@ -67,7 +68,7 @@ def read_findings(
     ``dismissed`` names those that people have checked (True) or have not (False); None: all.
     """
     with store.read() as session:
-        where = [_has(kind, dismissed), compares("number", ">", after)]
+        where = [*_where(kind, dismissed), compares("number", ">", after)]
         ids = Listing(session, dataset_id, where).ids(Order("number"), limit)
         states = read_states(session, ids)
     return [_group_findings(state, kind, dismissed) for state in states]
@@ -82,12 +83,14 @@ def finding_values(store: Store, dataset: str) -> Iterator[dict[str, Any]]:
             yield from group.values
 
 
-def _has(kind: str | None, dismissed: bool | None) -> Condition:
+def _where(kind: str | None, dismissed: bool | None) -> list[Condition]:
+    """What holds of groups with findings that can be read: those of an earlier solver cannot."""
     columns = {None: ("findings", "dismissed"), False: ("findings",), True: ("dismissed",)}
-    return either(
+    has = either(
         contains(column, ",") if kind is None else lists(column, kind)
         for column in columns[dismissed]
     )
+    return [has, is_solved()]
 
 
 def _group_findings(state: GroupState, kind: str | None, dismissed: bool | None) -> GroupFindings:

@@ -35,18 +35,21 @@ from app.store.log import Entry, append
 from app.store.queue import edited_groups, refresh_verdicts
 from app.store.reader import judges_in
 from app.store.session import Session
-from app.store.solutions import present_keys
+from app.store.sight import COPIES
+from app.store.solutions import present_keys, unsolved_groups
 from app.store.store import Store
+from app.store.takes import closed_copies
 from app.store.verdicts import StoredVerdict, insert_verdicts, next_verdict_id
 
 CHUNK = 100
 """Groups a transaction: two or three hundredths of a second, for which others wait to write."""
 SAMPLE = 5
-UNSOLVED, NEEDS_NOTE, UNUSABLE_BALL, NO_PICTURE = (
-    "unsolved", "needs_note", "unusable_ball", "no_picture",
+SUBMITTED, UNSOLVED, NEEDS_NOTE, UNUSABLE_BALL, NO_PICTURE = (
+    "submitted", "unsolved", "needs_note", "unusable_ball", "no_picture",
 )  # fmt: skip
-"""Why a group is left alone: its gates are not known, or it fails one, or its ball cannot be used,
-or no view of it has a picture, and nobody says why it shall be accepted all the same."""
+"""Why a group is left alone: it is an independent annotation that was submitted, or its gates are
+not known to this solver, or it fails one, or its ball cannot be used, or no view of it has a
+picture, and nobody says why it shall be accepted all the same."""
 
 
 @dataclass(frozen=True)
@@ -93,8 +96,8 @@ class BatchReport:
 
 
 ASKED = (
-    "group_id", "key", "number", "label", "status", "stale", "reason", "solved", "passes", "gate",
-    "pictures", "findings", "sigma_m",
+    "group_id", "key", "number", "label", "status", "stale", "reason", "passes", "gate", "pictures",
+    "findings", "dismissed", "sigma_m",
 )  # fmt: skip
 """What a bulk verdict asks of a group's row in the queue."""
 
@@ -116,7 +119,7 @@ def plan_verdicts(
     conditions = parse_query(query, MAX_LISTED_LENGTH).conditions
     with store.read() as session:
         rows = Listing(session, dataset_id, conditions).columns(ASKED, by_number=True)
-    sorted_out = sort_out(rows, verdict)
+        sorted_out = sort_out(session, dataset_id, rows, verdict)
     sample = [
         SampleGroup(row.group_id, row.key, row.number, row.label)
         for row in sorted_out.change[:SAMPLE]
@@ -141,7 +144,7 @@ def give_verdicts(
 
     Accepting a group that fails a gate overrides the policy, as it does for one group alone:
     without a note such groups are refused and counted, and so are groups whose ball cannot be
-    used and groups without any picture.
+    used and groups without any picture. So are independent annotations that were submitted.
     A run that was stopped goes on with the groups behind its place that match then; what was
     imported since it began is not among them.
 
@@ -167,7 +170,7 @@ def give_verdicts(
     with store.read() as session:
         begun = run.resume(session)
         rows = Listing(session, dataset_id, conditions).columns(ASKED, by_number=True)
-    found = sort_out(rows, verdict)
+        found = sort_out(session, dataset_id, rows, verdict)
     if begun is None:
         _require_expected(found, expected)
         left, refused = found.change, found.refused
@@ -184,7 +187,7 @@ def give_verdicts(
         chunk = places[start : start + CHUNK]
         with store.write() as session:
             rows = read_columns(session, [group for _, group in chunk], conditions, ASKED)
-            run.save(session, sort_out(rows, verdict).change)
+            run.save(session, sort_out(session, dataset_id, rows, verdict).change)
             if start + CHUNK < len(places):
                 here, end = chunk[-1][0], places[-1][0]
                 run.interrupt(session, {"after": here, "until": end, "refused": told})
@@ -247,13 +250,18 @@ class SortedOut:
     refused: tuple[Refusal, ...]
 
 
-def sort_out(rows: Sequence[Any], verdict: Verdict) -> SortedOut:
-    """The groups that a verdict changes, and how many it is refused for, and why."""
-    change, refused = [], {UNSOLVED: 0, NEEDS_NOTE: 0, UNUSABLE_BALL: 0, NO_PICTURE: 0}
+def sort_out(session: Session, dataset_id: int, rows: Sequence[Any], verdict: Verdict) -> SortedOut:
+    """The groups of a dataset that a verdict changes, and how many it is refused for, and why."""
+    reasons = (SUBMITTED, UNSOLVED, NEEDS_NOTE, UNUSABLE_BALL, NO_PICTURE)
+    change, refused = [], dict.fromkeys(reasons, 0)
+    closed = closed_copies(session, dataset_id) if dataset_id > COPIES else ()
+    unsolved = _unsolved(session, dataset_id, rows) if verdict.state == "accepted" else ()
     for row in rows:
         if _has(row, verdict):
             continue
-        if verdict.state == "accepted" and not row.solved:
+        if row.group_id in closed:
+            refused[SUBMITTED] += 1
+        elif row.group_id in unsolved:
             refused[UNSOLVED] += 1
         elif verdict.state == "accepted" and not row.passes and verdict.note is None:
             refused[NEEDS_NOTE] += 1
@@ -263,13 +271,23 @@ def sort_out(rows: Sequence[Any], verdict: Verdict) -> SortedOut:
             refused[NO_PICTURE] += 1
         else:
             change.append(row)
-    reasons = (Refusal(reason, count) for reason, count in refused.items() if count)
-    return SortedOut(change, tuple(reasons))
+    told = (Refusal(reason, count) for reason, count in refused.items() if count)
+    return SortedOut(change, tuple(told))
+
+
+def _unsolved(session: Session, dataset_id: int, rows: Sequence[Any]) -> set[int]:
+    """Groups that this solver has not solved as they are: their rows may tell of an earlier one."""
+    few = [row.group_id for row in rows] if len(rows) <= CHUNK else None
+    return set(unsolved_groups(session, dataset_id, few))
 
 
 def _is_unusable(row: Any) -> bool:
-    """Whether a finding says that nobody can use the ball; the number of sigma's is sigma."""
-    return any(makes_unusable(kind, row.sigma_m) for kind in row.findings.split(","))
+    """Whether a finding says that nobody can use the ball; the number of sigma's is sigma.
+
+    One that was dismissed says it, too: a verdict needs the note all the same.
+    """
+    kinds = [*row.findings.split(","), *row.dismissed.split(",")]
+    return any(makes_unusable(kind, row.sigma_m) for kind in kinds)
 
 
 def _has(row: Any, verdict: Verdict) -> bool:

@@ -68,7 +68,8 @@ def redo_batch(
         with store.write() as session:
             run.batch = _begun(session, batch_id, actor)
             ids = _unchanged(session, batch.spans, first, last)
-            found = sort_out(read_columns(session, ids, (), ASKED), verdict)
+            rows = read_columns(session, ids, (), ASKED)
+            found = sort_out(session, batch.dataset_id, rows, verdict)
             run.save(session, found.change)
             refused.update({item.reason: item.groups for item in found.refused})
             if run.batch is not None:

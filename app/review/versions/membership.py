@@ -55,14 +55,15 @@ def natural(key: str) -> list[str | int]:
     return parts
 
 
-def require_solved(candidates: Sequence[Candidate]) -> None:
-    """Raise ConflictError where groups that might enter have no solution."""
+def require_solved(candidates: Sequence[Candidate], dataset: str) -> None:
+    """Raise ConflictError where groups that might enter have no solution of this solver."""
     count = sum(item.unsolved for item in candidates)
     if count:
-        groups = "1 group has" if count == 1 else f"{count} groups have"
+        groups = "1 group waits" if count == 1 else f"{count} groups wait"
         raise ConflictError(
-            f"{groups} no solution under the present policy and might enter the version",
-            hint="Solve the dataset first.",
+            f"{groups} to be solved and might enter the version",
+            hint=f'The server solves them when it starts; touchline solve --dataset "{dataset}" '
+            "does it now.",
         )
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from sqlalchemy import select
+from sqlalchemy import delete, insert, select
 
 from app.geometry.camera import Camera
 from app.review.datasets.dataset import get_dataset
@@ -24,8 +24,10 @@ from app.soccer.frames import Box, ImagePoint
 from app.soccer.group import Group, Station, View
 from app.soccer.media import Media
 from app.soccer.pitch import MARKINGS, Pitch
+from app.soccer.solution import SOLVER_VERSION
 from app.store.store import Store
 from app.store.tables.groups import DatasetModel
+from app.store.tables.solutions import SolutionModel
 from tests.balls import seen
 from tests.cameras import SIZE, looking
 from tests.databases import Databases
@@ -197,6 +199,20 @@ def _ingested(store: Store, groups: tuple[Group, ...], solved: bool) -> list[int
         solve_dataset(store, "demo")
     page = list_groups(store, get_dataset(store, "demo").id, limit=500)
     return [row.id for row in page.items]
+
+
+@pytest.fixture
+def upgrade_solver(store: Store) -> Callable[[], None]:
+    """Lets every solution be one of an earlier solver, as it is after an upgrade."""
+
+    def run() -> None:
+        with store.write() as session:
+            rows = session.execute(select(*SolutionModel.__table__.columns)).all()
+            session.execute(delete(SolutionModel))
+            older = {"solver_version": f"{SOLVER_VERSION}-before"}
+            session.execute(insert(SolutionModel), [{**row._mapping, **older} for row in rows])
+
+    return run
 
 
 @pytest.fixture

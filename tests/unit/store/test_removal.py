@@ -1,7 +1,13 @@
 from __future__ import annotations
 
+import pytest
+from sqlalchemy import text
+
+from app.soccer.finding import Dismissal
 from app.store.datasets import dataset_rows
+from app.store.dismissals import insert_dismissal
 from app.store.group_rows import next_id
+from app.store.log import Entry, append
 from app.store.removal import (
     count_contents,
     delete_rows,
@@ -10,6 +16,44 @@ from app.store.removal import (
 from app.store.soundness import count_lost_references
 from app.store.store import Store
 from app.store.tables.groups import GroupModel
+from tests.databases import said_for_sqlite
+
+SAID = Dismissal("bad_point", None, None, None, 1.9, "It is off.", "ann", "2026-01-01")
+
+
+@pytest.fixture
+def dismissed(filled: Store) -> Store:
+    """A finding of the one group was dismissed."""
+    with filled.write() as session:
+        insert_dismissal(session, 1, 1, SAID, dismissed=True)
+    return filled
+
+
+class TestDismissals:
+    @pytest.mark.parametrize(
+        "statement",
+        [
+            "UPDATE dismissal SET actor = 'eve'",
+            "DELETE FROM dismissal",
+            "INSERT OR REPLACE INTO dismissal (id, group_id, actor, at, kind, sentence, dismissed)"
+            " SELECT id, group_id, 'eve', at, kind, sentence, dismissed FROM dismissal",
+        ],
+    )
+    def test_what_was_dismissed_cannot_be_rewritten(self, dismissed: Store, statement: str) -> None:
+        with dismissed.write() as session:
+            refused = pytest.raises(Exception, match="rows of dismissal are never changed")
+            with said_for_sqlite(session), refused:
+                session.execute(text(statement))
+            session.rollback()
+        with dismissed.read() as session:
+            assert session.scalars(text("SELECT actor FROM dismissal")).all() == ["ann"]
+
+    def test_they_go_with_their_dataset_once_the_log_says_so(self, dismissed: Store) -> None:
+        with dismissed.write() as session:
+            append(session, [Entry("dataset_deleted", "ann", "2026-01-02", {}, 1)])
+            delete_rows(session, 1)
+            assert count_lost_references(session) == 0
+            assert session.scalar(text("SELECT count(*) FROM dismissal")) == 0
 
 
 class TestRemoval:

@@ -382,7 +382,7 @@ class TestAppendOnly:
             "calibration_stays_in_versions",
             *(
                 f"{name}_refuses_{verb}"
-                for name in ("log", "verdict", "version", "version_group")
+                for name in ("log", "verdict", "dismissal", "version", "version_group")
                 for verb in ("update", "delete", "insert")
             ),
         }

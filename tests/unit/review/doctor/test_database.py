@@ -15,6 +15,7 @@ from app.review.doctor.database import REBUILD, examine
 from app.review.editing.recompute import solve_dataset
 from app.review.editing.replay import rebuild
 from app.review.editing.submit import load
+from app.review.verdicts.dismiss import FindingName, set_dismissal
 from app.review.verdicts.verdict import set_verdict
 from app.soccer.annotation import make_lines
 from app.store.dialect.dialect import dialect_of
@@ -241,6 +242,27 @@ class TestExamine:
         trigger = "DROP TRIGGER verdict_refuses_update"
         change(store, trigger, f"UPDATE verdict SET actor = 'eve' WHERE group_id = {ids[0]}")
         assert faults(store)["groups' verdicts"].mend == dialect_of(store.settings).restoring
+
+    @pytest.mark.parametrize(
+        ("verb", "forged"),
+        [
+            ("delete", "DELETE FROM dismissal"),
+            ("update", "UPDATE dismissal SET note = 'never looked'"),
+            ("update", "UPDATE dismissal SET dismissed = NOT dismissed"),
+        ],
+    )
+    def test_a_dismissal_that_is_gone_or_was_changed_needs_a_backup(
+        self, store: Store, fill, make_group, verb: str, forged: str
+    ) -> None:
+        state = load(store, fill(make_group(9, shift=80.0))[0])
+        assert state.solution is not None
+        name = FindingName(state.solution.findings[0].kind, state.solution.findings[0].view)
+        set_dismissal(store, state.id, name, dismissed=True, if_match=state.etag, actor="ann")
+        assert faults(store) == {}
+        change(store, f"DROP TRIGGER dismissal_refuses_{verb}", forged)
+        found = faults(store)["dismissed findings"]
+        assert found.sentence == f"1 not as the log says: {state.id}"
+        assert found.mend == dialect_of(store.settings).restoring
 
     def test_a_log_that_was_changed_ends_the_comparison(self, store: Store, ids) -> None:
         change(

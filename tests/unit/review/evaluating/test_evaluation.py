@@ -202,7 +202,7 @@ class TestRunEvaluation:
         self, store, fill, make_group, exact
     ) -> None:
         fill(make_group(10), solved=False)
-        with pytest.raises(ConflictError, match="no solution"):
+        with pytest.raises(ConflictError, match="1 group waits to be solved"):
             run_evaluation(store, "demo", EvaluationRequest(predictions=exact.id), actor="ann")
 
 

@@ -100,3 +100,14 @@ class TestVersionSource:
         with pytest.raises(NotFoundError, match='no version "v9"'):
             export(store, "demo", "cameras", tmp_path / "x", version="v9")
         assert not (tmp_path / "x").exists()
+
+
+class TestLiveSource:
+    def test_what_an_earlier_solver_solved_is_left_out_and_counted(
+        self, store, fill, make_group, tmp_path, upgrade_solver
+    ) -> None:
+        ids = fill(make_group(7))
+        judge(store, ids[0], "accepted")
+        upgrade_solver()
+        with pytest.raises(InputError, match="unsolved"):
+            export(store, "demo", "coco", tmp_path / "a.zip")

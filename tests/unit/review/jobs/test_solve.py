@@ -144,3 +144,13 @@ class TestSolveLeftovers:
     def test_a_dataset_that_is_complete_needs_no_job(self, jobs: Jobs, store: Store, state) -> None:
         solve_leftovers(jobs, store, actor="ann")
         assert jobs.find() == []
+
+    def test_what_an_earlier_solver_solved_is_solved_at_the_start(
+        self, jobs: Jobs, store: Store, state, upgrade_solver
+    ) -> None:
+        upgrade_solver()
+        jobs.start()
+        solve_leftovers(jobs, store, actor="ann")
+        (job,) = jobs.find()
+        assert jobs.wait(job.id, SECONDS).result["solved"] == 1
+        assert stale_groups(store, "demo") == []

@@ -56,6 +56,16 @@ def test_groups_that_wait_for_a_new_policy_wait_since_it_came(
     assert before <= found.oldest_unsolved <= now()
 
 
+def test_groups_that_an_earlier_solver_solved_wait(
+    store: Store, fill, make_group, upgrade_solver
+) -> None:
+    fill(make_group(7), make_group(8))
+    upgrade_solver()
+    found = read_home(store)
+    assert (found.groups, found.unsolved) == (2, 2)
+    assert found.oldest_unsolved is not None
+
+
 def test_files_are_those_of_the_database_wherever_it_lies(tmp_path: Path) -> None:
     settings = Settings(home=tmp_path, database_url=f"sqlite:///{tmp_path}/elsewhere.db")
     assert file_sizes(settings) == {}

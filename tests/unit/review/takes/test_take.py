@@ -27,7 +27,7 @@ from app.review.takes.gold import mark
 from app.review.takes.hand_back import hand_back_take
 from app.review.takes.mixing import Terms, begin_next, count_gold_left, is_gold_turn
 from app.review.takes.take import begin_take, get_take, get_take_of, hand_in, list_takes
-from app.review.verdicts.bulk import give_verdicts, list_batches
+from app.review.verdicts.bulk import give_verdicts, list_batches, plan_verdicts
 from app.review.verdicts.bulk_undo import undo_batch
 from app.review.verdicts.verdict import set_verdict
 from app.review.work.batches import NewBatch, make_batch
@@ -223,6 +223,38 @@ class TestHandIn:
         with pytest.raises(ConflictError, match="submitted"):
             undo_batch(store, batch.id, actor="ann")
         assert get_take(store, take.id).verdict == "deferred"
+
+    def test_nobody_else_takes_back_the_verdict_of_a_copy_that_was_returned(
+        self, store, state
+    ) -> None:
+        take = begin_take(store, state.id, person="ann")
+        judge(store, take.copy_id, "rejected", reason="other")
+        hand_back_take(store, take.id, "the ball", actor="lea")
+        with pytest.raises(ForbiddenError, match="only ann"):
+            judge(store, take.copy_id, "unreviewed", actor="lea")
+        assert get_take(store, take.id).verdict == "rejected"
+        judge(store, take.copy_id, "unreviewed")
+        assert get_take(store, take.id).verdict is None
+
+    def test_a_submitted_one_among_many_is_counted_and_the_others_are_judged(
+        self, store, fill, make_group
+    ) -> None:
+        takes = [
+            begin_take(store, number, person="ann")
+            for number in fill(make_group(7), make_group(8), make_group(9))
+        ]
+        hand_in(store, takes[1].id, actor="ann")
+        dataset = load(store, takes[0].copy_id).dataset_id
+        refused = [("submitted", 1)]
+        for verdict in ("deferred", "accepted"):
+            plan = plan_verdicts(store, dataset, "", verdict, note="seen")
+            assert [(item.reason, item.groups) for item in plan.refused] == refused
+            assert plan.would_change == 2
+        report = give_verdicts(store, dataset, "", "deferred", actor="ann", expected=2)
+        assert report.changed == 2
+        assert [(item.reason, item.groups) for item in report.refused] == refused
+        said = [get_take(store, take.id).verdict for take in takes]
+        assert said == ["deferred", None, "deferred"]
 
     def test_a_lead_returns_it_with_a_reason_and_each_step_is_in_the_log(
         self, store, state

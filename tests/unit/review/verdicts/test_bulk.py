@@ -12,6 +12,7 @@ from app.errors import ConflictError, InputError, NotFoundError
 from app.review.answers.saved_progress import SavedProgress
 from app.review.editing.edit import SetBall
 from app.review.editing.ledger import read_ledger
+from app.review.editing.recompute import solve_dataset
 from app.review.editing.replay import replay
 from app.review.editing.state import VerdictState
 from app.review.editing.submit import load, submit
@@ -96,6 +97,32 @@ class TestPlanVerdicts:
         plan = plan_verdicts(store, 1, "", "accepted")
         assert [group.id for group in plan.sample] == ids[:1]
         assert [(item.reason, item.groups) for item in plan.refused] == [("unusable_ball", 2)]
+
+    @pytest.mark.parametrize("open_ones", [",", ",bad_point,"])
+    def test_a_finding_that_was_dismissed_still_says_that_the_ball_cannot_be_used(
+        self, store, fill, make_group, open_ones: str
+    ) -> None:
+        fill(make_group(7), make_group(8))
+        for kind, sigma in (("high_uncertainty", 64.0), ("implausible_ball", 0.1)):
+            values = {"findings": open_ones, "dismissed": f",{kind},", "sigma_m": sigma}
+            with store.write() as session:
+                session.execute(update(QueueModel).values(values))
+            plan = plan_verdicts(store, 1, "", "accepted")
+            assert [(item.reason, item.groups) for item in plan.refused] == [("unusable_ball", 2)]
+        assert plan_verdicts(store, 1, "", "accepted", note="by eye").would_change == 2
+
+    def test_what_an_earlier_solver_solved_is_accepted_once_this_one_has(
+        self, store, ids, upgrade_solver
+    ) -> None:
+        upgrade_solver()
+        for note in (None, "checked by eye"):
+            plan = plan_verdicts(store, 1, "", "accepted", note=note)
+            assert [(item.reason, item.groups) for item in plan.refused] == [("unsolved", 4)]
+            assert give_verdicts(store, 1, "", "accepted", note=note, actor="ben").changed == 0
+        assert [row.passes for row in list_groups(store, 1).items] == [True, True, False, True]
+        assert plan_verdicts(store, 1, "", "deferred").would_change == 4
+        solve_dataset(store, 1)
+        assert give_verdicts(store, 1, "", "accepted", actor="ben").changed == 3
 
     def test_with_a_note_only_unsolved_groups_are_refused(
         self, store, ids, fill, make_group

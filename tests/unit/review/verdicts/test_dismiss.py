@@ -10,6 +10,7 @@ import pytest
 from app.errors import InputError, StaleRevisionError
 from app.review.editing.edit import SetBall
 from app.review.editing.past import history
+from app.review.editing.recompute import solve_dataset
 from app.review.editing.replay import rebuild
 from app.review.editing.state import GroupState
 from app.review.editing.submit import load, submit
@@ -175,6 +176,18 @@ class TestFindings:
             count_groups(store, number, None, dismissed=which) for which in (None, True, False)
         ]
         assert counts == [1, 1, 0]
+
+    def test_as_many_are_counted_as_can_be_read_after_an_upgrade_of_the_solver(
+        self, store, found, upgrade_solver
+    ) -> None:
+        upgrade_solver()
+        number = found.dataset_id
+        assert count_groups(store, number, None) == 0
+        assert read_findings(store, number, limit=10) == []
+        (row,) = list_groups(store, number, "finding:any").items
+        assert row.findings
+        solve_dataset(store, number)
+        assert count_groups(store, number, None) == len(read_findings(store, number, limit=10)) == 1
 
 
 class TestVersions:
