@@ -10,7 +10,7 @@ from typing import Any
 
 from app.datasets.camera_json import camera_from_json
 from app.datasets.coco import CAMERA, CORNER, ORIGIN, OUTSIDE, PREFIX, STATE
-from app.datasets.coco_annotation import NoPlaceError, ball_of, box_of
+from app.datasets.coco_annotation import NoPlaceError, ball_of, box_of, is_occluded
 from app.datasets.coco_categories import Categories, Category
 from app.datasets.coco_frames import Frame, FrameFile, groups_of, split_of_folders
 from app.datasets.coco_joins import Annotation, Joined, spelt
@@ -206,16 +206,13 @@ class _File:
                 our files of before are in our own frame.
         """
         annotations = self._joined.of_image[index]
-        added = self._added(annotations)
+        added = self._added(annotations, from_corner)
         if not view.balls:
-            boxes = [self._box(item, record) for record, item in added]
-            found = [box for box in boxes if box is not None]
-            return tuple(
-                BallAnnotation(box=box_from_corner(box) if from_corner else box) for box in found
-            )
+            return tuple(added)
         # A tool that drops fields that it does not know hands the written box on as a new one.
-        if len(added) < len(annotations) or not any(ball.box for ball in view.balls):
-            for record, _ in added:
+        written = any("written_bbox" in item for _, item in annotations)
+        if written or not any(ball.box for ball in view.balls):
+            for record in added.values():
                 self._note(record, "bbox", "adds a ball to a view that has one; left out")
         if len(view.balls) != 1:
             return view.balls
@@ -227,9 +224,9 @@ class _File:
                     return (replace(view.balls[0], box=box, point=None),)
         return view.balls
 
-    def _added(self, annotations: list[Annotation]) -> list[Annotation]:
-        """The balls among the annotations that were added since; anything else is reported."""
-        balls = []
+    def _added(self, annotations: list[Annotation], from_corner: bool) -> dict[BallAnnotation, str]:
+        """The balls that were added since, each with its place in the file; the rest is reported."""
+        balls: dict[BallAnnotation, str] = {}
         for record, item in annotations:
             if "written_bbox" in item:
                 continue
@@ -238,8 +235,12 @@ class _File:
                 shown = spelt(item.get("category_id")) if category is None else category.shown
                 problem = f"is {shown}: of boxes added to an export only the ball is read; left out"
                 self._note(record, "category_id", problem)
-            elif not self._is_crowd(item, record):
-                balls.append((record, item))
+            elif not self._is_crowd(item, record) and (box := self._box(item, record)) is not None:
+                box = box_from_corner(box) if from_corner else box
+                ball = BallAnnotation(box=box, occluded=is_occluded(item))
+                if ball in balls:
+                    self._note(record, "bbox", "puts a second ball at the same place; left out")
+                balls.setdefault(ball, record)
         return balls
 
     def _box(self, item: Mapping[str, Any], record: str) -> Box | None:

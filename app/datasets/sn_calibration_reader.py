@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
+from functools import partial
 from pathlib import PurePosixPath
 from typing import Any
 
 from app.datasets import fields
+from app.datasets.corner_origin import HALF
 from app.datasets.file_tree import DEFAULT_LIMITS, FileTree, Limits, Root
 from app.datasets.frame_names import IMAGE_SUFFIXES
 from app.datasets.line_documents import LineDocument, read_line_documents
@@ -105,11 +107,12 @@ def line_files_of(
             seen.add(named)
             drawn = document.size or said or size
             stays = said is not None or (ours.own_sizes and document.size is not None)
-            lines, others = lines_from_json(document.lines, drawn, tree.shown(name), report)
+            made = drawn if stays else size
+            shown = tree.shown(name)
+            lines, others = lines_from_json(document.lines, made, shown, report, drawn)
             media = _media(tree, beside.get(where))
-            file = LineFile(named, drawn, lines, others, media, where)
             report.imported += 1
-            yield file if stays else _resized(file, size)
+            yield LineFile(named, made, lines, others, media, where)
 
 
 def _whole(name: str) -> str:
@@ -134,25 +137,6 @@ def _documents(tree: FileTree, name: str, report: Report) -> list[LineDocument]:
         return []
 
 
-def _resized(file: LineFile, size: ImageSize) -> LineFile:
-    """The same in pixels of another size."""
-    if file.size == size:
-        return file
-    x, y = (size.width - 1) / (file.size.width - 1), (size.height - 1) / (file.size.height - 1)
-    lines = {
-        marking: [(point[0] * x, point[1] * y) for point in points]
-        for marking, points in file.lines.items()
-    }
-    others = tuple(
-        {
-            **line,
-            "points": [value * (y if at % 2 else x) for at, value in enumerate(line["points"])],
-        }
-        for line in file.others
-    )
-    return replace(file, size=size, lines=make_lines(lines), others=others)
-
-
 def _is_line_file(name: str) -> bool:
     last = PurePosixPath(name).name
     if not last.lower().endswith(".json"):
@@ -174,12 +158,19 @@ def _media(tree: FileTree, image: str | None) -> Media | None:
 
 
 def lines_from_json(
-    value: Any, size: ImageSize, path: str, report: Report
+    value: Any, size: ImageSize, path: str, report: Report, drawn: ImageSize | None = None
 ) -> tuple[Lines, tuple[Mapping[str, Any], ...]]:
     """Lines with geometry, and the others, of one image, in pixels.
 
     Coordinates are pixels when at least half of all points lie beyond 2, so that no single point
     decides (decision 0067); in a normalised file such points are left out and reported.
+
+    Args:
+        value: The parsed lines.
+        size: Of the image whose pixels are wanted.
+        path: File as the user knows it, for problems.
+        report: Takes what had to be left out.
+        drawn: Size of the image that pixels of the file are of; None: ``size``.
 
     Raises:
         DatasetFormatError: The file is no object at all.
@@ -195,7 +186,8 @@ def lines_from_json(
         line = [point for _, point in numbered]
         if not in_pixels:
             line = _near(numbered, path, name, report)
-        pixels = [ImagePoint(*p) if in_pixels else size.unit_to_pixel(*p) for p in line]
+        to_pixel = partial(_resized, drawn or size, size) if in_pixels else size.unit_to_pixel
+        pixels = [to_pixel(*point) for point in line]
         marking = _marking(name, path, report)
         if marking is None:
             flat = [coordinate for point in pixels for coordinate in point]
@@ -203,6 +195,14 @@ def lines_from_json(
         elif pixels:
             known.setdefault(marking, []).extend(pixels)
     return make_lines(known), tuple(others)
+
+
+def _resized(drawn: ImageSize, size: ImageSize, x: float, y: float) -> ImagePoint:
+    """A pixel where its image has another size: images are resized about the first pixel's corner."""
+    if drawn == size:
+        return ImagePoint(x, y)
+    across, down = size.width / drawn.width, size.height / drawn.height
+    return ImagePoint((x + HALF) * across - HALF, (y + HALF) * down - HALF)
 
 
 _Numbered = list[tuple[int, tuple[float, float]]]

@@ -16,6 +16,7 @@ from app.soccer.group import Group, Station, View
 
 _SUFFIX = re.compile(r"\.(png|jpe?g|webp|bmp|txt|json)$", re.IGNORECASE | re.ASCII)
 _NUMBER = re.compile(r"(?:frame|image|img)?[ _-]?(\d{1,9})", re.IGNORECASE | re.ASCII)
+_DIGITS = re.compile(r"\d{1,9}", re.ASCII)
 _MATCH = " - "
 """Stands in the name of every SoccerNet match."""
 _HOLDER = re.compile(
@@ -109,14 +110,13 @@ class FrameNames:
 
     def find_number(self, text: str) -> NamedFrame | None:
         """The one frame whose view or picture has a number for its name, ``4`` for ``0004.jpg``."""
-        bare = id_text(text) or ""
-        identity = self._numbered.get(int(bare)) if bare.isascii() and bare.isdigit() else None
+        number = _number(text)
+        identity = None if number is None else self._numbered.get(number)
         return self.frames[identity] if identity is not None and identity != _SEVERAL else None
 
     def why_not_number(self, text: str) -> str:
         """Why ``find_number`` found nothing, in words."""
-        bare = id_text(text) or ""
-        if bare.isascii() and bare.isdigit() and int(bare) in self._numbered:
+        if _number(text) in self._numbered:
             return "is the number of several frames of the dataset; name the picture or the camera, too"
         return "is no number in the name of a picture of the dataset"
 
@@ -150,6 +150,12 @@ class FrameNames:
                 if found is not None:
                     return found
         return None
+
+
+def _number(text: str) -> int | None:
+    """A number as tables write it, ``4``, ``0004`` or ``4.0``."""
+    found = _DIGITS.fullmatch(id_text(text) or "")
+    return int(found[0]) if found else None
 
 
 def _bare(name: str) -> str:

@@ -19,6 +19,7 @@ not have are counted and listed. Nothing is evaluated.
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -423,6 +424,7 @@ def _read_yolo(tree: FileTree, path: Path, run: PredictionRun) -> None:
             _add_yolo(run, frame, cells, tracked)
 
 
+_TRACK = re.compile(r"\d{1,18}", re.ASCII)
 _TRACKED = "the sixth number is the id of a track and no confidence: its boxes count as sure"
 
 
@@ -432,9 +434,7 @@ def _has_tracks(rows: list[list[str]]) -> bool:
     All of them are whole then, and one is beyond 1.
     """
     last = [cells[5] for cells in rows if len(cells) == 6]
-    return (
-        bool(last) and all(cell.isdigit() for cell in last) and any(int(cell) > 1 for cell in last)
-    )
+    return bool(last) and all(map(_TRACK.fullmatch, last)) and any(int(cell) > 1 for cell in last)
 
 
 def _add_yolo(

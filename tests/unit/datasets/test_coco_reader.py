@@ -105,6 +105,7 @@ class TestReadCoco:
             ({"category_id": 2}, 'category_id: is "Player"'),
             ({"category_id": 9}, "category_id: is 9"),
             ({"category_id": 1, "iscrowd": 1}, "iscrowd: is 1"),
+            ({"category_id": 1, "bbox": [600, 301, 0, 21]}, "bbox: has a box without area"),
         ],
     )
     @pytest.mark.parametrize("bare", [True, False])
@@ -125,6 +126,22 @@ class TestReadCoco:
         assert again.views[0].balls == view.balls
         (problem,) = map(str, report.problems)
         assert f"annotations[{len(items) - 1}], {field}" in problem
+
+    def test_a_ball_that_was_added_twice_is_one(
+        self, tmp_path: Path, solved: Solved, soccer_group: Make, report: Report
+    ) -> None:
+        group = soccer_group(replays=0)
+        bare = replace(group.views[0], balls=())
+        write_coco(tmp_path, [solved(replace(group, views=(bare,)), ball=False)], everything=True)
+        path = tmp_path / "annotations/instances_train.json"
+        value = json.loads(path.read_text())
+        box = {"bbox": [600, 301, 20, 21], "attributes": {"occluded": True}}
+        value["annotations"] = [ball(1, 98, **box), ball(1, 99, **box)]
+        path.write_text(json.dumps(value))
+        (again,) = read_coco(tmp_path, report)
+        (one,) = again.views[0].balls
+        assert (one.box, one.occluded) == (Box(599.5, 300.5, 20.0, 21.0), True)
+        assert "second ball at the same place" in report.problems[0].problem
 
     def test_a_second_ball_added_to_a_view_is_named(
         self, tmp_path: Path, solved: Solved, soccer_group: Make, report: Report

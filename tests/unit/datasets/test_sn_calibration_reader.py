@@ -180,6 +180,20 @@ class TestReadLineFiles:
         assert usual.size == DEFAULT_SIZE
         assert usual.lines["Middle line"][0] == pytest.approx(DEFAULT_SIZE.unit_to_pixel(0.25, 0.5))
 
+    def test_pixels_of_another_size_are_scaled_about_the_corner_of_the_first_pixel(
+        self, tmp_path: Path, report: Report
+    ) -> None:
+        line = [{"x": -0.5, "y": 539.5}, {"x": 100, "y": 100}]
+        lines = {"Middle line": line, "Line unknown": line}
+        value = {"image": "00001.jpg", "width": 960, "height": 540, "lines": lines}
+        (tmp_path / "00001.json").write_text(json.dumps(value))
+        (file,) = read_line_files(tmp_path, ImageSize(1920, 1080), report)
+        assert file.size == ImageSize(1920, 1080)
+        assert file.lines["Middle line"] == ((-0.5, 1079.5), (200.5, 200.5))
+        assert file.others[0]["points"] == [-0.5, 1079.5, 200.5, 200.5]
+        (same,) = read_line_files(tmp_path, ImageSize(960, 540), report)
+        assert same.lines["Middle line"] == ((-0.5, 539.5), (100.0, 100.0))
+
     def test_a_bad_image_of_many_is_named_and_the_others_are_read(
         self, tmp_path: Path, report: Report
     ) -> None:

@@ -137,7 +137,18 @@ class TestFindNumber:
 
     @pytest.mark.parametrize(
         ("text", "found"),
-        [("4", 1), ("0004", 1), ("4.0", 1), ("5", 2), ("6", 3), ("7", None), ("x", None)],
+        [
+            ("4", 1),
+            ("0004", 1),
+            ("4.0", 1),
+            ("4.00", 1),
+            ("5", 2),
+            ("6", 3),
+            ("7", None),
+            ("x", None),
+            ("9" * 5000, None),
+            ("²", None),
+        ],
     )
     def test_a_number_is_that_in_the_name_of_a_picture(
         self, pictures: FrameNames, text: str, found: int | None

@@ -334,6 +334,15 @@ class TestYolo:
         assert ([item.score for item in found.detections[1]], found.without_score) == ([1, 1], 2)
         assert "id of a track" in problems(found)[0][2]
 
+    @pytest.mark.parametrize("last", ["²", "9" * 5000, "٣"])
+    def test_a_last_number_that_is_none_is_named(self, tmp_path, names, last: str) -> None:
+        path = write(tmp_path / "7.txt", f"0 0.5 0.5 0.01 0.01 0.5\n0 0.5 0.5 0.01 0.01 {last}\n")
+        found = read_predictions(path, "yolo", names)
+        assert (found.boxes, [record for record, _, _ in problems(found)]) == (1, ["line 2"])
+        write(path, f"0 0.5 0.5 0.01 0.01 {last}\n")
+        with pytest.raises(DatasetFormatError, match="line 1"):
+            read_predictions(path, "yolo", names)
+
     def test_a_confidence_may_stand_before_the_id_of_a_track(self, tmp_path, names) -> None:
         write(tmp_path / "7.txt", "0 0.5 0.5 0.01 0.02 0.75 17\n")
         found = read_predictions(tmp_path, "yolo", names)
