@@ -10,6 +10,7 @@ import zipfile
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
+from typing import Any
 
 from app.config import Settings
 from app.datasets.match_frames import ARCHIVE
@@ -38,7 +39,7 @@ from app.store.imports import known_groups
 from app.store.jobs import Job
 from app.store.locks import practice_lock
 from app.store.people import person_by_name
-from app.store.sight import EVERYTHING, Sight
+from app.store.sight import COPIES, EVERYTHING, Sight
 from app.store.store import Store
 from app.store.stored_json import Json
 
@@ -100,9 +101,9 @@ def request_practice(
     ``person`` is whose practice it is (``practice_name``); ``keep`` keeps the answer with the job.
 
     Raises:
-        ConflictError: There is a dataset of that name with other groups.
+        ConflictError: There is a dataset of that name that is not the practice.
     """
-    _require_own(store, settings, practice_name(person))
+    _require_own(store, settings, person)
     return jobs.submit(
         KIND,
         "Begin the practice again" if again else "Make the practice groups",
@@ -170,11 +171,11 @@ def make_practice_dataset(
         everything was there already).
 
     Raises:
-        ConflictError: There is a dataset of that name with other groups.
+        ConflictError: There is a dataset of that name that is not the practice.
     """
     with practice_lock(settings, lambda: progress(0, 1, "Somebody else makes them.")):
         name = practice_name(person)
-        _require_own(store, settings, name)
+        _require_own(store, settings, person)
         ids = _group_ids(store, name)
         if len(ids) == len(LESSONS) and not again and _is_drawn(settings):
             return {"dataset": name, "groups": len(ids), "first": ids[0], "made": False}
@@ -225,7 +226,8 @@ def read_practice(
     truths, name = _truths(settings), practice_name(person)
     with store.read() as session:
         row = find_dataset(session, name)
-        if row is not None and not sight.sees(row.id):
+        # An ordinary dataset that is called so is nobody's practice.
+        if row is not None and (not sight.sees(row.id) or _is_ordinary(row, person)):
             return Practice(name, ())
         states = read_states(session, _group_ids(store, name))
     lessons = [
@@ -270,12 +272,23 @@ def _group_ids(store: Store, name: str) -> list[int]:
         return [group.id for group in known_groups(session, row.id)]
 
 
-def _require_own(store: Store, settings: Settings, name: str) -> None:
+def _is_ordinary(row: Any, person: str | None) -> bool:
+    """Whether a dataset with the name of a person's practice is not theirs: that one is hidden."""
+    return person is not None and row.id <= COPIES
+
+
+def _require_own(store: Store, settings: Settings, person: str | None) -> None:
     """Raise ConflictError where somebody's own dataset has the name."""
+    name = practice_name(person)
     with store.read() as session:
         row = find_dataset(session, name)
         if row is None:
             return
+        if _is_ordinary(row, person):
+            raise ConflictError(
+                f'"{name}" is the name of an ordinary dataset',
+                hint="Your practice needs that name. Ask an admin to rename or delete the dataset.",
+            )
         keys = {group.key for group in known_groups(session, row.id)}
     known = _truths(settings)
     if keys and not keys <= set(known or ()):

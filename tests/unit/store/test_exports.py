@@ -22,7 +22,15 @@ def solved(filled: Store) -> Store:
             GroupModel.id, GroupModel.inputs_hash, DatasetModel.policy_hash, literal(SOLVER_VERSION),
             literal("[]"), literal("{}"), literal(b""),
         ).join(DatasetModel, DatasetModel.id == GroupModel.dataset_id)  # fmt: skip
-        names = ["group_id", "inputs_hash", "policy_hash", "solver_version", "calibrations", "summary", "body"]
+        names = [
+            "group_id",
+            "inputs_hash",
+            "policy_hash",
+            "solver_version",
+            "calibrations",
+            "summary",
+            "body",
+        ]
         session.execute(insert(SolutionModel).from_select(names, key))
     return filled
 

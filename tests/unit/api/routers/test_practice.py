@@ -9,7 +9,10 @@ import numpy as np
 import pytest
 from sqlalchemy import update
 
+from app.review.datasets.dataset import get_dataset
+from app.review.importing.ingest import ensure_dataset
 from app.review.people.roles import Role
+from app.review.practice.practice import make_practice_dataset
 from app.store.tables.groups import DatasetModel
 from tests.security.apart import Apart, opened
 from tests.waiting import SECONDS
@@ -137,6 +140,27 @@ class TestTeam:
         assert again["made"] is True
         assert self.judge(apart, "ana", again["first"]) == 200
         assert apart.ask("ben", "GET", f"/groups/{theirs['first']}").status_code == 200
+
+    @pytest.mark.parametrize("filled", [False, True])
+    def test_an_ordinary_dataset_of_that_name_is_left_alone(
+        self, apart: Apart, filled: bool
+    ) -> None:
+        store = apart.store
+        if filled:
+            make_practice_dataset(store, store.settings, lambda *_: None, actor="local")
+            with store.write() as session:
+                mine = DatasetModel.name == "practice"
+                session.execute(update(DatasetModel).where(mine).values(name="practice ana"))
+        else:
+            ensure_dataset(store, "practice ana", actor="local")
+        before = get_dataset(store, "practice ana")
+        answer = apart.ask("ana", "POST", "/practice", {"again": True})
+        assert answer.status_code == 409
+        assert answer.json()["detail"] == '"practice ana" is the name of an ordinary dataset'
+        assert "rename or delete" in answer.json()["hint"]
+        assert get_dataset(store, "practice ana") == before
+        assert apart.ask("admin", "GET", "/practice").json()["lessons"] == []
+        assert apart.ask("ana", "GET", "/practice").json()["lessons"] == []
 
     def test_it_gives_no_rights_elsewhere(self, apart: Apart) -> None:
         before = apart.ask("ana", "GET", "/session").json()
