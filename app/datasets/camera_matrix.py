@@ -9,13 +9,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import cv2
 import numpy as np
 
 from app.datasets import fields
 from app.errors import DatasetFormatError, GeometryError
 from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
+from app.geometry.rotation import rotation_from_vector
 from app.soccer.pitch import Pitch
 
 _INTRINSICS = (
@@ -148,7 +148,7 @@ def _flat(value: Any) -> list[float]:
 def _rotation(value: Any) -> FloatArray:
     numbers = _flat(value)
     if len(numbers) == 3:
-        return np.asarray(cv2.Rodrigues(np.array(numbers))[0], dtype=float)
+        return rotation_from_vector(np.array(numbers))
     matrix = _numbers(numbers, 9).reshape(3, 3)
     left, _, right = np.linalg.svd(matrix)
     nearest: FloatArray = left @ right

@@ -56,3 +56,33 @@ def _about_z(angle: float) -> FloatArray:
 def _about_x(angle: float) -> FloatArray:
     cosine, sine = np.cos(angle), np.sin(angle)
     return np.array([[1.0, 0.0, 0.0], [0.0, cosine, -sine], [0.0, sine, cosine]])
+
+
+def rotation_from_vector(vector: FloatArray) -> FloatArray:
+    """The rotation about a vector by its length in radians (Rodrigues' formula).
+
+    Args:
+        vector: Axis times angle, radians, shape (3,).
+
+    Returns:
+        Rotation matrix, shape (3, 3).
+
+    Raises:
+        ShapeError: The vector has another shape.
+
+    Source: Hartley & Zisserman, appendix A4.3.2.
+
+    Example:
+        >>> rotation_from_vector(np.array([0.0, 0.0, np.pi / 2])).round(12) + 0.0
+        array([[ 0., -1.,  0.],
+               [ 1.,  0.,  0.],
+               [ 0.,  0.,  1.]])
+    """
+    require_shape(vector, (3,), "vector")
+    x, y, z = vector
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    angle = float(np.linalg.norm(vector))
+    # sin(a)/a and (1 - cos a)/a^2 without a division by zero.
+    first = np.sinc(angle / np.pi)
+    second = 0.5 * np.sinc(angle / (2 * np.pi)) ** 2
+    return np.asarray(np.eye(3) + first * cross + second * cross @ cross, dtype=float)

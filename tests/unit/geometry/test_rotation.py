@@ -1,9 +1,15 @@
+import cv2
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from app.geometry.rotation import pan_tilt_roll_from_rotation, rotation_from_pan_tilt_roll
+from app.errors import ShapeError
+from app.geometry.rotation import (
+    pan_tilt_roll_from_rotation,
+    rotation_from_pan_tilt_roll,
+    rotation_from_vector,
+)
 
 ANGLE = st.floats(-3.1, 3.1)
 
@@ -46,3 +52,19 @@ class TestPanTiltRollFromRotation:
         rotation = rotation_from_pan_tilt_roll(0.4, 0.0, 0.3)
         pan, tilt, roll = pan_tilt_roll_from_rotation(rotation)
         assert (pan, tilt, roll) == pytest.approx((0.7, 0.0, 0.0))
+
+
+class TestRotationFromVector:
+    @pytest.mark.parametrize("angle", [0.0, 1e-12, 1e-6, 0.3, 2.0, np.pi, 7.0])
+    def test_is_what_the_library_of_computer_vision_makes_of_it(self, angle: float) -> None:
+        axis = np.array([0.48, -0.6, 0.64])
+        expected, _ = cv2.Rodrigues(axis * angle)
+        assert np.allclose(rotation_from_vector(axis * angle), expected, atol=1e-14)
+
+    def test_is_a_rotation_also_for_a_tiny_vector(self) -> None:
+        found = rotation_from_vector(np.array([1e-9, -2e-9, 1e-10]))
+        assert np.allclose(found @ found.T, np.eye(3), atol=1e-15)
+
+    def test_another_shape_is_refused(self) -> None:
+        with pytest.raises(ShapeError):
+            rotation_from_vector(np.zeros((3, 1)))
