@@ -29,6 +29,11 @@ _NAMES: tuple[tuple[str, re.Pattern[str]], ...] = (
     ("cameras", re.compile(r"(?:camera_.*|issia_calibration)\.json")),
 )
 """By the last part of a name; the first one that any fits: exports hold cameras beside labels."""
+_DOCUMENTS = re.compile(
+    r"(?:readme|licen[cs]e|copying|notes?|about)(?:\.\w{1,5})?|.*\.(?:md|pdf|html?|docx?|rtf)",
+    re.IGNORECASE,
+)
+"""What people put beside pictures for other people."""
 
 
 def guess_format(path: Path | StoredPath) -> str | None:
@@ -43,14 +48,17 @@ def guess_of_names(found: Iterable[str]) -> str | None:
     for name, pattern in _NAMES:
         if any(map(pattern.fullmatch, names)):
             return name
-    return "frames" if names and _suffixes(names) <= set(IMAGE_SUFFIXES) else None
+    rest = _suffixes(name for name in names if not _DOCUMENTS.fullmatch(name))
+    pictures, videos = rest & set(IMAGE_SUFFIXES), set(VIDEO_SUFFIXES)
+    return "frames" if pictures and rest <= pictures | videos else None
 
 
 def holds_videos_alone(path: Path | StoredPath) -> bool:
-    """Whether a folder, a zip or a file is a video, or holds nothing but videos and pictures."""
+    """Whether a folder, a zip or a file is a video, or holds nothing but videos and documents."""
     names = [name for name in islice(_names(path), MAX_NAMES) if not is_system_file(name)]
-    suffixes = _suffixes(name for name in names if not name.endswith("/"))
-    return bool(suffixes & set(VIDEO_SUFFIXES)) and suffixes <= {*VIDEO_SUFFIXES, *IMAGE_SUFFIXES}
+    parts = (name.rpartition("/")[2] for name in names if not name.endswith("/"))
+    suffixes = _suffixes(part for part in parts if not _DOCUMENTS.fullmatch(part))
+    return bool(suffixes) and suffixes <= set(VIDEO_SUFFIXES)
 
 
 def _suffixes(names: Iterable[str]) -> set[str]:

@@ -270,7 +270,7 @@ def _views_contradict(item: Contradiction, group: Group, ball: Ball3D | None) ->
         )
     if not item.is_known:
         sentences.append(
-            "Nobody says how exact the given cameras are: “Noise of the clicks” under Statistics "
+            "Nobody says how exact the given cameras are: “Annotation noise” under Statistics "
             "estimates it."
         )
     if item.view is not None:

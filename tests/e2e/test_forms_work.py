@@ -163,7 +163,8 @@ class TestBatches:
     ) -> None:
         dora = crew.log_in("dora")
         page = open_as(open_page, dora, "/groups")
-        for row in GIVING:
+        *ordinary, gold = GIVING
+        for row in ordinary:
             carry_out(page, row, {})
         batches = read(page, "/datasets/sample/batches")["items"]
         friday = next(one["id"] for one in batches if one["name"] == "Friday")
@@ -173,6 +174,9 @@ class TestBatches:
         carl = crew.log_in("carl")
         sent(carl, "PUT", f"/batches/{friday}/groups/{second}/lease", {"take_over": False})
         sent(carl, "PUT", f"/batches/{friday}/groups/{second}/hand-in")
+        # From then on its annotators do not see the groups themselves.
+        page.reload()
+        carry_out(page, gold, {})
         page.goto("/work")
         self.shows_how_far_they_are(page)
         for row in BATCHES:

@@ -263,7 +263,7 @@ class TestNoise:
     def test_the_noise_of_the_clicks_stands_beside_what_the_policy_says(
         self, open_page: OpenPage, place: str
     ) -> None:
-        card = open_page(f"/datasets/sample/{place}").get_by_label("Noise of the clicks")
+        card = open_page(f"/datasets/sample/{place}").get_by_label("Annotation noise")
         expect(card).to_contain_text("Sigma of a point on a line")
         expect(card.get_by_role("row")).to_have_count(6)
 
@@ -310,7 +310,7 @@ class TestNoise:
             lambda route: route.fulfill(json={**job, "state": "done" if ended else "running"}),
         )
         page.goto("/datasets/sample/policy")
-        card = page.get_by_label("Noise of the clicks")
+        card = page.get_by_label("Annotation noise")
         expect(card).to_contain_text("sets “Of its diameter” to 0.08 (now 0.04)")
         expect(card).to_contain_text("differ from the dataset for camera cam2 (1.80 times)")
         button = card.get_by_role("button", name="Use the estimates and solve")

@@ -143,9 +143,9 @@ class TestReview:
         page = screen.page
         page.get_by_label("Comment on this group").fill("The replay is late.")
         page.get_by_role("button", name="Comment", exact=True).tap()
-        expect(page.locator(".talk__text")).to_have_text("The replay is late.")
+        expect(page.locator(".talk__text").last).to_have_text("The replay is late.")
         assert fits(page) == {}
-        page.get_by_role("button", name="Delete your comment").tap()
+        page.get_by_role("button", name="Delete your comment").last.tap()
         expect(page.get_by_text("The replay is late.")).to_have_count(0)
 
     def test_a_finger_moves_the_page_and_no_point(self, phone: OpenPhone) -> None:

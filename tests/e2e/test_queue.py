@@ -311,7 +311,8 @@ class TestFarJumps:
             long_list.keyboard.press("PageDown")
         expect(row(long_list, 301)).to_have_attribute("data-active", "true")
         expect(row(long_list, 301).get_by_role("link")).to_have_text("301")
-        expect(row(long_list, 301)).to_be_in_viewport(ratio=1)
+        # Of its 36 pixels a fraction of one may be cut: the head above has no whole height.
+        expect(row(long_list, 301)).to_be_in_viewport(ratio=0.99)
 
     def test_every_row_of_a_million_is_reached(self, long_list: Page) -> None:
         long_list.route("**/api/v1/groups?*", of_a_million)

@@ -49,12 +49,15 @@ class TestGuessFormat:
         system = {"__MACOSX/a/._1.jpg": "x", "a/Thumbs.db": "x", ".DS_Store": "x"}
         assert guess_format(make_zip(pictures | system)) == "frames"
         assert guess_format(make_zip(pictures | {"labels/1.txt": "x"})) is None
+        beside = {"README.txt": "x", "terms.pdf": "x", "a/clip.mp4": "x"}
+        assert guess_format(make_zip(pictures | beside)) == "frames"
 
     @pytest.mark.parametrize(
         ("names", "is_one"),
         [
             (("match.MP4",), True),
-            (("a/match.mov", "a/1.jpg", ".DS_Store"), True),
+            (("a/match.mov", "readme.txt", ".DS_Store"), True),
+            (("a/match.mov", "a/1.jpg"), False),
             (("match.mp4", "Labels-v3.json"), False),
             (("1.jpg",), False),
             ((".DS_Store",), False),

@@ -87,9 +87,9 @@ class TestPredictionReader:
     def test_what_needs_too_much_memory_is_refused_and_the_next_is_read(
         self, reader_of, tmp_path
     ) -> None:
-        reader, limits = reader_of(import_memory=300 * 2**20), Limits.of(Settings())
+        reader, limits = reader_of(import_memory=400 * 2**20), Limits.of(Settings())
         heavy = written(tmp_path / "heavy.json", b"[%s{}]" % (b"{}," * 8_000_000))
-        with pytest.raises(TooLargeError, match=r"heavy\.json needs more than 300 MiB") as refused:
+        with pytest.raises(TooLargeError, match=r"heavy\.json needs more than 400 MiB") as refused:
             reader.read(heavy, NAMES, limits)
         assert "in parts" in refused.value.hint
         empty = written(tmp_path / "empty.json", b"[]")
