@@ -8,20 +8,30 @@ from __future__ import annotations
 
 import threading
 from collections import OrderedDict
-from collections.abc import Callable
-from concurrent.futures import Future
+from collections.abc import Callable, Iterable
+from concurrent.futures import Future, wait
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from math import inf
+from pathlib import Path
 from time import monotonic
 from typing import Any
 
 from app.canonical import digest_of
 from app.child import Allowance, ChildEnded
 from app.child_figures import FIGURES
-from app.child_pool import ChildPool, PoolTask
+from app.child_pool import ChildPool, Explain, PoolTask
 from app.config import Settings
-from app.errors import ImageError, OverloadedError, ReviewError, StorageError, TooLargeError
+from app.errors import (
+    ImageError,
+    NotFoundError,
+    OverloadedError,
+    ReviewError,
+    StorageError,
+    TooLargeError,
+)
+from app.progress import TellProgress
 from app.soccer.media import Media
 from app.store.image_header import JPEG
 from app.store.media import (
@@ -31,10 +41,12 @@ from app.store.media import (
     frame_stamp,
     has_index,
     read_frame,
+    video_stamp,
     video_times,
 )
 from app.store.neighbours import neighbours
 from app.store.object_frames import fetch_frame, is_kept, is_stored
+from app.store.video_index import Times, remember_index, remembered_index
 
 ALLOWANCE = Allowance(memory=1024 * 2**20, processor=10.0, silence=60.0)
 """For one picture: one of 50 megapixels takes a few hundred MiB and two seconds."""
@@ -49,6 +61,10 @@ FETCHERS = 2
 INDEXING = Allowance(memory=1024 * 2**20, processor=3600.0, silence=3600.0)
 """For decoding a whole video once, so that its frames are found: 1080p takes 4 ms a frame."""
 INDEXERS = 1
+UNKEPT = 8
+"""Videos whose indices are remembered that the disk refuses."""
+TELL_SECONDS = 1.0
+"""Between two words of whoever waits for an index."""
 WAITING = 64
 """Pictures that may wait; one more is told to come back."""
 REMEMBERED = 256
@@ -88,9 +104,8 @@ class Frames:
         )
         self._readers = ChildPool(READING, READERS, WAITING, "pictures", FIGURES["readers"])
         self._fetchers = ChildPool(FETCHING, FETCHERS, WAITING, "pictures", FIGURES["fetchers"])
-        self._indexers = ChildPool(INDEXING, INDEXERS, WAITING, "videos", FIGURES["indexers"])
+        self._videos = VideoIndexer(settings)
         self._refused: OrderedDict[str, tuple[ReviewError, float]] = OrderedDict()
-        self._indexing: dict[str, PoolTask] = {}
         self._lock = threading.Lock()
 
     def warm(self) -> None:
@@ -146,14 +161,15 @@ class Frames:
         Raises:
             OverloadedError: Too many wait.
         """
-        return self._pool.submit(neighbours, media, group, static, self._settings)
+        work = self._videos.with_index(media, neighbours, media, group, static, self._settings)
+        return self._pool.submit(*work)
 
     def close(self) -> None:
         """End the processes."""
         self._pool.close()
         self._readers.close()
         self._fetchers.close()
-        self._indexers.close()
+        self._videos.close()
 
     def ask_of(
         self, media: Media, flipped: bool, work: Callable[..., Any], *arguments: Any
@@ -163,30 +179,73 @@ class Frames:
         Its future may have the errors of ``decode_frame``.
 
         Raises:
-            NotFoundError: The file is not there.
             OverloadedError: Too many wait.
         """
 
         def explain(error: ChildEnded) -> ReviewError:
             return refused_picture(frame_name(media), error)
 
-        return self._readers.submit(
-            work, media, flipped, self._settings, *arguments, explain=explain
-        )
+        return self._read(media, work, media, flipped, self._settings, *arguments, explain=explain)
 
-    def ask_to(self, work: Callable[..., Any], *arguments: Any) -> PoolTask:
-        """Have a function called that reads frames itself, ``work(*arguments, settings)``.
+    def ask_to(self, media: Media | None, work: Callable[..., Any], *arguments: Any) -> PoolTask:
+        """Have a function called that reads a frame itself, ``work(*arguments, settings)``.
 
-        Its future may have ``ChildEnded``.
+        Its future may have ``ChildEnded``, or say why its video cannot be indexed.
+
+        Args:
+            media: The frame; None: it reads none.
+            work: The function.
+            arguments: What it is called with.
 
         Raises:
             OverloadedError: Too many wait.
         """
-        return self._readers.submit(work, *arguments, self._settings)
+        return self._read(media, work, *arguments, self._settings)
+
+    def _read(
+        self,
+        media: Media | None,
+        work: Callable[..., Any],
+        *arguments: Any,
+        explain: Explain = lambda error: error,
+    ) -> PoolTask:
+        """Have a frame read, once its video is indexed: a reader has not the time for that."""
+
+        def submit(bounded: bool) -> PoolTask:
+            asked = (work, *arguments)
+            if media is not None:
+                asked = self._videos.with_index(media, *asked)
+            return self._readers.submit(*asked, explain=explain, bounded=bounded)
+
+        indexing = None
+        if media is not None:
+            # Of a video that is not there, or is none, its reader says so at once.
+            with suppress(NotFoundError):
+                indexing = self._videos.ask(media)
+        if indexing is None:
+            return submit(bounded=True)
+        waiting = PoolTask(explain)
+
+        def go_on(done: Future[Any]) -> None:
+            if waiting.future.cancelled():
+                return
+            error = None if done.cancelled() else done.exception()
+            if done.cancelled() or not isinstance(error, ImageError | NotFoundError | None):
+                _pass_on(waiting.future, done)
+                return
+            # It has waited already.
+            reading = submit(bounded=False)
+            waiting.future.add_done_callback(
+                lambda one: reading.leave() if one.cancelled() else None
+            )
+            reading.future.add_done_callback(partial(_pass_on, waiting.future))
+
+        indexing.future.add_done_callback(go_on)
+        return waiting
 
     def _fetch(self, media: Media, *, bounded: bool) -> PoolTask | None:
         if media.frame is not None:
-            return self._index(media, bounded=bounded)
+            return self._videos.ask(media, bounded=bounded)
         if not is_stored(media) or is_kept(media, self._settings):
             return None
 
@@ -197,26 +256,6 @@ class Frames:
             fetch_frame, media, self._settings, explain=explain, bounded=bounded
         )
 
-    def _index(self, media: Media, *, bounded: bool) -> PoolTask | None:
-        if has_index(media, self._settings):
-            return None
-
-        def explain(error: ChildEnded) -> ReviewError:
-            return refused_picture(frame_name(replace(media, frame=None)), error)
-
-        with self._lock:
-            running = self._indexing.get(media.path)
-            if running is None:
-                running = self._indexers.submit(
-                    index_video, media, self._settings, explain=explain, bounded=bounded
-                )
-                self._indexing[media.path] = running
-        running.future.add_done_callback(lambda _: self._indexing.pop(media.path, None))
-        # Who waits may leave; the index is made all the same, for it takes long and is needed again.
-        waiting = PoolTask(explain)
-        running.future.add_done_callback(partial(_pass_on, waiting.future))
-        return waiting
-
     def _submit(self, media: Media, width: int | None, flipped: bool, *, bounded: bool) -> PoolTask:
         def explain(error: ChildEnded) -> ReviewError:
             refusal = refused_picture(frame_name(media), error)
@@ -224,12 +263,9 @@ class Frames:
                 self._remember(media, refusal, REMEMBERED_SECONDS[error.reason])
             return refusal
 
+        work = self._videos.with_index(media, make_picture, media, width, flipped, self._settings)
         return self._pool.submit(
-            make_picture,
-            media,
-            width,
-            flipped,
-            self._settings,
+            *work,
             explain=explain,
             # Other widths of it may have waited while it was tried.
             begin=partial(self._require_untried, media),
@@ -248,6 +284,100 @@ class Frames:
             self._refused[frame_stamp(media)] = (refusal, monotonic() + seconds)
             while len(self._refused) > REMEMBERED:
                 self._refused.popitem(last=False)
+
+
+class VideoIndexer:
+    """Has videos indexed in a process of its own, each once, before frames of them are read."""
+
+    def __init__(self, settings: Settings):
+        self._settings = settings
+        self.pool = ChildPool(INDEXING, INDEXERS, WAITING, "videos", FIGURES["indexers"])
+        self._running: dict[str, PoolTask] = {}
+        self._unkept: OrderedDict[str, tuple[str, Times]] = OrderedDict()
+        self._lock = threading.Lock()
+
+    def ask(self, media: Media, *, bounded: bool = True) -> PoolTask | None:
+        """Have the video of a frame indexed; None where it is, and where it is no video.
+
+        Its future may have the errors of ``video_times``.
+
+        Raises:
+            NotFoundError: The video is not there.
+            OverloadedError: Too many wait.
+        """
+        if media.frame is None or self._is_ready(media):
+            return None
+
+        def explain(error: ChildEnded) -> ReviewError:
+            return refused_picture(frame_name(replace(media, frame=None)), error)
+
+        with self._lock:
+            running = self._running.get(media.path)
+            if running is None:
+                running = self.pool.submit(
+                    index_video, media, self._settings, explain=explain, bounded=bounded
+                )
+                self._running[media.path] = running
+        running.future.add_done_callback(partial(self._done, media.path))
+        # Who waits may leave; the index is made all the same, for it takes long and is needed again.
+        waiting = PoolTask(explain)
+        running.future.add_done_callback(partial(_pass_on, waiting.future))
+        return waiting
+
+    def make_ready(
+        self,
+        pictures: Iterable[Media | None],
+        done: int,
+        total: int,
+        progress: TellProgress | None,
+    ) -> None:
+        """Index the videos of frames that will be read; what is wrong with one its reader says.
+
+        Args:
+            pictures: The frames.
+            done: How far the whole work is.
+            total: How much there is to do in it.
+            progress: Hears every second which video is indexed; what it raises ends the waiting.
+        """
+        for media in pictures:
+            indexing = None
+            if media is not None:
+                with suppress(NotFoundError):
+                    indexing = self.ask(media, bounded=False)
+            while indexing is not None and not indexing.future.done():
+                wait([indexing.future], TELL_SECONDS)
+                if progress is not None and media is not None:
+                    progress(done, total, f"Finding the frames of {Path(media.path).name}.")
+
+    def with_index(
+        self, media: Media, work: Callable[..., Any], *arguments: Any
+    ) -> tuple[Callable[..., Any], *tuple[Any, ...]]:
+        """What to call in a process for ``work(*arguments)``, which reads a frame.
+
+        It brings the index along that the disk refused.
+        """
+        unkept = None if media.frame is None else self._unkept.get(media.path)
+        return (work, *arguments) if unkept is None else (with_index, *unkept, work, *arguments)
+
+    def close(self) -> None:
+        """End the process."""
+        self.pool.close()
+
+    def _is_ready(self, media: Media) -> bool:
+        if has_index(media, self._settings):
+            return True
+        stamp, _ = self._unkept.get(media.path, ("", None))
+        return stamp == video_stamp(media)
+
+    def _done(self, path: str, done: Future[Any]) -> None:
+        if not done.cancelled() and done.exception() is None:
+            stamp, unkept = done.result()
+            if unkept is not None:
+                with self._lock:
+                    self._unkept[path] = stamp, unkept
+                    while len(self._unkept) > UNKEPT:
+                        self._unkept.popitem(last=False)
+        self._running.pop(path, None)
 
 
 def _pass_on(waiting: Future[Any], done: Future[Any]) -> None:
@@ -277,10 +407,18 @@ def make_picture(media: Media, width: int | None, flipped: bool, settings: Setti
     return SentPicture.of(content_type(data), data)
 
 
-def index_video(media: Media, settings: Settings) -> bool:
-    """Make the index of a video, in this process."""
+def index_video(media: Media, settings: Settings) -> tuple[str, Times | None]:
+    """Make the index of a video, in this process: name of its content, and the index itself where
+    the disk refuses it."""
     video_times(media, settings)
-    return True
+    stamp = video_stamp(media)
+    return stamp, remembered_index(stamp)
+
+
+def with_index(stamp: str, times: Times, work: Callable[..., Any], *arguments: Any) -> Any:
+    """``work(*arguments)`` in this process, which remembers an index from now on."""
+    remember_index(stamp, times)
+    return work(*arguments)
 
 
 def ready() -> None:

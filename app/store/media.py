@@ -189,7 +189,7 @@ def video_times(
         TooLargeError: It is larger than the limits, in pixels or frames.
     """
     _require_contained(media, settings)
-    path, stamp = Path(media.path), _video_stamp(media)
+    path, stamp = Path(media.path), video_stamp(media)
     known = kept_index(stamp, settings)
     if known is not None:
         return known
@@ -218,10 +218,15 @@ def has_index(media: Media, settings: Settings) -> bool:
     Raises:
         NotFoundError: The video is not there.
     """
-    return kept_index(_video_stamp(media), settings) is not None
+    return kept_index(video_stamp(media), settings) is not None
 
 
-def _video_stamp(media: Media) -> str:
+def video_stamp(media: Media) -> str:
+    """Name of the content of a view's video.
+
+    Raises:
+        NotFoundError: The video is not there.
+    """
     return frame_stamp(replace(media, frame=None))
 
 

@@ -52,6 +52,7 @@ KNOWN_REVISIONS = (
     "0032",
     "0033",
     "0034",
+    "0035",
 )
 """Every revision that this version can migrate, oldest first."""
 SCHEMA_REVISION = KNOWN_REVISIONS[-1]

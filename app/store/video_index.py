@@ -7,6 +7,7 @@ by a frame rate: with a variable rate, a start after zero or frames that are dro
 from __future__ import annotations
 
 import hashlib
+from collections import OrderedDict
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from io import BytesIO
@@ -33,12 +34,18 @@ frames whose references they have not seen."""
 
 Times = npt.NDArray[np.float64]
 """Presentation time of each frame as the decoder returns them, milliseconds, shape (N,)."""
+_MOST_REMEMBERED = 8
+"""Videos; each takes 16 MiB at most."""
+_REMEMBERED: OrderedDict[str, Times] = OrderedDict()
+"""Indices that the disk refused, by the stamps of their videos."""
 
 
 def make_index(
     path: Path, stamp: str, settings: Settings, tell: Callable[[int], None] | None = None
 ) -> Times:
     """When each frame of a video is shown: decodes it all, and keeps the index in the cache.
+
+    Where the disk refuses it, it is remembered by this process.
 
     Args:
         path: The video.
@@ -55,14 +62,30 @@ def make_index(
     np.save(content, times, allow_pickle=False)
     place = _place(stamp, settings)
     # A full disk costs the cache and no frame.
-    with suppress(OSError):
+    try:
         place.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
         replace_file(place, content.getvalue())
+    except OSError:
+        remember_index(stamp, times)
     return times
+
+
+def remember_index(stamp: str, times: Times) -> None:
+    """Keep an index in this process, which the disk refuses."""
+    _REMEMBERED[stamp] = times
+    while len(_REMEMBERED) > _MOST_REMEMBERED:
+        _REMEMBERED.popitem(last=False)
+
+
+def remembered_index(stamp: str) -> Times | None:
+    """The index of a video that this process remembers."""
+    return _REMEMBERED.get(stamp)
 
 
 def kept_index(stamp: str, settings: Settings) -> Times | None:
     """The index of a video that was decoded before; None where there is none."""
+    if (remembered := remembered_index(stamp)) is not None:
+        return remembered
     with suppress(OSError, ValueError, EOFError):
         times: Times = np.load(_place(stamp, settings), allow_pickle=False)
         if times.dtype == np.float64 and times.ndim == 1:

@@ -53,14 +53,17 @@ class PaintFollower:
         leave_slot()
         end = monotonic() + SECONDS
         try:
-            asked = [(task, self._frames.ask_to(read_view_paint, task)) for task in tasks]
+            asked = [
+                (task, self._frames.ask_to(task.view.media, read_view_paint, task))
+                for task in tasks
+            ]
         except ReviewError:
             # As many wait as may.
             return
         for task, waiting in asked:
             try:
                 reading = waiting.future.result(max(end - monotonic(), 0.0))
-            except (TimeoutError, CancelledError, ChildEnded):
+            except (TimeoutError, CancelledError, ChildEnded, ReviewError):
                 waiting.leave()
                 continue
             if reading is not None:

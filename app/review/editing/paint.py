@@ -32,6 +32,7 @@ from app.soccer.policy import CalibrationPolicy
 from app.solving.calibrate import clicks_key
 from app.store.clock import now
 from app.store.datasets import group_ids
+from app.store.frames import VideoIndexer
 from app.store.groups import StoredGroup, read_groups
 from app.store.paint import (
     PAINT,
@@ -167,10 +168,16 @@ def read_paint(
     with store.read() as session:
         ids = group_ids(session, found.id, matches)
     run, count, done = run or now(), children or store.settings.image_workers, 0
-    with closing(ChildPool(ALLOWANCE, count, 0, "pictures", FIGURES["paint"])) as pool:
+    with (
+        closing(VideoIndexer(store.settings)) as videos,
+        closing(ChildPool(ALLOWANCE, count, 0, "pictures", FIGURES["paint"])) as pool,
+    ):
         for start in range(0, len(ids), _A_CHILD * count):
             some = ids[start : start + _A_CHILD * count]
-            readings = _readings(store, pool, _tasks(store, some, found))
+            tasks = _tasks(store, some, found)
+            views = [task.view.media for of_group in tasks.values() for task in of_group]
+            videos.make_ready(views, done, len(ids), progress)
+            readings = _readings(store, pool, videos, tasks)
             with store.write() as session:
                 if require_wanted is not None:
                     require_wanted()
@@ -298,14 +305,17 @@ def _group_tasks(
 def _readings(
     store: Store,
     pool: ChildPool,
+    videos: VideoIndexer,
     tasks: Mapping[int, Sequence[PaintTask]],
 ) -> dict[int, dict[str, PaintReading]]:
     """What was read for each group, by view; views without a camera of their clicks are left out."""
 
-    asked = {
-        number: [(task, PictureTask(pool, read_view_paint, task, store.settings)) for task in some]
-        for number, some in tasks.items()
-    }
+    def ask(task: PaintTask) -> PictureTask:
+        work = (read_view_paint, task, store.settings)
+        media = task.view.media
+        return PictureTask(pool, *(work if media is None else videos.with_index(media, *work)))
+
+    asked = {number: [(task, ask(task)) for task in some] for number, some in tasks.items()}
     return {
         number: {
             task.view.key: reading

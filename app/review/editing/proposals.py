@@ -26,6 +26,7 @@ from app.review.editing.picture_task import PictureTask
 from app.review.editing.view_paint import known_cameras
 from app.store.codecs import camera_to_json
 from app.store.digest import digest, station_digest
+from app.store.frames import VideoIndexer
 from app.store.groups import StoredGroup, read_groups
 from app.store.proposals import (
     MatchProposals,
@@ -149,10 +150,15 @@ def propose_views(
         asked = views_to_look_at(session, found.id, matches)
     count, total = children or store.settings.image_workers, sum(len(views) for _, views in asked)
     run = ProposalRun()
-    with closing(ChildPool(ALLOWANCE, count, 0, "pictures", FIGURES["proposals"])) as pool:
+    with (
+        closing(VideoIndexer(store.settings)) as videos,
+        closing(ChildPool(ALLOWANCE, count, 0, "pictures", FIGURES["proposals"])) as pool,
+    ):
         for start in range(0, len(asked), _A_CHILD * count):
             tasks = _tasks(store, found, dict(asked[start : start + _A_CHILD * count]))
-            answers = _answers(store, pool, tasks)
+            views = [task.media for task in tasks]
+            videos.make_ready(views, run.views, total, progress)
+            answers = _answers(store, pool, videos, tasks)
             with store.write() as session:
                 if require_wanted is not None:
                     require_wanted()
@@ -220,8 +226,13 @@ def _task(
     )
 
 
-def _answers(store: Store, pool: ChildPool, tasks: Sequence[ProposalTask]) -> list[Proposal | None]:
-    asked = [PictureTask(pool, read_proposal, task, store.settings) for task in tasks]
+def _answers(
+    store: Store, pool: ChildPool, videos: VideoIndexer, tasks: Sequence[ProposalTask]
+) -> list[Proposal | None]:
+    asked = [
+        PictureTask(pool, *videos.with_index(task.media, read_proposal, task, store.settings))
+        for task in tasks
+    ]
     return [_result(task, reads) for task, reads in zip(tasks, asked, strict=True)]
 
 

@@ -42,6 +42,8 @@ class TakeModel(Base):
         UniqueConstraint("batch_id", "group_id", "person", name="take_person"),
         UniqueConstraint("copy_id", name="take_copy"),
         Index("take_group", "group_id"),
+        # Each request asks what its sender has begun, also in a batch of thousands.
+        Index("take_of_person", "batch_id", "person", "handed_in", "settled"),
     )
 
     id: Mapped[int] = mapped_column(primary_key=True)

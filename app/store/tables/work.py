@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from sqlalchemy import ForeignKey, Index, UniqueConstraint
+from sqlalchemy import ForeignKey, Index, UniqueConstraint, text
 from sqlalchemy.orm import Mapped, mapped_column
 
 from app.store.tables.base import Base
@@ -57,6 +57,13 @@ class BatchGroupModel(Base):
     __table_args__ = (
         UniqueConstraint("batch_id", "place", name="batch_group_place"),
         Index("batch_group_group", "group_id"),
+        # Each request asks whether something is left, also in a batch of thousands that is done.
+        Index(
+            "batch_group_free",
+            "batch_id",
+            sqlite_where=text("settled IS NULL AND handed_in IS NULL"),
+            postgresql_where=text("settled IS NULL AND handed_in IS NULL"),
+        ),
     )
 
     batch_id: Mapped[int] = mapped_column(

@@ -173,7 +173,7 @@ POOLS: dict[str, Callable[[Services, Previews], Any]] = {
     "pictures": lambda services, _: services.frames._pool,
     "readers": lambda services, _: services.frames._readers,
     "fetchers": lambda services, _: services.frames._fetchers,
-    "indexers": lambda services, _: services.frames._indexers,
+    "indexers": lambda services, _: services.frames._videos.pool,
     "predictions": lambda services, _: services.predictions._pool,
     "previews": lambda _, previews: previews.children[0]._pool,
     "large": lambda _, previews: previews._large.children[0]._pool,

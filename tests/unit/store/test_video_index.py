@@ -160,7 +160,77 @@ class TestVideoTimes:
             video_times(Media(str(tmp_path / "cam1.mp4"), frame=0), settings)
 
 
+def is_indexed(media: Media, _flipped: bool, settings: Settings) -> bool:
+    """What a reader is called with: whether it need not decode the whole video."""
+    return has_index(media, settings)
+
+
+def decode_frame_of(media: Media, flipped: bool, settings: Settings) -> int:
+    return len(decode_frame(media, flipped, settings))
+
+
+def is_indexed_here(media: Media, settings: Settings) -> bool:
+    return has_index(media, settings)
+
+
 class TestFramesOfTheServer:
+    def test_a_video_is_indexed_before_a_frame_of_it_is_read(
+        self, tmp_path: Path, settings: Settings
+    ) -> None:
+        media = Media(str(write_video(tmp_path / "cam1.mp4", "mp4v", 20)), frame=5)
+        frames = Frames(settings)
+        try:
+            assert frames.ask_of(media, False, is_indexed).future.result(60)
+            write_video(tmp_path / "cam1.mp4", "mp4v", 21)
+            assert frames.ask_to(media, is_indexed_here, media).future.result(60)
+        finally:
+            frames.close()
+
+    def test_who_leaves_while_it_is_indexed_has_nothing_read(
+        self, tmp_path: Path, settings: Settings
+    ) -> None:
+        media = Media(str(write_video(tmp_path / "cam1.mp4", "mp4v", 20)), frame=5)
+        frames = Frames(settings)
+        try:
+            asked = frames.ask_of(media, False, is_indexed)
+            asked.leave()
+            indexing = frames.ask_fetch(media)
+            assert indexing is None or indexing.future.result(60)
+            assert asked.future.cancelled() and frames._readers.tasks == 0
+            assert has_index(media, settings)
+        finally:
+            frames.close()
+
+    def test_a_reader_says_what_is_wrong_with_a_video(
+        self, tmp_path: Path, settings: Settings
+    ) -> None:
+        (tmp_path / "cam1.mp4").write_bytes(b"no video")
+        frames = Frames(settings)
+        try:
+            for name, error in (("cam1.mp4", ImageError), ("cam2.mp4", NotFoundError)):
+                media = Media(str(tmp_path / name), frame=0)
+                with pytest.raises(error):
+                    frames.ask_of(media, False, decode_frame_of).future.result(60)
+        finally:
+            frames.close()
+
+    def test_an_index_that_the_disk_refuses_is_remembered(
+        self, tmp_path: Path, settings: Settings
+    ) -> None:
+        settings.cache.mkdir(parents=True)
+        (settings.cache / "videos").write_bytes(b"no folder")
+        media = Media(str(write_video(tmp_path / "cam1.mp4", "mp4v", 40)), frame=35)
+        frames = Frames(settings)
+        try:
+            data = np.frombuffer(frames.read(media, None, False).data, np.uint8)
+            assert number_of(cv2.imdecode(data, cv2.IMREAD_COLOR)) == 35
+            assert frames.ask_fetch(media) is None
+            assert frames.ask_of(media, False, is_indexed).future.result(60)
+            write_video(tmp_path / "cam1.mp4", "mp4v", 41)
+            assert frames.ask_fetch(media) is not None
+        finally:
+            frames.close()
+
     def test_a_video_is_indexed_before_its_first_frame_is_made(
         self, tmp_path: Path, settings: Settings
     ) -> None:
@@ -183,7 +253,7 @@ class TestFramesOfTheServer:
         try:
             first, second = frames.ask_fetch(media), frames.ask_fetch(media)
             assert first is not None and second is not None
-            assert frames._indexers.tasks == 1
+            assert frames._videos.pool.tasks == 1
             first.leave()
             assert second.future.result(60) and first.future.cancelled()
             assert has_index(media, settings)

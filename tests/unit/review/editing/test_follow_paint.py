@@ -35,7 +35,7 @@ class Frames:
     def __init__(self, settings, problem: Exception | None = None):
         self.settings, self.problem = settings, problem
 
-    def ask_to(self, work, *arguments):
+    def ask_to(self, _media, work, *arguments):
         if isinstance(self.problem, OverloadedError):
             raise self.problem
         task = PoolTask(lambda error: error)

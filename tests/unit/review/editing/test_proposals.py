@@ -38,11 +38,13 @@ from app.soccer.media import Media
 from app.store.digest import station_digest
 from app.store.frozen import freeze_said, thaw_group
 from app.store.log import verify_chain
+from app.store.media import has_index
 from app.store.store import Store
 from tests.cameras import SIZE
 from tests.unit.api.conftest import lines_of
 from tests.unit.paint.lawns import TRUE, drawn, lawn
 from tests.unit.review.editing.test_paint import Here
+from tests.videos import write_video
 
 CAMERA = TRUE.scaled(4 / 3, 4 / 3)
 """Of the annotated size; the pictures are smaller."""
@@ -125,6 +127,23 @@ def accept(store: Store, number: int = 2) -> str:
 
 
 class TestProposeViews:
+    def test_a_video_is_indexed_before_its_frames_are_looked_at(
+        self, store: Store, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        media = Media(str(write_video(tmp_path / "cam1.mp4", "mp4v", 20)), frame=5)
+        ingest(store, "demo", [Group("5", (view("cam1", media),))], source="files", actor="ann")
+        seen: list[bool] = []
+
+        def look(task, settings):  # type: ignore[no-untyped-def]
+            seen.append(has_index(task.media, settings))
+            return task.without_picture(MISSING)
+
+        monkeypatch.setattr(editing, "read_proposal", look)
+        told: list[str] = []
+        propose_views(store, "demo", progress=lambda _, __, said="": told.append(said))
+        assert seen == [True]
+        assert told[0] == "Finding the frames of cam1.mp4."
+
     def test_lines_are_found_from_the_picture_and_the_match_and_nothing_is_said(self, filled):
         before, kinds = load(filled, 2).etag, [entry.kind for entry in history(filled, 2)]
         assert counts(filled) == (1, 0, 0, 0, 0, 0)
