@@ -183,10 +183,10 @@ class TestEditing:
         view = screen.document()["views"][0]
         x, y, width, height = view["balls"][0]["box"]
         gate = screen.page.locator(".gates [data-gate=reprojection] .gates__value")
-        expect(gate).not_to_contain_text("left out")
+        expect(gate).not_to_contain_text("not used")
         before, sigma = gate.inner_text(), screen.pitch("sigma")
         screen.drag(screen.place(view, x + width / 2, y + height / 2), 60, 90, drop=False)
-        expect(gate).to_contain_text("left out")
+        expect(gate).to_contain_text("not used")
         expect(screen.page.locator('.mini-pitch [data-number="sigma"]')).not_to_have_text(sigma)
         screen.press("Escape")
         expect(gate).to_have_text(before)
