@@ -300,8 +300,8 @@ class TestLooking:
         screen.press("g")
         told = screen.page.locator('[data-gate="baseline"] .gates__margin')
         expect(told).to_have_text(
-            "margin over 999 %"
-            if gate["margin"] > 9.99
+            "margin over 10×"
+            if gate["margin"] > 10
             else f"margin +{100 * gate['margin']:.0f} %"
         )
         screen.press("g")
