@@ -300,9 +300,7 @@ class TestLooking:
         screen.press("g")
         told = screen.page.locator('[data-gate="baseline"] .gates__margin')
         expect(told).to_have_text(
-            "margin over 10×"
-            if gate["margin"] > 10
-            else f"margin +{100 * gate['margin']:.0f} %"
+            "margin over 10×" if gate["margin"] > 10 else f"margin +{100 * gate['margin']:.0f} %"
         )
         screen.press("g")
         expect(margins).to_have_count(0)
