@@ -84,7 +84,7 @@ def calibrate(
     if not result["calibrated"]:
         first = result["failed"][0]
         complain(
-            f"none of {result['frames']} frames could be calibrated: {first['frame']}: {first['reason']}"
+            f"none of {result['frames']} frame{'' if result['frames'] == 1 else 's'} could be calibrated: {first['frame']}: {first['reason']}"
         )
         raise typer.Exit(1)
 

@@ -92,7 +92,7 @@ def _propose_for_views(
                 return
             for item in items:
                 counts = ", ".join(f"{item[name]} {name}" for name in get_args(ProposalOutcome))
-                said = f"{item['looked']} of {item['views']} views looked at: {counts}"
+                said = f"{item['looked']} of {item['views']} view{'' if item['views'] == 1 else 's'} looked at: {counts}"
                 name = f"{item['match']}: " if item["match"] else ""
                 say(f"{name}{said}, {item['accepted']} accepted")
             return

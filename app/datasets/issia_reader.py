@@ -251,11 +251,13 @@ def _cameras(
         return
     yield camera_number(stem), tracks[0]
     for number, track in enumerate(tracks[1:], 2):
+        balls, persons = track.ball_points, track.person_boxes
         report.note(
             shown,
             f"source {number} ({track.source})",
             None,
-            f"is left out with {track.ball_points} balls and {track.person_boxes} persons: no name "
+            f"is left out with {balls} ball{'' if balls == 1 else 's'} and "
+            f"{persons} person{'' if persons == 1 else 's'}: no name "
             "of a camera in it tells it from the first source",
         )
 

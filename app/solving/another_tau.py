@@ -68,7 +68,7 @@ def retold(solution: Solution, diagonals: Sequence[float], policy: Policy) -> So
     if not missed <= told:
         return None
     letters = {key: view_letter(place) for place, key in enumerate(keys)}
-    gate = reprojection(solution.pairs, letters, tau_px)
+    gate = reprojection(solution.pairs, letters, tau_px, policy.tau_percent)
     return replace(
         solution,
         gates=tuple(gate if item.name == gate.name else item for item in solution.gates),

@@ -30,6 +30,7 @@ class JudgedView:
         tau_px: Largest reprojection error of a valid pair in this view, pixels.
         has_ball: Whether it shows the one ball.
         failed: First gate that dropped it, or None.
+        no_ball: Why it has none that counts, with a place for letters.
     """
 
     key: str
@@ -39,6 +40,7 @@ class JudgedView:
     tau_px: float
     has_ball: bool
     failed: str | None
+    no_ball: str = "none in {}"
 
 
 @dataclass(frozen=True)
@@ -95,8 +97,8 @@ def describe(
         *_agreement(group, policy),
         _two_views(group),
         _ball(group),
-        _baseline(group, float(judgement.baseline[0]), policy),
-        _reprojection(group, pairs),
+        _baseline(group, pairs, float(judgement.baseline[0]), policy),
+        _reprojection(group, pairs, policy),
         _parallax(group, ball, policy),
         _sigma(group, ball, policy),
         _chi_square(group, chi_square, policy),
@@ -198,8 +200,9 @@ def _ball(group: _Group) -> Gate:
     count = len(group.left) - len(without)
     passed = "ball" not in group.failed
     sentence = f"in {count} {'view' if count == 1 else 'views'}"
-    if without:
-        sentence += f", none in {_letters(without)}"
+    for why in dict.fromkeys(view.no_ball for view in without):
+        alike = _letters([view for view in without if view.no_ball == why])
+        sentence += f", {why.format(alike)}"
     if not passed:
         idle = _fallen([view for view in group.views if view.has_ball])
         sentence = ", ".join([sentence, *idle])
@@ -218,27 +221,34 @@ def _fallen(views: Sequence[JudgedView]) -> list[str]:
     ]
 
 
-def _baseline(group: _Group, widest: float, policy: Policy) -> Gate:
+def _baseline(group: _Group, pairs: Sequence[Pair], widest: float, policy: Policy) -> Gate:
     if isnan(widest):
         return _unjudged("baseline", policy.min_baseline_m)
     passed = "baseline" not in group.failed
     letters = "–".join(view.letter for view in group.left if view.has_ball)
-    return _gate(
-        "baseline",
-        passed,
-        widest,
-        policy.min_baseline_m,
-        f"{widest:.1f} m" if passed else f"{letters} {widest:.1f} m apart",
-    )
+    sentence = f"{widest:.1f} m" if passed else f"{letters} {widest:.1f} m apart"
+    named = _letters_of(group)
+    close = [pair for pair in pairs if pair.failed == "baseline"]
+    if passed and close:
+        said = ", ".join(f"{_name(pair, named)} {pair.baseline_m:.1f} m" for pair in close)
+        sentence += f"; {said} not used"
+    return _gate("baseline", passed, widest, policy.min_baseline_m, sentence)
 
 
-def _reprojection(group: _Group, pairs: Sequence[Pair]) -> Gate:
-    letters = {view.key: view.letter for view in group.left}
-    return reprojection(pairs, letters, {view.key: view.tau_px for view in group.left})
+def _letters_of(group: _Group) -> dict[str, str]:
+    return {view.key: view.letter for view in group.views}
+
+
+def _reprojection(group: _Group, pairs: Sequence[Pair], policy: Policy) -> Gate:
+    tau_px = {view.key: view.tau_px for view in group.left}
+    return reprojection(pairs, _letters_of(group), tau_px, policy.tau_percent)
 
 
 def reprojection(
-    pairs: Sequence[Pair], letters: Mapping[str, str], tau_px: Mapping[str, float]
+    pairs: Sequence[Pair],
+    letters: Mapping[str, str],
+    tau_px: Mapping[str, float],
+    tau_percent: float,
 ) -> Gate:
     """The gate of the best pair: its error that is larger in units of tau.
 
@@ -246,6 +256,7 @@ def reprojection(
         pairs: Of the group.
         letters: What people call the views, by key.
         tau_px: Largest reprojection error of a valid pair in each view, pixels, by key.
+        tau_percent: The same, of the image diagonal of each view.
     """
     judged = [
         (max(_shares(pair, tau_px), key=lambda share: share[0]), pair)
@@ -255,15 +266,27 @@ def reprojection(
     if not judged:
         return _unjudged("reprojection", None)
     (_, error, tau), best = min(judged, key=lambda item: (not item[1].valid, item[0][0]))
-    sentence = f"{_name(best, letters)} {error:.1f} px"
+    sentence = f"{_name(best, letters)} {error:.1f} px, {_percent(error / tau, tau_percent)}"
+    if len(judged) > 1:
+        sentence += " (best pair)"
     margin = margin_of(error, tau, at_most=True)
     if not best.valid and error <= tau:
         # Its pixels are near enough, and there is no ball: no share of tau says how far it is off.
         sentence, margin = f"the rays of {_name(best, letters)} meet behind a camera", None
     left_out = [pair for _, pair in judged if not pair.valid]
     if best.valid and left_out:
-        sentence += f"; {', '.join(_name(pair, letters) for pair in left_out)} left out"
+        sentence += f"; {', '.join(_name(pair, letters) for pair in left_out)} not used"
     return Gate("reprojection", best.valid, error, tau, margin, sentence)
+
+
+def _percent(share: float, limit: float) -> str:
+    """A share of a limit as per cent, in as many digits as it takes to tell it from the limit.
+
+    Example:
+        >>> _percent(0.14, 1.0), _percent(1.0002, 1.0)
+        ('0.14 %', '1.0002 %')
+    """
+    return f"{_beside(share * limit, limit)} %"
 
 
 def _shares(

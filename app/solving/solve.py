@@ -135,6 +135,14 @@ def _with_ball(
     return replace(solved, ball=fit)
 
 
+def _no_ball(view: View) -> str:
+    """Why a view has no ball that counts, with a place for letters."""
+    seen = [ball for ball in view.balls if not ball.out_of_view]
+    if len(seen) > 1:
+        return "several in {}"
+    return "placed in {} (not counted)" if seen and seen[0].inferred else "none in {}"
+
+
 def _judged(
     group: Group, views: Sequence[ViewSolution], judgement: Judgement, policy: Policy
 ) -> tuple[JudgedView, ...]:
@@ -147,6 +155,7 @@ def _judged(
             tau_px=policy.tau_px(view.size.diagonal),
             has_ball=view.ball is not None and not view.ball.inferred,
             failed=solved.failed,
+            no_ball=_no_ball(view),
         )
         for index, (view, solved, jac) in enumerate(
             zip(group.views, views, judgement.jac.tolist(), strict=True)

@@ -38,8 +38,8 @@ export function percent(value) {
 	return fixed(value, size >= 99.95 ? 0 : size >= 9.995 ? 1 : 2);
 }
 
-/** Beyond this many per cent nobody compares any more. */
-const MOST_PERCENT = 999;
+/** Beyond this many times nobody compares any more. */
+const MOST_TIMES = 10;
 
 /**
  * A share without its sign, as per cent in few characters: 0.352 -> "35 %", 0.041 -> "4.1 %".
@@ -48,7 +48,7 @@ const MOST_PERCENT = 999;
  */
 export function sharePercent(value) {
 	const size = Math.abs(100 * value);
-	if (size >= MOST_PERCENT + 0.5) return `over ${MOST_PERCENT} %`;
+	if (size > 100 * MOST_TIMES) return `over ${MOST_TIMES}×`;
 	return `${size.toFixed(size >= 9.95 ? 0 : 1)} %`;
 }
 
@@ -62,8 +62,8 @@ export function marginText(value) {
 	if (value === null || value === undefined || !Number.isFinite(value)) return NONE;
 	const text = sharePercent(value);
 	if (text === '0.0 %') return text;
-	const signed = `${value < 0 ? MINUS : '+'}${text.replace('over ', '')}`;
-	return text === signed.slice(1) ? signed : `${value < 0 ? '<' : '>'}${signed}`;
+	const sign = value < 0 ? MINUS : '+';
+	return text.startsWith('over ') ? `${value < 0 ? '<' : '>'}${sign}${text.slice(5)}` : `${sign}${text}`;
 }
 
 /** 12764 -> "12,764". @param {number} value */
@@ -74,6 +74,11 @@ export function count(value) {
 /** 1, "group" -> "1 group"; 12764 -> "12,764 groups". @param {number} n @param {string} noun */
 export function plural(n, noun) {
 	return `${count(n)} ${noun}${n === 1 ? '' : 's'}`;
+}
+
+/** 1, "balls" -> "1 ball"; 1, "pictures turned by EXIF" -> "1 picture turned by EXIF". @param {number} n @param {string} names of several, as a report counts them */
+export function counted(n, names) {
+	return `${count(n)} ${n === 1 ? words(names).replace(/(?<=x|ss)es\b|s\b/, '') : words(names)}`;
 }
 
 /** "bad_field_lines" -> "bad field lines". @param {string} name */

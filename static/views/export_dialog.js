@@ -6,7 +6,7 @@ import { useEffect, useRef, useState } from 'preact/hooks';
 
 import { getFormats } from '../api/exports.js';
 import { withForm } from '../lib/field.js';
-import { count, words } from '../lib/format.js';
+import { count, counted, plural } from '../lib/format.js';
 import { useResource } from '../lib/resource.js';
 import { dataset, loadDatasets } from '../state/datasets.js';
 import { download, FORMATS, makeExport } from '../state/exports.js';
@@ -70,7 +70,7 @@ const BOXES = [
 
 /** @param {{made: ExportJson}} props */
 function Result({ made }) {
-	const counts = Object.entries(made.counts ?? {}).map(([name, n]) => `${count(n)} ${words(name)}`);
+	const counts = Object.entries(made.counts ?? {}).map(([name, n]) => counted(n, name));
 	return html`
 		<p class="export__result" role="status">
 			${made.incomplete ? 'Written, but not complete' : 'Ready'}${counts.length ? `: ${counts.join(', ')}` : ''}.
@@ -135,7 +135,7 @@ export function ExportDialog({ one, version = null, onClose }) {
 				<div class="export">
 					<${FormatChoice} answers=${formats.value} chosen=${chosen} choose=${setWanted} />
 					<div class="export__column">
-						${version ? html`<p class="note">${count(version.counts.groups)} groups as they were frozen: always the same bytes.</p>`
+						${version ? html`<p class="note">${plural(version.counts.groups, 'group')} as frozen: always the same bytes.</p>`
 							: html`<${Choice} legend="Groups" name="groups" options=${groupChoices(one)} onChoose=${(/** @type {string} */ name) => setAll(name === 'all')} />`}
 						<${Choice} legend="Ball boxes" name="boxes" options=${BOXES} />
 						<label class="form__check"><input type="checkbox" name="images" />Copy the frames into the zip</label>

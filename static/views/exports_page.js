@@ -8,7 +8,7 @@ import { postExport } from '../api/client.js';
 import { listen } from '../api/events.js';
 import { deleteExport, getExports } from '../api/exports.js';
 import { useAttempt } from '../lib/attempt.js';
-import { count, plural, words } from '../lib/format.js';
+import { count, counted, plural, words } from '../lib/format.js';
 import { useResource } from '../lib/resource.js';
 import { dataset, loadDatasets } from '../state/datasets.js';
 import { isOver } from '../state/jobs.js';
@@ -27,7 +27,7 @@ const dayText = (at) => new Date(at).toLocaleDateString('en-GB', { day: 'numeric
 /** What is in it, in words. @param {ExportRow} row */
 function contents({ request, counts }) {
 	const what = request.version ? `version ${request.version}` : request.all ? 'all groups' : 'accepted groups';
-	const numbers = Object.entries(counts ?? {}).map(([name, n]) => `${count(n)} ${words(name)}`);
+	const numbers = Object.entries(counts ?? {}).map(([name, n]) => counted(n, name));
 	return [what, `${request.boxes} boxes`, ...numbers].join(' · ');
 }
 

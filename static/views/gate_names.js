@@ -5,6 +5,9 @@ import { sharePercent } from '../lib/format.js';
 
 /** @import {GateJson, PolicyJson} from '../api/types.js' */
 
+/** Gates that count views: their sentence says how many there are, and no margin does. */
+export const COUNTED = new Set(['calibratable', 'two_views', 'ball']);
+
 /** What is wrong when the gate fails. */
 export const GATE_TITLES = /** @type {Record<string, string>} */ ({
 	calibratable: 'Too few views have a camera',
@@ -37,10 +40,10 @@ export function gateLabel(gate, policy) {
 	return labels[gate.name] ?? gate.name;
 }
 
-/** How far the value is from its threshold, as a share of the threshold, or "". @param {GateJson} gate */
+/** How far the value is from its threshold, as a share of the threshold, or "" where views are counted. @param {GateJson} gate */
 export function gateMargin(gate) {
-	const { margin, passed, active } = gate;
-	if (margin === null || !active) return '';
+	const { margin, passed, active, name } = gate;
+	if (margin === null || !active || COUNTED.has(name)) return '';
 	const size = sharePercent(margin);
 	// A gate may ask for more than its threshold.
 	if (size === '0.0 %') return passed ? 'equals the threshold' : 'equals the threshold; must be above it';

@@ -3,7 +3,7 @@
 
 import { html } from 'htm/preact';
 
-import { count, plural, words } from '../lib/format.js';
+import { count, counted, plural } from '../lib/format.js';
 import { queueAddress } from '../state/navigation.js';
 import { pageAddress } from './dataset_menu.js';
 
@@ -60,7 +60,7 @@ export function ImportReport({ report, dry, dataset }) {
 		<section class="import__report" aria-label=${dry ? 'What would happen' : 'What happened'}>
 			<h3 data-grade=${grade}>${heading(outcome, dry)}</h3>
 			<dl class="number-list">${numbers.map(([name, n]) => html`<div key=${name}><dt>${name}</dt><dd>${count(Number(n ?? 0))}</dd></div>`)}</dl>
-			${counts.length ? html`<p class="note">${counts.map(([name, n]) => `${count(n)} ${words(name)}`).join(' · ')}</p>` : null}
+			${counts.length ? html`<p class="note">${counts.map(([name, n]) => counted(n, name)).join(' · ')}</p>` : null}
 			<${WithoutPicture} report=${report} dry=${dry} dataset=${dataset} />
 			${report.paint_job ? html`
 				<p>Cameras are found from the lines first. Then <a href=${pageAddress(dataset, 'statistics')}>the paint of the pictures</a> is read, which places them more exactly.</p>` : null}

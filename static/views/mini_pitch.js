@@ -182,7 +182,7 @@ function Estimator({ solution }) {
 export function MiniPitch({ group, solution }) {
 	return html`
 		<section class="card strip-card mini-pitch" aria-label="Pitch">
-			<h2>Pitch${solution?.best_ball ? html` <${Estimator} solution=${solution} />` : null}</h2>
+			<h2>Pitch${solution?.best_ball && solution.ball ? html` <${Estimator} solution=${solution} />` : null}</h2>
 			${solution ? html`
 				<${Drawing} group=${group} solution=${solution} />
 				<${Numbers} solution=${solution} />` : html`<p class="empty-note">Not solved yet.</p>`}

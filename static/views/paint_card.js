@@ -82,7 +82,7 @@ export function PaintCard({ dataset }) {
 				<p class="buttons paint-card__actions">
 					<${JobButton}
 						busy=${busy} act=${() => send(() => readDatasetPaint(dataset.id, null))} kind=${left ? 'button--primary' : ''}
-						title=${left ? `${count(left)} pictures to read; those that fit are only compared` : 'Every picture is compared with what was read of it'}
+						title=${left ? `${plural(left, 'picture')} to read; pictures that fit are only compared` : 'Every picture is compared with what was read of it'}
 					>${isRead ? 'Read again' : 'Read the pictures'}<//>
 					${isRead ? html`<${JobButton} busy=${busy} act=${() => send(() => takeDatasetPaintBack(dataset.id))} title="Restores the previous cameras of all groups">Undo the last reading<//>` : null}
 				</p>` : html`

@@ -7,7 +7,7 @@ import { useState } from 'preact/hooks';
 import { deleteSavedView, getSavedViews, postSavedView } from '../api/queue.js';
 import { useAttempt } from '../lib/attempt.js';
 import { withValue } from '../lib/field.js';
-import { count } from '../lib/format.js';
+import { plural } from '../lib/format.js';
 import { useResource } from '../lib/resource.js';
 import { announce } from '../state/notice.js';
 import { FormError } from './form_error.js';
@@ -54,7 +54,7 @@ function Views({ dataset, q, open }) {
 			${items.map((view) => html`
 				<li key=${view.id}>
 					<button class="saved-views__open" type="button" aria-current=${view.q === q ? 'true' : undefined} onClick=${() => open(view.q)}>
-						${view.name} <span class="saved-views__count">${count(view.groups)} groups · ${view.by}</span><small>${view.q}</small>
+						${view.name} <span class="saved-views__count">${plural(view.groups, 'group')} · ${view.by}</span><small>${view.q}</small>
 					</button>
 					<button
 						class="icon-button" type="button" data-needs="annotate" aria-label=${`Delete the view ${view.name}`} title="Delete"

@@ -38,7 +38,7 @@ export function paintOf(solved, read) {
 	return { supported: share(fit.supported), explained: share(fit.explained), reason };
 }
 
-/** @param {ViewPicture} picture @returns {{grade: Grade, sentence: string}} */
+/** @param {Pick<ViewPicture, 'view' | 'solved' | 'ball' | 'apart' | 'tau'>} picture @returns {{grade: Grade, sentence: string}} */
 export function gradeOfView(picture) {
 	const { view, solved, apart, tau } = picture;
 	if (!view.included) return { grade: 'unseen', sentence: leftOutText(view.left_out) };
@@ -52,7 +52,7 @@ export function gradeOfView(picture) {
 	const error = errorOf(picture).px;
 	if (error !== null && error > tau) return { grade: 'bad', sentence: given };
 	// What is wrong is not to be seen in this view: it has nobody to agree with.
-	if (apart !== null || (solved.ball && !solved.included)) return { grade: 'warn', sentence: 'not usable: no matching view' };
+	if (apart !== null || (solved.ball && !solved.included)) return { grade: 'warn', sentence: 'no matching view' };
 	return { grade: 'ok', sentence: given };
 }
 
@@ -60,7 +60,7 @@ export function gradeOfView(picture) {
  * The ball's error in a view: to the 3D ball, or where the view agrees with no other, in its best
  * pair.
  *
- * @param {ViewPicture} picture
+ * @param {Pick<ViewPicture, 'view' | 'ball' | 'apart'>} picture
  * @returns {{px: number | null, percent: number | null}}
  */
 export function errorOf({ view, ball, apart }) {

@@ -28,7 +28,7 @@ function Difference({ answer, name, changed }) {
 	if (changed === 0) return html`<p class="yield__difference">The saved policy <strong>${name}</strong>: ${count(answer.passing)} of ${count(answer.groups)} groups pass.</p>`;
 	return html`
 		<div class="yield__difference" role="status">
-			<p><strong>+${count(answer.gained)}</strong> groups and <strong>−${count(answer.lost)}</strong> against <strong>${name}</strong>: ${count(answer.passing)} pass.</p>
+			<p><strong>+${count(answer.gained)}</strong> ${answer.gained === 1 ? 'group' : 'groups'} and <strong>−${count(answer.lost)}</strong> against <strong>${name}</strong>: ${count(answer.passing)} pass.</p>
 			${answer.needs_solving?.length ? html`<p data-grade="warn">What ${answer.needs_solving.map((field) => words(field)).join(', ')} would change shows only once it is saved and solved.</p>` : null}
 		</div>
 	`;

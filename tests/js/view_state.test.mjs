@@ -50,7 +50,7 @@ describe('gradeOfView', () => {
 
 	it('puts no red cross before a view whose own numbers are good', () => {
 		const blameless = picture({ apart: 0.4, error: 0.4, solved: { included: false } });
-		assert.deepEqual(gradeOfView(blameless), { grade: 'warn', sentence: 'not usable: no matching view' });
+		assert.deepEqual(gradeOfView(blameless), { grade: 'warn', sentence: 'no matching view' });
 	});
 
 	it('says that a ball was placed and does not count', () => {

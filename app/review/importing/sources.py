@@ -90,7 +90,8 @@ class BallTally:
             f'"{name[:40]}" ({count:,})' for name, count in self.classes.most_common(12)
         )
         boxes = f"; its boxes are of {most}" if most else ""
-        return f"no ball was read from any of {self.groups:,} groups{boxes}"
+        groups = "the 1 group" if self.groups == 1 else f"any of {self.groups:,} groups"
+        return f"no ball was read from {groups}{boxes}"
 
 
 STILLS_HINT = (

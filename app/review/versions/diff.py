@@ -130,7 +130,8 @@ def read_changelog(session: Session, version: Version) -> list[str]:
     """``changelog`` within a session."""
     if version.previous is None:
         counts = version.counts
-        return [f"First version: {_groups(counts['groups'])}, {counts['balls']} balls in views."]
+        groups, balls = _groups(counts["groups"]), _count(counts["balls"], "ball")
+        return [f"First version: {groups}, {balls} in views."]
     return changelog_lines(read_diff(session, read_version(session, version.previous), version))
 
 

@@ -19,7 +19,8 @@ def examine_yields(settings: Settings) -> Check:
         sentence = f"{damaged[0].relative_to(settings.home)}{more} cannot be read as written"
         mend = f"Stop the server and delete {settings.yields}: yields are counted anew."
         return Check("yields", False, sentence, mend)
-    return Check("yields", True, f"{len(files):,} files in the cache, each as it was written")
+    count = "1 file" if len(files) == 1 else f"{len(files):,} files"
+    return Check("yields", True, f"{count} in the cache, each as it was written")
 
 
 def _is_sound(path: Path) -> bool:

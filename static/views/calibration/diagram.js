@@ -6,6 +6,7 @@ import { useMemo, useRef } from 'preact/hooks';
 
 import { pathFromAbove, pitchMarkings } from '../../geometry/pitch.js';
 import { GLYPHS } from '../../geometry/residual.js';
+import { plural } from '../../lib/format.js';
 import { choice, hovered, lines, mode } from '../../state/calibration.js';
 import { focusImage, pickMarking } from './actions.js';
 
@@ -36,7 +37,7 @@ function shapesOf(length, width) {
 function words(grade, points) {
 	if (points === 0) return grade ? 'visible, not drawn' : 'outside this view';
 	const state = { ok: 'fits', warn: 'fits badly', bad: 'does not fit', unseen: 'outside this view' }[grade ?? 'unseen'];
-	return `${points} points, ${state}`;
+	return `${plural(points, 'point')}, ${state}`;
 }
 
 /** @param {{pitch: {length: number, width: number}, fits: MarkingResiduals[]}} props */

@@ -7,7 +7,7 @@ import { useCallback, useState } from 'preact/hooks';
 import { getStation } from '../../api/calibration.js';
 import { ApiError, sentenceOf } from '../../api/problem.js';
 import { deleteRig, postRig } from '../../api/rig.js';
-import { capital, count, fixed } from '../../lib/format.js';
+import { capital, count, fixed, plural } from '../../lib/format.js';
 import { useResource } from '../../lib/resource.js';
 import { follow, isOver } from '../../state/jobs.js';
 import { announce } from '../../state/notice.js';
@@ -53,7 +53,7 @@ function Proposal({ proposal }) {
 					</tr>`)}</tbody>
 			</table>
 		</div>
-		<p>${count(proposal.frames)} instants were used, ${count(proposal.gross)} were left out, because their cameras do not show one ball. Balls move by ${fixed(proposal.ball_moved_m, 2, ' m')} in the median. The cameras are ${proposal.anchor}. ${capital(proposal.time)}.</p>
+		<p>${plural(proposal.frames, 'instant')} ${proposal.frames === 1 ? 'was' : 'were'} used, ${count(proposal.gross)} left out, because their cameras do not show one ball. Balls move by ${fixed(proposal.ball_moved_m, 2, ' m')} in the median. The cameras are ${proposal.anchor}. ${capital(proposal.time)}.</p>
 		${proposal.left_alone.length ? html`<p data-grade="warn">Too few common balls: ${proposal.left_alone.join(', ')}</p>` : null}
 	`;
 }
@@ -97,7 +97,7 @@ export function RigDialog({ dataset, station, onClose }) {
 	async function takeBack() {
 		await attempt(async () => {
 			const { taken_back: cameras } = await deleteRig(dataset.id);
-			announce(`${count(cameras)} cameras are restored.`);
+			announce(`${plural(cameras, 'camera')} ${cameras === 1 ? 'is' : 'are'} restored.`);
 			watchSolving(dataset.name);
 			onClose();
 		});

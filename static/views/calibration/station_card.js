@@ -16,7 +16,7 @@ export function StationCard({ view, station, dataset }) {
 	const [adjusting, setAdjusting] = useState(false);
 	if (!view.station.shared) return null;
 	const work = solving.value?.dataset === dataset.name ? solving.value : null;
-	const all = station ? `all ${count(station.groups)} groups` : 'all groups';
+	const all = station ? station.groups === 1 ? 'its 1 group' : `all ${count(station.groups)} groups` : 'all groups';
 	return html`
 		<section class="card station-card" aria-label="Static camera">
 			<h2>Static camera ${view.station.key}</h2>

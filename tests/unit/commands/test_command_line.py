@@ -435,7 +435,7 @@ class TestCalibrateAndScore:
         (tmp_path / "00001.json").write_text('{"Middle line": [[0.5, 0.1], [0.5, 0.9]]}')
         code, told, err = run("calibrate", tmp_path, tmp_path / "out", "--workers", "1", "--json")
         assert (code, json.loads(told)["calibrated"]) == (1, 0)
-        assert "none of 1 frames could be calibrated: 00001: " in err
+        assert "none of 1 frame could be calibrated: 00001: " in err
 
     def test_an_import_of_nothing_usable_makes_no_dataset(self, run: Run, tmp_path: Path) -> None:
         (tmp_path / "00001.json").write_text('{"kp": {"3": {"x": 0.4, "y": 0.3}}, "lines": {}}')

@@ -74,7 +74,7 @@ class TestOfDataset:
 
     def test_looks_shows_and_forgets(self, propose):
         assert propose("--show")[1] == (
-            "m: 0 of 1 views looked at: 0 proposed, 0 unsure, 0 nothing, 0 accepted\n"
+            "m: 0 of 1 view looked at: 0 proposed, 0 unsure, 0 nothing, 0 accepted\n"
         )
         found = json.loads(propose("--workers", "1", "--json")[1])
         assert (found["views"], found["nothing"], found["missing"]) == (1, 1, 1)

@@ -302,4 +302,4 @@ class TestSeveralSources:
         assert (view.key, view.balls[0].point) == ("cam1", ImagePoint(1.0, 2.0))
         (problem,) = report.problems
         assert problem.record == f"source 2 ({second})"
-        assert problem.problem.startswith("is left out with 1 balls and 2 persons")
+        assert problem.problem.startswith("is left out with 1 ball and 2 persons")

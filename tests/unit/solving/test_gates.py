@@ -229,6 +229,12 @@ class TestBall:
         found = gates(views, ("ball",))["ball"]
         assert found == Gate("ball", False, 1.0, 2, -0.5, "in 1 view, none in B, C", "b")
 
+    def test_says_why_a_ball_that_is_there_does_not_count(self):
+        placed = {"has_ball": False, "no_ball": "placed in {} (not counted)"}
+        views = [seen("A"), seen("B"), seen("C", **placed), seen("D", has_ball=False)]
+        sentence = "in 2 views, placed in C (not counted), none in D"
+        assert gates(views)["ball"].sentence == sentence
+
     def test_a_ball_in_a_view_that_does_not_count_is_said(self):
         views = [seen("A"), seen("B", **LOW), seen("C", has_ball=False, **NO_CAMERA)]
         found = gates(views, ("ball",))["ball"]
@@ -250,6 +256,12 @@ class TestBaseline:
         found = gates(views, ("baseline",), baseline=0.25)["baseline"]
         assert found == Gate("baseline", False, 0.25, 1.0, -0.75, "A–C 0.2 m apart")
 
+    def test_names_the_pairs_that_are_not_used_beside_the_widest(self):
+        views = [seen("A"), seen("C"), seen("D")]
+        close = replace(pair("c", "d", 1.0, 1.0, failed="baseline"), baseline_m=0.9)
+        found = gates(views, pairs=(pair("a", "c", 1.0, 1.0), close), baseline=112.2)["baseline"]
+        assert (found.passed, found.sentence) == (True, "112.2 m; C–D 0.9 m not used")
+
     def test_without_two_sights_it_is_not_judged(self):
         found = gates([seen("A")], ("baseline",))["baseline"]
         assert found == Gate("baseline", False, None, 1.0, None, "not judged")
@@ -260,26 +272,33 @@ class TestReprojection:
         views = [seen("A"), seen("B"), seen("C")]
         pairs = (pair("a", "b", 4.0, 6.0), pair("a", "c", 2.0, 5.0), pair("b", "c", 9.0, 1.0))
         found = gates(views, pairs=pairs)["reprojection"]
-        assert found == Gate("reprojection", True, 5.0, 20.0, 0.75, "A–C 5.0 px")
+        assert found == Gate(
+            "reprojection", True, 5.0, 20.0, 0.75, "A–C 5.0 px, 0.25 % (best pair)"
+        )
 
     def test_errors_compare_in_units_of_their_own_views_tau(self):
         views = [seen("A", tau_px=4.0), seen("B", tau_px=40.0)]
         found = gates(views, pairs=(pair("a", "b", 2.0, 10.0),))["reprojection"]
-        assert found == Gate("reprojection", True, 2.0, 4.0, 0.5, "A–B 2.0 px")
+        assert found == Gate("reprojection", True, 2.0, 4.0, 0.5, "A–B 2.0 px, 0.50 %")
         found = gates(views, pairs=(pair("a", "b", 2.0, 30.0),))["reprojection"]
         assert (found.value, found.threshold, found.margin) == (30.0, 40.0, 0.25)
 
     def test_pairs_compare_in_units_of_tau_as_well(self):
         views = [seen("A", tau_px=4.0), seen("B", tau_px=40.0), seen("C", tau_px=40.0)]
         pairs = (pair("a", "b", 2.0, 2.0), pair("b", "c", 10.0, 8.0))
-        assert gates(views, pairs=pairs)["reprojection"].sentence == "B–C 10.0 px"
+        assert gates(views, pairs=pairs)["reprojection"].sentence == (
+            "B–C 10.0 px, 0.25 % (best pair)"
+        )
 
     def test_a_valid_pair_goes_before_a_closer_one_that_is_not(self):
         views = [seen("A"), seen("B"), seen("C")]
         behind = pair("a", "b", 1.0, 1.0, failed="reprojection")
         far = pair("b", "c", 50.0, 50.0, failed="reprojection")
         found = gates(views, pairs=(behind, pair("a", "c", 2.0, 8.0), far))["reprojection"]
-        assert (found.passed, found.sentence) == (True, "A–C 8.0 px; A–B, B–C left out")
+        assert (found.passed, found.sentence) == (
+            True,
+            "A–C 8.0 px, 0.40 % (best pair); A–B, B–C not used",
+        )
 
     def test_without_a_valid_pair_the_closest_speaks_and_none_is_left_out(self):
         views = [seen("A"), seen("B"), seen("C")]
@@ -288,7 +307,13 @@ class TestReprojection:
             pair("a", "c", 30.0, 40.0, failed="reprojection"),
         )
         found = gates(views, ("reprojection",), pairs=pairs)["reprojection"]
-        assert found == Gate("reprojection", False, 40.0, 20.0, -1.0, "A–C 40.0 px")
+        sentence = "A–C 40.0 px, 2.00 % (best pair)"
+        assert found == Gate("reprojection", False, 40.0, 20.0, -1.0, sentence)
+
+    def test_a_share_beside_the_threshold_has_the_digits_to_tell_them_apart(self):
+        pairs = (pair("a", "b", 20.02, 1.0, failed="reprojection"),)
+        found = gates([seen("A"), seen("B")], ("reprojection",), pairs=pairs)["reprojection"]
+        assert found.sentence == "A–B 20.0 px, 1.0010 %"
 
     def test_pairs_that_failed_before_do_not_speak(self):
         views = [seen("A"), seen("B"), seen("C", **LOW)]

@@ -287,6 +287,10 @@ class TestFindings:
     def test_several_balls_ask_to_pick_one(self, clean):
         twice = replace(clean.views[0], balls=clean.views[0].balls * 2)
         assert "several_balls" in self.kinds(twice, *clean.views[1:])
+        ball = next(
+            one for one in solve(group(twice, *clean.views[1:]), PAPER).gates if one.name == "ball"
+        )
+        assert ball.sentence.endswith("several in A")
 
     def test_a_low_parallax_is_said(self):
         near = looking((7.0, 62.0, -16.0), (34.0, -4.0, 0.0), 2300.0, bend=BEND)
@@ -409,6 +413,8 @@ class TestExpectedBall:
         after = solve(group(*clean.views[:2], replace(blind, balls=(put,))), PAPER)
         assert (after.ball, after.pairs) == (before.ball, before.pairs)
         assert not after.view("7_2.png").included
+        gate = next(gate for gate in after.gates if gate.name == "ball")
+        assert gate.sentence == "in 2 views, placed in C (not counted)"
         alone = solve(group(clean.views[0], replace(clean.views[1], balls=(put,))), PAPER)
         assert alone.first_failing.name == "ball"
 

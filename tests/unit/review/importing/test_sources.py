@@ -358,7 +358,7 @@ class TestRemarks:
         (tmp_path / "Labels-v3.json").write_text(json.dumps({"actions": {"7.png": image}}))
         imported = import_source(store, "x", Source("soccernet-v3", tmp_path), store.settings)
         assert imported.values()["remarks"][0] == (
-            'no ball was read from any of 1 groups; its boxes are of "Player team left" (1)'
+            'no ball was read from the 1 group; its boxes are of "Player team left" (1)'
         )
 
     def test_a_category_that_is_named_is_the_ball_and_the_report_says_so(

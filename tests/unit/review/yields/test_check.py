@@ -37,7 +37,7 @@ def spoil(path: Path, array: str) -> None:
 def test_what_was_written_is_sound(settings: Settings) -> None:
     check = examine_yields(settings)
     assert check.ok
-    assert "1 files" in check.sentence
+    assert "1 file in" in check.sentence
 
 
 @pytest.mark.parametrize("array", ["jac", "inputs"])
