@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shlex
+import shutil
 from contextlib import closing
 from pathlib import Path
 
@@ -14,6 +15,7 @@ from app.config import Settings
 from app.review.doctor.check import Check
 from app.review.jobs.examination import examine_everything
 from app.soccer.solution import SOLVER_VERSION
+from app.store.home import make_home
 from app.store.migrate import KNOWN_REVISIONS, migrate
 from app.store.store import Store
 from tests.torture.populated import carry_back, people_work
@@ -26,12 +28,20 @@ NUMBERS = "SELECT group_id, solved, passes, error_px, sigma_m, min_jac FROM queu
 
 
 @pytest.fixture
-def worked_in(store: Store, fill, make_group, revision: str) -> Path:
+def worked_in(store: Store, fill, make_group, revision: str, tmp_path: Path) -> Path:
     """A home in which groups were solved, edited, judged and, where its schema can, frozen."""
     fill(make_group(7), make_group(8))
-    store.close()
-    people_work(store.settings, freezes=revision >= VERSIONS)
-    return store.settings.home
+    # A copy: the store itself serves other tests.
+    copy = Settings(home=tmp_path / "copy")
+    make_home(copy)
+    shutil.copy(store.settings.home / "home.json", copy.home / "home.json")
+    with (
+        closing(sqlite.connect(str(store.settings.database_file))) as one,
+        closing(sqlite.connect(str(copy.database_file))) as two,
+    ):
+        one.backup(two)
+    people_work(copy, freezes=revision >= VERSIONS)
+    return copy.home
 
 
 def of_earlier_solver(home: Path, revision: str, folder: Path) -> Settings:
