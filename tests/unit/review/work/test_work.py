@@ -346,6 +346,7 @@ class TestLeases:
         leases.hand_back(batch, groups[0], BO, "too wide", actor="bo")
         (mine,) = my_work(store, lambda _: ADA)
         assert (mine.left, [one.group for one in mine.handed_back]) == (1, [groups[0]])
+        assert (mine.batch.groups, mine.batch.settled, mine.batch.waiting) == (3, 2, 1)
         back = leases.next(batch, ADA)
         assert (back.group, back.handed_back.reason) == (groups[0], "too wide")
         leases.hand_in(batch, groups[0], ADA, actor="ada")
