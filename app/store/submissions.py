@@ -28,12 +28,11 @@ _ONLY_LEADS = "Only a lead can return it, and says why."
 
 
 def require_open(take: Any | None) -> None:
-    """Raise ConflictError where a copy was submitted; ``None`` is an ordinary group."""
-    if take is None:
-        return
-    if take.settled is not None:
-        raise ConflictError("this annotation was adjudicated already, and can no longer be changed")
-    if take.handed_in is not None:
+    """Raise ConflictError where a copy was submitted; ``None`` is an ordinary group.
+
+    Whether it was adjudicated since the sentence does not say: copies of gold groups never are.
+    """
+    if take is not None and (take.handed_in is not None or take.settled is not None):
         raise ConflictError(
             "this annotation was submitted, and can no longer be changed", hint=_ONLY_LEADS
         )

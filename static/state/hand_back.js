@@ -7,10 +7,10 @@ import { postAdoption, postTakeBack } from '../api/takes.js';
 import { postHandBack } from '../api/work.js';
 import { navigate } from '../lib/router.js';
 import { groupDocument } from './group.js';
-import { lease, nextOfBatch } from './leases.js';
+import { handInAndNext, lease, nextOfBatch } from './leases.js';
 import { isTeam, myName } from './me.js';
 import { currentId, reviewAddress } from './navigation.js';
-import { announce, inform } from './notice.js';
+import { announce, complain, inform } from './notice.js';
 import { whyNot } from './rights.js';
 
 /** @import {TakeJson} from '../api/takes.js' */
@@ -41,6 +41,12 @@ export const frozen = computed(() => {
 	if (one.handed_in !== null) return mine ? 'This is submitted; only a lead can return it.' : `${one.person} has submitted this; return it, or take it over.`;
 	return mine ? '' : `${one.person} reviews this annotation.`;
 });
+
+/** Submit the group and go on, unless it was submitted already. */
+export async function submitAndNext() {
+	if (frozen.value) complain(frozen.value);
+	else await handInAndNext();
+}
 
 /** Whether it can be taken over into the group that it is of. */
 export const canTakeOver = computed(() => isReady.value);

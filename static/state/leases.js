@@ -198,7 +198,7 @@ export async function handInAndNext() {
 	}
 	try {
 		await putHandIn(held.batch, held.group);
-		announce('Handed in.');
+		announce('Submitted.');
 	} catch (error) {
 		if (!(error instanceof ApiError)) throw error;
 		complain(`This group was not submitted: ${error.message}`);

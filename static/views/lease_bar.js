@@ -6,9 +6,9 @@ import { html } from 'htm/preact';
 import { ago } from '../lib/format.js';
 import { useNow } from '../lib/hooks.js';
 import { groupDocument } from '../state/group.js';
-import { askHandBack, canHandBack } from '../state/hand_back.js';
+import { askHandBack, canHandBack, frozen, submitAndNext } from '../state/hand_back.js';
 import { isCopy } from '../state/takes.js';
-import { batch, canHandIn, handInAndNext, isMoving, lease, nextOfBatch, others, takeOver } from '../state/leases.js';
+import { batch, canHandIn, isMoving, lease, nextOfBatch, others, takeOver } from '../state/leases.js';
 
 /** Others who are here, in the header. */
 export function Presence() {
@@ -29,7 +29,7 @@ export function HandIn() {
 		return html`<button class="button" type="button" title="Return this group to its annotator, with a reason (Shift U)" onClick=${askHandBack}>Return to ${lease.value?.handedInBy}… <kbd>⇧U</kbd></button>`;
 	}
 	if (!canHandIn.value) return null;
-	return html`<button class="button button--primary" type="button" aria-disabled=${isMoving.value} title="Submit this group for review (Shift F)" onClick=${handInAndNext}>Submit and next <kbd>⇧F</kbd></button>`;
+	return html`<button class="button button--primary" type="button" aria-disabled=${isMoving.value || frozen.value !== ''} title=${frozen.value || 'Submit this group for review (Shift F)'} onClick=${submitAndNext}>Submit and next <kbd>⇧F</kbd></button>`;
 }
 
 /** Below the header: this group is somebody else's. It blocks nothing. */

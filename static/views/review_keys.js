@@ -10,10 +10,10 @@ import { drawHere, endDrawing, placeExpected, startDrawing } from '../state/draw
 import { moveCross } from '../state/drawing_cross.js';
 import { swapSides } from '../state/edits.js';
 import { draft, group, groupDocument, solution, submit, withdraw } from '../state/group.js';
-import { askHandBack, askTakeOver, canHandBack, canTakeOver } from '../state/hand_back.js';
+import { askHandBack, askTakeOver, canHandBack, canTakeOver, submitAndNext } from '../state/hand_back.js';
 import { redo, undo } from '../state/undo.js';
 import { backToInstant, stepInstant } from '../state/instants.js';
-import { canHandIn, handInAndNext } from '../state/leases.js';
+import { canHandIn } from '../state/leases.js';
 import { isHeld, mend, mends, turnMend } from '../state/mends.js';
 import { goBy, goFlagged, goNext, goPrevious, historyAddress } from '../state/navigation.js';
 import { announce, dismiss, notice } from '../state/notice.js';
@@ -219,7 +219,7 @@ const VERDICT = [
 const NAVIGATE = [
 	{ keys: ['f'], label: 'Next group', group: 'Navigate', run: () => { goNext(); } },
 	{ keys: ['d'], label: 'Previous group', group: 'Navigate', run: () => { goPrevious(); } },
-	{ keys: ['Shift+f'], label: 'Submit the group and go to the next, in a batch that you annotate', group: 'Navigate', needs: 'annotate', when: () => canHandIn.value, run: () => { handInAndNext(); } },
+	{ keys: ['Shift+f'], label: 'Submit the group and go to the next, in a batch that you annotate', group: 'Navigate', needs: 'annotate', when: () => canHandIn.value, run: () => { submitAndNext(); } },
 	{ keys: ['Shift+u'], label: 'Return the group to its annotator, with a reason', group: 'Verdict', needs: 'review', when: () => canHandBack.value, run: askHandBack },
 	{ keys: ['Shift+r'], label: 'Take over an independent annotation into the group', group: 'Verdict', needs: 'lead', when: () => canTakeOver.value, run: askTakeOver },
 	{ keys: ['v'], label: 'Ten groups on', group: 'Navigate', run: () => { goBy(1, FAR); } },

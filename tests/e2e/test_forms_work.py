@@ -190,7 +190,7 @@ class TestBatches:
             batch = one["batch"]
             item = page.locator(f"{TEAM} .work__item")
             item = item.filter(has=page.get_by_role("link", name=batch["name"], exact=True))
-            handed = batch["annotators"] and batch["verdicts"] == 1
+            handed = batch["handed_in"] and batch["annotators"] and batch["verdicts"] == 1
             words = [
                 f"{batch['settled']} of {batch['groups']} groups done",
                 f"{batch['handed_in']} submitted" if handed else "",
@@ -211,9 +211,9 @@ class TestBatches:
                 expect(line.get_by_role("cell")).to_have_text(numbers)
         for mine in read(page, "/work")["items"]:
             left, name = mine["left"], mine["batch"]["name"]
-            groups = f": {left} group{'' if left == 1 else 's'}" if left else ""
-            go_on = page.get_by_role("button", name=f"Continue{groups} of {name}", exact=True)
-            expect(go_on).to_be_visible()
+            groups = f"{left} group{'' if left == 1 else 's'}"
+            go_on = page.get_by_role("button", name=f"Continue: {groups} of {name}", exact=True)
+            expect(go_on).to_have_count(1 if left else 0)
 
 
 TEXT = "Policy as YAML"

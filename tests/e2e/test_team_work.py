@@ -10,6 +10,8 @@ from playwright.sync_api import Page, expect
 
 from app.review.people.roles import Role
 from app.review.work.batches import NewBatch, make_batch
+from app.review.work.leases import Leases, Worker
+from app.store.store import Store
 from tests.e2e.screen import TWO_FRAMES, Screen, hears, holding, until
 from tests.e2e.team import (
     REFUSED,
@@ -21,6 +23,8 @@ from tests.e2e.team import (
     verdict,
 )
 from tests.e2e.test_access import serious_in_both
+
+SUBMITTED = "This is submitted; only a lead can return it."
 
 
 class TestWork:
@@ -224,6 +228,37 @@ class TestWork:
         until(page, lambda: "/review/8" in page.url)
         expect(page.get_by_text("ute’s annotation is in the group now")).to_be_visible()
         assert verdict(page, 8) == {"state": "accepted", "by": "ute"}
+
+    def test_what_one_submitted_is_done_and_offers_nothing_that_changes_it(
+        self, open_page: OpenPage, team: str, team_home: Path, console: Any
+    ) -> None:
+        join(team_home, "sina", Role.REVIEWER)
+        new = NewBatch("Once", "id:5", annotators=["sina"], verdicts=2, skip_given=False)
+
+        def submitted(store: Store) -> tuple[int, int]:
+            batch = make_batch(store, "sample", new, actor="local").id
+            leases, sina = Leases(store), Worker("sina")
+            copy = leases.next(batch, sina).group
+            leases.hand_in(batch, copy, sina, actor="sina")
+            return batch, copy
+
+        batch, copy = in_store(team_home, submitted)
+        page = open_page("/work", address=team)
+        log_in(page, "sina")
+        mine = page.locator(".work__item").filter(
+            has=page.get_by_role("heading", name="Once", exact=True)
+        )
+        expect(mine.first).to_contain_text("1 of 1 group done · 0 open")
+        expect(page.get_by_role("button", name="Continue")).to_have_count(0)
+        page.goto(f"{team}/review/{copy}?q=batch:{batch}")
+        Screen(page).ready()
+        expect(page.get_by_text("It is submitted and can no longer be changed")).to_be_visible()
+        for name in ("Submit and next ⇧F", "Accept A", "Reject X", "Defer S"):
+            button = page.get_by_role("button", name=name)
+            expect(button).to_have_attribute("aria-disabled", "true")
+            expect(button).to_have_attribute("title", SUBMITTED)
+        page.keyboard.press("Shift+F")
+        expect(page.get_by_text(SUBMITTED)).to_be_visible()
 
 
 def give_to(home: Path, name: str, batch: str, q: str) -> None:

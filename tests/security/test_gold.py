@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import hashlib
+import json
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -20,13 +22,21 @@ from app.review.takes import mixing
 from app.soccer.media import Media
 from app.store.takes import GOLD, takes_in
 from tests.scenes import make_scenes
-from tests.security.apart import API, Apart, opened
+from tests.security.apart import API, BODIES, Apart, opened
 from tests.security.cheat import features_of, in_order, telling
 from tests.security.table import rows
 
 ORDINARY = GOLDEN = 16
 OTHERS = 3
 BALL = [613.25, 301.75, 9.5, 9.5]
+SAID = {
+    f"PATCH {API}/views/{{view}}/ball": {"box": [*BALL[:3], 30.0]},
+    f"PATCH {API}/views/{{view}}": {"included": False},
+    f"PUT {API}/groups/{{group}}/verdict": {"state": "deferred"},
+    f"POST {API}/groups/{{group}}/hand-back": {"reason": "mine"},
+    f"POST {API}/batches/{{batch}}/groups/{{group}}/hand-back": {"reason": "mine"},
+}
+"""Bodies with which routes get to what they would change."""
 PEOPLE = {"olaf": Role.ANNOTATOR, "rita": Role.REVIEWER, "anna": Role.ANNOTATOR}
 
 
@@ -123,6 +133,33 @@ def snapshot(team: Apart, person: str, named: dict[str, str], *, about: bool) ->
             answer = team.ask(person, "GET", target.removeprefix(API))
             assert answer.status_code < 500, (target, answer.text)
             found |= features_of(f"{row.path} {place or ''}".strip(), answer)
+    return found
+
+
+def refusals(team: Apart, person: str, copy: int, batch: str) -> dict[str, Any]:
+    """What every route that changes something answers about a copy, its ids and times left out."""
+    found: dict[str, Any] = {}
+    for row in rows():
+        named = {*row.parameters} & {"group", "view", "station"}
+        if not row.changes or not row.path.startswith(API) or not named or "saved" in row.path:
+            continue
+        document = team.ask(person, "GET", f"/groups/{copy}").json()
+        view = document["views"][0]
+        ids = {"group": copy, "view": view["id"], "station": view["station"]["id"]}
+        texts = {name: str(number) for name, number in ids.items()}
+        target = row.target({**texts, "batch": batch}).removeprefix(API)
+        body = SAID.get(str(row), BODIES.get(str(row), {}))
+        for etag in ({"If-Match": document["etag"]}, {}):
+            answer = team.ask(person, row.method, target, body, **etag)
+            if answer.status_code < 400:
+                continue
+            said = answer.json()
+            said.pop("instance", None), said.pop("request_id", None)
+            text = json.dumps(said, sort_keys=True)
+            for name, number in ids.items():
+                text = re.sub(rf"(?<![\d.]){number}(?![\d.])", name, text)
+            text = re.sub(r"\d+-\d+", "label", text)
+            found[f"{row} {len(etag)}"] = (answer.status_code, text)
     return found
 
 
@@ -299,6 +336,20 @@ class TestGold:
             assert (one["outcome"], one["status"]) == ("refused", 409)
         with made.team.store.read() as session:
             assert [take._mapping for take in takes_in(session, 1, person)] == before
+
+    def test_every_refused_change_of_a_copy_reads_the_same(
+        self, made: Gold, played: Played
+    ) -> None:
+        with made.team.store.read() as session:
+            takes = {take.copy_id: take for take in takes_in(session, 1, "olaf")}
+        gold = played.copies[played.gold.index(True)]
+        ordinary = played.copies[played.gold.index(False)]
+        assert (takes[gold].settled, takes[ordinary].settled is None) == (None, False)
+        batch = str(takes[gold].batch_id)
+        told, other = (refusals(made.team, "olaf", copy, batch) for copy in (gold, ordinary))
+        assert told == other
+        submitted = "this annotation was submitted, and can no longer be changed"
+        assert sum(submitted in str(said) for said in told.values()) >= 8
 
 
 class TestReviewers:

@@ -19,6 +19,7 @@ from app.review.people.roles import Action, may
 from app.review.queue.query import MAX_LISTED_LENGTH, parse_query
 from app.soccer.actors import person_of
 from app.store.clock import now
+from app.store.gold import gold_heads
 from app.store.listing import Listing
 from app.store.log import Entry, append
 from app.store.session import Session
@@ -204,7 +205,7 @@ def make_batch(
 
     Raises:
         InputError: The query cannot be understood or finds nothing, or somebody named may not.
-        ConflictError: The dataset has as many batches as it may.
+        ConflictError: The dataset has as many batches as it may, or no gold group to mix in.
     """
     query = parse_query(new.query, longest=MAX_LISTED_LENGTH)
     _check(new)
@@ -223,6 +224,8 @@ def make_batch(
         ids = [one for one in found if one not in given][: new.size or MOST_GROUPS]
         if not ids:
             raise _nothing(found)
+        if new.gold_every is not None:
+            _require_gold(session, number)
         values = {
             "dataset_id": number,
             "name": new.name.strip(),
@@ -271,6 +274,7 @@ def change_batch(
     Raises:
         NotFoundError: There is none.
         InputError: Somebody named may not do that part, or gold groups would be too rare.
+        ConflictError: The dataset has no gold group to mix in.
     """
     _check_gold(gold_every)
     before = get_batch(store, batch_id)
@@ -291,6 +295,8 @@ def change_batch(
     }
     with store.write() as session:
         read_batch(session, batch_id)
+        if gold_every not in (None, before.gold_every):
+            _require_gold(session, before.dataset_id)
         if values:
             update_batch(session, batch_id, values)
         for part, chosen in people.items():
@@ -395,6 +401,16 @@ def _check_gold(every: int | None) -> None:
         raise InputError(f"one of 1 to {RAREST_GOLD} groups is a gold one", pointer="/gold_every")
 
 
+def _require_gold(session: Session, dataset: int) -> None:
+    """Raise ConflictError where a dataset has no gold group to mix in."""
+    if not gold_heads(session, dataset):
+        raise ConflictError(
+            "no group of this dataset is a gold group",
+            hint="Mark gold groups first, take those of a sample or a frozen version, or assign "
+            "the batch without them.",
+        )
+
+
 def _nothing(found: Sequence[int]) -> InputError:
     if not found:
         return InputError("no group matches that query", pointer="/q")
@@ -409,7 +425,9 @@ def _tell(session: Session, batch: Batch, people: Iterable[str], actor: str) -> 
     """Tell people that work was given to them."""
     by = person_of(actor)
     due = "" if batch.due is None else f", due {batch.due}"
-    said = f"{by} assigned you work: {batch.name}, {batch.groups} groups of {batch.dataset}{due}"
+    # Who is told how many groups it has counts how many gold ones are mixed in.
+    groups = "groups" if batch.gold_every is not None else f"{batch.groups} groups"
+    said = f"{by} assigned you work: {batch.name}, {groups} of {batch.dataset}{due}"
     for name in dict.fromkeys(people):
         tell(
             session, name, RingKind.ASSIGNED, said,

@@ -85,15 +85,24 @@ def as_seen(session: Session, batch: Batch) -> Batch:
     reader = READER.get()
     if reader is None or batch.id not in reader.batches.get(batch.dataset_id, ()):
         return batch
+    return replace(own_part(session, batch, reader.person), query="")
+
+
+def own_part(session: Session, batch: Batch, person: str) -> Batch:
+    """A batch with the counts of somebody's own annotations: what they submitted is done."""
     takes = takes_of_batch(session, batch.id, batch.dataset_id)
-    done = [take.handed_in for take in takes if take.person == reader.person and take.handed_in]
-    left = own_left(session, batch, reader.person)
+    name = person_of(person)
+    back = set(returned_to(session, batch, person))
+    done = [
+        take.handed_in
+        for take in takes
+        if take.person == name and take.handed_in and take.group_id not in back
+    ]
     return replace(
         batch,
-        query="",
-        groups=len(done) + left,
-        handed_in=len(done),
-        settled=0,
+        groups=len(done) + own_left(session, batch, person),
+        handed_in=0,
+        settled=len(done),
         last=max(done, default=None),
         here=[],
     )

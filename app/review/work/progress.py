@@ -14,7 +14,7 @@ from app.review.people.roles import EVERYTHING, Sight
 from app.review.takes.handed_back import HandedBack, read_handed_back
 from app.review.work.batches import Batch, Part, read_batches
 from app.review.work.leases import Worker
-from app.review.work.own import as_seen, own_left, takes_part
+from app.review.work.own import as_seen, own_left, own_part, takes_part
 from app.review.work.stalls import Why, last_of, stall_of
 from app.soccer.actors import person_of
 from app.store.session import Session
@@ -92,7 +92,8 @@ def my_work(
                 own = takes_part(batch, parts)
                 left = own_left(session, batch, worker.name) if own else _left(batch, parts)
                 back = _handed_back(session, batch, worker.name)
-                found.append(MyBatch(as_seen(session, batch), sorted(parts), left, back))
+                seen = own_part(session, batch, worker.name) if own else batch
+                found.append(MyBatch(as_seen(session, seen), sorted(parts), left, back))
         return found
 
 

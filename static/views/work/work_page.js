@@ -42,7 +42,7 @@ function MyBatch({ one: { batch, parts, left, handed_back: back }, first }) {
 						<li key=${one.group}><a href=${reviewAddress(one.group, `batch:${batch.id}`)}>${one.title}</a> was returned by ${one.by}${one.reason ? html`: “${one.reason}”` : ''} <small><${When} at=${one.at} /></small></li>`)}</ul>` : null}
 					${error ? html`<${FormError} error=${error} />` : null}
 				</div>
-				<button ref=${button} class=${first ? 'button button--primary' : 'button'} type="button" data-needs="annotate" onClick=${go}>${left ? `Continue: ${plural(left, 'group')}` : 'Continue'}<span class="hidden-text"> of ${batch.name}</span></button>
+				${left ? html`<button ref=${button} class=${first ? 'button button--primary' : 'button'} type="button" data-needs="annotate" onClick=${go}>Continue: ${plural(left, 'group')}<span class="hidden-text"> of ${batch.name}</span></button>` : null}
 			</div>
 		</li>
 	`;

@@ -43,6 +43,7 @@ from app.review.policies.text import policy_to_yaml
 from app.review.versions.version import list_versions
 from app.review.work.batches import get_batch
 from app.soccer.policy import PAPER
+from app.store.gold import mark_gold, unmark_gold
 from app.store.store import Store
 from tests.scenes import make_scenes
 from tests.waiting import SECONDS
@@ -162,11 +163,18 @@ def test_what_is_imported_frozen_exported_and_measured_there_is_as_here(
             assert remote("batch", *words, *more).stdout == local("batch", *words, *more).stdout
     assert "closed" in told(local("batch", "show", rest, "--json"))["state"]
     assert remote(*give, "--due", "soon").exit_code == 2
+    assert "no group of this dataset is a gold" in str(
+        remote("batch", "change", rest, "--gold-every", "5").exception
+    )
+    with place.store.write() as session:
+        mark_gold(session, 1, 1, "imported", {}, "anna")
     for run, every in ((remote, "5"), (local, "7")):
         run("batch", "change", rest, "--gold-every", every)
         assert get_batch(place.store, int(rest)).gold_every == int(every)
         assert "the truth of none" in str(run("batch", "gold", "small").exception)
         assert "say sample or version" in run("batch", "gold", "small", "--from", "hearsay").output
+    with place.store.write() as session:
+        unmark_gold(session, 1)
     remote("batch", "change", rest, "--no-gold")
     assert get_batch(place.store, int(rest)).gold_every is None
     assert remote("batch", "change", rest).exit_code == 2

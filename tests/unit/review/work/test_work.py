@@ -16,7 +16,7 @@ from app.review.people.audit import read_audit
 from app.review.people.people import invite
 from app.review.people.roles import EVERYTHING, Role
 from app.review.queue.listing import list_groups
-from app.review.takes.gold import mark
+from app.review.takes.gold import mark, unmark
 from app.review.verdicts.verdict import set_verdict
 from app.review.work import leases as leases_module
 from app.review.work.batches import (
@@ -72,6 +72,11 @@ def leases(store, clock) -> Leases:
     return Leases(store, clock)
 
 
+def make_gold(store, group: int) -> None:
+    judge(store, group, "cy")
+    mark(store, group, "imported", actor="cy")
+
+
 def judge(store, group: int, actor: str, state: str = "rejected") -> None:
     reason = "ball_hidden" if state == "rejected" else None
     etag = load(store, group).etag
@@ -125,6 +130,40 @@ class TestBatch:
             get_batch(store, batch.id)
         with store.read() as session:
             replay(session)
+
+
+class TestGoldGroups:
+    """What a batch asks for that mixes gold groups in, and what its people are told."""
+
+    def test_none_are_mixed_in_where_none_is_marked(self, store, dataset, groups):
+        plain = make_batch(store, dataset, NewBatch("a"), actor="lead").id
+        new = NewBatch("b", skip_given=False, gold_every=2)
+        for ask in (
+            lambda: make_batch(store, dataset, new, actor="lead"),
+            lambda: change_batch(store, plain, gold_every=2, actor="lead"),
+        ):
+            with pytest.raises(ConflictError, match="no group of this dataset is") as refused:
+                ask()
+            assert "Mark gold groups first" in refused.value.hint
+        assert [(one.id, one.gold_every) for one in list_batches(store, dataset)] == [(plain, None)]
+        make_gold(store, groups[5])
+        change_batch(store, plain, gold_every=2, actor="lead")
+        unmark(store, groups[5], actor="cy")
+        assert change_batch(store, plain, gold_every=2, name="c", actor="lead").name == "c"
+
+    @pytest.mark.parametrize(
+        ("every", "said"),
+        [(None, "assigned you work: a, 3 groups of"), (2, "assigned you work: a, groups of")],
+    )
+    def test_no_message_counts_the_groups_without_the_gold_ones(
+        self, store, dataset, groups, every, said
+    ):
+        make_gold(store, groups[5])
+        new = NewBatch("a", size=3, annotators=["ada"], gold_every=every)
+        make_batch(store, dataset, new, actor="lead")
+        with store.read() as session:
+            (ring,) = read_rings(session, person_by_name(session, "ada").id, EVERYTHING, "", 9)
+        assert said in ring.sentence
 
 
 class TestLeases:
@@ -271,6 +310,7 @@ class TestLeases:
 
     @pytest.mark.parametrize("every", [0, 1001])
     def test_gold_groups_come_at_least_once_in_a_thousand(self, store, dataset, groups, every):
+        make_gold(store, groups[5])
         kept = make_batch(store, dataset, NewBatch("a", size=1, gold_every=1000), actor="lead").id
         with pytest.raises(InputError, match="one of 1 to 1000 groups is a gold one") as refused:
             make_batch(store, dataset, NewBatch("b", size=1, gold_every=every), actor="lead")
@@ -282,8 +322,7 @@ class TestLeases:
     def test_what_is_annotated_among_gold_waits_for_its_reviewer_who_may_hand_it_back(
         self, store, dataset, groups, leases
     ):
-        judge(store, groups[5], "cy")
-        mark(store, groups[5], "imported", actor="cy")
+        make_gold(store, groups[5])
         new = NewBatch("a", size=2, annotators=["ada"], reviewers=["bo"], gold_every=2)
         batch = make_batch(store, dataset, new, actor="lead").id
         had = 0
@@ -292,7 +331,14 @@ class TestLeases:
             assert [one.left for one in my_work(store, lambda _: ADA)] == [3 - had]
             leases.hand_in(batch, copy, ADA, actor="ada")
             had += 1
-            assert [one.left for one in my_work(store, lambda _: ADA)] == [3 - had]
+            (mine,) = my_work(store, lambda _: ADA)
+            seen = mine.batch
+            assert (mine.left, seen.groups, seen.settled, seen.waiting) == (
+                3 - had,
+                3,
+                had,
+                3 - had,
+            )
         assert had == 3
         assert get_batch(store, batch).handed_in == 2
         found = leases.next(batch, BO)
@@ -300,6 +346,7 @@ class TestLeases:
         leases.hand_back(batch, groups[0], BO, "too wide", actor="bo")
         (mine,) = my_work(store, lambda _: ADA)
         assert (mine.left, [one.group for one in mine.handed_back]) == (1, [groups[0]])
+        assert (mine.batch.groups, mine.batch.settled, mine.batch.waiting) == (3, 2, 1)
         back = leases.next(batch, ADA)
         assert (back.group, back.handed_back.reason) == (groups[0], "too wide")
         leases.hand_in(batch, groups[0], ADA, actor="ada")
@@ -310,6 +357,7 @@ class TestLeases:
     def test_what_was_submitted_before_a_stop_is_taken_over_when_the_server_starts(
         self, store, dataset, groups, leases
     ):
+        make_gold(store, groups[5])
         new = NewBatch("a", size=1, annotators=["ada"], reviewers=["bo"], gold_every=1000)
         batch = make_batch(store, dataset, new, actor="lead").id
         copy = leases.next(batch, ADA).group
@@ -377,6 +425,7 @@ class TestOwnPlace:
         assert told == [(1, 3), (2, 3), (3, 3)]
 
     def test_no_count_tells_gold_groups_from_others(self, store, dataset, groups):
+        make_gold(store, groups[5])
         new = NewBatch("a", size=3, annotators=["ada"], gold_every=2)
         batch = make_batch(store, dataset, new, actor="lead").id
         lease = Leases(store).next(batch, ADA)
