@@ -249,7 +249,7 @@ class TestWork:
             has=page.get_by_role("heading", name="Once", exact=True)
         )
         expect(mine.first).to_contain_text("1 of 1 group done · 0 open")
-        expect(page.get_by_role("button", name="Continue")).to_have_count(0)
+        expect(mine.first.get_by_role("button", name="Continue")).to_have_count(0)
         page.goto(f"{team}/review/{copy}?q=batch:{batch}")
         Screen(page).ready()
         expect(page.get_by_text("It is submitted and can no longer be changed")).to_be_visible()
