@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import json
-
 from sqlalchemy import delete, insert, select
 
+from app.finite import json_text
 from app.store.session import Session
-from app.store.stored_json import Json
+from app.store.stored_json import Json, parse
 from app.store.tables.people import TeamSettingModel
 
 _NAME = "maintenance"
@@ -17,12 +16,12 @@ def find_banner(session: Session) -> Json | None:
     """What was put last; None: nothing, or it was taken away."""
     statement = select(TeamSettingModel.value).where(TeamSettingModel.name == _NAME)
     text = session.scalar(statement)
-    return None if text is None else json.loads(text)
+    return None if text is None else parse(text)
 
 
 def put_banner(session: Session, banner: Json | None) -> None:
     """Put another one in its place; None: take it away."""
     session.execute(delete(TeamSettingModel).where(TeamSettingModel.name == _NAME))
     if banner is not None:
-        values = {"name": _NAME, "value": json.dumps(banner)}
+        values = {"name": _NAME, "value": json_text(banner)}
         session.execute(insert(TeamSettingModel), values)

@@ -266,7 +266,9 @@ class TestCommandLine:
         self, record: ExportRecord, bad: float, capsys: pytest.CaptureFixture[str]
     ) -> None:
         solution = poisoned(record.solution, bad)
-        values = GroupFindings(1, 1, record.group, solution.findings).values
+        values = GroupFindings(
+            1, 1, record.group, solution.findings, (None,) * len(solution.findings)
+        ).values
         print_json(values)
         (found,) = strict(capsys.readouterr().out)
         assert (found["number"], found["threshold"], found["confidence"]) == (None, None, None)

@@ -98,11 +98,13 @@ KEPT: dict[str, Made] = {
 behind its name tells them apart."""
 HARMLESS = {
     "changeTeam": "The same setting once more changes nothing, and has the same answer.",
+    "clearMaintenance": "A notice that is taken away is away.",
     "deleteUpload": "It is written down before what goes: the rest is done, and the answer the same.",
     "giveGroupBack": "A lease that has ended is ended.",
     "previewGroup": "Saves nothing.",
     "proposeLines": "Saves nothing.",
     "readPaint": "Saves nothing.",
+    "setMaintenance": "The same notice once more is the same notice.",
     "setMemberRole": "The same role once more changes nothing, and has the same answer.",
     "takeGroup": "A lease that one has lasts on.",
     "takeNextGroup": "A lease is a courtesy: one that nobody uses ends after three minutes.",

@@ -329,7 +329,9 @@ class TestFindings:
         assert code == 0
         assert {item["kind"] for item in found} >= {"under_constrained"}
         keys = {"kind", "group", "view", "marking", "suggested", "number", "threshold"}
-        assert all(keys | {"confidence", "sentence", "fix"} == set(item) for item in found)
+        assert all(
+            keys | {"confidence", "sentence", "fix", "dismissed"} == set(item) for item in found
+        )
         assert "under_constrained" in run("findings", "--dataset", "sn")[1]
 
 

@@ -15,6 +15,7 @@ import pytest
 from app.errors import ImageError, NotFoundError, TooLargeError
 from app.soccer.media import Media
 from app.store import media as media_module
+from app.store import video_index
 from app.store.archives import Archives
 from app.store.media import (
     content_type,
@@ -227,7 +228,8 @@ class TestReadFrame:
         path = tmp_path / "cam1.mp4"
         path.write_bytes(b"")
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(media_module, "open_video", lambda _: nullcontext(Growing()))
+            for module in (media_module, video_index):
+                patch.setattr(module, "open_video", lambda _: nullcontext(Growing()))
             patch.setattr(media_module, "video_times", lambda *_: np.arange(2.0))
             with pytest.raises(TooLargeError, match="8000 x 8000"):
                 read_frame(Media(str(path), frame=1), None, False, settings)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shlex
-import shutil
 from contextlib import closing
 from pathlib import Path
 
@@ -34,7 +33,6 @@ def worked_in(store: Store, fill, make_group, revision: str, tmp_path: Path) -> 
     # A copy: the store itself serves other tests.
     copy = Settings(home=tmp_path / "copy")
     make_home(copy)
-    shutil.copy(store.settings.home / "home.json", copy.home / "home.json")
     with (
         closing(sqlite.connect(str(store.settings.database_file))) as one,
         closing(sqlite.connect(str(copy.database_file))) as two,

@@ -78,7 +78,7 @@ class TestDiffVersions:
     @pytest.mark.parametrize(
         ("before", "after", "told"),
         [
-            (True, None, "yes before, not asked now"),
+            (True, None, "yes before, not set now"),
             ([], ["cam1", "cam2"], "none before, cam1, cam2 now"),
             (
                 {"source": "lines", "weights": [1.0]},
