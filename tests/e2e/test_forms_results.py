@@ -119,7 +119,10 @@ class TestExports:
         for line, one in zip(lines.all(), items, strict=True):
             asked, cells = one["request"], line.get_by_role("cell")
             groups = "all groups" if asked["all"] else "accepted groups"
-            held = [f"{n:,} {name.replace('_', ' ')}" for name, n in one["counts"].items()]
+            held = [
+                f"{n:,} {name.replace('_', ' ').removesuffix('s' if n == 1 else '')}"
+                for name, n in one["counts"].items()
+            ]
             expect(line.get_by_role("rowheader")).to_have_text(f"sample{asked['format']}")
             what = " · ".join([groups, f"{asked['boxes']} boxes", *held])
             expect(cells.nth(0)).to_contain_text(what)
