@@ -25,6 +25,7 @@ from app.datasets.picture_names import picture_parts
 from app.datasets.report import Report
 from app.datasets.split_names import split_of
 from app.geometry.camera import Camera
+from app.plural import plural
 from app.soccer.annotation import BallAnnotation, Extras
 from app.soccer.frames import Box, ImageSize
 from app.soccer.group import Group, Station, View
@@ -171,13 +172,13 @@ def _tell_pictures(
             guessed.append(f"{name} is {item.place}")
     if guessed:
         report.remark(
-            f"{file.path}: {_counted(guessed, 'picture was', 'pictures were')} found by the end of"
+            f"{file.path}: {plural(len(guessed), 'picture was', 'pictures were')} found by the end of"
             f" the name: {_listed(guessed)}"
         )
     if missing:
         where = ", ".join(f"{folder or '.'}/" for folder in list(file.home.folders())[:_SHOWN])
         sentence = (
-            f"{_counted(missing, 'picture was', 'pictures were')} not found: {_listed(missing)}"
+            f"{plural(len(missing), 'picture was', 'pictures were')} not found: {_listed(missing)}"
             f" (looked in {where} and everywhere else)"
         )
         if finder.some:
@@ -355,10 +356,6 @@ def _label(frame: Frame, key: str) -> str:
 def split_of_folders(parts: Sequence[str]) -> str:
     """The split that the innermost folder of a name says; empty where none does."""
     return next((split for part in reversed(parts) if (split := split_of(part))), "")
-
-
-def _counted(items: Sequence[str], one: str, many: str) -> str:
-    return f"1 {one}" if len(items) == 1 else f"{len(items):,} {many}"
 
 
 def _listed(items: Sequence[str]) -> str:

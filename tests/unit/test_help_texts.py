@@ -62,7 +62,7 @@ PLAIN_WORDS = """
     main map markdown marks match matches matrix membership menu merge metrics migrate mini missing
     model modules name names navigation neighbours nested notice nudge numbers object
     observability onnx open openapi opened options order origin orphans output overlap page pages
-    paint palette parquet parse patch pen pins pitch pitches pixel place places plain png pointer
+    paint palette parquet parse patch pen pins pitch pitches pixel place places plain plural png pointer
     policies pool popover pose position preview problem progress projection props query rail reader reasons receiving
     recompute record remedies removal render reply report requests resect resource restore result
     revert reviewers rotation router row rows run runs sample save scale scene scene3d scenes score

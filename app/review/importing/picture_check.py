@@ -10,6 +10,7 @@ from app.config import Settings
 from app.datasets.report import Report
 from app.errors import ImageError, NotFoundError, StorageError, TooLargeError
 from app.paint.picture_scale import SHAPES_APART
+from app.plural import plural
 from app.progress import TellProgress
 from app.soccer.frames import ImageSize
 from app.soccer.group import Group, View
@@ -76,18 +77,18 @@ class PictureCheck:
         found = []
         if self.shapes:
             found.append(
-                f"{_counted(len(self.shapes), 'picture has', 'pictures have')} another shape than "
+                f"{plural(len(self.shapes), 'picture has', 'pictures have')} another shape than "
                 f"the file declares: {_named(self.shapes)}. Annotations on them lie in the wrong "
                 "place: correct the size in the file, or replace the picture, and import again."
             )
         if self.outside:
             found.append(
-                f"{_counted(len(self.outside), 'view has', 'views have')} annotations outside the "
+                f"{plural(len(self.outside), 'view has', 'views have')} annotations outside the "
                 f"picture: {_named(self.outside)}. Check the size that the file declares."
             )
         if self.beyond:
             found.append(
-                f"{_counted(len(self.beyond), 'view has', 'views have')} no frame in the video: "
+                f"{plural(len(self.beyond), 'view has', 'views have')} no frame in the video: "
                 f"{_named(self.beyond)}. Check --frame-offset, and that it is the whole video."
             )
         return found
@@ -186,10 +187,6 @@ def _difference(size: ImageSize, header: ImageHeader) -> str:
 
 def _file(media: Media | None) -> str:
     return "" if media is None else f" ({PurePosixPath(media.member or media.path).name})"
-
-
-def _counted(count: int, one: str, many: str) -> str:
-    return f"{count:,} {one if count == 1 else many}"
 
 
 def _named(places: list[str]) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
+from app.plural import counted, plural
 from app.review.exporting.formats import lacking
 from app.store.stored_json import Json
 
@@ -23,8 +24,8 @@ def _solved(result: Json) -> str:
         return "Nothing was left to solve."
     passed, rest = result["passed"], result["solved"] - result["passed"]
     return (
-        f"{_many(result['solved'], 'group')} solved: {passed:,} pass, {rest:,} do not; "
-        f"{_many(result['failed'], 'error')}."
+        f"{plural(result['solved'], 'group')} solved: {passed:,} pass, {rest:,} do not; "
+        f"{plural(result['failed'], 'error')}."
     )
 
 
@@ -33,19 +34,19 @@ def _imported(result: Json) -> str:
     would = " (dry run: nothing was changed)" if result.get("dry_run") else ""
     told = ", ".join(f"{count:,} {name}" for name, count in counts.items())
     left = len(result.get("skipped", ())) + result.get("more_skipped", 0)
-    more = f"; {_many(left, 'record')} left out" if left else ""
-    return f"{_many(sum(counts.values()), 'group')} read: {told}{more}{would}."
+    more = f"; {plural(left, 'record')} left out" if left else ""
+    return f"{plural(sum(counts.values()), 'group')} read: {told}{more}{would}."
 
 
 def _exported(result: Json) -> str:
     counts = result["counts"]
-    told = ", ".join(f"{count:,} {name.replace('_', ' ')}" for name, count in counts.items())
+    told = ", ".join(counted(count, name) for name, count in counts.items())
     lacks = lacking(result.get("format", ""), counts)
     return f"Written: {told}." + ("" if lacks is None else f" {lacks}.")
 
 
 def _frozen(result: Json) -> str:
-    return f"Version {result['name']} holds {_many(result['counts']['groups'], 'group')}."
+    return f"Version {result['name']} holds {plural(result['counts']['groups'], 'group')}."
 
 
 def _verified(result: Json) -> str:
@@ -58,36 +59,36 @@ def _evaluated(result: Json) -> str:
 
 def _accepted(result: Json) -> str:
     refused = sum(result["refused"].values())
-    more = f"; {_many(refused, 'view')} refused" if refused else ""
-    groups = _many(result["groups"], "group")
-    return f"{_many(result['changed'], 'view')} of {groups} have a ball from predictions{more}."
+    more = f"; {plural(refused, 'view')} refused" if refused else ""
+    groups = plural(result["groups"], "group")
+    return f"{plural(result['changed'], 'view')} of {groups} have a ball from predictions{more}."
 
 
 def _practice(result: Json) -> str:
-    groups = _many(result["groups"], "practice group")
+    groups = plural(result["groups"], "practice group")
     return f"{groups} made." if result["made"] else f"The {groups} were there already."
 
 
 def _rig(result: Json) -> str:
-    cameras = _many(len(result["cameras"]), "camera")
+    cameras = plural(len(result["cameras"]), "camera")
     if result["accepted"] is None:
         return f"An adjustment of {cameras} is proposed."
     return f"The adjustment of {cameras} was accepted ({result['accepted']})."
 
 
 def _positions(result: Json) -> str:
-    shared, matches = result["shared"], _many(result["matches"], "match", "matches")
-    return f"{_many(shared, 'picture')} of {matches} share the position of their camera."
+    shared, matches = result["shared"], plural(result["matches"], "match", "matches")
+    return f"{plural(shared, 'picture')} of {matches} share the position of their camera."
 
 
 def _painted(result: Json) -> str:
-    return f"The paint of {_many(result['read'], 'picture')} was read."
+    return f"The paint of {plural(result['read'], 'picture')} was read."
 
 
 def _proposed(result: Json) -> str:
     looked = result["proposed"] + result["unsure"] + result["nothing"]
     return (
-        f"{_many(looked, 'view')} looked at: {result['proposed']:,} proposed, "
+        f"{plural(looked, 'view')} looked at: {result['proposed']:,} proposed, "
         f"{result['unsure']:,} unsure, {result['nothing']:,} without a proposal."
     )
 
@@ -95,12 +96,8 @@ def _proposed(result: Json) -> str:
 def _pictures(result: Json) -> str:
     items = result["items"]
     proposed = sum(item["proposed"] is not None for item in items)
-    matches = _many(len(items), "match", "matches")
+    matches = plural(len(items), "match", "matches")
     return f"{matches} estimated, {proposed:,} with a proposal."
-
-
-def _many(count: int, one: str, several: str | None = None) -> str:
-    return f"{count:,} {one if count == 1 else several or f'{one}s'}"
 
 
 _ENDINGS: Mapping[str, Callable[[Json], str]] = {

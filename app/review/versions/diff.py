@@ -10,6 +10,7 @@ from statistics import median
 from typing import Any
 
 from app.errors import InputError
+from app.plural import plural
 from app.review.versions.version import Version, read_version
 from app.store.codecs import policy_to_json
 from app.store.session import Session
@@ -130,7 +131,7 @@ def read_changelog(session: Session, version: Version) -> list[str]:
     """``changelog`` within a session."""
     if version.previous is None:
         counts = version.counts
-        groups, balls = _groups(counts["groups"]), _count(counts["balls"], "ball")
+        groups, balls = _groups(counts["groups"]), plural(counts["balls"], "ball")
         return [f"First version: {groups}, {balls} in views."]
     return changelog_lines(read_diff(session, read_version(session, version.previous), version))
 
@@ -146,7 +147,7 @@ def changelog_lines(diff: VersionDiff) -> list[str]:
     if diff.moved:
         metres = [item.metres for item in diff.moved]
         lines.append(
-            f"{_count(len(metres), 'ball')} moved, by {median(metres):.3g} m in the median and "
+            f"{plural(len(metres), 'ball')} moved, by {median(metres):.3g} m in the median and "
             f"{metres[0]:.3g} m at most."
         )
     lines += [
@@ -240,8 +241,4 @@ def _whys(items: Sequence[Passage]) -> str:
 
 
 def _groups(count: int) -> str:
-    return _count(count, "group")
-
-
-def _count(count: int, what: str) -> str:
-    return f"1 {what}" if count == 1 else f"{count:,} {what}s"
+    return plural(count, "group")

@@ -1,0 +1,32 @@
+"""Counts in a sentence: one thing, or several."""
+
+from __future__ import annotations
+
+import pytest
+
+from app.plural import counted, plural
+
+
+class TestPlural:
+    def test_is_singular_for_one_thing_alone(self):
+        told = [plural(count, "group") for count in (0, 1, 2, 12764)]
+        assert told == ["0 groups", "1 group", "2 groups", "12,764 groups"]
+
+    def test_takes_the_words_of_several_where_an_s_is_not_all(self):
+        told = [plural(count, "view has", "views have") for count in (1, 2)]
+        assert told == ["1 view has", "2 views have"]
+
+
+class TestCounted:
+    @pytest.mark.parametrize(
+        ("name", "one"),
+        [
+            ("groups", "1 group"),
+            ("images_missing", "1 image missing"),
+            ("boxes", "1 box"),
+            ("views_without_ball", "1 view without ball"),
+        ],
+    )
+    def test_names_one_thing_in_the_singular(self, name, one):
+        assert counted(1, name) == one
+        assert counted(3, name) == f"3 {name.replace('_', ' ')}"
