@@ -10,6 +10,7 @@ import { finishSignOn } from '../api/sign_on.js';
 import { navigate, place } from '../lib/router.js';
 import { me, welcome } from '../state/me.js';
 import { FormError } from './form_error.js';
+import { EntryPage } from './login.js';
 import { OneField } from './second_factor.js';
 
 /** @import {SignOnAnswer} from '../api/sign_on.js' */
@@ -63,17 +64,14 @@ function useReturn() {
 export function SignOnPage() {
 	const { error, asked, again } = useReturn();
 	const main = useRef(/** @type {HTMLElement | null} */ (null));
-	useEffect(() => { document.title = 'Log in · Touchline'; }, []);
 	useEffect(() => { /** @type {HTMLElement | null | undefined} */ (main.current?.querySelector('input, a.button'))?.focus(); }, [asked, error]);
 	return html`
-		<main class="login" ref=${main}>
-			<section class="card" aria-labelledby="sign-on-title">
-				<p class="login__brand">Touchline</p>
-				<h1 id="sign-on-title">${asked ? 'One more step' : error ? 'You are not logged in' : 'Logging in…'}</h1>
+		<${EntryPage} title="Log in" heading=${asked ? 'One more step' : error ? 'You are not logged in' : 'Logging in…'}>
+			<div ref=${main}>
 				${asked ? html`<${OneField} id="sign-on-factor" label="Code of your second factor" button="Log in" name="factor" complete="one-time-code" error=${error} send=${again} />` : null}
 				${error && !asked ? html`<${FormError} error=${error} /><p><a class="button button--primary" href=${me.value ? '/account' : '/groups'}>${me.value ? 'Back to your account' : 'Back to the login'}</a></p>` : null}
 				${!error ? html`<p role="status">Checking your login with the provider.</p>` : null}
-			</section>
-		</main>
+			</div>
+		<//>
 	`;
 }
