@@ -63,7 +63,8 @@ export function JoinPage() {
 	const [error, setError] = useState(/** @type {ApiError | null} */ (null));
 	useEffect(() => {
 		history.replaceState(null, '', '/join');
-		lookAtLink(token || '-').then(setMeant, (problem) => {
+		// What no link ends with is answered like one that is not good any more.
+		lookAtLink(/^[\w-]{1,200}$/.test(token) ? token : '-').then(setMeant, (problem) => {
 			if (!(problem instanceof ApiError)) throw problem;
 			setError(problem);
 		});

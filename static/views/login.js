@@ -69,8 +69,10 @@ function PasskeyButton() {
 /** Every way in that there is here. @param {{name?: string}} props */
 function LoginForm({ name = '' }) {
 	const { password, sign_on: provider } = ways.value;
+	// A longer address is not kept for whoever comes back from the provider.
+	const to = () => (location.href.length < 2000 ? location.pathname + location.search : location.pathname.slice(0, 1000));
 	return html`
-		${provider ? html`<${SignOnButton} primary=${!password} begin=${() => beginSignOn({ to: location.pathname + location.search })}>Log in with ${provider}<//>` : null}
+		${provider ? html`<${SignOnButton} primary=${!password} begin=${() => beginSignOn({ to: to() })}>Log in with ${provider}<//>` : null}
 		${provider && password ? html`<p class="login__or">or</p>` : null}
 		${password ? html`<${PasswordForm} name=${name} /><${PasskeyButton} />` : null}
 	`;

@@ -24,13 +24,20 @@ const SAYS = /** @type {{[error: string]: {detail: string, hint: string}}} */ ({
 });
 const OTHERWISE = { detail: 'the provider refused the request of this server', hint: 'The operator of this server has to check its settings.' };
 
+/** Of what the address may say, characters: this server's own part, and the provider's. */
+const LONGEST_STATE = 200;
+const LONGEST = 4096;
+const STRANGE = { detail: 'this is no address to which the provider sends anybody', hint: 'Log in again.' };
+
 /** What the address says, which it then forgets. @returns {SignOnAnswer | ApiError | null} */
 function readAddress() {
 	const { search } = place.peek();
 	const [state, code, iss, error] = ['state', 'code', 'iss', 'error'].map((name) => search.get(name));
 	history.replaceState(null, '', '/login');
 	if (error) return new ApiError(400, SAYS[error] ?? OTHERWISE);
-	return state && code ? { state, code, ...(iss ? { iss } : {}) } : null;
+	if (!state || !code) return null;
+	if (state.length > LONGEST_STATE || code.length > LONGEST) return new ApiError(400, STRANGE);
+	return { state, code, ...(iss ? { iss } : {}) };
 }
 
 /** Ask the server, once, and again with the code of a second factor. */

@@ -221,6 +221,24 @@ class TestSessions:
         expect(again.get_by_text("Back at noon")).to_be_visible()
         in_store(team_home, lambda store: clear_banner(store, actor="local"))
 
+    def test_addresses_that_nobody_made_are_answered_in_plain_words(
+        self, open_page: OpenPage, team: str, console: Any
+    ) -> None:
+        console.expect(REFUSED)
+        console.expect("the server responded with a status of 404")
+        page = open_page("/groups", address=team)
+        for path, sentence in {
+            f"/join#{'x' * 300}": "This link is not good any more",
+            "/join#what%20is%20this?": "This link is not good any more",
+            f"/login?state={'x' * 300}&code=x": "This is no address to which the provider sends",
+            f"/login?state=x&code={'x' * 5000}": "This is no address to which the provider sends",
+            "/login?state=x&code=x": "That took too long, was answered before",
+            "/login?error=KeyError": "The provider refused the request of this server",
+        }.items():
+            page.goto("about:blank")
+            page.goto(f"{team}{path}")
+            expect(page.get_by_role("alert")).to_contain_text(sentence)
+
     def test_what_others_said_while_the_page_did_not_listen_yet_is_shown(
         self, open_page: OpenPage, team: str, team_home: Path, console: Any
     ) -> None:
