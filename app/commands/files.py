@@ -161,8 +161,13 @@ def export(
     everything: Annotated[
         bool, typer.Option("--all", help="Every group, failed and rejected too.")
     ] = False,
-    boxes: Annotated[BoxKind, typer.Option(help="Which ball box is written.")] = "optimized",
-    images: Annotated[PicturesWritten, typer.Option(help="What happens to frames.")] = "none",
+    boxes: Annotated[
+        BoxKind,
+        typer.Option(help="coco, parquet, soccernet-v3d and yolo: which ball box is written."),
+    ] = "optimized",
+    images: Annotated[
+        PicturesWritten, typer.Option(help="What happens to frames; touchline holds none.")
+    ] = "none",
     views: Annotated[
         TrainingViews, typer.Option(help="coco and yolo: balls that no other view confirms, too?")
     ] = "valid",
