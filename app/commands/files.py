@@ -68,6 +68,14 @@ def import_(
         str,
         typer.Option(metavar="NAME", help="COCO: the category that is the ball; default: by name."),
     ] = "",
+    group_by: Annotated[
+        str,
+        typer.Option(
+            metavar="folder|PATTERN",
+            help="frames: which pictures are one group, by folder or by a pattern of their names, "
+            "{instant}_{camera}.jpg; default: each is one.",
+        ),
+    ] = "",
     policy: Annotated[
         str | None,
         typer.Option(
@@ -102,6 +110,7 @@ def import_(
             "flipped": sorted(parse_cameras(flip)),
             "size": None if size is None else [size.width, size.height],
             **({"ball_category": ball_category} if ball_category else {}),
+            **({"grouping": group_by} if group_by else {}),
         }
         with connected(server) as client, show_progress("Importing") as progress:
             values, nothing = remote_files.import_values(
@@ -128,6 +137,7 @@ def import_(
         flipped=parse_cameras(flip),
         frames=None if frames is None else _root(settings, frames),
         ball_category=ball_category,
+        grouping=group_by,
     )
     source.check(policy=policy is not None)
     chosen = read_policy_option(policy or "paper")

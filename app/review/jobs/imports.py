@@ -45,7 +45,7 @@ class ImportRequest:
         lines: The same for ISSIA's line files, or None.
         frames: The same for a list of frames, or None.
         options: ``calibration``, ``frame_offset``, ``flipped``, ``size`` ([width, height]),
-            ``ball_category``.
+            ``ball_category``, ``grouping``.
         policy: Name of a shipped one for a dataset that is made; None: as its pictures suggest.
     """
 
@@ -235,6 +235,7 @@ def source_of(settings: Settings, request: ImportRequest) -> Source:
         flipped=frozenset(options.get("flipped", ())),
         name=name,
         ball_category=options.get("ball_category", ""),
+        grouping=options.get("grouping", ""),
     )
     source.check(policy=request.policy is not None)
     return source

@@ -77,9 +77,7 @@ class TestReadJson:
         text = json.dumps("{'a': [nan, -inf, 1.5], 'b': 'nan'}").encode()
         value = read_json(text, "f", report=report, double_encoded=True)
         assert value == {"a": [None, None, 1.5], "b": "nan"}
-        assert report.remarks == [
-            "f: 2 numbers are not finite (nan, inf); read as missing"
-        ]
+        assert report.remarks == ["f: 2 numbers are not finite (nan, inf); read as missing"]
         for bad in ("{'a': nan, 'b': open('x')}", "[nan, x]", "[nan.real]", "-nan()"):
             with pytest.raises(DatasetFormatError, match="neither JSON nor"):
                 read_json(json.dumps(bad).encode(), "f", report=report, double_encoded=True)
