@@ -51,7 +51,7 @@ class IngestReport:
 
     Attributes:
         changed: Groups, and static cameras that many groups share.
-        findings: Edits that a changed source met.
+        findings: Edits that a changed source met, and pictures of another shape than declared.
         without_picture: Groups of which no view has a picture.
         missing: Groups that this source brought before and does not bring any more; they stay.
         problems: What to tell about single groups, or about the missing ones.

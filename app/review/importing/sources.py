@@ -342,6 +342,10 @@ def import_source(
         told=report,
     )
     result.problems += check.remarks()
+    if dry_run or not result.new + result.changed + result.unchanged:
+        result.findings += len(check.found)
+    else:
+        result.findings += check.note(store, dataset)
     if folder is not None and not dry_run:
         ingest_spare(store, dataset, _spare(folder), source=source.label, actor=actor)
     if source.format not in BALLS_ELSEWHERE and (sentence := tally.without_ball()):
