@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 
+from app.plural import plural
 from app.soccer.finding import UNUSABLE_SIGMA_M, Finding, Fix
 from app.soccer.group import Group, View, view_letter
 from app.soccer.pitch import Pitch
@@ -258,10 +259,9 @@ def _views_contradict(item: Contradiction, group: Group, ball: Ball3D | None) ->
     """Views that pass tau and are still farther apart than their uncertainty lets them be."""
     found = item.chi_square
     one = "The two views do" if len(found.views) == 2 else "The views do"
-    degrees = "degree" if found.freedom == 1 else "degrees"
     sentences = [
         f"{one} not show one ball: consistent views have residuals as large as these "
-        f"(χ² {found.value:,.1f}, {found.freedom} {degrees} of freedom) in only "
+        f"(χ² {found.value:,.1f}, {plural(found.freedom, 'degree')} of freedom) in only "
         f"{chance(found.p_value)}."
     ]
     if ball is not None and item.widening > 1:

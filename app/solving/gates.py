@@ -9,6 +9,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import floor, isnan, log10
 
+from app.plural import plural
 from app.soccer.policy import Policy
 from app.soccer.solution import GATES, Ball3D, Calibration, ChiSquare, Gate, Pair, margin_of
 from app.solving.chi_square import LOW_P_VALUE
@@ -199,7 +200,7 @@ def _ball(group: _Group) -> Gate:
     without = [view for view in group.left if not view.has_ball]
     count = len(group.left) - len(without)
     passed = "ball" not in group.failed
-    sentence = f"in {count} {'view' if count == 1 else 'views'}"
+    sentence = f"in {plural(count, 'view')}"
     for why in dict.fromkeys(view.no_ball for view in without):
         alike = _letters([view for view in without if view.no_ball == why])
         sentence += f", {why.format(alike)}"

@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, field
 
+from app.plural import plural
 from app.progress import TellProgress
 from app.review.datasets.dataset import (
     DatasetHead,
@@ -71,7 +72,7 @@ def outcome_sentence(solved: int, passed: int, errors: int) -> str:
         '52 pass, 8 do not; 1 error'
     """
     rest = solved - passed
-    return f"{passed} pass, {rest} do not; {errors} error{'' if errors == 1 else 's'}"
+    return f"{passed} pass, {rest} do not; {plural(errors, 'error')}"
 
 
 @dataclass(frozen=True)

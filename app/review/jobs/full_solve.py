@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from concurrent.futures import Executor
 
+from app.plural import plural
 from app.progress import TellProgress
 from app.review.datasets.dataset import get_dataset_head
 from app.review.editing.pitches import estimate_pitches, stale_matches
@@ -43,7 +44,7 @@ def left_undone(store: Store, dataset: str | int) -> str | None:
     groups, matches = len(stale_groups(store, dataset)), len(stale_matches(store, dataset))
     if groups:
         return f"{groups} are left to do"
-    many = "1 match" if matches == 1 else f"{matches} matches"
+    many = plural(matches, "match", "matches")
     return f"the pitch of {many} is left to estimate" if matches else None
 
 

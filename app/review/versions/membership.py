@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any, get_args
 
 from app.errors import ConflictError
+from app.plural import plural
 from app.soccer.choices import VersionRule
 from app.store.session import Session
 from app.store.stored_json import Json
@@ -59,7 +60,7 @@ def require_solved(candidates: Sequence[Candidate], dataset: str) -> None:
     """Raise ConflictError where groups that might enter have no solution of this solver."""
     count = sum(item.unsolved for item in candidates)
     if count:
-        groups = "1 group waits" if count == 1 else f"{count} groups wait"
+        groups = plural(count, "group waits", "groups wait")
         raise ConflictError(
             f"{groups} to be solved and might enter the version",
             hint=f'The server solves them when it starts; touchline solve --dataset "{dataset}" '
