@@ -8,7 +8,7 @@ import { ballName, ballTold } from '../geometry/estimator.js';
 import { pathFromAbove, pitchMarkings } from '../geometry/pitch.js';
 import { ballCenter, ballOf } from '../geometry/preview.js';
 import { clipSegment, spreadApart, within as inBox } from '../geometry/spread.js';
-import { fixed } from '../lib/format.js';
+import { degrees, metres } from '../lib/format.js';
 import { useSize } from '../lib/hooks.js';
 import { groupDocument, isPreview } from '../state/group.js';
 import { cycleEstimator, estimator } from '../state/workspace.js';
@@ -155,11 +155,11 @@ function Numbers({ solution }) {
 	const [x, y] = ball.point;
 	return html`
 		<dl class="mini-pitch__numbers">
-			<div><dt>x</dt><dd data-number="x">${fixed(x, 2, ' m')}</dd></div>
-			<div><dt>y</dt><dd data-number="y">${fixed(y, 2, ' m')}</dd></div>
-			<div><dt>height</dt><dd data-number="height">${fixed(ball.height_m, 2, ' m')}</dd></div>
-			<div><dt>σ</dt><dd data-number="sigma">${fixed(ball.sigma_m, 2, ' m')}</dd></div>
-			<div><dt title="Parallax: angle between the rays">β</dt><dd data-number="parallax">${fixed(ball.parallax_degrees, 1, '°')}</dd></div>
+			<div><dt>x</dt><dd data-number="x">${metres(x)}</dd></div>
+			<div><dt>y</dt><dd data-number="y">${metres(y)}</dd></div>
+			<div><dt>height</dt><dd data-number="height">${metres(ball.height_m)}</dd></div>
+			<div><dt>σ</dt><dd data-number="sigma">${metres(ball.sigma_m)}</dd></div>
+			<div><dt title="Parallax: angle between the rays">β</dt><dd data-number="parallax">${degrees(ball.parallax_degrees)}</dd></div>
 		</dl>
 	`;
 }

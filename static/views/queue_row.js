@@ -3,7 +3,7 @@
 
 import { html } from 'htm/preact';
 
-import { fixed, marginText, pixels, words } from '../lib/format.js';
+import { degrees, fixed, marginText, pixels, words } from '../lib/format.js';
 import { navigate } from '../lib/router.js';
 import { reviewAddress } from '../state/navigation.js';
 import { activeRow } from '../state/queue.js';
@@ -96,7 +96,7 @@ function Cells({ row, index, q, painted, active, ticked }) {
 		${painted ? html`<div role="gridcell" class="queue-cell" data-numeric="true" data-number="agreement">${fixed(row.agreement, 2)}</div>` : null}
 		<div role="gridcell" class="queue-cell" data-numeric="true">${pixels(row.error_px)}</div>
 		<div role="gridcell" class="queue-cell" data-numeric="true">${fixed(row.sigma_m, 2)}</div>
-		<div role="gridcell" class="queue-cell" data-numeric="true">${fixed(row.parallax_degrees, 0, '°')}</div>
+		<div role="gridcell" class="queue-cell" data-numeric="true">${degrees(row.parallax_degrees)}</div>
 		<div role="gridcell" class="queue-cell" data-numeric="true">${fixed(row.size_ratio, 2)}</div>
 		<div role="gridcell" class="queue-cell" data-numeric="true">${row.views}</div>
 		<div role="gridcell" class="queue-cell" data-narrow="true">${row.split || '–'}</div>
