@@ -24,6 +24,8 @@ class Candidate:
     """A group that may enter a version.
 
     Attributes:
+        split: As its dataset gives it.
+        views: Keys of its views.
         why: Why it does not; None: it does.
         verdict: State, reason, note and override; None where nobody decided.
         unsolved: It might enter, and nobody knows while it has no solution.
@@ -33,6 +35,7 @@ class Candidate:
     key: str
     match: str
     split: str
+    views: tuple[str, ...]
     why: str | None
     verdict: Json
     unsolved: bool
@@ -75,6 +78,7 @@ def _candidate(row: Any, rule: str) -> Candidate:
         key=row.key,
         match=row.match,
         split=row.split,
+        views=tuple(row.view_keys.strip(",").split(",")),
         why=why,
         verdict=_verdict(row),
         unsolved=why == UNSOLVED,
