@@ -51,12 +51,19 @@ other processes a chunk is what Ctrl+C has to wait for."""
 
 @dataclass
 class SolveReport:
-    """What was done; ``failed`` are groups whose solving itself broke, with the reason."""
+    """What was done; ``failed`` are groups whose solving itself broke, with the reason.
+
+    Attributes:
+        estimated: Matches whose pitch was estimated.
+        proposed: Matches of the dataset for which another pitch is proposed, then.
+    """
 
     total: int = 0
     solved: int = 0
     passed: int = 0
     failed: list[tuple[str, str]] = field(default_factory=list)
+    estimated: int = 0
+    proposed: int = 0
 
     @property
     def sentence(self) -> str:

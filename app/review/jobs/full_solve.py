@@ -34,8 +34,14 @@ def solve_fully(
     report = solve_dataset(store, dataset, executor, progress, stop)
     total = report.total
     if not stop():
-        # It stays at the groups that are solved, and can be ended all the same.
-        estimate_pitches(store, dataset, executor, lambda *_: progress(total, total), stop)
+
+        def estimated(done: int, _total: int | None = None, _said: str = "") -> None:
+            report.estimated = done
+            # It stays at the groups that are solved, and can be ended all the same.
+            progress(total, total)
+
+        found = estimate_pitches(store, dataset, executor, estimated, stop)
+        report.proposed = len(found.proposals)
     return report
 
 

@@ -44,6 +44,8 @@ class TestRequestSolve:
             "passed": 1,
             "failed": 0,
             "failures": [],
+            "estimated": 1,
+            "proposed": 0,
         }
         assert (done.done, done.total) == (2, 2)
         assert done.sentence == "2 groups solved: 1 pass, 1 do not; 0 errors."
