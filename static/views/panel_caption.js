@@ -7,7 +7,7 @@ import { GLYPHS } from '../geometry/residual.js';
 import { pixelText } from '../lib/format.js';
 import { overlaysHidden } from '../state/workspace.js';
 import { otherShape } from './frame.js';
-import { errorOf, FROM, gradeOfView, jacOf } from './view_state.js';
+import { errorOf, gradeOfView, jacOf } from './view_state.js';
 import { Letter } from './letter.js';
 
 /** @import {ViewPicture} from '../overlays/scene.js' */
@@ -32,7 +32,7 @@ export function PanelCaption({ picture, frame }) {
 			<span class="caption__state" data-grade=${grade}>
 				<span aria-hidden="true">${GLYPHS[grade]}</span> ${sentence}
 				${jac !== null ? html`<span data-number="jac">${sentence ? ' · ' : ''}JaC ${jac.toFixed(2)}</span>` : null}
-				${error.px === null ? null : html`<span data-number="error" title=${`Error of the ball ${FROM[error.from]}`}> · ball ${pixelText(error.px)}${SHORT[error.from]}</span>`}
+				${error.px === null ? null : html`<span data-number="error"> · ball ${pixelText(error.px)}${SHORT[error.from]}</span>`}
 			</span>
 			${shape ? html`<span class="caption__state" data-grade="warn" title=${shape}>! other shape</span>` : null}
 		</figcaption>

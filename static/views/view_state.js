@@ -77,7 +77,7 @@ export function gradeOfView(picture) {
 }
 
 /** What an error of the ball in a view is measured from. */
-export const FROM = { ball: 'from the 3D ball', pair: 'in its best pair', others: 'from the 3D ball of the others' };
+const FROM = { ball: 'from the 3D ball', pair: 'in its best pair', others: 'from the 3D ball of the others' };
 
 /**
  * The ball's error in a view: to the 3D ball, or where the view agrees with no other, in its best pair.
@@ -94,12 +94,13 @@ export function errorOf({ view, solved, ball, apart }) {
 /**
  * Both errors of a view that the 3D ball does without, so that neither is taken for the other; '' of one that it is made of.
  *
- * @param {Pick<ViewPicture, 'solved' | 'ball' | 'apart'>} picture
+ * @param {Pick<ViewPicture, 'solved' | 'ball' | 'apart' | 'tau'>} picture
  */
-export function unusedErrors({ solved, ball, apart }) {
+export function unusedErrors({ solved, ball, apart, tau }) {
 	const far = ball?.error_px ?? null;
 	if (!solved || solved.included || far === null) return '';
-	return `${apart === null ? '' : `${pixelText(apart)} ${FROM.pair}, `}${pixelText(far)} ${FROM.others}`;
+	const counts = apart !== null && apart <= tau ? ', which does not count' : '';
+	return `${apart === null ? '' : `${pixelText(apart)} ${FROM.pair}${counts}; `}${pixelText(far)} ${FROM.others}`;
 }
 
 /** @param {ViewPicture} picture @param {PolicyJson} policy */

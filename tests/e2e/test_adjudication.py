@@ -65,7 +65,7 @@ def test_two_who_agree_without_a_verdict_are_told_alike_by_queue_and_agreement(
     group = passing(page, 2)
     store = Store.open(Settings(home=home))
     try:
-        for person in ("cid", "dot"):
+        for person in ("kim", "lou"):
             take = begin_take(store, group, person=person)
             hand_in(store, take.id, actor=person)
             came_to = after_hand_in(store, take.copy_id)
@@ -77,11 +77,11 @@ def test_two_who_agree_without_a_verdict_are_told_alike_by_queue_and_agreement(
     expect(row.locator(".pill").last).to_contain_text("agreed, no verdict")
     page.goto("/datasets/sample/agreement")
     groups = page.get_by_role("region", name="Groups, the worst first", exact=True)
-    expect(groups.get_by_role("row").filter(has_text="cid")).to_contain_text("agreed, no verdict")
+    expect(groups.get_by_role("row").filter(has_text="kim")).to_contain_text("agreed, no verdict")
     takes = page.get_by_role("region", name="Independent annotations").get_by_role("row")
     found = page.request.get(f"/api/v1/groups?dataset=sample&q=id:{group}").json()
     number = found["items"][0]["number"]
-    for person in ("cid", "dot"):
+    for person in ("kim", "lou"):
         one = takes.filter(has_text=person)
         expect(one).to_contain_text("done")
         expect(one.get_by_role("link")).to_have_text(re.compile(rf"^{number} · "))

@@ -55,7 +55,8 @@ describe('errors of a view that is not used', () => {
 	const unused = (more) => picture({ error: 223, solved: { included: false }, ...more });
 
 	it('say what they are measured from, before and after the view is left out', () => {
-		assert.equal(unusedErrors(unused({ apart: 31.8 })), '31.8 px in its best pair, 223 px from the 3D ball of the others');
+		assert.equal(unusedErrors(unused({ apart: 31.8 })), '31.8 px in its best pair; 223 px from the 3D ball of the others');
+		assert.equal(unusedErrors(unused({ apart: 9 })), '9.0 px in its best pair, which does not count; 223 px from the 3D ball of the others');
 		assert.equal(unusedErrors(unused({ view: { included: false } })), '223 px from the 3D ball of the others');
 		assert.equal(errorOf(unused({ apart: 31.8 })).from, 'pair');
 		assert.equal(errorOf(unused()).from, 'others');
