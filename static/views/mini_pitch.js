@@ -12,6 +12,7 @@ import { degrees, metres } from '../lib/format.js';
 import { useSize } from '../lib/hooks.js';
 import { groupDocument, isPreview } from '../state/group.js';
 import { cycleEstimator, estimator } from '../state/workspace.js';
+import { uncertainViews } from './view_state.js';
 
 /** @import {GroupDocument, SolutionJson, ViewJson} from '../api/types.js' */
 /** @import {Camera, PitchPoint} from '../geometry/camera.js' */
@@ -109,6 +110,7 @@ function Drawing({ group, solution }) {
 	// One unit of the drawing is a metre; marks keep their size on screen.
 	const pixel = Math.max(frame.width / Math.max(1, size.width), frame.height / Math.max(1, size.height));
 	const ball = solution.ball?.point;
+	const guessed = new Set(uncertainViews(group, solution).filter(({ guess }) => guess.includes('position')).map(({ view }) => view.letter));
 	const [l, w] = [group.pitch.length, group.pitch.width];
 	const rim = (MARK + 1) * pixel;
 	const room = {
@@ -137,7 +139,8 @@ function Drawing({ group, solution }) {
 				${cameras.map(({ letter }, i) => {
 					const { x, y } = marks[i];
 					return html`
-						<g class="mini-pitch__camera" data-letter=${letter}>
+						<g class="mini-pitch__camera" data-letter=${letter} data-uncertain=${guessed.has(letter)}>
+							${guessed.has(letter) ? html`<title>The lines of ${letter} do not determine where its camera stands</title>` : null}
 							<circle cx=${x} cy=${y} r=${MARK * pixel} />
 							<text x=${x} y=${y} dy=${3.6 * pixel} font-size=${10 * pixel}>${letter}</text>
 						</g>`;

@@ -163,6 +163,8 @@ class TestSayingOneThing:
         gate = page.locator('[data-gate="calibratable"]')
         expect(gate).to_have_attribute("data-state", "doubt")
         expect(gate).to_contain_text("in 4 of 4 views, B uncertain")
+        uncertain = page.locator('.mini-pitch__camera[data-uncertain="true"]')
+        expect(uncertain).to_have_attribute("data-letter", "B")
         expect(page.locator('[data-remark="B"]')).to_contain_text(
             "uncertain camera: its lines do not determine the position"
         )
