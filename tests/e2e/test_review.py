@@ -140,7 +140,9 @@ class TestSayingOneThing:
         screen.ready()
         told = page.locator('[data-unused="D"]')
         expect(told).to_have_text(
-            re.compile(r"not used: \S+ px in its best pair.*; \S+ px from the 3D ball of the others")
+            re.compile(
+                r"not used: \S+ px in its best pair.*; \S+ px from the 3D ball of the others"
+            )
         )
         far = (told.inner_text().split("; ")[-1]).removesuffix(" of the others")
         box = page.get_by_label("Include view D")

@@ -163,7 +163,7 @@ def _clock(session: Session) -> Check:
     count, latest = entries_after(session, text_of(now + timedelta(minutes=5)))
     if count == 0:
         return Check("clock", True, "not behind the log")
-    sentence = f"{count:,} entries of the log are later than the clock, which says {text_of(now)}; the latest is of {latest}"
+    sentence = f"{plural(count, 'entry of the log is', 'entries of the log are')} later than the clock, which says {text_of(now)}; the latest is of {latest}"
     last = last_time(session)
     if last is not None and datetime.fromisoformat(last) > now + timedelta(minutes=5):
         return Check("clock", False, sentence, "Set the clock of this machine.")
