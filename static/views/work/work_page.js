@@ -8,7 +8,7 @@ import { getMyWork } from '../../api/work.js';
 import { useAttempt } from '../../lib/attempt.js';
 import { plural } from '../../lib/format.js';
 import { useResource } from '../../lib/resource.js';
-import { dataset, datasets } from '../../state/datasets.js';
+import { dataset, datasets, loadDatasets } from '../../state/datasets.js';
 import { goOn } from '../../state/leases.js';
 import { isTeam } from '../../state/me.js';
 import { reviewAddress } from '../../state/navigation.js';
@@ -64,6 +64,8 @@ function Mine({ items }) {
 
 export function WorkPage() {
 	const mine = useResource((signal) => getMyWork(signal), []);
+	// Whether groups are hidden follows from the work that is assigned.
+	useEffect(() => { loadDatasets(); }, []);
 	return html`
 		<${PageFrame} current="work" title="My work" where=${html`<strong>My work</strong>`}>
 			${mine.error ? html`<${Trouble} title="Your work cannot be shown" error=${mine.error} retry=${mine.reload} />` : null}
