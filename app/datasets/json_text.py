@@ -13,6 +13,7 @@ import numpy as np
 
 from app.datasets.report import Report
 from app.errors import DatasetFormatError
+from app.plural import plural
 
 NanRule = Literal["refuse", "keep"]
 MAX_BYTES = 256 * 1024 * 1024
@@ -180,7 +181,7 @@ def _literal_without_infinite(text: str, path: str, record: str | None, report: 
     missing = _Missing()
     value = ast.literal_eval(missing.visit(ast.parse(text, mode="eval")))
     if missing.count:
-        numbers = "1 number is" if missing.count == 1 else f"{missing.count:,} numbers are"
+        numbers = plural(missing.count, "number is", "numbers are")
         _remark(report, path, record, None, f"{numbers} not finite (nan, inf)")
     return value
 

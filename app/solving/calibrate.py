@@ -13,6 +13,7 @@ from app.errors import DegenerateGeometryError
 from app.geometry.arrays import FloatArray, row_by_row
 from app.geometry.camera import Camera
 from app.geometry.resection import LOG_FOCAL, PARAMETERS, X, Z
+from app.plural import plural
 from app.soccer.annotation import Lines
 from app.soccer.frames import ImagePoint, ImageSize
 from app.soccer.group import Group, SharedPosition, Station, View
@@ -80,7 +81,7 @@ def calibrate(
     if measurements < MIN_MEASUREMENTS:
         count = len(observations.markings)
         reason = (
-            f"{count} {'marking gives' if count == 1 else 'markings give'} {measurements} "
+            f"{plural(count, 'marking gives', 'markings give')} {measurements} "
             f"independent measurements, a camera needs {MIN_MEASUREMENTS}"
         )
         return Calibration("lines", None, reason=reason)

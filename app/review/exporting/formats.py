@@ -27,6 +27,7 @@ from app.datasets.soccernet_v3d_writer import write_soccernet_v3d
 from app.datasets.view_files import PutText
 from app.datasets.yolo_writer import write_yolo
 from app.errors import InputError
+from app.plural import plural
 from app.soccer.group import Group
 
 FORMATS: tuple[str, ...] = get_args(ExportFormat)
@@ -211,7 +212,7 @@ def lacking(format: str, counts: Mapping[str, int]) -> str | None:  # noqa: A002
     missing = counts.get("images_missing", 0)
     if format != "yolo" or not missing:
         return None
-    images = "1 image is" if missing == 1 else f"{missing:,} images are"
+    images = plural(missing, "image is", "images are")
     return f"{images} not in this export; frames.csv names their places"
 
 

@@ -27,6 +27,7 @@ from app.datasets.sn_calibration_reader import read_sn_calibration
 from app.datasets.soccernet_v3_reader import read_soccernet_v3
 from app.datasets.soccernet_v3d_reader import read_soccernet_v3d
 from app.errors import DatasetFormatError, InputError
+from app.plural import plural
 from app.progress import TellProgress
 from app.review.importing.cameras import ingest_cameras
 from app.review.importing.ingest import IngestReport, ingest
@@ -92,7 +93,7 @@ class BallTally:
             f'"{name[:40]}" ({count:,})' for name, count in self.classes.most_common(12)
         )
         boxes = f"; its boxes are of {most}" if most else ""
-        groups = "the 1 group" if self.groups == 1 else f"any of {self.groups:,} groups"
+        groups = f"{'the' if self.groups == 1 else 'any of'} {plural(self.groups, 'group')}"
         return f"no ball was read from {groups}{boxes}"
 
 

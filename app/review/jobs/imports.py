@@ -9,6 +9,7 @@ from typing import Any
 from app.config import Settings
 from app.datasets.file_tree import Root
 from app.errors import InputError
+from app.plural import plural
 from app.progress import TellProgress
 from app.review.answers.keep import Keep, keep_nothing
 from app.review.datasets.dataset import get_dataset_head
@@ -178,7 +179,7 @@ def _following(
 def _step(progress: JobProgress, sentence: str) -> TellProgress:
     def step(done: int, _total: int | None = None, said: str = "") -> None:
         more = f" {said}" if said else ""
-        progress(done, None, f"{sentence}{more} {done:,} groups so far.")
+        progress(done, None, f"{sentence}{more} {plural(done, 'group')} so far.")
 
     return step
 
