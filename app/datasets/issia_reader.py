@@ -13,6 +13,7 @@ from app.datasets.file_tree import DEFAULT_LIMITS, FileTree, Limits, Root
 from app.datasets.folder_tree import FolderTree
 from app.datasets.frame_names import IMAGE_SUFFIXES, VIDEO_SUFFIXES
 from app.datasets.issia import CALIBRATION, DEFAULT_OFFSET, DEFAULT_SIZE, MATCH, FramePersons
+from app.datasets.issia_people import mirrored_people, turned
 from app.datasets.report import Report
 from app.datasets.sn_calibration import LineFile
 from app.datasets.sn_calibration_reader import line_files_of, read_line_files
@@ -181,6 +182,15 @@ def complete(
     for camera, size in sizes.items():
         station = _station(camera, given.get(camera), lines.get(camera), options, size)
         found.stations[camera] = station
+    widths = {camera: size.width for camera, size in sizes.items()}
+    mirrored = mirrored_people(found.tracks, given, widths)
+    for camera in mirrored:
+        found.tracks[camera] = turned(found.tracks[camera], widths[camera])
+    if mirrored:
+        report.remark(
+            f"People of {' and '.join(f'cam{camera}' for camera in mirrored)} are turned left to "
+            "right: ISSIA's files hold them mirrored, and the balls as the cameras see them."
+        )
     _tell_unused(found, {"camera": list(given), "line file": list(drawn)}, report)
 
 
