@@ -6,10 +6,12 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from PIL import Image
 from sqlalchemy import select
 
+from app.datasets import issia_people
 from app.datasets.cameras_writer import write_cameras
 from app.datasets.soccernet_v3_writer import write_soccernet_v3
 from app.errors import InputError
@@ -28,6 +30,7 @@ from app.soccer.group import Group
 from app.store.store import Store
 from app.store.tables.groups import GroupModel
 from app.store.tables.log import LogModel
+from tests.unit.datasets.test_issia_people import issia_folder
 
 SIZE = ImageSize(1280, 720)
 Fill = Callable[..., list[int]]
@@ -454,3 +457,34 @@ class TestCheck:
         with pytest.raises(InputError, match="coco does not use --size"):
             import_source(store, "new", source, store.settings)
         assert list_datasets(store) == []
+
+
+class TestMirroredPeople:
+    """People of ISSIA's camera 2, who are mirrored in its files (``datasets.issia_people``)."""
+
+    def test_importing_again_mends_a_dataset_of_before_and_turns_nobody_twice(
+        self, store: Store, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        source = Source("issia", issia_folder(tmp_path / "issia"))
+
+        def people() -> list[list[float]]:
+            (group,) = groups_of(store, "old").values()
+            view = group.view("cam2")
+            assert view is not None
+            dataset = get_dataset(store, "old").id
+            with store.read() as session:
+                spare = [one for one in spare_frames(session, dataset) if one.camera == "cam2"]
+            every = (view.extras, *(one.extras for one in spare))
+            return [[box["points"]["x1"] for box in extras.boxes] for extras in every]
+
+        with monkeypatch.context() as before:
+            before.setattr(issia_people, "MIRRORED", frozenset())
+            import_source(store, "old", source, store.settings)
+        mirrored = people()
+        again = import_source(store, "old", source, store.settings)
+        assert again.result.changed == 1
+        right = [[1920 - 20.0 - x for x in frame] for frame in mirrored]
+        assert np.array(people()) == pytest.approx(np.array(right))
+        third = import_source(store, "old", source, store.settings)
+        assert (third.result.changed, third.result.unchanged) == (0, 1)
+        assert np.array(people()) == pytest.approx(np.array(right))
