@@ -48,14 +48,15 @@ class IssiaOptions:
             by camera.
         flipped: Cameras whose frames are mirrored; annotations and calibration are not.
         lines: Folder (or zip) of ``cam1.json`` .. with the field lines of the static cameras.
-        calibration: What counts for a camera that has both: ``given`` or ``lines``.
+        calibration: What counts for a camera that has both: ``lines``, or ``given``, and its lines are
+            left aside; None: the given one, which is measured by its lines.
         size: Size of the annotated images; None: as the XGTF file says, else ISSIA's.
     """
 
     frame_offset: int | Mapping[int, int] = DEFAULT_OFFSET
     flipped: frozenset[int] = frozenset()
     lines: Root | None = None
-    calibration: str = "given"
+    calibration: str | None = None
     size: ImageSize | None = None
 
     def size_of(self, track: ViperTrack) -> ImageSize:
@@ -353,13 +354,14 @@ def _station(
     options: IssiaOptions,
     size: ImageSize,
 ) -> Station:
+    left_aside = options.calibration == "given" and given is not None
     return Station(
         key=f"cam{camera}",
         size=size,
         shared=True,
-        lines=lines.lines if lines else {},
+        lines=lines.lines if lines and not left_aside else {},
         given=given,
-        calibration=options.calibration,
+        calibration=options.calibration or "given",
         flipped=camera in options.flipped,
     )
 

@@ -23,10 +23,12 @@ def _solved(result: Json) -> str:
     if not result["solved"] and not result["failed"]:
         return "Nothing was left to solve."
     passed, rest = result["passed"], result["solved"] - result["passed"]
+    gates = ", ".join(f"{gate} {count:,}" for gate, count in result.get("failing", {}).items())
+    why = f" (first failing gate: {gates})" if gates else ""
     return (
-        f"{plural(result['solved'], 'group')} solved: {passed:,} pass, {rest:,} do not; "
-        f"{plural(result['failed'], 'error')}."
-    )
+        f"{plural(result['solved'], 'group')} solved: {passed:,} pass, {rest:,} do not{why}; "
+        f"{plural(result['failed'], 'error')}. {result.get('advice', '')}"
+    ).rstrip()
 
 
 def _imported(result: Json) -> str:

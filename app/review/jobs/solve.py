@@ -208,4 +208,6 @@ def _report(report: SolveReport) -> Json:
         "passed": report.passed,
         "failed": len(report.failed),
         "failures": named,
+        "failing": dict(report.failing),
+        "advice": report.advice,
     }
