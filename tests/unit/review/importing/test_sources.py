@@ -459,6 +459,65 @@ class TestCheck:
         assert list_datasets(store) == []
 
 
+class TestLinesOfAnotherDay:
+    """Lines of static cameras that do not fit the cameras that were given."""
+
+    @pytest.fixture
+    def source(self, tmp_path: Path) -> Source:
+        """Two cameras, both given, and lines that were drawn before they were moved."""
+        folder, lines = issia_folder(tmp_path / "issia"), tmp_path / "lines"
+        lines.mkdir()
+        for name in ("cam1", "cam2"):
+            points = [{"x": 100.0 + 90 * n, "y": 900.0 - 7 * n * n} for n in range(9)]
+            drawn = {"Middle line": points[:4], "Side line top": points[4:]}
+            (lines / f"{name}.json").write_text(json.dumps(drawn))
+        return Source("issia", folder, lines=lines)
+
+    def test_import_and_solve_say_what_does_not_pass_and_how_to_take_the_given(
+        self, store: Store, source: Source
+    ) -> None:
+        imported = import_source(store, "old", source, store.settings)
+        (told,) = [text for text in imported.report.remarks if "do not fit" in text]
+        assert told.startswith(
+            "The lines of cam1, cam2 do not fit the given cameras (JaC 0.00): 1 of 1"
+        )
+        assert (
+            f"`touchline import issia {source.path} --dataset old --lines {source.lines} "
+            "--calibration given` takes the given cameras"
+        ) in told
+        solved = solve_dataset(store, "old")
+        assert (solved.passed, solved.failing) == (0, {"jac": 1})
+        assert (
+            "0 pass, 1 do not (first failing gate: jac 1); 0 errors. The lines of"
+            in solved.sentence
+        )
+        assert "1 of 1 groups fail first at the gate jac" in solved.sentence
+        assert "importing the files again with `--calibration given`" in solved.sentence
+
+    def test_given_asked_for_leaves_them_aside_also_those_of_before(
+        self, store: Store, source: Source
+    ) -> None:
+        import_source(store, "old", source, store.settings)
+        given = replace(source, calibration="given")
+        for name in ("old", "new"):
+            imported = import_source(store, name, given, store.settings)
+            assert not [text for text in imported.report.remarks if "do not fit" in text]
+            solved = solve_dataset(store, name)
+            assert (solved.solved, solved.failing["jac"], solved.advice) == (1, 0, "")
+            (group,) = groups_of(store, name).values()
+            assert [(view.station.lines, view.station.calibration) for view in group.views] == [
+                ({}, "given"), ({}, "given"),
+            ]  # fmt: skip
+
+    def test_without_the_option_lines_of_an_earlier_import_stay(
+        self, store: Store, source: Source
+    ) -> None:
+        import_source(store, "old", source, store.settings)
+        import_source(store, "old", replace(source, lines=None), store.settings)
+        (group,) = groups_of(store, "old").values()
+        assert all(view.station.lines for view in group.views)
+
+
 class TestMirroredPeople:
     """People of ISSIA's camera 2, who are mirrored in its files (``datasets.issia_people``)."""
 
