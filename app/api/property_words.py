@@ -16,6 +16,7 @@ PARAMETERS: Mapping[str, str] = {
     "evaluation": "Id of the evaluation.",
     "export": "Id of the export, which is that of its job.",
     "figure": "Name of the figure.",
+    "goal": "Which line of a goal lines are fitted to: `inner` edges or `middle` of posts and bar.",
     "group": "Id of the group.",
     "high": "Only frames whose value is at most this.",
     "job": "Id of the job.",
