@@ -13,7 +13,7 @@ from app.geometry.sphere import tight_box
 from app.sample.instant import BALL_DIAMETER, HALF_LENGTH, Instant
 from app.sample.look import Colour
 from app.sample.patch import Image, Patch
-from app.soccer.pitch import FRAME_WIDTH, GOAL_HEIGHT, GOAL_WIDTH
+from app.soccer.pitch import GOAL_HEIGHT, GOAL_WIDTH
 
 POST_RADIUS = 0.06
 NET_DEPTH_TOP, NET_DEPTH_LOW = 0.9, 2.1
@@ -74,8 +74,8 @@ def _on_goal(sign: float, profile: FloatArray, y: FloatArray | float) -> FloatAr
 
 def draw_frame(image: Image, camera: Camera, sign: float, gain: Colour) -> None:
     """Posts and crossbar of the goal at x = ``sign`` * 52.5 m, round and 12 cm thick."""
-    half, height = (GOAL_WIDTH + FRAME_WIDTH) / 2, GOAL_HEIGHT + FRAME_WIDTH / 2
-    corners = np.array([(-half, 0.0), (-half, height), (half, height), (half, 0.0)])
+    half = GOAL_WIDTH / 2
+    corners = np.array([(-half, 0.0), (-half, GOAL_HEIGHT), (half, GOAL_HEIGHT), (half, 0.0)])
     pieces = [a + np.linspace(0, 1, 9)[:, None] * (b - a) for a, b in pairwise(corners)]
     bars = [np.column_stack([np.full(9, sign * HALF_LENGTH), p[:, 0], -p[:, 1]]) for p in pieces]
     pixels = [camera.project(bar) for bar in bars]

@@ -15,8 +15,6 @@ WIDTH, HEIGHT = 1280, 720
 CENTER = np.array([(WIDTH - 1) / 2, (HEIGHT - 1) / 2])
 CORNER_RADIUS = float(np.hypot(*CENTER))
 PITCH = Pitch()
-CLICKED = PITCH.with_goal("middle")
-"""What people click of it: the middle of posts and bars."""
 
 
 Mask = npt.NDArray[np.bool_]
@@ -50,7 +48,7 @@ def make_skeleton(spacing: float, fewest: int) -> Skeleton:
     """Sample the markings at most ``spacing`` metres apart, each at ``fewest`` points or more."""
     points, tangents, counts = [], [], []
     for marking in MARKINGS:
-        dense = CLICKED.sample(marking, 0.1, 0.1)
+        dense = PITCH.sample(marking, 0.1, 0.1)
         # Circles bend, so their samples stand twice as close.
         wanted = spacing / (2 if marking in CIRCLES else 1)
         step = max(1, min(int(wanted / 0.1), (len(dense) - 1) // (fewest - 1)))

@@ -13,6 +13,7 @@ from app.datasets.sn_calibration import LineFile
 from app.datasets.sn_calibration_writer import write_line_files
 from app.review.editing.submit import load
 from app.soccer.picture import PictureGeometry
+from app.soccer.pitch import Pitch
 from app.store.store import Store
 from tests.cameras import SIZE, looking
 from tests.unit.commands.match_home import ingest_match
@@ -20,6 +21,7 @@ from tests.unit.solving.conftest import BEND, click
 
 Run = Callable[..., tuple[int, str, str]]
 MATCH, TRUE = "cup", PictureGeometry(1.06)
+CLICKED = Pitch(goal="middle")
 
 
 def frames() -> list[LineFile]:
@@ -27,7 +29,9 @@ def frames() -> list[LineFile]:
     files = []
     for number in range(4):
         camera = looking((1.0, 62.0, -16.0), (-30.0 + 20.0 * number, -4.0, 0.0), 1300.0, bend=BEND)
-        files.append(LineFile(f"{number}", SIZE, click(TRUE.done(camera, SIZE), 0.7, number)))
+        files.append(
+            LineFile(f"{number}", SIZE, click(TRUE.done(camera, SIZE), 0.7, number, CLICKED))
+        )
     return files
 
 
