@@ -16,7 +16,6 @@ from app.soccer.group import Group, Station, View
 from app.soccer.paint_evidence import PaintEvidence, PaintPoint, PaintReading
 from app.soccer.picture import OPEN
 from app.soccer.pitch import MARKINGS, Pitch
-from app.soccer.pitch import Pitch
 from app.soccer.policy import PAPER, TOUCHLINE
 from app.solving.calibrate import calibrate_view, view_key
 from app.solving.solve import solve
@@ -48,15 +47,19 @@ def painted(camera: Camera, moved_px: float = 0.0) -> PaintEvidence:
     return PaintEvidence(points)
 
 
-@cache
 MIDDLE = Pitch(goal="middle")
 """Goals where people click them, as the policy fits them."""
 
 
+@cache
 def clicked() -> Group:
     """Two views with clicks that are a pixel off."""
     views = tuple(
-        View(key, Station(key, SIZE, lines=click(camera, 1.0, seed, MIDDLE)), (box_around(camera, BALL),))
+        View(
+            key,
+            Station(key, SIZE, lines=click(camera, 1.0, seed, MIDDLE)),
+            (box_around(camera, BALL),),
+        )
         for seed, (key, camera) in enumerate((("a", MAIN), ("b", BEHIND_GOAL)))
     )
     return Group("g", views)
