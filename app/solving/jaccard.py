@@ -191,7 +191,7 @@ def camera_jaccard(
 
 @lru_cache(maxsize=8)
 def _samples(
-    pitch: Pitch, names: tuple[str, ...]
+    pitch: Pitch, names: tuple[str, ...] = MARKINGS
 ) -> tuple[FloatArray, tuple[tuple[str, int, int], ...]]:
     parts, limits, count = [], [], 0
     for marking in names:
