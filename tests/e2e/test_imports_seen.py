@@ -249,3 +249,19 @@ class TestGroupsWithoutAPicture:
             return said["state"], said["note"]
 
         until(page, lambda: verdict() == ("accepted", "seen in the video"))
+
+
+class TestGivenCameras:
+    def test_lines_of_another_day_can_be_left_aside_where_they_are_files_of_their_own(
+        self, open_page: OpenPage
+    ) -> None:
+        page = open_page("/import")
+        choice = page.get_by_label("Where a view has a given camera and lines")
+        page.get_by_role("radio", name="SoccerNet-v3D").check()
+        assert choice.locator("option").all_inner_texts() == ["the given camera", "the lines"]
+        page.get_by_role("radio", name="ISSIA XGTF").check()
+        assert choice.locator("option").all_inner_texts() == [
+            "the given camera, measured by the lines",
+            "the given camera, lines left aside",
+            "the lines",
+        ]
