@@ -257,9 +257,9 @@ class TestGivenCameras:
     ) -> None:
         page = open_page("/import")
         choice = page.get_by_label("Where a view has a given camera and lines")
-        page.get_by_role("radio", name="SoccerNet-v3D").check()
+        page.locator("label", has_text="SoccerNet-v3D").click()
         assert choice.locator("option").all_inner_texts() == ["the given camera", "the lines"]
-        page.get_by_role("radio", name="ISSIA XGTF").check()
+        page.locator("label", has_text="XGTF").click()
         assert choice.locator("option").all_inner_texts() == [
             "the given camera, measured by the lines",
             "the given camera, lines left aside",
