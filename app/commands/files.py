@@ -47,7 +47,13 @@ def import_(
     lines: Annotated[
         Path | None, typer.Option(exists=True, help="ISSIA: line files of the static cameras.")
     ] = None,
-    calibration: Annotated[CalibrationChoice, typer.Option(help="Which one counts.")] = "given",
+    calibration: Annotated[
+        CalibrationChoice | None,
+        typer.Option(
+            help="Which one counts; said of ISSIA, given leaves the lines of given cameras aside.",
+            show_default="given",
+        ),
+    ] = None,
     frame_offset: Annotated[
         str, typer.Option(help="ISSIA: XGTF frame minus video frame; 8, or 1=8,2=9 by camera.")
     ] = "8",
@@ -105,7 +111,7 @@ def import_(
         from app.commands import remote_files
 
         options: dict[str, Any] = {
-            "calibration": calibration,
+            **({} if calibration is None else {"calibration": calibration}),
             "frame_offset": parse_frame_offset(frame_offset),
             "flipped": sorted(parse_cameras(flip)),
             "size": None if size is None else [size.width, size.height],

@@ -30,6 +30,7 @@ from app.soccer.solution import (
     Suspect,
 )
 from app.solving.jaccard import (
+    evaluated,
     jaccard,
     measure_markings,
     not_missing,
@@ -76,6 +77,7 @@ def calibrate(
         size: Annotated size.
         policy: Robust scale, prior of the distortion, whether labels are checked.
     """
+    pitch = policy.fitted(pitch)
     observations = observe(lines, pitch, size)
     measurements = measurement_count(observations)
     if measurements < MIN_MEASUREMENTS:
@@ -112,7 +114,7 @@ def calibrate_near(
     """
     if alone.camera is None:
         return alone
-    problem = ResectionProblem.of(size, policy)
+    problem, pitch = ResectionProblem.of(size, policy), policy.fitted(pitch)
     left_out = [suspect.marking for suspect in alone.suspects]
     observations = observe(lines, pitch, size).without(*left_out)
     fit = Resection(problem.parameters(alone.camera), 0.0)
@@ -137,7 +139,7 @@ def calibrate_picture(
     Args:
         picture: What was done to it.
     """
-    problem = ResectionProblem.of(size, policy)
+    problem, pitch = ResectionProblem.of(size, policy), policy.fitted(pitch)
     observations = observe(lines, pitch, size)
     if measurement_count(observations) < MIN_MEASUREMENTS:
         return calibrate(lines, pitch, size, policy)
@@ -239,7 +241,8 @@ def _measured(
 ) -> Calibration:
     """A calibration measured against the lines of its station, and what is said not to be visible."""
     size, shortest = station.size, shortest_px(policy, station.size)
-    return measure(found, station.lines, pitch, size, station.not_visible, shortest)
+    fitted = policy.fitted(pitch)
+    return measure(found, station.lines, fitted, size, station.not_visible, shortest)
 
 
 def calibrate_paint(
@@ -369,20 +372,22 @@ def measure(
     """The calibration with JaC and the distances of the annotated points filled in.
 
     Without lines there is no JaC; the projected markings are there all the same, but for those that
-    nobody drew and that are ``not_missing``.
+    nobody drew and that are ``not_missing``. Distances are those to the goals of ``pitch``, JaC and
+    the outcomes that it counts are told by the evaluator's goals.
     """
     if calibration.camera is None:
         return calibration
     measured = measure_markings(project_markings(calibration.camera, pitch, size), lines)
-    for marking in not_missing(measured, lines, not_visible, shortest_px):
-        del measured[marking]
-    by_gamma = [outcomes(measured, lines, gamma / 100 * size.diagonal) for gamma in GAMMAS_PERCENT]
+    judged = evaluated(calibration.camera, pitch, size, lines, measured)
+    for marking in not_missing(judged, lines, not_visible, shortest_px):
+        del judged[marking]
+    by_gamma = [outcomes(judged, lines, gamma / 100 * size.diagonal) for gamma in GAMMAS_PERCENT]
     left_out = {suspect.marking for suspect in calibration.suspects}
     markings = []
     for marking, outcome in by_gamma[0].items():
         fit = MarkingFit(marking, outcome, used=marking not in left_out)
-        if marking in measured:
-            seen = measured[marking]
+        seen = measured.get(marking) or judged.get(marking)
+        if seen is not None:
             nearest = np.round(seen.nearest, DRAWN_DIGITS).tolist()
             fit = replace(
                 fit,
@@ -396,6 +401,7 @@ def measure(
     return replace(
         calibration,
         jac=tuple(jaccard(found) for found in by_gamma) if has_lines else None,
+        goal=pitch.goal,
         error_px=float(np.median(distances)) if len(distances) else None,
         markings=tuple(markings),
     )
@@ -427,6 +433,8 @@ def _camera_parts(
     # Plain tuples are spelt out in half the time.
     lines = [(marking, [*map(tuple, points)]) for marking, points in sorted(station.lines.items())]
     parts = [*map(repr, (version, station.size, pitch)), policy.spelling, repr(lines)]
+    if policy.goal != "inner":
+        parts.append(repr(("goal", policy.goal)))
     if station.given is not None and station.calibration == "given":
         parts.append(repr(station.given.parameters.tolist()))
         if station.given.is_wide:

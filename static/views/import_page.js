@@ -52,16 +52,18 @@ function GroupingField({ option, change }) {
 	`;
 }
 
-/** @param {{option: FormatOption, change: (value: any) => void}} props */
-function OptionField({ option, change }) {
+/** @param {{option: FormatOption, apart: boolean, change: (value: any) => void}} props `apart`: lines are files of their own, which may be of another day */
+function OptionField({ option, apart, change }) {
 	const id = `option-${option.name}`;
 	if (option.kind === 'grouping') return html`<${GroupingField} option=${option} change=${change} />`;
 	if (option.kind === 'calibration') {
 		return html`
 			<div class="form__row">
 				<label for=${id}>${option.label}</label>
-				<select class="field" id=${id} onChange=${withValue(change)}>
-					<option value="given">the given camera</option><option value="lines">the lines</option>
+				<select class="field" id=${id} onChange=${withValue((choice) => change(choice || undefined))}>
+					<option value="">the given camera${apart ? ', measured by the lines' : ''}</option>
+					${apart ? html`<option value="given">the given camera, lines left aside</option>` : null}
+					<option value="lines">the lines</option>
 				</select>
 			</div>
 		`;
@@ -182,7 +184,7 @@ export function ImportPage() {
 						</div>
 						<${FormatChoice} format=${format} choose=${setFormat} />
 						<${SourceChoice} onSource=${setSource} guess=${(/** @type {string} */ guessed) => { if (IMPORT_FORMATS.some((one) => one.name === guessed)) setFormat(guessed); }} />
-						${chosen.options.map((option) => html`<${OptionField} key=${option.name} option=${option} change=${(/** @type {any} */ value) => setOptions({ ...options, [option.name]: value })} />`)}
+						${chosen.options.map((option) => html`<${OptionField} key=${option.name} option=${option} apart=${chosen.lines === true} change=${(/** @type {any} */ value) => setOptions({ ...options, [option.name]: value })} />`)}
 						${chosen.lines ? html`
 							<${LinesField} source=${source} change=${(/** @type {ImportSource | undefined} */ lines) => setOptions({ ...options, lines })} />` : null}
 						${chosen.keepsPolicy ? null : html`<${PolicyField} kept=${kept} change=${setPolicy} />`}

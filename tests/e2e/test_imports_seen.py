@@ -275,3 +275,19 @@ class TestGroupsWithoutAPicture:
             return said["state"], said["note"]
 
         until(page, lambda: verdict() == ("accepted", "seen in the video"))
+
+
+class TestGivenCameras:
+    def test_lines_of_another_day_can_be_left_aside_where_they_are_files_of_their_own(
+        self, open_page: OpenPage
+    ) -> None:
+        page = open_page("/import")
+        choice = page.get_by_label("Where a view has a given camera and lines")
+        page.locator("label", has_text="SoccerNet-v3D").click()
+        assert choice.locator("option").all_inner_texts() == ["the given camera", "the lines"]
+        page.locator("label", has_text="XGTF").click()
+        assert choice.locator("option").all_inner_texts() == [
+            "the given camera, measured by the lines",
+            "the given camera, lines left aside",
+            "the lines",
+        ]

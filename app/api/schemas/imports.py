@@ -42,9 +42,11 @@ class ImportOptions(BaseModel):
 
     model_config = ConfigDict(extra="forbid")
 
-    calibration: CalibrationChoice = Field(
-        default="given",
-        description="Which calibration counts where a view has a given camera and lines.",
+    calibration: CalibrationChoice | None = Field(
+        default=None,
+        description="Which calibration counts where a view has a given camera and lines; null: the "
+        "given one. Of `issia` and `issia-3d`, `given` leaves the lines of given cameras aside, "
+        "which otherwise measure them.",
     )
     frame_offset: Offset | dict[Camera, Offset] = Field(
         default=8, description="ISSIA: XGTF frame minus video frame, for all or by camera."

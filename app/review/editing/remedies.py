@@ -218,7 +218,8 @@ def _of_undrawn(group: Group, view: View, solved: ViewSolution) -> Iterator[_Ide
     names = [f"{fit.marking} (visible over {pixels(max(fit.length_px, 1))})" for fit in undrawn]
     verb = "were" if len(names) > 1 else "was"
     said = f"{' and '.join(names)} {verb} drawn in {letter}"
-    seen = project_markings(camera, group.pitch, view.size)
+    fitted = group.pitch.with_goal(solved.calibration.goal)
+    seen = project_markings(camera, fitted, view.size)
     drawn = {fit.marking: _clicks_on(seen[fit.marking]) for fit in undrawn}
     fix = Fix("draw_marking", view.key, undrawn[0].marking)
     yield _Idea(said, fix, trial=SetLines(view.key, drawn))

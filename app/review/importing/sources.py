@@ -34,8 +34,10 @@ from app.review.importing.ingest import IngestReport, ingest
 from app.review.importing.picture_check import PictureCheck
 from app.review.importing.spare import SpareFrame, ingest_spare
 from app.soccer.annotation import Extras
+from app.soccer.choices import CalibrationChoice
 from app.soccer.frames import ImageSize
 from app.soccer.group import Group
+from app.soccer.pitch import Pitch
 from app.soccer.policy import PAPER, Policy
 from app.store.image_header import check_size, read_header
 from app.store.store import Store
@@ -114,7 +116,8 @@ class Source:
         format: One of ``FORMATS``.
         path: Folder, zip or file.
         lines: ISSIA: folder of the line files of the static cameras.
-        calibration: Which calibration counts where there are both.
+        calibration: Which calibration counts where there are both: ``given``, as where nothing is
+            said, or ``lines``. Said of static cameras, ``given`` leaves the lines of given ones aside.
         frame_offset: ISSIA: number in the XGTF file minus number in video, also by camera.
         flipped: ISSIA: cameras whose frames are mirrored.
         size: Size of the annotated images, for formats that do not say it; None: the usual one. Of
@@ -130,7 +133,7 @@ class Source:
     path: Root
     size: ImageSize | None = None
     lines: Root | None = None
-    calibration: str = "given"
+    calibration: CalibrationChoice | None = None
     frame_offset: int | Mapping[int, int] = 8
     flipped: frozenset[int] = frozenset()
     frames: Root | None = None
@@ -341,12 +344,15 @@ def import_source(
         dry_run=dry_run,
         policy=policy,
         told=report,
+        lines_left=folder is not None and source.calibration == "given",
     )
     result.problems += check.remarks()
     if dry_run or not result.new + result.changed + result.unchanged:
         result.findings += len(check.found)
     else:
         result.findings += check.note(store, dataset)
+    if folder is not None and source.calibration is None:
+        _tell_contradicted(folder, dataset, source, report)
     if folder is not None and not dry_run:
         ingest_spare(store, dataset, _spare(folder), source=source.label, actor=actor)
     if source.format not in BALLS_ELSEWHERE and (sentence := tally.without_ball()):
@@ -361,7 +367,7 @@ def _size_of_picture(settings: Settings, data: bytes, name: str) -> ImageSize:
 
 
 def _groups(source: Source, settings: Settings, report: Report, limits: Limits) -> Iterator[Group]:
-    path, calibration = source.path, source.calibration
+    path, calibration = source.path, source.calibration or "given"
     match source.format:
         case "soccernet-v3":
             return read_soccernet_v3(path, report, limits)
@@ -397,6 +403,26 @@ def _static(source: Source, report: Report, limits: Limits) -> IssiaFolder:
     )
     read = open_issia if source.format == "issia" else open_issia_3d
     return read(source.path, options, report, limits)
+
+
+def _tell_contradicted(folder: IssiaFolder, dataset: str, source: Source, report: Report) -> None:
+    """Say of which static cameras the lines do not fit the given camera, and what to do."""
+    from app.review.editing.given_cameras import contradicted, sentence_of
+
+    stations = {station.key: number for number, station in folder.stations.items()}
+    off = contradicted(((one, Pitch()) for one in folder.stations.values()), PAPER)
+    showing = [folder.tracks[stations[key]].balls.keys() for key in off]
+    groups = {frame for track in folder.tracks.values() for frame in track.balls}
+    if not off:
+        return
+    lines = "" if source.lines is None else f" --lines {source.lines}"
+    command = (
+        f"touchline import {source.format} {source.path} --dataset {dataset}{lines} "
+        "--calibration given"
+    )
+    shown = len(set[int]().union(*showing))
+    where = f"{shown:,} of {len(groups):,} groups show {'it' if len(off) == 1 else 'one of them'}, and it fails there at the gate jac"
+    report.remark(sentence_of(off, where, f"`{command}`"))
 
 
 def _spare(folder: IssiaFolder) -> Iterator[SpareFrame]:

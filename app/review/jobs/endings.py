@@ -24,9 +24,13 @@ def _solved(result: Json) -> str:
     if not result["solved"] and not result["failed"]:
         return pitches or "Nothing was left to solve."
     passed, rest = result["passed"], result["solved"] - result["passed"]
+    gates = ", ".join(f"{gate} {count:,}" for gate, count in result.get("failing", {}).items())
+    why = f" (first failing gate: {gates})" if gates else ""
     return (
-        f"{plural(result['solved'], 'group')} solved: {passed:,} pass, {rest:,} do not; "
-        f"{plural(result['failed'], 'error')}." + (f" {pitches}" if pitches else "")
+        f"{plural(result['solved'], 'group')} solved: {passed:,} pass, {rest:,} do not{why}; "
+        f"{plural(result['failed'], 'error')}."
+        + (f" {pitches}" if pitches else "")
+        + (f" {advice}" if (advice := result.get("advice")) else "")
     )
 
 

@@ -231,7 +231,7 @@ def source_of(settings: Settings, request: ImportRequest) -> Source:
         size=None if size is None else ImageSize(*size),
         lines=None if request.lines is None else _place(settings, request.lines)[0],
         frames=None if request.frames is None else _place(settings, request.frames)[0],
-        calibration=options.get("calibration", "given"),
+        calibration=options.get("calibration"),
         frame_offset=offset,
         flipped=frozenset(options.get("flipped", ())),
         name=name,

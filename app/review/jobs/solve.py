@@ -210,4 +210,6 @@ def _report(report: SolveReport) -> Json:
         "failures": named,
         "estimated": report.estimated,
         "proposed": report.proposed,
+        "failing": dict(report.failing),
+        "advice": report.advice,
     }

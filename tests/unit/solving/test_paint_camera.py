@@ -49,11 +49,19 @@ def painted(camera: Camera, moved_px: float = 0.0) -> PaintEvidence:
     return PaintEvidence(points)
 
 
+MIDDLE = Pitch(goal="middle")
+"""Goals where people click them, as the policy fits them."""
+
+
 @cache
 def clicked() -> Group:
     """Two views with clicks that are a pixel off."""
     views = tuple(
-        View(key, Station(key, SIZE, lines=click(camera, 1.0, seed)), (box_around(camera, BALL),))
+        View(
+            key,
+            Station(key, SIZE, lines=click(camera, 1.0, seed, MIDDLE)),
+            (box_around(camera, BALL),),
+        )
         for seed, (key, camera) in enumerate((("a", MAIN), ("b", BEHIND_GOAL)))
     )
     return Group("g", views)

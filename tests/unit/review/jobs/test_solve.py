@@ -46,11 +46,13 @@ class TestRequestSolve:
             "failures": [],
             "estimated": 1,
             "proposed": 0,
+            "failing": {"reprojection": 1},
+            "advice": "",
         }
         assert (done.done, done.total) == (2, 2)
         assert done.sentence == (
-            "2 groups solved: 1 pass, 1 do not; 0 errors. The pitch of 1 match was estimated: no other "
-            "size is proposed."
+            "2 groups solved: 1 pass, 1 do not (first failing gate: reprojection 1); 0 errors. The "
+            "pitch of 1 match was estimated: no other size is proposed."
         )
         assert stale_groups(store, "demo") == []
 
