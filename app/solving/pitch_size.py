@@ -220,7 +220,8 @@ class _Seen:
             self.problem.size.diagonal / 2,
         )
         # A marking that moves is a camera that moves the other way.
-        length, width = self._moves(offsets[:, 1] != 0).T
+        moves = size_moves(self.problem, self.fit.parameters, self.observations, offsets[:, 1] != 0)
+        length, width = moves.T
         by_length = -by_camera[:, :, X] * length[:, None]
         by_width = -by_camera[:, :, Y] * width[:, None]
         rows = np.concatenate([by_camera, np.stack([by_length, by_width], axis=-1)], axis=-1)
@@ -235,23 +236,42 @@ class _Seen:
         information[range(PARAMETERS), range(PARAMETERS)] += inverse
         return gradient, information
 
-    def _moves(self, beyond: npt.NDArray[np.bool_]) -> FloatArray:
-        """How far each point's nearest place moves with the sizes, shape (N, 2).
 
-        ``beyond`` are points beyond an end: their place is the end, and ends of the lines that
-        cross the pitch are its corners, or the middle line's ends.
-        """
-        moves = _SHARES[self.observations.marking].copy()
-        camera = self.problem.camera(self.fit.parameters)
-        center = np.array(principal_point(self.problem.size))
-        rows = np.flatnonzero(beyond & _CROSSING[self.observations.marking])
-        shapes = self.observations.curves.shapes[self.observations.marking[rows]]
-        ends = shapes.reshape(-1, 2, 3)
-        seen = camera.project(ends.reshape(-1, 3)).reshape(-1, 2, 2) - center
-        apart = seen - self.observations.pixels[rows, None]
-        near = np.nan_to_num(np.hypot(*np.moveaxis(apart, 2, 0)), nan=np.inf).argmin(axis=1)
-        moves[rows] = 0.5 * np.sign(ends[np.arange(len(rows)), near, :2])
+def size_shares(marking: npt.NDArray[np.int64]) -> FloatArray:
+    """How far markings move along x with each metre of length, along y with each of width.
+
+    Args:
+        marking: Indices into ``MARKINGS``, shape (N,).
+
+    Returns:
+        Shape (N, 2).
+    """
+    shares: FloatArray = _SHARES[marking]
+    return shares
+
+
+def size_moves(
+    problem: ResectionProblem,
+    parameters: FloatArray,
+    observations: Observations,
+    beyond: npt.NDArray[np.bool_],
+) -> FloatArray:
+    """How far each point's nearest place moves with length and width, shape (N, 2).
+
+    ``beyond`` are points beyond an end, shape (N,): their place is the end, and ends of the lines
+    that cross the pitch are its corners, or the middle line's ends.
+    """
+    moves: FloatArray = _SHARES[observations.marking].copy()
+    rows = np.flatnonzero(beyond & _CROSSING[observations.marking])
+    if not len(rows):
         return moves
+    center = np.array(principal_point(problem.size))
+    ends = observations.curves.shapes[observations.marking[rows]].reshape(-1, 2, 3)
+    seen = problem.camera(parameters).project(ends.reshape(-1, 3)).reshape(-1, 2, 2) - center
+    apart = seen - observations.pixels[rows, None]
+    near = np.nan_to_num(np.hypot(*np.moveaxis(apart, 2, 0)), nan=np.inf).argmin(axis=1)
+    moves[rows] = 0.5 * np.sign(ends[np.arange(len(rows)), near, :2])
+    return moves
 
 
 def _adjust(pitch: Pitch, seen: Sequence[_Seen]) -> tuple[Pitch, list[_Seen], list[Share]]:
