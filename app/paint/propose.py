@@ -24,6 +24,7 @@ from app.geometry.resection import X, Z
 from app.paint.agreement import PaintAgreement, agreement
 from app.paint.candidates import KNOWN, MAIN, WIDE, Library, known_library
 from app.paint.evidence import Reading, read_picture, shows_grass_beside, trace
+from app.paint.goal import goal_height
 from app.paint.grass import field_of_play, why_no_field
 from app.paint.ridges import line_like
 from app.paint.scoring import ScoredPicture
@@ -41,8 +42,12 @@ Image = npt.NDArray[np.uint8]
 SEARCH_VERSION = 2
 """Of the search and what decides: where nothing was proposed, a later one looks again."""
 WORK_WIDTH = 960
+ENLARGED_WIDTH, ENLARGED = 640, 2
+"""Narrower pictures are read so many times as large: their paint is hardly a pixel broad."""
 LEAST_SIDE = 160
 """Pixels: in a smaller picture lines are narrower than a pixel."""
+SHAPES = (1.29, 2.45)
+"""Width by height of broadcast pictures, from 4:3 to the widest films."""
 BORDER_PX = 4
 """At the border of a picture ridges are no paint."""
 MOST_PIECES = 8
@@ -112,12 +117,14 @@ class Ranked:
     Attributes:
         weakest: As of ``weakest_marking``.
         policy: Prior of the distortion with which it was snapped.
+        known: Covariance of where it started, shape (8, 8), where the match knows the position.
     """
 
     snapped: Snapped
     agreement: PaintAgreement
     weakest: float
     policy: CalibrationPolicy = field(default_factory=CalibrationPolicy)
+    known: FloatArray | None = None
 
     @property
     def uncertain_m(self) -> float:
@@ -165,6 +172,12 @@ def propose(
     return _answer(image, frame, ranked, pitch)
 
 
+def enlarged(image: Image) -> Image:
+    """A small picture as it is read."""
+    cubic = cv2.INTER_CUBIC
+    return np.asarray(cv2.resize(image, None, fx=ENLARGED, fy=ENLARGED, interpolation=cubic))
+
+
 def why_too_small(image: Image) -> str | None:
     """Why no line can be followed in a picture of that size; None where lines can."""
     height, width = image.shape[:2]
@@ -178,7 +191,9 @@ def read_frame(image: Image) -> SearchedFrame | str:
     if (small := why_too_small(image)) is not None:
         return small
     height, width = image.shape[:2]
-    if width > WORK_WIDTH:
+    if width < ENLARGED_WIDTH:
+        image = enlarged(image)
+    elif width > WORK_WIDTH:
         size = (WORK_WIDTH, max(round(height * WORK_WIDTH / width), 1))
         image = np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA))
     field = field_of_play(image)
@@ -219,6 +234,7 @@ def rank(
             agreement(item.camera, frame.field, frame.paint, pitch),
             weakest_marking(frame.reading, item, pitch),
             policy,
+            _spread(library) if library.name == KNOWN else None,
         )
         for item in snapped
         if item.reason is None
@@ -229,15 +245,40 @@ def rank(
 def _drawn(
     frame: SearchedFrame, start: Camera, library: Library, pitch: Pitch, policy: CalibrationPolicy
 ) -> Snapped:
-    """A camera drawn onto the paint; where the paint leaves a number open or would move it far,
-    once more with what is known of cameras."""
-    alone = snap_reading(frame.reading, start, pitch, WINDOWS, policy, circles_count_twice=True)
+    """A camera drawn onto the paint: near the position that the match knows, or by the paint alone;
+    where that leaves a number open or would move it far, once more with what is known of cameras."""
+    known = _spread(library)
+    if library.name == KNOWN:
+        away = np.linalg.norm(library.stands - start.position, axis=1)
+        start = replace(start, position=library.stands[away.argmin()])
+        return _snap(frame.reading, start, pitch, WINDOWS, policy, known)
+    alone = _snap(frame.reading, start, pitch, WINDOWS, policy)
     if alone.reason is None:
         return alone
-    sigma = np.concatenate([AIM_SIGMA, library.position_sigma, LENS_SIGMA])
     return snap_reading(
-        frame.reading, start, pitch, WINDOWS, policy, np.diag(sigma**2), circles_count_twice=True
+        frame.reading, start, pitch, WINDOWS, policy, known, circles_count_twice=True
     )
+
+
+def _spread(library: Library) -> FloatArray:
+    """Covariance of a start of the search, shape (8, 8)."""
+    sigma = np.concatenate([AIM_SIGMA, library.position_sigma, LENS_SIGMA])
+    return np.diag(sigma**2)
+
+
+def _snap(
+    reading: Reading,
+    start: Camera,
+    pitch: Pitch,
+    windows: Sequence[float],
+    policy: CalibrationPolicy,
+    known: FloatArray | None = None,
+) -> Snapped:
+    """As ``snap_reading``, with what is known of the position where the match knows it."""
+    return snap_reading(
+        reading, start, pitch, windows, policy, known,
+        circles_count_twice=True, position_is_known=known is not None,
+    )  # fmt: skip
 
 
 def weakest_marking(reading: Reading, snapped: Snapped, pitch: Pitch) -> float:
@@ -296,6 +337,31 @@ def why_unsure(ranked: Sequence[Ranked]) -> str | None:
     return None
 
 
+def why_not_square(image: Image, camera: Camera, pitch: Pitch) -> str | None:
+    """Why the pixels of a picture may not be square; None where nothing speaks against it.
+
+    Args:
+        image: Red green blue, shape (H, W, 3).
+        camera: On its paint, pixels of it.
+        pitch: The pitch.
+    """
+    seen = goal_height(image, camera, pitch)
+    if seen is not None and seen.is_square:
+        return None
+    if seen is not None and seen.is_certain:
+        return (
+            f"the pixels are not square: the goal looks {seen.share:.1f} times as high as the "
+            "grass says; bring the picture in its own shape"
+        )
+    height, width = image.shape[:2]
+    if not SHAPES[0] < width / height < SHAPES[1]:
+        return (
+            "the picture has not the shape of a broadcast, and no goal shows that its pixels are "
+            "square; bring it in its own shape"
+        )
+    return None
+
+
 def _answer(
     image: Image, frame: SearchedFrame, ranked: list[Ranked], pitch: Pitch
 ) -> FrameProposal:
@@ -304,7 +370,11 @@ def _answer(
         return FrameProposal("unsure", reason)
     best, lead = ranked[0], runner_up(ranked)
     snapped = best.snapped
-    if image.shape[:2] != frame.field.shape:
+    reason = reason or why_not_square(frame.image, snapped.camera, pitch)
+    height, width = image.shape[:2]
+    if width < ENLARGED_WIDTH:
+        snapped = scaled(snapped, height, width)
+    elif (height, width) != frame.field.shape:
         snapped = _at_full_size(image, frame, best, pitch)
     return FrameProposal(
         "unsure" if reason else "proposed",
@@ -325,9 +395,7 @@ def _at_full_size(image: Image, frame: SearchedFrame, best: Ranked, pitch: Pitch
     grass = cv2.resize(frame.field.astype(np.uint8), size, interpolation=cv2.INTER_NEAREST)
     reading = read_picture(image, grass.astype(np.bool_))
     found = scaled(best.snapped, height, width)
-    last = snap_reading(
-        reading, found.camera, pitch, LAST_WINDOWS, best.policy, circles_count_twice=True
-    )
+    last = _snap(reading, found.camera, pitch, LAST_WINDOWS, best.policy, best.known)
     return last if last.reason is None else found
 
 
