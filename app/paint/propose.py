@@ -20,7 +20,16 @@ import numpy.typing as npt
 
 from app.geometry.arrays import BoolArray, FloatArray
 from app.geometry.camera import Camera
-from app.geometry.resection import X, Z
+from app.geometry.resection import (
+    LOG_FOCAL,
+    PAN,
+    ROLL,
+    TILT,
+    X,
+    Z,
+    camera_from_parameters,
+    parameters_from_camera,
+)
 from app.paint.agreement import PaintAgreement, agreement
 from app.paint.candidates import KNOWN, MAIN, WIDE, Library, known_library
 from app.paint.evidence import Reading, read_picture, shows_grass_beside, trace
@@ -66,10 +75,16 @@ WELL_SUPPORTED, WELL_PAINTED = 0.75, 0.75
 """Where less of the markings has paint, each that would be seen has to have it nearly whole."""
 LEAST_SUPPORTED, LEAST_SCORE, LEAST_LEAD, LEAST_SUM = 0.50, 0.30, 0.06, 0.52
 """The less of the paint a camera explains, the farther all others have to lie behind it."""
+NEAR_KNOWN_M, NEAR_KNOWN_SIGMAS, KEPT_AT_KNOWN = 4.0, 3.0, 0.95
+"""How near a known position a camera of the other libraries has to stand to be sought there, and the
+share of its agreement that it has to keep."""
+LEAST_KNOWN = 0.25, 0.40
+"""As the second and the last of the above where the match knows the position and most of the markings have paint."""
 MOST_UNCERTAIN_M = 1.0
 """Standard deviation of the position: three lines lie on their paint for many cameras."""
 AIM_SIGMA, LENS_SIGMA = np.radians([3.0, 3.0, 1.0]), np.array([0.2, 0.01])
 """Pan, tilt and roll; logarithm of the focal length and kappa: how far a start may be off."""
+AIM = [PAN, TILT, ROLL, LOG_FOCAL]
 SOLE_LEAD = 0.15
 """What counts as lead where the search found no other camera."""
 LAST_WINDOWS = (5.0, 3.0, 3.0)
@@ -165,8 +180,12 @@ def propose(
     if isinstance(frame, str):
         return FrameProposal("nothing", frame)
     ranked: list[Ranked] = []
-    for library in [*([known_library(known)] if known else []), MAIN, WIDE]:
-        ranked = merged(frame, ranked, rank(frame, library, pitch, policy))
+    match = known_library(known) if known else None
+    for library in [*([match] if match else []), MAIN, WIDE]:
+        found = rank(frame, library, pitch, policy)
+        if match is not None and library is not match:
+            found = [_where_known(frame, item, match, pitch) for item in found]
+        ranked = merged(frame, ranked, found)
         if why_unsure(ranked) is None:
             break
     return _answer(image, frame, ranked, pitch)
@@ -249,8 +268,7 @@ def _drawn(
     where that leaves a number open or would move it far, once more with what is known of cameras."""
     known = _spread(library)
     if library.name == KNOWN:
-        away = np.linalg.norm(library.stands - start.position, axis=1)
-        start = replace(start, position=library.stands[away.argmin()])
+        start = _at_stand(frame.reading, start, library, pitch)
         return _snap(frame.reading, start, pitch, WINDOWS, policy, known)
     alone = _snap(frame.reading, start, pitch, WINDOWS, policy)
     if alone.reason is None:
@@ -258,6 +276,38 @@ def _drawn(
     return snap_reading(
         frame.reading, start, pitch, WINDOWS, policy, known, circles_count_twice=True
     )
+
+
+def _where_known(frame: SearchedFrame, item: Ranked, match: Library, pitch: Pitch) -> Ranked:
+    """A camera that was found by the paint alone, at the position that the match knows where it lies
+    on the paint there as well."""
+    camera = item.snapped.camera
+    away = np.linalg.norm(match.stands - camera.position, axis=1)
+    if away.min() > max(NEAR_KNOWN_M, NEAR_KNOWN_SIGMAS * item.uncertain_m):
+        return item
+    policy = replace(item.policy, distortion_mean=match.kappa or item.policy.distortion_mean)
+    start, known = _at_stand(frame.reading, camera, match, pitch), _spread(match)
+    snapped = _snap(frame.reading, start, pitch, WINDOWS, policy, known)
+    if snapped.reason is not None:
+        return item
+    seen = agreement(snapped.camera, frame.field, frame.paint, pitch)
+    if seen.product < KEPT_AT_KNOWN * item.agreement.product:
+        return item
+    return Ranked(snapped, seen, weakest_marking(frame.reading, snapped, pitch), policy, known)
+
+
+def _at_stand(reading: Reading, camera: Camera, library: Library, pitch: Pitch) -> Camera:
+    """The camera at the nearest stand of a library, turned and zoomed so that it shows the same."""
+    away = np.linalg.norm(library.stands - camera.position, axis=1)
+    moved = library.stands[away.argmin()] - camera.position
+    rows = trace(reading, camera, pitch).jacobian
+    if len(rows) < len(AIM):
+        return camera
+    turned = np.linalg.lstsq(rows[:, AIM], -rows[:, X : Z + 1] @ moved, rcond=None)[0]
+    parameters = parameters_from_camera(camera, reading.half_diagonal)
+    parameters[X : Z + 1] += moved
+    parameters[AIM] += turned
+    return camera_from_parameters(parameters, camera.principal_point, reading.half_diagonal)
 
 
 def _spread(library: Library) -> FloatArray:
@@ -327,12 +377,16 @@ def why_unsure(ranked: Sequence[Ranked]) -> str | None:
     is_patchy = supported < WELL_SUPPORTED and best.weakest < WELL_PAINTED
     if is_patchy or supported < LEAST_SUPPORTED:
         return "much of the markings that the best camera shows has no paint"
-    if best.uncertain_m > MOST_UNCERTAIN_M:
+    # Where the match knows the position no paint has to tell it.
+    is_known = best.known is not None
+    if best.uncertain_m > MOST_UNCERTAIN_M and not is_known:
         return "too few markings are seen to say where the camera stands"
     lead = SOLE_LEAD if lead is None else lead
     if lead < LEAST_LEAD:
         return "another camera fits the paint nearly as well"
-    if best.score < LEAST_SCORE or best.score + lead < LEAST_SUM:
+    is_well_known = is_known and supported >= WELL_SUPPORTED
+    least, least_sum = LEAST_KNOWN if is_well_known else (LEAST_SCORE, LEAST_SUM)
+    if best.score < least or best.score + lead < least_sum:
         return "much of what looks like paint is no marking of the best camera"
     return None
 

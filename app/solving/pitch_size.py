@@ -112,6 +112,7 @@ def estimate_pitch(
     policy: CalibrationPolicy,
     *,
     one_match: bool = True,
+    least: int = MIN_FRAMES,
 ) -> PitchEstimate:
     """The size of the pitch that explains the lines of many frames best.
 
@@ -119,6 +120,7 @@ def estimate_pitch(
         frames: Of one match.
         policy: How frames are calibrated.
         one_match: Whether the frames are known to be of one match.
+        least: Frames below which nothing is estimated.
 
     Raises:
         DegenerateGeometryError: Too few frames show enough markings, or frames that nobody says
@@ -126,9 +128,9 @@ def estimate_pitch(
     """
     pitch = Pitch()
     seen = [_Seen.of(frames[index], pitch, policy) for index in choose_frames(frames)]
-    if len(seen) < MIN_FRAMES:
+    if len(seen) < least:
         raise DegenerateGeometryError(
-            f"{len(seen)} frames show enough markings, the size of a pitch needs {MIN_FRAMES}"
+            f"{len(seen)} frames show enough markings, the size of a pitch needs {least}"
         )
     pitch, seen, _ = _adjust(pitch, seen)
     # Labels are judged on the pitch as it is now: on one of the wrong size the touchlines look
@@ -235,19 +237,6 @@ class _Seen:
         gradient[:PARAMETERS] += (self.fit.parameters - prior.mean) * inverse
         information[range(PARAMETERS), range(PARAMETERS)] += inverse
         return gradient, information
-
-
-def size_shares(marking: npt.NDArray[np.int64]) -> FloatArray:
-    """How far markings move along x with each metre of length, along y with each of width.
-
-    Args:
-        marking: Indices into ``MARKINGS``, shape (N,).
-
-    Returns:
-        Shape (N, 2).
-    """
-    shares: FloatArray = _SHARES[marking]
-    return shares
 
 
 def size_moves(
