@@ -75,7 +75,7 @@ WELL_SUPPORTED, WELL_PAINTED = 0.75, 0.75
 """Where less of the markings has paint, each that would be seen has to have it nearly whole."""
 LEAST_SUPPORTED, LEAST_SCORE, LEAST_LEAD, LEAST_SUM = 0.50, 0.30, 0.06, 0.52
 """The less of the paint a camera explains, the farther all others have to lie behind it."""
-NEAR_KNOWN_M, NEAR_KNOWN_SIGMAS, KEPT_AT_KNOWN = 4.0, 3.0, 0.95
+NEAR_KNOWN_M, NEAR_KNOWN_SIGMAS, KEPT_AT_KNOWN = 4.0, 3.0, 0.97
 """How near a known position a camera of the other libraries has to stand to be sought there, and the
 share of its agreement that it has to keep."""
 LEAST_KNOWN = 0.25, 0.40
@@ -84,7 +84,8 @@ MOST_UNCERTAIN_M = 1.0
 """Standard deviation of the position: three lines lie on their paint for many cameras."""
 AIM_SIGMA, LENS_SIGMA = np.radians([3.0, 3.0, 1.0]), np.array([0.2, 0.01])
 """Pan, tilt and roll; logarithm of the focal length and kappa: how far a start may be off."""
-AIM = [PAN, TILT, ROLL, LOG_FOCAL]
+AIM, MOST_TURNED = [PAN, TILT, ROLL, LOG_FOCAL], 0.3
+"""Radians, and a share of the focal length, that another position may make up for."""
 SOLE_LEAD = 0.15
 """What counts as lead where the search found no other camera."""
 LAST_WINDOWS = (5.0, 3.0, 3.0)
@@ -246,54 +247,58 @@ def rank(
     found = search(frame.picture, frame.pieces, library, pitch, threads(), *amount, kappa)
     if not found:
         return []
-    snapped = threads().map(lambda item: _drawn(frame, item.camera, library, pitch, policy), found)
-    ranked = [
-        Ranked(
-            item,
-            agreement(item.camera, frame.field, frame.paint, pitch),
-            weakest_marking(frame.reading, item, pitch),
-            policy,
-            _spread(library) if library.name == KNOWN else None,
-        )
-        for item in snapped
-        if item.reason is None
-    ]
+    drawn = threads().map(lambda item: _drawn(frame, item.camera, library, pitch, policy), found)
+    known = _spread(library) if library.name == KNOWN else None
+    ranked = [_ranked(frame, item, pitch, policy, known) for item in drawn if item.reason is None]
+    if known is not None:
+        ranked = [_where_known(frame, item, library, pitch) for item in ranked]
     return merged(frame, [], ranked)
+
+
+def _ranked(
+    frame: SearchedFrame,
+    snapped: Snapped,
+    pitch: Pitch,
+    policy: CalibrationPolicy,
+    known: FloatArray | None,
+) -> Ranked:
+    seen = agreement(snapped.camera, frame.field, frame.paint, pitch)
+    return Ranked(snapped, seen, weakest_marking(frame.reading, snapped, pitch), policy, known)
 
 
 def _drawn(
     frame: SearchedFrame, start: Camera, library: Library, pitch: Pitch, policy: CalibrationPolicy
 ) -> Snapped:
-    """A camera drawn onto the paint: near the position that the match knows, or by the paint alone;
-    where that leaves a number open or would move it far, once more with what is known of cameras."""
+    """A camera drawn onto the paint; where the paint leaves a number open or would move it far,
+    once more with what is known of cameras, or at the position that the match knows."""
+    alone = _snap(frame.reading, start, pitch, WINDOWS, policy)
+    if alone.reason is None:
+        return alone
     known = _spread(library)
     if library.name == KNOWN:
         start = _at_stand(frame.reading, start, library, pitch)
         return _snap(frame.reading, start, pitch, WINDOWS, policy, known)
-    alone = _snap(frame.reading, start, pitch, WINDOWS, policy)
-    if alone.reason is None:
-        return alone
     return snap_reading(
         frame.reading, start, pitch, WINDOWS, policy, known, circles_count_twice=True
     )
 
 
 def _where_known(frame: SearchedFrame, item: Ranked, match: Library, pitch: Pitch) -> Ranked:
-    """A camera that was found by the paint alone, at the position that the match knows where it lies
-    on the paint there as well."""
+    """A camera at the position that the match knows, where the paint alone leaves that open and shows
+    the markings there as well."""
+    if item.uncertain_m <= MOST_UNCERTAIN_M:
+        return replace(item, known=None)
     camera = item.snapped.camera
     away = np.linalg.norm(match.stands - camera.position, axis=1)
     if away.min() > max(NEAR_KNOWN_M, NEAR_KNOWN_SIGMAS * item.uncertain_m):
-        return item
+        return replace(item, known=None)
     policy = replace(item.policy, distortion_mean=match.kappa or item.policy.distortion_mean)
     start, known = _at_stand(frame.reading, camera, match, pitch), _spread(match)
     snapped = _snap(frame.reading, start, pitch, WINDOWS, policy, known)
     if snapped.reason is not None:
-        return item
-    seen = agreement(snapped.camera, frame.field, frame.paint, pitch)
-    if seen.product < KEPT_AT_KNOWN * item.agreement.product:
-        return item
-    return Ranked(snapped, seen, weakest_marking(frame.reading, snapped, pitch), policy, known)
+        return replace(item, known=None)
+    there = _ranked(frame, snapped, pitch, policy, known)
+    return there if there.score >= KEPT_AT_KNOWN * item.score else replace(item, known=None)
 
 
 def _at_stand(reading: Reading, camera: Camera, library: Library, pitch: Pitch) -> Camera:
@@ -304,6 +309,8 @@ def _at_stand(reading: Reading, camera: Camera, library: Library, pitch: Pitch) 
     if len(rows) < len(AIM):
         return camera
     turned = np.linalg.lstsq(rows[:, AIM], -rows[:, X : Z + 1] @ moved, rcond=None)[0]
+    if np.abs(turned).max() > MOST_TURNED:
+        return camera
     parameters = parameters_from_camera(camera, reading.half_diagonal)
     parameters[X : Z + 1] += moved
     parameters[AIM] += turned

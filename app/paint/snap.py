@@ -129,13 +129,13 @@ def snap_reading(
         strict = index >= len(windows) - STRICT_ROUNDS
         spacing = SPACING_PX if strict else COARSE_PX
         evidence = rounds.seek(parameters, window, spacing)
-        if not _suffices(evidence, twice, least, spacing):
+        if not _suffices(evidence, twice, spacing, least):
             return _kept(rounds, evidence, NO_PAINT)
         parameters = parameters + rounds.problem.step(parameters, rounds.seen(evidence), strict)
         if not np.isfinite(parameters).all():
             return _kept(rounds, evidence, PAINT_DISAGREES)
     evidence = rounds.seek(parameters, windows[-1])
-    if not _suffices(evidence, twice, least) or evidence.share < LEAST_SEEN:
+    if not _suffices(evidence, twice, least=least) or evidence.share < LEAST_SEEN:
         return _kept(rounds, evidence, NO_PAINT)
     noise = rounds.problem.noise(parameters, rounds.seen(evidence))
     if noise is None:
@@ -199,7 +199,7 @@ class _Rounds:
 
 
 def _suffices(
-    evidence: Evidence, twice: list[int], least: int, spacing: float = SPACING_PX
+    evidence: Evidence, twice: list[int], spacing: float = SPACING_PX, least: int = LEAST_MARKINGS
 ) -> bool:
     counts = np.bincount(evidence.traced.marking, minlength=len(MARKINGS))
     markings = int((counts >= LEAST_ON_MARKING).sum())

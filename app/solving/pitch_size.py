@@ -312,7 +312,7 @@ def _is_confirmed(shares: Sequence[Share]) -> npt.NDArray[np.bool_]:
     pulls = np.array([gradient for gradient, _ in shares])
     told = np.maximum([np.diag(information) for _, information in shares], 1e-30)
     loudest = told.argmax(axis=0), range(2)
-    others = told.sum(axis=0) - told[loudest]
+    others = np.maximum(told.sum(axis=0) - told[loudest], 1e-30)
     apart = pulls[loudest] / told[loudest] - (pulls.sum(axis=0) - pulls[loudest]) / others
     chance = 1 / told[loudest] + 1 / others
     known: npt.NDArray[np.bool_] = others >= UNKNOWN_SIGMA_M**-2
