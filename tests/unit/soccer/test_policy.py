@@ -63,7 +63,9 @@ class TestHash:
         short = replace(PAPER, calibration=CalibrationPolicy(shortest_marking_px=5.0))
         assert short.hash != PAPER.hash and short.calibration_hash != PAPER.calibration_hash
         painted = replace(PAPER, calibration=CalibrationPolicy(source="paint"))
-        assert painted.hash == TOUCHLINE.hash != PAPER.hash
+        assert painted.hash != PAPER.hash
+        alone = replace(PAPER, calibration=CalibrationPolicy(source="paint", lone_frames="any"))
+        assert alone.hash == TOUCHLINE.hash != painted.hash
         assert painted.calibration_hash != PAPER.calibration_hash
 
     def test_sharing_positions_has_no_part_in_what_keys_calibrations(self):
@@ -72,6 +74,7 @@ class TestHash:
 
     def test_paint_has_no_part_in_what_keys_calibrations_either(self):
         assert repr(CalibrationPolicy(source="paint")) == repr(CalibrationPolicy())
+        assert repr(CalibrationPolicy(lone_frames="any")) == repr(CalibrationPolicy())
 
     def test_tau_leaves_calibrations_alone(self):
         assert replace(PAPER, tau_percent=0.9).calibration_hash == PAPER.calibration_hash
