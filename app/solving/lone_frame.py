@@ -43,9 +43,9 @@ PRIORS = {
     "any": np.append(LAWS_SIZE_SIGMA_M, WARP_SIGMA),
 }
 """Standard deviations of the five, by what ``CalibrationPolicy.lone_frames`` says."""
-ROUNDS, SETTLED = 8, 1e-2
+ROUNDS, SETTLED = 6, 1e-2
 """Steps of a fit at most, and the share of the cost below which a step ends it."""
-LINEAR = np.array([1.0, 1.0, 0.02, 0.05, 0.05])
+LINEAR = np.array([3.0, 3.0, 0.05, 0.1, 0.1])
 """Steps of the five within which the first slopes hold."""
 LONGEST = np.array([8.0, 8.0, 0.15, 0.2, 0.2])
 """Steps of the five are no longer."""
