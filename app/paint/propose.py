@@ -48,7 +48,7 @@ from app.solving.observations import principal_point
 
 Image = npt.NDArray[np.uint8]
 
-SEARCH_VERSION = 2
+SEARCH_VERSION = 3
 """Of the search and what decides: where nothing was proposed, a later one looks again."""
 WORK_WIDTH = 960
 ENLARGED_WIDTH, ENLARGED = 640, 2
