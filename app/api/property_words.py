@@ -245,6 +245,7 @@ PROPERTIES: Mapping[str, str] = {
     "line_px": "Distance of annotated lines, pixels.",
     "line_share": "Share of the noise of lines that all points of a line have in common.",
     "line_sigma_px": "Standard deviation of annotated line points, pixels; null: estimated.",
+    "lone_frames": "What counts of pitch and picture of a frame without a match and other views, where nobody says it: `exact` as assumed, `professional` pitches, `any`.",
     "lines": "Points of each marking, pixels, by name of the marking.",
     "Changelog.lines": "What is new, line by line.",
     "NoiseDocument.lines": "Noise of the annotated lines; null where it cannot be estimated.",

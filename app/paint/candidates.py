@@ -26,6 +26,9 @@ TILT_DEGREES = (35.0, 91.0)
 KNOWN, KNOWN_FOCAL, ZOOM = "known", (0.5, 6.0), 3.0
 """Name of what a match knows; its focal lengths in widths of the image, and how much wider or
 narrower than the cameras at hand another frame may be."""
+KNOWN_SIGMA_M = np.array([1.5, 1.0, 0.6])
+"""By which a camera is off the positions that a match knows: a lens turns before its tripod, by 1.7 m
+along the touchline for each radian of pan in the median of real matches."""
 SAME_STAND_M = 1.0
 MOST_KAPPA = 0.3
 SLACK_M = 4.0
@@ -110,7 +113,7 @@ def known_library(known: Sequence[Camera]) -> Library:
         KNOWN,
         np.array(stands),
         (min(max(low, KNOWN_FOCAL[0]), high), max(min(high, KNOWN_FOCAL[1]), low)),
-        np.array([0.5, 0.5, 0.5]),
+        KNOWN_SIGMA_M,
         float(np.clip(np.median(kappas), -MOST_KAPPA, MOST_KAPPA)),
     )
 

@@ -20,10 +20,20 @@ import numpy.typing as npt
 
 from app.geometry.arrays import BoolArray, FloatArray
 from app.geometry.camera import Camera
-from app.geometry.resection import X, Z
+from app.geometry.resection import (
+    LOG_FOCAL,
+    PAN,
+    ROLL,
+    TILT,
+    X,
+    Z,
+    camera_from_parameters,
+    parameters_from_camera,
+)
 from app.paint.agreement import PaintAgreement, agreement
 from app.paint.candidates import KNOWN, MAIN, WIDE, Library, known_library
 from app.paint.evidence import Reading, read_picture, shows_grass_beside, trace
+from app.paint.goal import goal_height
 from app.paint.grass import field_of_play, why_no_field
 from app.paint.ridges import line_like
 from app.paint.scoring import ScoredPicture
@@ -38,11 +48,15 @@ from app.solving.observations import principal_point
 
 Image = npt.NDArray[np.uint8]
 
-SEARCH_VERSION = 2
+SEARCH_VERSION = 3
 """Of the search and what decides: where nothing was proposed, a later one looks again."""
 WORK_WIDTH = 960
+ENLARGED_WIDTH, ENLARGED = 640, 2
+"""Narrower pictures are read so many times as large: their paint is hardly a pixel broad."""
 LEAST_SIDE = 160
 """Pixels: in a smaller picture lines are narrower than a pixel."""
+SHAPES = (1.29, 2.45)
+"""Width by height of broadcast pictures, from 4:3 to the widest films."""
 BORDER_PX = 4
 """At the border of a picture ridges are no paint."""
 MOST_PIECES = 8
@@ -61,10 +75,17 @@ WELL_SUPPORTED, WELL_PAINTED = 0.75, 0.75
 """Where less of the markings has paint, each that would be seen has to have it nearly whole."""
 LEAST_SUPPORTED, LEAST_SCORE, LEAST_LEAD, LEAST_SUM = 0.50, 0.30, 0.06, 0.52
 """The less of the paint a camera explains, the farther all others have to lie behind it."""
+NEAR_KNOWN_M, NEAR_KNOWN_SIGMAS, KEPT_AT_KNOWN = 4.0, 3.0, 0.97
+"""How near a known position a camera of the other libraries has to stand to be sought there, and the
+share of its agreement that it has to keep."""
+LEAST_KNOWN = 0.25, 0.40
+"""As the second and the last of the above where the match knows the position and most of the markings have paint."""
 MOST_UNCERTAIN_M = 1.0
 """Standard deviation of the position: three lines lie on their paint for many cameras."""
 AIM_SIGMA, LENS_SIGMA = np.radians([3.0, 3.0, 1.0]), np.array([0.2, 0.01])
 """Pan, tilt and roll; logarithm of the focal length and kappa: how far a start may be off."""
+AIM, MOST_TURNED = [PAN, TILT, ROLL, LOG_FOCAL], 0.3
+"""Radians, and a share of the focal length, that another position may make up for."""
 SOLE_LEAD = 0.15
 """What counts as lead where the search found no other camera."""
 LAST_WINDOWS = (5.0, 3.0, 3.0)
@@ -112,12 +133,14 @@ class Ranked:
     Attributes:
         weakest: As of ``weakest_marking``.
         policy: Prior of the distortion with which it was snapped.
+        known: Covariance of where it started, shape (8, 8), where the match knows the position.
     """
 
     snapped: Snapped
     agreement: PaintAgreement
     weakest: float
     policy: CalibrationPolicy = field(default_factory=CalibrationPolicy)
+    known: FloatArray | None = None
 
     @property
     def uncertain_m(self) -> float:
@@ -158,11 +181,21 @@ def propose(
     if isinstance(frame, str):
         return FrameProposal("nothing", frame)
     ranked: list[Ranked] = []
-    for library in [*([known_library(known)] if known else []), MAIN, WIDE]:
-        ranked = merged(frame, ranked, rank(frame, library, pitch, policy))
+    match = known_library(known) if known else None
+    for library in [*([match] if match else []), MAIN, WIDE]:
+        found = rank(frame, library, pitch, policy)
+        if match is not None and library is not match:
+            found = [_where_known(frame, item, match, pitch) for item in found]
+        ranked = merged(frame, ranked, found)
         if why_unsure(ranked) is None:
             break
     return _answer(image, frame, ranked, pitch)
+
+
+def enlarged(image: Image) -> Image:
+    """A small picture as it is read."""
+    cubic = cv2.INTER_CUBIC
+    return np.asarray(cv2.resize(image, None, fx=ENLARGED, fy=ENLARGED, interpolation=cubic))
 
 
 def why_too_small(image: Image) -> str | None:
@@ -178,7 +211,9 @@ def read_frame(image: Image) -> SearchedFrame | str:
     if (small := why_too_small(image)) is not None:
         return small
     height, width = image.shape[:2]
-    if width > WORK_WIDTH:
+    if width < ENLARGED_WIDTH:
+        image = enlarged(image)
+    elif width > WORK_WIDTH:
         size = (WORK_WIDTH, max(round(height * WORK_WIDTH / width), 1))
         image = np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA))
     field = field_of_play(image)
@@ -212,32 +247,95 @@ def rank(
     found = search(frame.picture, frame.pieces, library, pitch, threads(), *amount, kappa)
     if not found:
         return []
-    snapped = threads().map(lambda item: _drawn(frame, item.camera, library, pitch, policy), found)
-    ranked = [
-        Ranked(
-            item,
-            agreement(item.camera, frame.field, frame.paint, pitch),
-            weakest_marking(frame.reading, item, pitch),
-            policy,
-        )
-        for item in snapped
-        if item.reason is None
-    ]
+    drawn = threads().map(lambda item: _drawn(frame, item.camera, library, pitch, policy), found)
+    known = _spread(library) if library.name == KNOWN else None
+    ranked = [_ranked(frame, item, pitch, policy, known) for item in drawn if item.reason is None]
+    if known is not None:
+        ranked = [_where_known(frame, item, library, pitch) for item in ranked]
     return merged(frame, [], ranked)
+
+
+def _ranked(
+    frame: SearchedFrame,
+    snapped: Snapped,
+    pitch: Pitch,
+    policy: CalibrationPolicy,
+    known: FloatArray | None,
+) -> Ranked:
+    seen = agreement(snapped.camera, frame.field, frame.paint, pitch)
+    return Ranked(snapped, seen, weakest_marking(frame.reading, snapped, pitch), policy, known)
 
 
 def _drawn(
     frame: SearchedFrame, start: Camera, library: Library, pitch: Pitch, policy: CalibrationPolicy
 ) -> Snapped:
     """A camera drawn onto the paint; where the paint leaves a number open or would move it far,
-    once more with what is known of cameras."""
-    alone = snap_reading(frame.reading, start, pitch, WINDOWS, policy, circles_count_twice=True)
+    once more with what is known of cameras, or at the position that the match knows."""
+    alone = _snap(frame.reading, start, pitch, WINDOWS, policy)
     if alone.reason is None:
         return alone
-    sigma = np.concatenate([AIM_SIGMA, library.position_sigma, LENS_SIGMA])
+    known = _spread(library)
+    if library.name == KNOWN:
+        start = _at_stand(frame.reading, start, library, pitch)
+        return _snap(frame.reading, start, pitch, WINDOWS, policy, known)
     return snap_reading(
-        frame.reading, start, pitch, WINDOWS, policy, np.diag(sigma**2), circles_count_twice=True
+        frame.reading, start, pitch, WINDOWS, policy, known, circles_count_twice=True
     )
+
+
+def _where_known(frame: SearchedFrame, item: Ranked, match: Library, pitch: Pitch) -> Ranked:
+    """A camera at the position that the match knows, where the paint alone leaves that open and shows
+    the markings there as well."""
+    if item.uncertain_m <= MOST_UNCERTAIN_M:
+        return replace(item, known=None)
+    camera = item.snapped.camera
+    away = np.linalg.norm(match.stands - camera.position, axis=1)
+    if away.min() > max(NEAR_KNOWN_M, NEAR_KNOWN_SIGMAS * item.uncertain_m):
+        return replace(item, known=None)
+    policy = replace(item.policy, distortion_mean=match.kappa or item.policy.distortion_mean)
+    start, known = _at_stand(frame.reading, camera, match, pitch), _spread(match)
+    snapped = _snap(frame.reading, start, pitch, WINDOWS, policy, known)
+    if snapped.reason is not None:
+        return replace(item, known=None)
+    there = _ranked(frame, snapped, pitch, policy, known)
+    return there if there.score >= KEPT_AT_KNOWN * item.score else replace(item, known=None)
+
+
+def _at_stand(reading: Reading, camera: Camera, library: Library, pitch: Pitch) -> Camera:
+    """The camera at the nearest stand of a library, turned and zoomed so that it shows the same."""
+    away = np.linalg.norm(library.stands - camera.position, axis=1)
+    moved = library.stands[away.argmin()] - camera.position
+    rows = trace(reading, camera, pitch).jacobian
+    if len(rows) < len(AIM):
+        return camera
+    turned = np.linalg.lstsq(rows[:, AIM], -rows[:, X : Z + 1] @ moved, rcond=None)[0]
+    if np.abs(turned).max() > MOST_TURNED:
+        return camera
+    parameters = parameters_from_camera(camera, reading.half_diagonal)
+    parameters[X : Z + 1] += moved
+    parameters[AIM] += turned
+    return camera_from_parameters(parameters, camera.principal_point, reading.half_diagonal)
+
+
+def _spread(library: Library) -> FloatArray:
+    """Covariance of a start of the search, shape (8, 8)."""
+    sigma = np.concatenate([AIM_SIGMA, library.position_sigma, LENS_SIGMA])
+    return np.diag(sigma**2)
+
+
+def _snap(
+    reading: Reading,
+    start: Camera,
+    pitch: Pitch,
+    windows: Sequence[float],
+    policy: CalibrationPolicy,
+    known: FloatArray | None = None,
+) -> Snapped:
+    """As ``snap_reading``, with what is known of the position where the match knows it."""
+    return snap_reading(
+        reading, start, pitch, windows, policy, known,
+        circles_count_twice=True, position_is_known=known is not None,
+    )  # fmt: skip
 
 
 def weakest_marking(reading: Reading, snapped: Snapped, pitch: Pitch) -> float:
@@ -286,13 +384,42 @@ def why_unsure(ranked: Sequence[Ranked]) -> str | None:
     is_patchy = supported < WELL_SUPPORTED and best.weakest < WELL_PAINTED
     if is_patchy or supported < LEAST_SUPPORTED:
         return "much of the markings that the best camera shows has no paint"
-    if best.uncertain_m > MOST_UNCERTAIN_M:
+    # Where the match knows the position no paint has to tell it.
+    is_known = best.known is not None
+    if best.uncertain_m > MOST_UNCERTAIN_M and not is_known:
         return "too few markings are seen to say where the camera stands"
     lead = SOLE_LEAD if lead is None else lead
     if lead < LEAST_LEAD:
         return "another camera fits the paint nearly as well"
-    if best.score < LEAST_SCORE or best.score + lead < LEAST_SUM:
+    is_well_known = is_known and supported >= WELL_SUPPORTED
+    least, least_sum = LEAST_KNOWN if is_well_known else (LEAST_SCORE, LEAST_SUM)
+    if best.score < least or best.score + lead < least_sum:
         return "much of what looks like paint is no marking of the best camera"
+    return None
+
+
+def why_not_square(image: Image, camera: Camera, pitch: Pitch) -> str | None:
+    """Why the pixels of a picture may not be square; None where nothing speaks against it.
+
+    Args:
+        image: Red green blue, shape (H, W, 3).
+        camera: On its paint, pixels of it.
+        pitch: The pitch.
+    """
+    seen = goal_height(image, camera, pitch)
+    if seen is not None and seen.is_square:
+        return None
+    if seen is not None and seen.is_certain:
+        return (
+            f"the pixels are not square: the goal looks {seen.share:.1f} times as high as the "
+            "grass says; bring the picture in its own shape"
+        )
+    height, width = image.shape[:2]
+    if not SHAPES[0] < width / height < SHAPES[1]:
+        return (
+            "the picture has not the shape of a broadcast, and no goal shows that its pixels are "
+            "square; bring it in its own shape"
+        )
     return None
 
 
@@ -304,7 +431,11 @@ def _answer(
         return FrameProposal("unsure", reason)
     best, lead = ranked[0], runner_up(ranked)
     snapped = best.snapped
-    if image.shape[:2] != frame.field.shape:
+    reason = reason or why_not_square(frame.image, snapped.camera, pitch)
+    height, width = image.shape[:2]
+    if width < ENLARGED_WIDTH:
+        snapped = scaled(snapped, height, width)
+    elif (height, width) != frame.field.shape:
         snapped = _at_full_size(image, frame, best, pitch)
     return FrameProposal(
         "unsure" if reason else "proposed",
@@ -325,9 +456,7 @@ def _at_full_size(image: Image, frame: SearchedFrame, best: Ranked, pitch: Pitch
     grass = cv2.resize(frame.field.astype(np.uint8), size, interpolation=cv2.INTER_NEAREST)
     reading = read_picture(image, grass.astype(np.bool_))
     found = scaled(best.snapped, height, width)
-    last = snap_reading(
-        reading, found.camera, pitch, LAST_WINDOWS, best.policy, circles_count_twice=True
-    )
+    last = _snap(reading, found.camera, pitch, LAST_WINDOWS, best.policy, best.known)
     return last if last.reason is None else found
 
 

@@ -109,6 +109,7 @@ def snap_reading(
     policy: CalibrationPolicy,
     start_covariance: FloatArray | None = None,
     circles_count_twice: bool = False,
+    position_is_known: bool = False,
 ) -> Snapped:
     """As ``snap``, for a picture that is prepared already.
 
@@ -116,7 +117,10 @@ def snap_reading(
         windows: How far to either side paint is sought, round by round, pixels at 960 x 540.
         circles_count_twice: A circle of which much is seen stands for two markings, as it tells
             as much as two lines: with the middle line it determines a camera.
+        position_is_known: Whether the start's covariance knows where the camera stands: that
+            stands for a marking, as two lines then tell where it looks and how far it zooms.
     """
+    least = LEAST_MARKINGS - position_is_known
     problem = ResectionProblem.of(ImageSize(reading.width, reading.height), policy)
     twice = CURVED if circles_count_twice else []
     rounds = _Rounds(reading, start, pitch, problem, start_covariance)
@@ -125,13 +129,13 @@ def snap_reading(
         strict = index >= len(windows) - STRICT_ROUNDS
         spacing = SPACING_PX if strict else COARSE_PX
         evidence = rounds.seek(parameters, window, spacing)
-        if not _suffices(evidence, twice, spacing):
+        if not _suffices(evidence, twice, spacing, least):
             return _kept(rounds, evidence, NO_PAINT)
         parameters = parameters + rounds.problem.step(parameters, rounds.seen(evidence), strict)
         if not np.isfinite(parameters).all():
             return _kept(rounds, evidence, PAINT_DISAGREES)
     evidence = rounds.seek(parameters, windows[-1])
-    if not _suffices(evidence, twice) or evidence.share < LEAST_SEEN:
+    if not _suffices(evidence, twice, least=least) or evidence.share < LEAST_SEEN:
         return _kept(rounds, evidence, NO_PAINT)
     noise = rounds.problem.noise(parameters, rounds.seen(evidence))
     if noise is None:
@@ -194,11 +198,13 @@ class _Rounds:
         )
 
 
-def _suffices(evidence: Evidence, twice: list[int], spacing: float = SPACING_PX) -> bool:
+def _suffices(
+    evidence: Evidence, twice: list[int], spacing: float = SPACING_PX, least: int = LEAST_MARKINGS
+) -> bool:
     counts = np.bincount(evidence.traced.marking, minlength=len(MARKINGS))
     markings = int((counts >= LEAST_ON_MARKING).sum())
     markings += int((counts[twice] * spacing >= LEAST_ON_CIRCLE * SPACING_PX).sum())
-    return len(evidence.offsets) >= LEAST_POINTS and markings >= LEAST_MARKINGS
+    return len(evidence.offsets) >= LEAST_POINTS and markings >= least
 
 
 def _kept(

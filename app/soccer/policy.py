@@ -114,6 +114,19 @@ class CalibrationPolicy:
     """0: each one, as the public evaluator does. Stubs of a few pixels at the border of a picture
     are none that people draw. Not in the ``repr``: ``calibration_key`` knows it where it is set."""
 
+    lone_frames: Literal["exact", "professional", "any"] = _threshold(
+        "exact",
+        CALIBRATION,
+        "Pitch and picture of a frame alone",
+        choices=("exact", "professional", "any"),
+        later=True,
+        told=False,
+    )
+    """What nobody says of the pitch and the picture of a frame without a match and other views: ``exact``, they are
+    as they stand here; ``professional``, the pitch is that of some professional club; ``any``, it is
+    as the Laws allow, and the picture may have been stretched or cropped. Not in the ``repr``: what
+    it makes of a calibration has a key of its own."""
+
     goal: Literal["inner", "middle"] = _threshold(
         "inner",
         CALIBRATION,
@@ -255,10 +268,11 @@ CLICKED = CalibrationPolicy(goal="middle")
 """How the commands without a dataset calibrate: as ``paper``, with goals where people click them."""
 STRICT = Policy(name="strict", calibration=CLICKED, min_parallax_degrees=5.0, max_sigma_m=0.5)
 TOUCHLINE = Policy(
-    name="touchline", calibration=replace(CLICKED, source="paint", shortest_marking_px=5.0)
+    name="touchline",
+    calibration=replace(CLICKED, source="paint", shortest_marking_px=5.0, lone_frames="any"),
 )
-"""As ``paper``, with cameras from the paint of their pictures, goals where people click them, and
-stubs that nobody draws not counted as missing."""
+"""As ``paper``, with cameras from the paint of their pictures, goals where people click them, stubs
+that nobody draws not counted as missing, and unsure of what nobody says of frames alone."""
 POLICIES = {policy.name: policy for policy in (PAPER, STRICT, TOUCHLINE)}
 
 

@@ -38,6 +38,7 @@ from app.solving.jaccard import (
     project_markings,
 )
 from app.solving.labels import find_suspects
+from app.solving.lone_frame import LoneFrame, lone_frame
 from app.solving.main_position import PositionPrior, match_prior
 from app.solving.observations import Observations, observe
 from app.solving.paint_camera import PaintProblem, solve_paint
@@ -172,6 +173,33 @@ def calibrate_picture(
     )
 
 
+def look_alone(
+    found: Calibration, lines: Lines, pitch: Pitch, size: ImageSize, policy: CalibrationPolicy
+) -> LoneFrame | None:
+    """What nobody says of the pitch and the picture of a frame that was calibrated from its lines.
+
+    Args:
+        found: What ``calibrate`` makes of the lines.
+
+    Returns:
+        None without a camera, where its lines leave it open, and where the policy takes both for
+        known.
+    """
+    if found.camera is None or found.covariance is None:
+        return None
+    problem = ResectionProblem.of(size, policy)
+    left_out = [suspect.marking for suspect in found.suspects]
+    pitch = policy.fitted(pitch)
+    observations = observe(lines, pitch, size)
+    parameters = problem.parameters(found.camera)
+    return lone_frame(problem, parameters, observations, pitch, policy, left_out)
+
+
+def as_lone(found: Calibration, alone: LoneFrame | None) -> Calibration:
+    """The calibration with that in its covariance; what the lines determine they still do."""
+    return found if alone is None else replace(found, covariance=row_by_row(alone.covariance))
+
+
 def _picture_covariance(
     problem: ResectionProblem,
     observations: Observations,
@@ -304,7 +332,11 @@ def calibrate_view(
     clicked = known.get(key) or calibrate_clicks(group, view, policy)
     reading = wanted_paint(group, view, policy)
     if reading is None or reading.sought_for != sought_key(group, view, policy):
-        return clicked
+        if not is_lone(group, view, policy):
+            return clicked
+        station = view.station
+        alone = look_alone(clicked, station.lines, group.pitch, station.size, policy)
+        return as_lone(clicked, alone)
     return calibrate_paint(clicked, reading, view.station, group.pitch, policy)
 
 
@@ -323,7 +355,9 @@ def view_keys(group: Group, view: View, policy: CalibrationPolicy) -> tuple[str,
     key = clicks_key(group, view, policy)
     reading = wanted_paint(group, view, policy)
     if reading is None or reading.sought_for != sought_key(group, view, policy):
-        return (key,)
+        if not is_lone(group, view, policy):
+            return (key,)
+        return digest_of(f"{key} lone {policy.lone_frames}".encode()), key
     painted = digest_of(f"{key} {reading.digest}".encode())
     return painted, key
 
@@ -340,6 +374,18 @@ def sought_key(group: Group, view: View, policy: CalibrationPolicy) -> str:
     """
     shared = _shared(group, view, policy)
     return _key(_camera_parts(START_VERSION, view.station, group.pitch, policy, shared))
+
+
+def is_lone(group: Group, view: View, policy: CalibrationPolicy) -> bool:
+    """Whether nobody but its own lines says anything of the pitch and the picture of a view.
+
+    Several views of one instant share their pitch: each by itself would be too uncertain.
+    """
+    station = view.station
+    is_said = bool(group.match) or station.shared or station.picture is not None
+    is_given = station.given is not None and station.calibration == "given"
+    is_exact = policy.lone_frames == "exact" or group.pitch != Pitch()
+    return not (is_exact or is_said or is_given) and len(group.views) == 1
 
 
 def wanted_paint(group: Group, view: View, policy: CalibrationPolicy) -> PaintReading | None:

@@ -7,10 +7,12 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from app.soccer.camera_size import other_size
-from app.soccer.finding import Finding, Fix
+from app.soccer.finding import PITCH_SIZE, Finding, Fix
 from app.soccer.frames import ImageSize, height_above_grass
+from app.soccer.pitch import Pitch
 from app.soccer.solution import Calibration
 from app.solving.calibrate import MAX_POSITION_SIGMA_M
+from app.solving.lone_frame import OTHER_M, OTHER_SIGMAS, LoneFrame
 from app.solving.numbers import metres, pixels
 from app.solving.picture_findings import BELIEVED, MIN_SHIFT, MIN_STRETCH
 
@@ -190,6 +192,29 @@ def _picture_geometry(
         number=number,
         threshold=threshold,
         fix=None if view is None else Fix("free_picture", view),
+    )
+
+
+def lone_findings(alone: LoneFrame | None, pitch: Pitch) -> Iterator[Finding]:
+    """What the lines of a frame alone say of its pitch.
+
+    Args:
+        alone: What nobody else says of it; None where it is said.
+        pitch: The one that it was calibrated on.
+    """
+    other = None if alone is None else alone.other_pitch(pitch)
+    if alone is None or other is None:
+        return
+    off = np.abs([other.length - pitch.length, other.width - pitch.width])
+    axis = int(np.argmax(off / alone.sizes_sigma))
+    names = " and ".join(f"“{name}”" for name in alone.explains)
+    where = f"; {names} {'lies' if len(alone.explains) == 1 else 'lie'} there, too" if names else ""
+    yield Finding(
+        PITCH_SIZE,
+        f"The lines show a pitch of {other.length:g} x {other.width:g} m, and the camera is found on "
+        f"{pitch.length:g} x {pitch.width:g} m{where}. Its place is as uncertain as that.",
+        number=float(off[axis]),
+        threshold=max(OTHER_M, OTHER_SIGMAS * float(alone.sizes_sigma[axis])),
     )
 
 

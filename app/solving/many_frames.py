@@ -76,6 +76,6 @@ def shared_sigmas(pulls: FloatArray, information: FloatArray, spent: int) -> Flo
         spent: Frames' worth of freedom that the numbers took.
     """
     count, inverse = len(pulls), np.linalg.inv(information)
-    between = inverse @ (pulls.T @ pulls) @ inverse * count / (count - spent)
+    between = inverse @ (pulls.T @ pulls) @ inverse * count / max(count - spent, 1)
     sigmas: FloatArray = np.sqrt(np.maximum(np.diag(inverse), np.diag(between)))
     return sigmas

@@ -112,6 +112,7 @@ def estimate_pitch(
     policy: CalibrationPolicy,
     *,
     one_match: bool = True,
+    least: int = MIN_FRAMES,
 ) -> PitchEstimate:
     """The size of the pitch that explains the lines of many frames best.
 
@@ -119,6 +120,7 @@ def estimate_pitch(
         frames: Of one match.
         policy: How frames are calibrated.
         one_match: Whether the frames are known to be of one match.
+        least: Frames below which nothing is estimated.
 
     Raises:
         DegenerateGeometryError: Too few frames show enough markings, or frames that nobody says
@@ -126,9 +128,9 @@ def estimate_pitch(
     """
     pitch = policy.fitted(Pitch())
     seen = [_Seen.of(frames[index], pitch, policy) for index in choose_frames(frames)]
-    if len(seen) < MIN_FRAMES:
+    if len(seen) < least:
         raise DegenerateGeometryError(
-            f"{len(seen)} frames show enough markings, the size of a pitch needs {MIN_FRAMES}"
+            f"{len(seen)} frames show enough markings, the size of a pitch needs {least}"
         )
     pitch, seen, _ = _adjust(pitch, seen)
     # Labels are judged on the pitch as it is now: on one of the wrong size the touchlines look
@@ -220,7 +222,8 @@ class _Seen:
             self.problem.size.diagonal / 2,
         )
         # A marking that moves is a camera that moves the other way.
-        length, width = self._moves(offsets[:, 1] != 0).T
+        moves = size_moves(self.problem, self.fit.parameters, self.observations, offsets[:, 1] != 0)
+        length, width = moves.T
         by_length = -by_camera[:, :, X] * length[:, None]
         by_width = -by_camera[:, :, Y] * width[:, None]
         rows = np.concatenate([by_camera, np.stack([by_length, by_width], axis=-1)], axis=-1)
@@ -235,23 +238,29 @@ class _Seen:
         information[range(PARAMETERS), range(PARAMETERS)] += inverse
         return gradient, information
 
-    def _moves(self, beyond: npt.NDArray[np.bool_]) -> FloatArray:
-        """How far each point's nearest place moves with the sizes, shape (N, 2).
 
-        ``beyond`` are points beyond an end: their place is the end, and ends of the lines that
-        cross the pitch are its corners, or the middle line's ends.
-        """
-        moves = _SHARES[self.observations.marking].copy()
-        camera = self.problem.camera(self.fit.parameters)
-        center = np.array(principal_point(self.problem.size))
-        rows = np.flatnonzero(beyond & _CROSSING[self.observations.marking])
-        shapes = self.observations.curves.shapes[self.observations.marking[rows]]
-        ends = shapes.reshape(-1, 2, 3)
-        seen = camera.project(ends.reshape(-1, 3)).reshape(-1, 2, 2) - center
-        apart = seen - self.observations.pixels[rows, None]
-        near = np.nan_to_num(np.hypot(*np.moveaxis(apart, 2, 0)), nan=np.inf).argmin(axis=1)
-        moves[rows] = 0.5 * np.sign(ends[np.arange(len(rows)), near, :2])
+def size_moves(
+    problem: ResectionProblem,
+    parameters: FloatArray,
+    observations: Observations,
+    beyond: npt.NDArray[np.bool_],
+) -> FloatArray:
+    """How far each point's nearest place moves with length and width, shape (N, 2).
+
+    ``beyond`` are points beyond an end, shape (N,): their place is the end, and ends of the lines
+    that cross the pitch are its corners, or the middle line's ends.
+    """
+    moves: FloatArray = _SHARES[observations.marking].copy()
+    rows = np.flatnonzero(beyond & _CROSSING[observations.marking])
+    if not len(rows):
         return moves
+    center = np.array(principal_point(problem.size))
+    ends = observations.curves.shapes[observations.marking[rows]].reshape(-1, 2, 3)
+    seen = problem.camera(parameters).project(ends.reshape(-1, 3)).reshape(-1, 2, 2) - center
+    apart = seen - observations.pixels[rows, None]
+    near = np.nan_to_num(np.hypot(*np.moveaxis(apart, 2, 0)), nan=np.inf).argmin(axis=1)
+    moves[rows] = 0.5 * np.sign(ends[np.arange(len(rows)), near, :2])
+    return moves
 
 
 def _adjust(pitch: Pitch, seen: Sequence[_Seen]) -> tuple[Pitch, list[_Seen], list[Share]]:
@@ -303,7 +312,7 @@ def _is_confirmed(shares: Sequence[Share]) -> npt.NDArray[np.bool_]:
     pulls = np.array([gradient for gradient, _ in shares])
     told = np.maximum([np.diag(information) for _, information in shares], 1e-30)
     loudest = told.argmax(axis=0), range(2)
-    others = told.sum(axis=0) - told[loudest]
+    others = np.maximum(told.sum(axis=0) - told[loudest], 1e-30)
     apart = pulls[loudest] / told[loudest] - (pulls.sum(axis=0) - pulls[loudest]) / others
     chance = 1 / told[loudest] + 1 / others
     known: npt.NDArray[np.bool_] = others >= UNKNOWN_SIGMA_M**-2

@@ -18,6 +18,7 @@ from tests.bench.geometry import bench_geometry
 from tests.bench.goals import bench_goals
 from tests.bench.line_coverage import bench_line_coverage
 from tests.bench.listeners import bench_listeners
+from tests.bench.lone_frames import bench_lone_frames
 from tests.bench.page_loads import bench_page_loads
 from tests.bench.paint import bench_paint
 from tests.bench.people import bench_people
@@ -43,6 +44,7 @@ def main() -> None:
     bench_pictures()
     bench_picture_power()
     bench_pitches()
+    bench_lone_frames()
     bench_line_coverage(REAL_DATA, 3)
     bench_geometry()
     if (REAL_DATA / "sn22-dev" / "lines.zip").is_file():

@@ -26,6 +26,7 @@ from tests.bench.table import print_table
 from tests.scenes import make_scenes
 
 GROUPS, SEED = 36, 20261123
+UNSEEN, UNSEEN_SEED, WIDTHS = 150, 20261207, (1280, 848, 480)
 JPEG = [cv2.IMWRITE_JPEG_QUALITY, 85]
 PITCH = Pitch()
 GAMMA, RIGHT = 0.005, 0.75
@@ -49,8 +50,11 @@ class Tried:
 def bench_propose(data: Path) -> None:
     """Print the table; real frames where they are."""
     rows = [*_rows("sample", list(_sample())), *_rows("sample, match known", list(_known()))]
+    rows += _rows("unseen", list(_unseen()))
     if (data / "broadcast" / "index.csv").is_file():
         rows += _rows("real", list(_real(data / "broadcast")))
+        rows += _rows("real, 398 px wide", list(_real(data / "broadcast", 398)))
+        rows += _rows("real, squeezed to 1024 x 1024", list(_real(data / "broadcast", 1024, 1024)))
     header = (
         "camera from a frame alone",
         "frames",
@@ -113,8 +117,8 @@ def _shots() -> list[tuple[str, str, Image, Camera]]:
     return list(_drawn())
 
 
-def _drawn() -> Iterator[tuple[str, str, Image, Camera]]:
-    for scene in make_scenes(GROUPS, SEED, faults=False):
+def _drawn(groups: int = GROUPS, seed: int = SEED) -> Iterator[tuple[str, str, Image, Camera]]:
+    for scene in make_scenes(groups, seed, faults=False):
         for index, view in enumerate(scene.truth.views):
             done, data = cv2.imencode(".jpg", render(scene, view.view), JPEG)
             assert done
@@ -140,6 +144,22 @@ def _known() -> Iterator[Tried]:
         first.setdefault(match, true)
 
 
+def _unseen() -> Iterator[Tried]:
+    """Main cameras that nothing was chosen on, a third of them in each width of ``WIDTHS``."""
+    shots = (shot for shot in _drawn(UNSEEN, UNSEEN_SEED) if shot[1] == "main")
+    for number, (_, kind, image, true) in enumerate(shots):
+        width = WIDTHS[number % len(WIDTHS)]
+        small = _resized(image, width)
+        camera = true.scaled(width / image.shape[1], small.shape[0] / image.shape[0])
+        found, processor, wall = _try(kind, small, [])
+        yield Tried(kind, found, _agrees(found, camera, small), processor, wall)
+
+
+def _resized(image: Image, width: int, height: int | None = None) -> Image:
+    size = (width, height or round(image.shape[0] * width / image.shape[1]))
+    return np.ascontiguousarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA))
+
+
 def _agrees(found: FrameProposal, true: Camera, image: Image) -> bool | None:
     if found.outcome != "proposed" or found.camera is None:
         return None
@@ -151,7 +171,8 @@ def _agrees(found: FrameProposal, true: Camera, image: Image) -> bool | None:
     return camera_jaccard(found.camera, seen, PITCH, size, gammas, symmetric=True)[0] > RIGHT
 
 
-def _real(folder: Path) -> Iterator[Tried]:
+def _real(folder: Path, width: int | None = None, height: int | None = None) -> Iterator[Tried]:
+    """Real frames, resized to a width, or squeezed to a width and height."""
     for row in csv.DictReader((folder / "index.csv").read_text().splitlines()):
         path, names = folder / row["file"], row["clicked"].split()
         kind = row["camera"].split("-")[0]
@@ -161,6 +182,7 @@ def _real(folder: Path) -> Iterator[Tried]:
             frames = [(names[0] if names else "", 0)]
         for name, number in frames:
             image = _picture(path, number)
+            image = image if width is None else _resized(image, width, height)
             found, processor, wall = _try(kind, image, [])
             right = _near_clicks(found, folder / "lines" / name, image) if name else None
             yield Tried(kind, found, right, processor, wall)

@@ -24,6 +24,7 @@ from tests.docs.settings import SETTINGS_PAGE, settings_page
 
 AGAIN = "run: python -m tests.docs"
 PLAIN_WORDS = """
+    lone stadium priors
     choice give hand handed back lease leases on people work
     take takes gold guidelines mixing copying copies own errors parts guideline datasets
     adjudicate compare differences distance limits other panel rater summary weigh workspace

@@ -28,9 +28,10 @@ from app.soccer.picture import PictureGeometry
 from app.soccer.pitch import Pitch
 from app.soccer.policy import CLICKED, CalibrationPolicy
 from app.soccer.solution import Calibration
-from app.solving.calibrate import calibrate
-from app.solving.calibration_findings import calibration_findings
+from app.solving.calibrate import calibrate, look_alone
+from app.solving.calibration_findings import calibration_findings, lone_findings
 from app.solving.leave_one_out import leave_one_out
+from app.solving.lone_frame import LoneFrame
 from app.solving.match_model import FramePlace
 from app.solving.match_position import Places, place_of, share_position
 from app.solving.warm import warm_up
@@ -43,7 +44,8 @@ CHUNK = 16
 class CalibratedFrame:
     """What became of one line file.
 
-    ``camera`` is the text of its file, ``left_out`` (marking, pixels) of ``leave_one_out``.
+    ``camera`` is the text of its file, ``left_out`` (marking, pixels) of ``leave_one_out``,
+    ``lone`` what nobody says of its pitch and picture, where no match shares anything with it.
     """
 
     stem: str
@@ -54,6 +56,7 @@ class CalibratedFrame:
     milliseconds: float
     alone: Calibration
     place: FramePlace | None
+    lone: LoneFrame | None
 
 
 def calibrate_files(
@@ -105,7 +108,7 @@ def calibrate_files(
         files = as_taken(files, geometry)
     named = None if matches is None else read_matches(matches)
     sharing = guess or named is not None
-    policy = replace(CLICKED, check_labels=labels == "checked")
+    policy = replace(CLICKED, check_labels=labels == "checked", lone_frames="any")
     chunks = [files[start : start + CHUNK] for start in range(0, len(files), CHUNK)]
     rounds = 2 if sharing else 1
 
@@ -173,8 +176,11 @@ def _calibrate_file(
     began = time.thread_time()
     calibration = calibrate(file.lines, Pitch(), size, policy)
     milliseconds = 1000 * (time.thread_time() - began)
+    began = time.thread_time()
+    lone = look_alone(calibration, file.lines, Pitch(), size, policy)
+    milliseconds += 1000 * (time.thread_time() - began)
     left_out = leave_one_out(file.lines, Pitch(), size, policy) if with_leave_one_out else ()
-    return _frame(file.stem, calibration, size, milliseconds, tuple(left_out))
+    return _frame(file.stem, calibration, size, milliseconds, tuple(left_out), lone)
 
 
 def _share_file(
@@ -201,19 +207,22 @@ def _frame(
     size: ImageSize,
     milliseconds: float,
     left_out: tuple[tuple[str, float | None], ...],
+    lone: LoneFrame | None = None,
 ) -> CalibratedFrame:
     camera = calibration.camera
+    findings = [*calibration_findings(calibration, size), *lone_findings(lone, Pitch())]
     # What is drawn travels no further: it is most of a calibration.
     alone = replace(calibration, markings=())
     return CalibratedFrame(
         stem=stem,
         camera=None if camera is None else camera_text(camera),
         reason=calibration.reason,
-        findings=tuple(calibration_findings(calibration, size)),
+        findings=tuple(findings),
         left_out=left_out,
         milliseconds=milliseconds,
         alone=alone,
         place=place_of(calibration, size),
+        lone=lone,
     )
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections import Counter
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -19,13 +20,18 @@ from app.durable import replace_file
 from app.errors import GeometryError, InputError
 from app.finite import json_text
 from app.geometry.camera import Camera
+from app.paint.frame_pitch import films, pitch_frame, pitch_of
 from app.paint.propose import FrameProposal, propose
 from app.progress import TellProgress
 from app.review.datasets.picture_files import PictureFile, UniqueNames, read_pictures
 from app.soccer.frames import ImageSize
 from app.soccer.paint_evidence import PROPOSAL_OUTCOMES
+from app.soccer.pitch import Pitch
+from app.solving.pitch_size import PitchFrame
 
 RESULT = "propose.json"
+LIKELY = 0.6
+"""Share of the markings that have paint, of an unsure camera that is asked for the size of its pitch."""
 
 
 def propose_files(
@@ -58,16 +64,64 @@ def propose_files(
     cameras = _known(known)
     rows: list[dict[str, Any]] = []
     names = UniqueNames()
+    seen: list[_Proposed | None] = []
     for picture in read_pictures(sources, settings, report):
         frame = names.name(picture.stem)
-        rows.append(_propose_one(picture, frame, out, cameras, size))
+        row, proposed = _propose_one(picture, frame, out, cameras, size, Pitch())
+        rows.append(row)
+        seen.append(proposed)
         if progress is not None:
             progress(len(rows))
     if not rows:
         why = f": {report.problems[0].message}" if report.problems else ""
         raise InputError(f"there are no pictures (jpg, png or webp) to read{why}")
+    pitches = _other_pitches(seen)
+    if pitches:
+        for at, picture in enumerate(read_pictures(sources, settings, Report())):
+            if at in pitches:
+                _propose_again(picture, rows, at, out, pitches[at], seen[at], size)
     _write(out / RESULT, json_text(rows, indent=1) + "\n")
     return rows
+
+
+@dataclass(frozen=True)
+class _Proposed:
+    """A camera, proposed or nearly so, and the paint beside it; an unsure one agrees by nothing."""
+
+    camera: Camera
+    agreement: float
+    frame: PitchFrame
+
+
+def _other_pitches(seen: Sequence[_Proposed | None]) -> dict[int, Pitch]:
+    """The pitch of each frame whose film certainly shows another size, by its index."""
+    cameras = [None if one is None else one.camera for one in seen]
+    sizes = [None if one is None else one.frame.size for one in seen]
+    found = {}
+    for film in films(cameras, sizes):
+        frames = [one.frame for index in film if (one := seen[index]) is not None]
+        pitch = pitch_of(frames, Pitch())
+        if pitch is not None:
+            found.update(dict.fromkeys(film, pitch))
+    return found
+
+
+def _propose_again(
+    picture: PictureFile,
+    rows: list[dict[str, Any]],
+    at: int,
+    out: Path,
+    pitch: Pitch,
+    before: _Proposed | None,
+    size: ImageSize | None,
+) -> None:
+    """A frame once more on the pitch that its film shows; kept where the paint agrees no less."""
+    frame = rows[at]["frame"]
+    if picture.image is None or before is None:
+        return
+    row, again = _propose_one(picture, frame, out, [before.camera], size, pitch, before.agreement)
+    if again is not None:
+        rows[at] = row | {"ms": row["ms"] + rows[at]["ms"]}
 
 
 def counts_of(rows: Sequence[dict[str, Any]]) -> dict[str, int]:
@@ -82,26 +136,41 @@ def _propose_one(
     out: Path,
     known: Sequence[Camera],
     size: ImageSize | None,
-) -> dict[str, Any]:
+    pitch: Pitch,
+    least: float | None = None,
+) -> tuple[dict[str, Any], _Proposed | None]:
+    """Propose and write the camera of one frame; below a least agreement nothing is changed."""
     began = time.perf_counter()
     if picture.image is None:
         found = FrameProposal("nothing", picture.problem)
     else:
         try:
-            found = propose(picture.image, known=known)
+            found = propose(picture.image, pitch, known)
         except (GeometryError, np.linalg.LinAlgError) as error:
             found = FrameProposal("nothing", f"the picture cannot be solved ({error})")
     milliseconds = 1000 * (time.perf_counter() - began)
-    file = resolve_inside(out, camera_name(frame))
+    file, row = resolve_inside(out, camera_name(frame)), _row(frame, found, milliseconds)
+    if pitch != Pitch():
+        row["pitch"] = {"length": pitch.length, "width": pitch.width}
+    agrees = 0.0 if found.agreement is None else found.agreement.product
+    if least is not None and (found.outcome != "proposed" or agrees < least):
+        return row, None
     if found.outcome == "proposed" and found.camera is not None and picture.image is not None:
         camera = found.camera
         if size is not None:
             height, width = picture.image.shape[:2]
             camera = camera.scaled(size.width / width, size.height / height)
         _write(file, camera_text(camera))
-    else:
-        file.unlink(missing_ok=True)
-    return _row(frame, found, milliseconds)
+        return row, _Proposed(found.camera, agrees, pitch_frame(picture.image, found.camera, pitch))
+    file.unlink(missing_ok=True)
+    if found.camera is None or picture.image is None or not _is_likely(found):
+        return row, None
+    return row, _Proposed(found.camera, 0.0, pitch_frame(picture.image, found.camera, pitch))
+
+
+def _is_likely(found: FrameProposal) -> bool:
+    """Whether an unsure camera may lie on its paint but for markings of another pitch."""
+    return found.agreement is not None and found.agreement.supported >= LIKELY
 
 
 def _row(frame: str, found: FrameProposal, milliseconds: float) -> dict[str, Any]:

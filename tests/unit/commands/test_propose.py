@@ -15,9 +15,10 @@ from app.config import Settings
 from app.review.importing.ingest import ingest
 from app.soccer.group import Group, Station, View
 from app.soccer.media import Media
+from app.soccer.pitch import Pitch
 from app.store.store import Store
-from tests.cameras import SIZE
-from tests.unit.paint.lawns import TRUE, drawn, lawn
+from tests.cameras import SIZE, looking
+from tests.unit.paint.lawns import SMALL, TRUE, drawn, lawn
 
 Run = Callable[..., tuple[int, str, str]]
 
@@ -55,6 +56,24 @@ class TestPropose:
         code, told, _ = touchline("propose", tmp_path / "good.png", tmp_path / "out")
         assert (code, "unsure" in told) == (0, True)
         assert [file.name for file in (tmp_path / "out").iterdir()] == ["propose.json"]
+
+    def test_frames_of_one_film_show_their_pitch_together(self, tmp_path: Path, touchline: Run):
+        for number, target in enumerate(((22.0, -6.0), (14.0, -10.0), (-20.0, -8.0))):
+            camera = looking((1.0, 62.0, -16.0), (*target, 0.0), 1150.0, size=SMALL)
+            picture = lawn(drawn(camera, 2, Pitch(100.5, 68.0)))
+            cv2.imwrite(str(tmp_path / f"{number}.png"), picture[:, :, ::-1])
+        code, told, _ = touchline("propose", tmp_path, tmp_path / "out", "--json")
+        rows = json.loads(told)
+        assert code == 0
+        assert [row["outcome"] for row in rows] == ["proposed"] * 3
+        assert all(row["pitch"]["length"] == pytest.approx(100.5, abs=0.4) for row in rows)
+        assert all(row["pitch"]["width"] == 68.0 for row in rows)
+        for row in rows:
+            file = json.loads((tmp_path / "out" / f"camera_{row['frame']}.json").read_text())
+            assert np.allclose(file["position_meters"], (1.0, 62.0, -16.0), atol=0.8)
+        touchline("propose", tmp_path / "0.png", tmp_path / "alone", "--json")
+        (alone,) = json.loads((tmp_path / "alone" / "propose.json").read_text())
+        assert "pitch" not in alone
 
     def test_a_folder_without_pictures_is_said(self, tmp_path: Path, touchline: Run):
         (tmp_path / "in").mkdir()

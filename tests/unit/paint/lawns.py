@@ -19,16 +19,18 @@ TRUE = looking((2.0, 62.0, -16.0), (36.0, -4.0, 0.0), 1500.0, size=SMALL)
 """A main camera that looks at the right penalty area."""
 
 
-def drawn(camera: Camera, broad: int = 1) -> npt.NDArray[np.bool_]:
+def drawn(camera: Camera, broad: int = 1, pitch: Pitch = PITCH) -> npt.NDArray[np.bool_]:
     """The grass markings as thin lines, shape (540, 960)."""
     names = [name for name in MARKINGS if not name.startswith("Goal")]
-    return marked(camera, *names, broad=broad)
+    return marked(camera, *names, broad=broad, pitch=pitch)
 
 
-def marked(camera: Camera, *names: str, broad: int = 3) -> npt.NDArray[np.bool_]:
+def marked(
+    camera: Camera, *names: str, broad: int = 3, pitch: Pitch = PITCH
+) -> npt.NDArray[np.bool_]:
     """These markings alone, shape (540, 960)."""
     mask = np.zeros((SMALL.height, SMALL.width), np.uint8)
-    for name, polyline in project_markings(camera, PITCH, SMALL).items():
+    for name, polyline in project_markings(camera, pitch, SMALL).items():
         if name in names and len(polyline) > 1:
             cv2.polylines(mask, [np.round(polyline).astype(np.int32)], False, 1, broad)
     return mask.astype(np.bool_)

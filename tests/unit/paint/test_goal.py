@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from app.geometry.camera import Camera
-from app.paint.goal import goal_lines
+from app.paint.goal import goal_height, goal_lines
 from app.soccer.pitch import GOAL_PARTS, Pitch
 from tests.cameras import looking
 
@@ -69,3 +69,23 @@ class TestGoalLines:
     def test_a_post_alone_is_proposed_alone(self) -> None:
         (post,) = [part for part in RIGHT if part.endswith("post left")]
         assert list(goal_lines(picture(post), CAMERA, PITCH)) == [post]
+
+
+class TestGoalHeight:
+    def test_a_goal_is_as_high_as_it_is(self) -> None:
+        seen = goal_height(picture(*RIGHT), CAMERA, PITCH)
+        assert seen is not None and seen.is_square
+        assert seen.share == pytest.approx(1.0, abs=0.04)
+
+    def test_beside_a_camera_that_foreshortens_too_much_it_looks_too_high(self) -> None:
+        image = picture()
+        for part in RIGHT:
+            places = CAMERA.project(PITCH.sample(part, 0.05, 0.05) * (1.0, 1.0, 1.4))
+            shown = places.round().astype(np.int32)
+            cv2.polylines(image, [shown], False, (220,) * 3, 3, cv2.LINE_AA)
+        seen = goal_height(image, CAMERA, PITCH)
+        assert seen is not None and not seen.is_square and seen.is_certain
+        assert seen.share == pytest.approx(1.4, abs=0.06)
+
+    def test_a_crowd_has_no_goal(self) -> None:
+        assert goal_height(picture(), CAMERA, PITCH) is None

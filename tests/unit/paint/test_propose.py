@@ -18,6 +18,7 @@ from app.paint.propose import (
     read_frame,
     scaled,
     weakest_marking,
+    why_not_square,
     why_unsure,
 )
 from app.paint.snap import Snapped, snap_reading
@@ -99,7 +100,7 @@ class TestPropose:
         assert (found[0], last[0]) == (960, 1280)
         # The lens of the match is known, and a circle counts as two lines.
         assert found[1] == last[1] != CalibrationPolicy()
-        assert last[2] == {"circles_count_twice": True}
+        assert last[2] == {"circles_count_twice": True, "position_is_known": False}
 
     def test_what_was_found_in_the_small_picture_is_told_in_pixels_of_the_large_one(self):
         reading = read_picture(lawn(drawn(TRUE, 3)), np.ones((540, 960), np.bool_))
@@ -115,6 +116,66 @@ class TestPropose:
             wanted = np.array(places) * 2 + (0.5, 0.5, 0.0)
             assert told == pytest.approx(wanted, abs=0.001)
         assert (large.error_px, large.moved_px, large.size) == (2.0, 1.0, (1080, 1920))
+
+    def test_what_paint_leaves_open_the_match_tells(self):
+        true = looking((-1.0, 60.0, -16.0), (0.0, -4.0, 0.0), 2600.0, size=SMALL)
+        picture = lawn(drawn(true, 3))
+        alone = propose(picture)
+        assert alone.outcome == "unsure"
+        assert alone.reason is not None and "where the camera stands" in alone.reason
+        found = propose(
+            picture, known=[replace(true, position=true.position + np.array([0.6, -0.3, 0.2]))]
+        )
+        assert (found.outcome, found.reason) == ("proposed", None)
+        assert found.camera is not None
+        assert np.linalg.norm(found.camera.position - true.position) < 1.0
+
+    def test_a_position_of_another_match_moves_no_camera_that_paint_determines(self):
+        alone = propose(lawn(drawn(TRUE, 3)))
+        other = replace(TRUE, position=TRUE.position + np.array([2.5, 1.5, -1.0]))
+        found = propose(lawn(drawn(TRUE, 3)), known=[other])
+        assert alone.camera is not None and found.camera is not None
+        assert np.linalg.norm(found.camera.position - TRUE.position) < 0.3
+
+    def test_a_known_position_counts_for_a_marking(self):
+        true = looking((-3.0, 56.0, -16.0), (50.0, 0.0, 0.0), 2900.0, size=SMALL)
+        picture = lawn(marked(true, "Side line right", "Small rect. right top"))
+        reading = read_picture(picture, np.ones(picture.shape[:2], np.bool_))
+        spread = np.diag(np.array([0.05, 0.05, 0.01, 0.5, 0.5, 0.5, 0.2, 0.01]) ** 2)
+        asked = (reading, true, PITCH, (4.0, 3.0, 3.0), CalibrationPolicy(), spread)
+        assert snap_reading(*asked).reason == NO_PAINT
+        assert snap_reading(*asked, position_is_known=True).reason is None
+
+    def test_a_small_picture_is_read_enlarged_and_told_in_its_own_pixels(
+        self, scene: Scene, frame: Image
+    ):
+        height, width = frame.shape[:2]
+        small = cv2.resize(frame, (400, 400 * height // width), interpolation=cv2.INTER_AREA)
+        read = read_frame(small)
+        assert isinstance(read, SearchedFrame) and read.image.shape[1] == 800
+        found = propose(np.asarray(small, np.uint8))
+        assert found.outcome == "proposed"
+        assert found.camera is not None and found.snapped is not None
+        assert found.snapped.size == small.shape[:2]
+        true = scene.truth.views[0].camera.scaled(400 / width, small.shape[0] / height)
+        assert found.camera.principal_point == pytest.approx(true.principal_point, abs=0.01)
+        seen = true.on_ground(np.array([[150.0, 120.0], [250.0, 160.0], [350.0, 200.0]]))
+        seen = np.column_stack([seen, np.zeros(len(seen))])
+        apart = np.hypot(*(found.camera.project(seen) - true.project(seen)).T)
+        assert np.nanmax(apart) < 0.5
+
+    def test_a_squeezed_picture_is_not_proposed(self, frame: Image):
+        squeezed = np.asarray(cv2.resize(frame, (1024, 1024), interpolation=cv2.INTER_AREA))
+        found = propose(squeezed)
+        assert found.outcome == "unsure"
+        assert found.reason is not None
+
+    def test_a_square_picture_needs_a_goal_that_says_so(self):
+        # Twice as narrow as it was taken: the grass is foreshortened as from farther up.
+        blank = np.full((800, 800, 3), 60, np.uint8)
+        reason = why_not_square(blank, TRUE, PITCH)
+        assert reason is not None and "shape of a broadcast" in reason
+        assert why_not_square(np.full((540, 960, 3), 60, np.uint8), TRUE, PITCH) is None
 
     def test_three_lines_say_too_little_of_the_camera(self):
         true = looking((-3.0, 56.0, -16.0), (50.0, 0.0, 0.0), 2900.0, size=SMALL)

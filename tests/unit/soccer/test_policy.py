@@ -70,6 +70,8 @@ class TestHash:
         painted = replace(PAPER, calibration=CalibrationPolicy(source="paint"))
         # What touchline was before it left stubs out.
         assert painted.hash == "2e048fba4ca30dd4" not in (PAPER.hash, TOUCHLINE.hash)
+        alone = replace(PAPER, calibration=CalibrationPolicy(source="paint", lone_frames="any"))
+        assert alone.hash not in (painted.hash, TOUCHLINE.hash)
         assert painted.calibration_hash != PAPER.calibration_hash
 
     def test_the_paper_fits_the_inner_edges_of_goals_and_the_others_their_middle(self):
@@ -85,6 +87,7 @@ class TestHash:
 
     def test_paint_has_no_part_in_what_keys_calibrations_either(self):
         assert repr(CalibrationPolicy(source="paint")) == repr(CalibrationPolicy())
+        assert repr(CalibrationPolicy(lone_frames="any")) == repr(CalibrationPolicy())
 
     def test_tau_leaves_calibrations_alone(self):
         assert replace(PAPER, tau_percent=0.9).calibration_hash == PAPER.calibration_hash

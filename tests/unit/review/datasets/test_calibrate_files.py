@@ -64,6 +64,16 @@ class TestCalibrateFiles:
             "Circle right",
         )
 
+    def test_a_frame_that_shows_another_pitch_says_so(self, tmp_path):
+        camera = looking((3.0, 66.0, -18.0), (24.0, -2.0, 0.0), 1500.0, bend=BEND)
+        frames = {"short": Pitch(98.0, 64.0), "usual": Pitch()}
+        lines = {stem: click(camera, 1.0, 3, pitch) for stem, pitch in frames.items()}
+        run(write(tmp_path / "lines", **lines), tmp_path / "out")
+        findings = json.loads((tmp_path / "out" / "findings.json").read_text())
+        (told,) = [item for item in findings if item["kind"] == "pitch_size"]
+        assert told["frame"] == "short"
+        assert told["number"] > told["threshold"]
+
     def test_labels_taken_as_given_are_not_doubted(self, lines, tmp_path):
         run(lines, tmp_path / "out", labels="given")
         findings = json.loads((tmp_path / "out" / "findings.json").read_text())
