@@ -26,6 +26,7 @@ from app.soccer.pitch import MARKINGS, Pitch
 from app.solving.main_position import MAIN_MEAN, STADIUM, is_main_position
 from app.solving.observations import pitch_curves, principal_point
 from app.solving.paint_noise import PaintNoise, PaintOffsets, marking_weights, paint_noise
+from app.solving.paint_terms import painted_terms
 from app.solving.resect import ResectionProblem
 
 ROBUST_PX = 1.0
@@ -194,7 +195,12 @@ def offsets_of(
     half = problem.resection.size.diagonal / 2
     offsets, jacobians = residuals(parameters, pitch_curves(pitch), sightings, half)
     radii = np.hypot(*sightings.pixels.T) / half
-    return PaintOffsets(offsets[:, 0], sigmas, sightings.curve, -jacobians[:, 0], radii)
+    camera = problem.resection.camera(parameters)
+    places = np.nan_to_num(camera.on_ground(sightings.pixels + np.array(camera.principal_point)))
+    rows, marking = -jacobians[:, 0], sightings.curve
+    # The size of the pitch is that of the match, found from all its frames.
+    terms = painted_terms(places, marking, rows, pitch)
+    return PaintOffsets(offsets[:, 0], sigmas, marking, rows, radii, terms)
 
 
 def _sightings(evidence: PaintEvidence, size: ImageSize) -> tuple[Sightings, FloatArray]:

@@ -2,7 +2,8 @@
 
 Lines are not painted quite where the plan has them, and all points of one marking share that:
 each residual is an offset of its marking and a part of its own, as for clicks
-(``solving.line_noise``, which estimates both).
+(``solving.line_noise``, which estimates both). What a pitch is other than the plan
+(``solving.paint_terms``) shows in no residual and is carried into the camera's covariance.
 """
 
 from __future__ import annotations
@@ -42,6 +43,8 @@ class PaintOffsets:
         jacobian: Derivative of the marking's place along the normal by the parameters,
             shape (N, 8).
         radii: Distance from the principal point, half diagonals, shape (N,).
+        terms: How far one standard deviation of each number of the pitch moves the paint
+            (``paint_terms``), pixels, shape (N, M).
     """
 
     offsets: FloatArray
@@ -49,6 +52,7 @@ class PaintOffsets:
     marking: IntArray
     jacobian: FloatArray
     radii: FloatArray
+    terms: FloatArray
 
 
 @dataclass(frozen=True)
@@ -59,11 +63,13 @@ class PaintNoise:
         variance: Of a residual in units of its sigma squared.
         share: Of it, what the points of a marking have in common.
         parameters: Covariance of the camera's parameters, shape (8, 8).
+        planned: The same if the pitch was painted as planned.
     """
 
     variance: float
     share: float
     parameters: FloatArray
+    planned: FloatArray
 
 
 def marking_weights(marking: IntArray, sigmas: FloatArray) -> FloatArray:
@@ -118,5 +124,7 @@ def paint_noise(
     # Kappa moves a place by the third power of its radius, a further term by the fifth.
     lens = weighted.T @ (seen.radii**2 * seen.jacobian[:, KAPPA] * root)
     meat = noise.variance * meat + LENS**2 * np.outer(lens, lens)
-    covariance = bread @ (meat + known) @ bread
-    return PaintNoise(noise.variance, float(shares.mean()), 0.5 * (covariance + covariance.T))
+    planned = bread @ (meat + known) @ bread
+    planned = 0.5 * (planned + planned.T)
+    moved = bread @ (weighted.T @ (seen.terms * root[:, None]))
+    return PaintNoise(noise.variance, float(shares.mean()), planned + moved @ moved.T, planned)

@@ -14,6 +14,7 @@ from tests.bench.ball import bench_ball
 from tests.bench.ball_noise import bench_ball_noise
 from tests.bench.browser import bench_browser
 from tests.bench.calibration import bench_calibration
+from tests.bench.clips import bench_clips
 from tests.bench.geometry import bench_geometry
 from tests.bench.line_coverage import bench_line_coverage
 from tests.bench.listeners import bench_listeners
@@ -50,6 +51,7 @@ def main() -> None:
     if (REAL_DATA / "issia-lines").is_dir():
         bench_rigs(REAL_DATA)
     bench_paint(REAL_DATA)
+    bench_clips(REAL_DATA)
     bench_propose(REAL_DATA)
     bench_requests()
     bench_listeners()
