@@ -160,6 +160,12 @@ class Calibration:
         return self.covariance is not None and sum(self.covariance[::9]) > 0
 
     @property
+    def known_covariance(self) -> tuple[float, ...] | None:
+        """``covariance`` where it says how exact a camera is, as files and documents show it."""
+        known = self.covariance if self.camera is not None and self.is_known else None
+        return known if known is not None and all(map(math.isfinite, known)) else None
+
+    @property
     def is_bare(self) -> bool:
         """Whether the camera came with the data and nobody says how exact it is."""
         return self.source == "given" and not self.is_known

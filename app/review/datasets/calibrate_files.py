@@ -207,7 +207,7 @@ def _frame(
     alone = replace(calibration, markings=())
     return CalibratedFrame(
         stem=stem,
-        camera=None if camera is None else camera_text(camera),
+        camera=None if camera is None else camera_text(camera, calibration.known_covariance, size),
         reason=calibration.reason,
         findings=tuple(calibration_findings(calibration, size)),
         left_out=left_out,
@@ -224,7 +224,8 @@ def _in_picture(
     camera = frame.alone.camera
     if picture is None or camera is None:
         return frame
-    return replace(frame, camera=camera_text(picture.done(camera, size)))
+    known = frame.alone.known_covariance
+    return replace(frame, camera=camera_text(picture.done(camera, size), known, size))
 
 
 def _summary(frames: list[CalibratedFrame], report: Report, seconds: float) -> dict[str, Any]:

@@ -18,6 +18,7 @@ from app.datasets.safe_path import resolve_inside
 from app.durable import replace_file
 from app.errors import GeometryError, InputError
 from app.finite import json_text
+from app.geometry.arrays import row_by_row
 from app.geometry.camera import Camera
 from app.paint.propose import FrameProposal, propose
 from app.progress import TellProgress
@@ -95,10 +96,12 @@ def _propose_one(
     file = resolve_inside(out, camera_name(frame))
     if found.outcome == "proposed" and found.camera is not None and picture.image is not None:
         camera = found.camera
+        height, width = picture.image.shape[:2]
         if size is not None:
-            height, width = picture.image.shape[:2]
             camera = camera.scaled(size.width / width, size.height / height)
-        _write(file, camera_text(camera))
+        spread = None if found.snapped is None else found.snapped.covariance
+        covariance = None if spread is None else row_by_row(spread)
+        _write(file, camera_text(camera, covariance, size or ImageSize(width, height)))
     else:
         file.unlink(missing_ok=True)
     return _row(frame, found, milliseconds)

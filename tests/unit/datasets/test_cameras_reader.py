@@ -9,10 +9,11 @@ import pytest
 
 from app.datasets.camera_json import camera_to_json
 from app.datasets.cameras_reader import read_cameras
-from app.datasets.cameras_writer import camera_text, write_cameras
+from app.datasets.cameras_writer import camera_text
 from app.datasets.report import Report
 from app.geometry.camera import Camera
 from app.soccer.frames import ImageSize
+from tests.cameras import write_cameras
 
 
 class TestReadCameras:

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from app.datasets.cameras_reader import read_cameras
-from app.datasets.cameras_writer import write_camera_files, write_cameras
+from app.datasets.cameras_writer import write_camera_files
 from app.datasets.export_record import ExportRecord
 from app.datasets.report import Report
 from app.errors import InputError, UnsafePathError
@@ -53,9 +53,3 @@ class TestWriteCameraFiles:
         group = replace(soccer_group(), match="../..")
         with pytest.raises(UnsafePathError):
             write_camera_files(tmp_path, [solved(group)])
-
-
-class TestWriteCameras:
-    def test_a_key_that_leaves_the_folder_is_refused(self, tmp_path: Path, camera: Camera) -> None:
-        with pytest.raises(UnsafePathError):
-            write_cameras(tmp_path, {"../x": camera})

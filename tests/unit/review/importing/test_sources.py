@@ -10,7 +10,6 @@ import pytest
 from PIL import Image
 from sqlalchemy import select
 
-from app.datasets.cameras_writer import write_cameras
 from app.datasets.soccernet_v3_writer import write_soccernet_v3
 from app.errors import InputError
 from app.review.datasets.dataset import dataset_id, get_dataset, list_datasets
@@ -28,6 +27,7 @@ from app.soccer.group import Group
 from app.store.store import Store
 from app.store.tables.groups import GroupModel
 from app.store.tables.log import LogModel
+from tests.cameras import write_cameras
 
 SIZE = ImageSize(1280, 720)
 Fill = Callable[..., list[int]]
