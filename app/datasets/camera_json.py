@@ -102,8 +102,9 @@ def covariance_from_json(
     rows = [fields.numbers(row, PARAMETERS) for row in fields.sequence(found)]
     if len(rows) != PARAMETERS:
         raise ValueError(f"has {len(rows)} rows, not {PARAMETERS}")
+    known = np.reshape(camera_covariance(number for row in rows for number in row), (8, 8))
     back = np.linalg.inv(_file_numbers(camera, size))
-    return camera_covariance(row_by_row(back @ np.array(rows) @ back.T))
+    return camera_covariance(row_by_row(back @ known @ back.T))
 
 
 def _file_numbers(camera: Camera, size: ImageSize) -> FloatArray:

@@ -9,7 +9,7 @@ from app.datasets.camera_json import camera_to_json
 from app.datasets.export_names import folded, frame_claims
 from app.datasets.export_record import ExportRecord
 from app.datasets.frame_names import view_place
-from app.datasets.view_files import PutText, put_on_disk, write_below
+from app.datasets.view_files import PutText, put_on_disk
 from app.errors import InputError
 from app.finite import json_text
 from app.geometry.camera import Camera

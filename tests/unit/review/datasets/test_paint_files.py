@@ -74,7 +74,9 @@ class TestSnapFiles:
         for name in ("grey", "small", "crowd", "cut", "huge"):
             assert by_frame[name]["reason"], name
         assert json.loads((tmp_path / "snap.json").read_text()) == rows
-        assert set(read_cameras(tmp_path, Report())) >= {"good", "grey", "crowd"}
+        known: dict[str, object] = {}
+        assert set(read_cameras(tmp_path, Report(), covariances=known)) >= {"good", "grey", "crowd"}
+        assert set(known) == {"good", "grey", "crowd"}
         (file,) = (
             f for f in read_line_files(tmp_path / "lines", SIZE, Report()) if f.stem == "good"
         )
