@@ -22,7 +22,7 @@ from app.soccer.pitch import CIRCLES, MARKINGS, Pitch
 from app.soccer.policy import CalibrationPolicy
 from app.solving.paint_camera import MOST_SURPRISING, WORST_PX, PaintProblem
 from app.solving.paint_noise import PaintOffsets
-from app.solving.paint_terms import painted_terms, size_terms
+from app.solving.paint_terms import pitch_terms
 from app.solving.resect import ResectionProblem
 
 WINDOWS = (10.0, 8.0, 6.0, 5.0, 4.0, 3.0, 3.0)
@@ -54,12 +54,12 @@ class Snapped:
         evidence: The paint at the end, marking by marking.
         error_px: Median distance of the paint to its marking, pixels; None without paint.
         covariance: Of the camera's parameters (``geometry.resection``), shape (8, 8); None where
-            the paint does not determine them. It knows that no pitch is quite the plan.
+            the paint does not determine them.
         moved_px: Median distance that the visible markings moved, or would have, pixels.
         reason: ``no_paint`` where too little is seen, ``paint_disagrees`` where it contradicts
             the start or itself; None where the camera is the paint's.
         size: Height and width of the picture, pixels.
-        planned: ``covariance`` if the pitch was of its size and painted as planned.
+        pitch: What comes to it because no pitch is quite the plan, alike.
     """
 
     camera: Camera
@@ -69,7 +69,14 @@ class Snapped:
     moved_px: float
     reason: str | None
     size: tuple[int, int]
-    planned: FloatArray | None = None
+    pitch: FloatArray | None = None
+
+    @property
+    def known_covariance(self) -> FloatArray | None:
+        """How well the camera is known, with what is not known of the pitch, shape (8, 8)."""
+        if self.covariance is None or self.pitch is None:
+            return self.covariance
+        return self.covariance + self.pitch
 
     @property
     def points(self) -> int:
@@ -148,9 +155,7 @@ def snap_reading(
         or evidence.share < KEPT_SHARE * before.share
     ):
         return _kept(rounds, evidence, PAINT_DISAGREES, error, moved)
-    return Snapped(
-        camera, evidence, error, noise.parameters, moved, None, rounds.size, noise.planned
-    )
+    return Snapped(camera, evidence, error, noise.parameters, moved, None, rounds.size, noise.pitch)
 
 
 class _Rounds:
@@ -190,15 +195,13 @@ class _Rounds:
         """The evidence as it is solved with."""
         traced = evidence.traced
         apart = (traced.pixels - self.start.principal_point) / self._reading.half_diagonal
-        seen = traced.marking, traced.jacobian, self._pitch
-        painted, size = painted_terms(traced.places[:, :2], *seen), size_terms(*seen)
         return PaintOffsets(
             evidence.offsets,
             evidence.sigmas,
             traced.marking,
             traced.jacobian,
             np.hypot(*apart.T),
-            np.column_stack([painted, size]),
+            pitch_terms(traced.places[:, :2], traced.marking, traced.jacobian, self._pitch),
         )
 
 

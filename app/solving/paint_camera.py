@@ -26,7 +26,7 @@ from app.soccer.pitch import MARKINGS, Pitch
 from app.solving.main_position import MAIN_MEAN, STADIUM, is_main_position
 from app.solving.observations import pitch_curves, principal_point
 from app.solving.paint_noise import PaintNoise, PaintOffsets, marking_weights, paint_noise
-from app.solving.paint_terms import painted_terms
+from app.solving.paint_terms import pitch_terms
 from app.solving.resect import ResectionProblem
 
 ROBUST_PX = 1.0
@@ -136,11 +136,13 @@ class PaintCamera:
     Attributes:
         parameters: Shape (8,).
         covariance: Of them, shape (8, 8).
+        pitch: What comes to it because no pitch is quite the plan, shape (8, 8).
         error_px: Median distance of the paint from its markings, pixels.
     """
 
     parameters: FloatArray
     covariance: FloatArray
+    pitch: FloatArray
     error_px: float
 
 
@@ -181,7 +183,7 @@ def solve_paint(problem: PaintProblem, evidence: PaintEvidence, pitch: Pitch) ->
         or problem.surprise(parameters) > MOST_SURPRISING
     ):
         return None
-    return PaintCamera(parameters, noise.parameters, error)
+    return PaintCamera(parameters, noise.parameters, noise.pitch, error)
 
 
 def offsets_of(
@@ -198,8 +200,7 @@ def offsets_of(
     camera = problem.resection.camera(parameters)
     places = np.nan_to_num(camera.on_ground(sightings.pixels + np.array(camera.principal_point)))
     rows, marking = -jacobians[:, 0], sightings.curve
-    # The size of the pitch is that of the match, found from all its frames.
-    terms = painted_terms(places, marking, rows, pitch)
+    terms = pitch_terms(places, marking, rows, pitch)
     return PaintOffsets(offsets[:, 0], sigmas, marking, rows, radii, terms)
 
 

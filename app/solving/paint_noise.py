@@ -62,14 +62,14 @@ class PaintNoise:
     Attributes:
         variance: Of a residual in units of its sigma squared.
         share: Of it, what the points of a marking have in common.
-        parameters: Covariance of the camera's parameters, shape (8, 8).
-        planned: The same if the pitch was painted as planned.
+        parameters: Covariance of the camera's parameters if the pitch is the plan, shape (8, 8).
+        pitch: What comes to it because no pitch is, shape (8, 8).
     """
 
     variance: float
     share: float
     parameters: FloatArray
-    planned: FloatArray
+    pitch: FloatArray
 
 
 def marking_weights(marking: IntArray, sigmas: FloatArray) -> FloatArray:
@@ -124,7 +124,7 @@ def paint_noise(
     # Kappa moves a place by the third power of its radius, a further term by the fifth.
     lens = weighted.T @ (seen.radii**2 * seen.jacobian[:, KAPPA] * root)
     meat = noise.variance * meat + LENS**2 * np.outer(lens, lens)
-    planned = bread @ (meat + known) @ bread
-    planned = 0.5 * (planned + planned.T)
+    covariance = bread @ (meat + known) @ bread
+    covariance = 0.5 * (covariance + covariance.T)
     moved = bread @ (weighted.T @ (seen.terms * root[:, None]))
-    return PaintNoise(noise.variance, float(shares.mean()), planned + moved @ moved.T, planned)
+    return PaintNoise(noise.variance, float(shares.mean()), covariance, moved @ moved.T)

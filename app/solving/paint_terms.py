@@ -27,6 +27,14 @@ from app.solving.stadium_priors import (
 )
 
 
+def pitch_terms(
+    places: FloatArray, marking: IntArray, jacobian: FloatArray, pitch: Pitch
+) -> FloatArray:
+    """``painted_terms`` and ``size_terms`` side by side, shape (N, K + 2)."""
+    painted = painted_terms(places, marking, jacobian, pitch)
+    return np.column_stack([painted, size_terms(marking, jacobian, pitch)])
+
+
 def painted_terms(
     places: FloatArray, marking: IntArray, jacobian: FloatArray, pitch: Pitch
 ) -> FloatArray:

@@ -219,9 +219,10 @@ def _snap_picture(
         moved_px=snapped.moved_px,
         reason=f"{snapped.reason}: {SENTENCES[snapped.reason]}" if snapped.reason else None,
     )
-    if snapped.reason is not None or snapped.covariance is None:
+    known = snapped.known_covariance
+    if snapped.reason is not None or known is None:
         return row, kept, None
-    return row, camera_text(snapped.camera, row_by_row(snapped.covariance), size), snapped
+    return row, camera_text(snapped.camera, row_by_row(known), size), snapped
 
 
 def _snapped(picture: PictureFile, field: Any, clicked: Calibration) -> Snapped:
