@@ -15,6 +15,7 @@ from tests.bench.ball_noise import bench_ball_noise
 from tests.bench.browser import bench_browser
 from tests.bench.calibration import bench_calibration
 from tests.bench.clips import bench_clips
+from tests.bench.drawn import bench_drawn
 from tests.bench.geometry import bench_geometry
 from tests.bench.line_coverage import bench_line_coverage
 from tests.bench.listeners import bench_listeners
@@ -51,6 +52,7 @@ def main() -> None:
     if (REAL_DATA / "issia-lines").is_dir():
         bench_rigs(REAL_DATA)
     bench_paint(REAL_DATA)
+    bench_drawn()
     bench_clips(REAL_DATA)
     bench_propose(REAL_DATA)
     bench_requests()

@@ -83,7 +83,7 @@ def bench_paint(data: Path) -> None:
     solutions = _through_a_dataset(scenes)
     for scene, solution in zip(scenes, solutions, strict=True):
         seen = {
-            key: replace(shot, solved=_calibration(solution, key)) for key, shot in _shots(scene)
+            key: replace(shot, solved=_calibration(solution, key)) for key, shot in shots_of(scene)
         }
         shots += seen.values()
         clicked, snapped, true = _balls(scene, seen)
@@ -136,7 +136,8 @@ def _calibration(solution: Solution, key: str) -> Calibration | None:
     return None if found is None else found.calibration
 
 
-def _shots(scene: Scene) -> Iterator[tuple[str, Shot]]:
+def shots_of(scene: Scene) -> Iterator[tuple[str, Shot]]:
+    """Each view of a scene that its clicks calibrate, with its key."""
     for view in scene.group.views:
         truth = scene.truth.view(view.key)
         found = calibrate(view.station.lines, PITCH, view.size, PAPER.calibration)
@@ -195,7 +196,7 @@ def _off(solution: Solution, scene: Scene) -> float:
 
 def _print_sample(shots: list[Shot], balls: FloatArray) -> None:
     rows = []
-    fields = np.array([[_field_error(c, s.truth, s.size) for c in _cameras(s)] for s in shots])
+    fields = np.array([[field_error(c, s.truth, s.size) for c in _cameras(s)] for s in shots])
     places = np.array(
         [[np.linalg.norm(c.position - s.truth.position) for c in _cameras(s)] for s in shots]
     )
@@ -252,7 +253,7 @@ def _apart(shot: Shot) -> float | None:
     return float(np.abs((one - other) / np.sqrt(np.diag(snapped.covariance))).max())
 
 
-def _field_error(camera: Camera, truth: Camera, size: ImageSize) -> float:
+def field_error(camera: Camera, truth: Camera, size: ImageSize) -> float:
     """Median distance between both images of the grass in view, a point every 2 m, pixels."""
     true, found = truth.project(GRASS), camera.project(GRASS)
     x, y = true.T
