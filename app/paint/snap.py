@@ -22,7 +22,6 @@ from app.soccer.pitch import CIRCLES, MARKINGS, Pitch
 from app.soccer.policy import CalibrationPolicy
 from app.solving.paint_camera import MOST_SURPRISING, WORST_PX, PaintProblem
 from app.solving.paint_noise import PaintOffsets
-from app.solving.paint_terms import pitch_terms
 from app.solving.resect import ResectionProblem
 
 WINDOWS = (10.0, 8.0, 6.0, 5.0, 4.0, 3.0, 3.0)
@@ -143,7 +142,8 @@ def snap_reading(
     evidence = rounds.seek(parameters, windows[-1])
     if not _suffices(evidence, twice) or evidence.share < LEAST_SEEN:
         return _kept(rounds, evidence, NO_PAINT)
-    noise = rounds.problem.noise(parameters, rounds.seen(evidence))
+    places = evidence.traced.places[:, :2]
+    noise = rounds.problem.noise(parameters, rounds.seen(evidence), places, pitch)
     if noise is None:
         return _kept(rounds, evidence, NO_PAINT)
     camera, before = rounds.camera(parameters), rounds.seek(rounds.first, windows[-1])
@@ -201,7 +201,6 @@ class _Rounds:
             traced.marking,
             traced.jacobian,
             np.hypot(*apart.T),
-            pitch_terms(traced.places[:, :2], traced.marking, traced.jacobian, self._pitch),
         )
 
 

@@ -116,11 +116,21 @@ class PaintProblem:
         moved = parameters - self.first
         return float(moved @ self.information @ moved)
 
-    def noise(self, parameters: FloatArray, seen: PaintOffsets) -> PaintNoise | None:
-        """Noise of the paint and covariance at a minimum; None where it leaves the camera open."""
+    def noise(
+        self, parameters: FloatArray, seen: PaintOffsets, places: FloatArray, pitch: Pitch
+    ) -> PaintNoise | None:
+        """Noise of the paint and covariance at a minimum; None where it leaves the camera open.
+
+        Args:
+            parameters: At the minimum, shape (8,).
+            seen: The paint there.
+            places: Where on the pitch each of it lies, metres, shape (N, 2).
+            pitch: The pitch.
+        """
         robust = self._robust(seen.offsets, seen.sigmas, strict=True)
         prior = self.prior(parameters).sigma ** -2.0
-        return paint_noise(seen, robust, prior, self.information)
+        terms = pitch_terms(places, seen.marking, seen.jacobian, pitch)
+        return paint_noise(seen, robust, prior, self.information, terms)
 
     def prior(self, parameters: FloatArray) -> Prior:
         """The calibrator's: main cameras stand where main cameras stand, others anywhere."""
@@ -176,7 +186,10 @@ def solve_paint(problem: PaintProblem, evidence: PaintEvidence, pitch: Pitch) ->
         if strict and float(np.abs(seen.jacobian @ moved).max()) < SETTLED * sigmas.min():
             break
     seen = offsets_of(problem, parameters, sightings, sigmas, pitch)
-    noise, error = problem.noise(parameters, seen), float(np.median(np.abs(seen.offsets)))
+    camera = problem.resection.camera(parameters)
+    places = camera.on_ground(sightings.pixels + np.array(camera.principal_point))
+    noise = problem.noise(parameters, seen, np.nan_to_num(places), pitch)
+    error = float(np.median(np.abs(seen.offsets)))
     if (
         noise is None
         or error > problem.unit * WORST_PX
@@ -197,11 +210,7 @@ def offsets_of(
     half = problem.resection.size.diagonal / 2
     offsets, jacobians = residuals(parameters, pitch_curves(pitch), sightings, half)
     radii = np.hypot(*sightings.pixels.T) / half
-    camera = problem.resection.camera(parameters)
-    places = np.nan_to_num(camera.on_ground(sightings.pixels + np.array(camera.principal_point)))
-    rows, marking = -jacobians[:, 0], sightings.curve
-    terms = pitch_terms(places, marking, rows, pitch)
-    return PaintOffsets(offsets[:, 0], sigmas, marking, rows, radii, terms)
+    return PaintOffsets(offsets[:, 0], sigmas, sightings.curve, -jacobians[:, 0], radii)
 
 
 def _sightings(evidence: PaintEvidence, size: ImageSize) -> tuple[Sightings, FloatArray]:

@@ -43,8 +43,6 @@ class PaintOffsets:
         jacobian: Derivative of the marking's place along the normal by the parameters,
             shape (N, 8).
         radii: Distance from the principal point, half diagonals, shape (N,).
-        terms: How far one standard deviation of each number of the pitch moves the paint
-            (``paint_terms``), pixels, shape (N, M).
     """
 
     offsets: FloatArray
@@ -52,7 +50,6 @@ class PaintOffsets:
     marking: IntArray
     jacobian: FloatArray
     radii: FloatArray
-    terms: FloatArray
 
 
 @dataclass(frozen=True)
@@ -97,7 +94,8 @@ def paint_noise(
     seen: PaintOffsets,
     robust: FloatArray,
     prior: FloatArray,
-    information: FloatArray | None = None,
+    information: FloatArray | None,
+    terms: FloatArray,
 ) -> PaintNoise | None:
     """Noise of the paint and covariance of the camera; None where the paint leaves it open.
 
@@ -106,6 +104,8 @@ def paint_noise(
         robust: Weight of each point by its residual, shape (N,).
         prior: Information of the parameters' own prior, a diagonal, shape (8,).
         information: What the start knew of the parameters, shape (8, 8).
+        terms: How far one standard deviation of each number of the pitch moves the paint
+            (``paint_terms``), pixels, shape (N, M).
     """
     root = np.sqrt(robust) / seen.sigmas
     rows, rest = seen.jacobian * root[:, None], seen.offsets * root
@@ -126,5 +126,5 @@ def paint_noise(
     meat = noise.variance * meat + LENS**2 * np.outer(lens, lens)
     covariance = bread @ (meat + known) @ bread
     covariance = 0.5 * (covariance + covariance.T)
-    moved = bread @ (weighted.T @ (seen.terms * root[:, None]))
+    moved = bread @ (weighted.T @ (terms * root[:, None]))
     return PaintNoise(noise.variance, float(shares.mean()), covariance, moved @ moved.T)
