@@ -53,12 +53,12 @@ class Snapped:
         evidence: The paint at the end, marking by marking.
         error_px: Median distance of the paint to its marking, pixels; None without paint.
         covariance: Of the camera's parameters (``geometry.resection``), shape (8, 8); None where
-            the paint does not determine them.
+            the paint does not determine them. It knows that no pitch is quite the plan.
         moved_px: Median distance that the visible markings moved, or would have, pixels.
         reason: ``no_paint`` where too little is seen, ``paint_disagrees`` where it contradicts
             the start or itself; None where the camera is the paint's.
         size: Height and width of the picture, pixels.
-        pitch: What comes to it because no pitch is quite the plan, alike.
+        planned: The same if the pitch was, which is what the paint itself leaves open.
     """
 
     camera: Camera
@@ -68,14 +68,7 @@ class Snapped:
     moved_px: float
     reason: str | None
     size: tuple[int, int]
-    pitch: FloatArray | None = None
-
-    @property
-    def known_covariance(self) -> FloatArray | None:
-        """How well the camera is known, with what is not known of the pitch, shape (8, 8)."""
-        if self.covariance is None or self.pitch is None:
-            return self.covariance
-        return self.covariance + self.pitch
+    planned: FloatArray | None = None
 
     @property
     def points(self) -> int:
@@ -155,7 +148,8 @@ def snap_reading(
         or evidence.share < KEPT_SHARE * before.share
     ):
         return _kept(rounds, evidence, PAINT_DISAGREES, error, moved)
-    return Snapped(camera, evidence, error, noise.parameters, moved, None, rounds.size, noise.pitch)
+    own, size = noise.parameters, rounds.size
+    return Snapped(camera, evidence, error, own + noise.pitch, moved, None, size, planned=own)
 
 
 class _Rounds:

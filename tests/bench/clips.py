@@ -204,18 +204,18 @@ def _snapped(image: np.ndarray, lines: Lines | None) -> Known | None:
         return None
     field = field_of_play(image)
     found = snap(image, field, start.camera, start_covariance=start.covariance)
-    if found.reason is not None or found.known_covariance is None:
+    if found.reason is not None or found.covariance is None:
         return None
-    return Known(found.camera, found.known_covariance, start.size)
+    return Known(found.camera, found.covariance, start.size)
 
 
 def _proposed(image: np.ndarray, lines: Lines | None) -> Known | None:
     found = propose(image)
     if found.outcome != "proposed" or found.camera is None or found.snapped is None:
         return None
-    if found.snapped.known_covariance is None:
+    if found.snapped.covariance is None:
         return None
-    return Known(found.camera, found.snapped.known_covariance, _size(image))
+    return Known(found.camera, found.snapped.covariance, _size(image))
 
 
 if __name__ == "__main__":

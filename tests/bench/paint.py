@@ -172,8 +172,8 @@ def _balls(scene: Scene, shots: dict[str, Shot]) -> tuple[float, float, float]:
         key = calibration_key(view.station, group.pitch, PAPER.calibration)
         found = replace(shot.clicked, camera=shot.truth)
         true[key] = measure(found, view.station.lines, group.pitch, view.size)
-        if shot.snapped.covariance is not None:
-            covariance = tuple(shot.snapped.covariance.ravel().tolist())
+        if shot.snapped.planned is not None:
+            covariance = tuple(shot.snapped.planned.ravel().tolist())
             found = replace(shot.clicked, camera=shot.snapped.camera, covariance=covariance)
             known[key] = measure(found, view.station.lines, group.pitch, view.size)
     return (
@@ -245,12 +245,12 @@ def _cameras(shot: Shot) -> tuple[Camera, Camera, Camera]:
 def _apart(shot: Shot) -> float | None:
     """How far the dataset's camera is from that of snap, the most of its parameters, sigmas."""
     snapped, solved = shot.snapped, shot.solved
-    if snapped.covariance is None or solved is None or solved.source != "paint":
+    if snapped.planned is None or solved is None or solved.source != "paint":
         return None
     assert solved.camera is not None
     half = shot.size.diagonal / 2
     one, other = (parameters_from_camera(item, half) for item in (snapped.camera, solved.camera))
-    return float(np.abs((one - other) / np.sqrt(np.diag(snapped.covariance))).max())
+    return float(np.abs((one - other) / np.sqrt(np.diag(snapped.planned))).max())
 
 
 def field_error(camera: Camera, truth: Camera, size: ImageSize) -> float:
@@ -265,7 +265,8 @@ def _holds(shot: Shot, column: int) -> bool | None:
     """Whether the 95 % ellipsoid of the position holds the truth."""
     found = (shot.clicked, None, shot.solved)[column]
     if column == 1:
-        covariance = shot.snapped.covariance
+        # The pitches of the sample are as planned.
+        covariance = shot.snapped.planned
     else:
         known = None if found is None else found.covariance
         covariance = None if known is None else np.reshape(known, (8, 8))

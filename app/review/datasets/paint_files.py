@@ -219,7 +219,7 @@ def _snap_picture(
         moved_px=snapped.moved_px,
         reason=f"{snapped.reason}: {SENTENCES[snapped.reason]}" if snapped.reason else None,
     )
-    known = snapped.known_covariance
+    known = snapped.covariance
     if snapped.reason is not None or known is None:
         return row, kept, None
     return row, camera_text(snapped.camera, row_by_row(known), size), snapped

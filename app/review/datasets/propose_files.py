@@ -99,7 +99,7 @@ def _propose_one(
         height, width = picture.image.shape[:2]
         if size is not None:
             camera = camera.scaled(size.width / width, size.height / height)
-        spread = None if found.snapped is None else found.snapped.known_covariance
+        spread = None if found.snapped is None else found.snapped.covariance
         covariance = None if spread is None else row_by_row(spread)
         _write(file, camera_text(camera, covariance, size or ImageSize(width, height)))
     else:
