@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from app.geometry.camera import Camera
 from app.soccer.finding import Finding
 from app.soccer.frames import Box, ImagePoint, height_above_grass
+from app.soccer.pitch import GoalEdge
 
 SOLVER_VERSION = "8"
 """Part of every solution's key; raised by one whenever a number changes."""
@@ -142,6 +143,7 @@ class Calibration:
         pitch_covariance: What ``covariance`` lacks where a camera was placed by paint: what nobody
             knows of the pitch (its size, how it is laid and painted), 8 x 8, row by row. All cameras
             of a match have it in common, so it says nothing of how their rays miss each other.
+        goal: Which line of the goals the distances are to; JaC is told by their inner edges.
     """
 
     source: str
@@ -157,6 +159,7 @@ class Calibration:
     paint: PaintFit | None = field(default=None, metadata={"later": True})
     picture_covariance: tuple[float, ...] | None = field(default=None, metadata={"later": True})
     pitch_covariance: tuple[float, ...] | None = field(default=None, metadata={"later": True})
+    goal: GoalEdge = field(default="inner", metadata={"later": True})
 
     @property
     def is_known(self) -> bool:

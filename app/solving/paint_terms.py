@@ -68,9 +68,10 @@ def size_terms(marking: IntArray, jacobian: FloatArray, pitch: Pitch) -> FloatAr
 
     A pitch that is not the usual one is one that somebody measured: zeros.
     """
-    if pitch != Pitch():
+    usual = Pitch()
+    if (pitch.length, pitch.width) != (usual.length, usual.width):
         return np.zeros((len(marking), 2))
-    return PAINT_SIZE_SIGMA_M * _by_place(jacobian)[:, :2] * _size_moves(pitch)[marking]
+    return PAINT_SIZE_SIGMA_M * _by_place(jacobian)[:, :2] * _size_moves()[marking]
 
 
 def _by_place(jacobian: FloatArray) -> FloatArray:
@@ -81,10 +82,11 @@ def _by_place(jacobian: FloatArray) -> FloatArray:
 _MIDDLE = MARKINGS.index("Middle line")
 
 
-@lru_cache(maxsize=8)
-def _size_moves(pitch: Pitch) -> FloatArray:
+@lru_cache(maxsize=1)
+def _size_moves() -> FloatArray:
     """How far each marking moves along x with a metre of length, along y with one of width, (M, 2)."""
-    curves, other = pitch_curves(pitch), pitch_curves(Pitch(pitch.length + 1, pitch.width + 1))
+    usual = Pitch()
+    curves, other = pitch_curves(usual), pitch_curves(Pitch(usual.length + 1, usual.width + 1))
     moves = other.shapes - curves.shapes
     ends = np.where((curves.kinds == ARC)[:, None], moves[:, :2], moves[:, 3:5])
     return np.asarray((moves[:, :2] + ends) / 2)

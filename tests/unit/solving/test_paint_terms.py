@@ -54,6 +54,14 @@ class TestSizeTerms:
         rows = across_middles(seen)
         assert np.abs(seen.offsets - told)[rows] == pytest.approx(0, abs=0.05 * np.abs(told).max())
 
+    def test_which_line_of_a_goal_is_meant_changes_nothing(self):
+        seen, _ = seen_by(MAIN)
+        one, other = (
+            size_terms(seen.marking, seen.jacobian, PITCH.with_goal(goal))
+            for goal in ("inner", "middle")
+        )
+        assert one.any() and (one == other).all()
+
     def test_a_pitch_that_was_measured_has_none(self):
         seen, _ = seen_by(MAIN)
         assert not size_terms(seen.marking, seen.jacobian, Pitch(104, 68)).any()
