@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
+from app.datasets.cameras_writer import camera_name, camera_text
+from app.datasets.view_files import write_below
 from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
 from app.geometry.lens import ARCTAN_POLYNOMIAL, FISHEYE
@@ -85,3 +88,10 @@ def _level(place: FloatArray, target: FloatArray) -> FloatArray:
     right = np.cross(np.array([0.0, 0.0, 1.0]), forward)
     right = right / np.linalg.norm(right)
     return np.vstack([right, np.cross(forward, right), forward])
+
+
+def write_cameras(root: Path, cameras: Mapping[str, Camera]) -> list[Path]:
+    """Write ``camera_<stem>.json`` per camera below an existing folder; the paths written."""
+    return [
+        write_below(root, camera_name(key), camera_text(camera)) for key, camera in cameras.items()
+    ]

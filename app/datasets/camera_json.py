@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, TypeVar
 
 import numpy as np
@@ -10,10 +10,12 @@ import numpy as np
 from app.datasets import fields
 from app.errors import DatasetFormatError, GeometryError
 from app.finite import quoted
-from app.geometry.arrays import FloatArray
-from app.geometry.camera import Camera
+from app.geometry.arrays import FloatArray, row_by_row
+from app.geometry.camera import Camera, camera_covariance
 from app.geometry.lens import BROWN_CONRADY, LENSES
+from app.geometry.resection import KAPPA, LOG_FOCAL, PAN, PARAMETERS, ROLL, X, Z
 from app.geometry.rotation import rotation_from_pan_tilt_roll
+from app.soccer.frames import ImageSize
 
 MAX_DISAGREEMENT_DEGREES = 0.01
 """Between the angles and the matrix of one file; beyond, the file contradicts itself."""
@@ -22,6 +24,8 @@ MAX_NUMBER = 1e7
 ROUNDING = 1e-10
 """Below, a matrix and its angles are the same rotation but for rounding."""
 
+COVARIANCE = "covariance"
+"""Ours: how well the camera is known (``covariance_to_json``)."""
 LENS, LENS_COEFFICIENTS = "lens", "lens_coefficients"
 """Ours: name and numbers of a lens that SoccerNet's arrays do not hold (``geometry.lens``)."""
 _ANGLES = ("pan_degrees", "tilt_degrees", "roll_degrees")
@@ -30,12 +34,19 @@ _DISTORTION = (("radial_distortion", 6), ("tangential_distortion", 2), ("thin_pr
 T = TypeVar("T")
 
 
-def camera_to_json(camera: Camera) -> dict[str, Any]:
+def camera_to_json(
+    camera: Camera, covariance: Sequence[float] | None = None, size: ImageSize | None = None
+) -> dict[str, Any]:
     """The camera as SoccerNet spells it: angles, matrix and all three distortion arrays.
 
     Every number is a plain float, so that ``repr`` and JSON keep it exactly. ``skew`` is ours
     and stands there only when it is not zero. A wide lens has ``lens`` and ``lens_coefficients``
     in place of the three arrays: whoever expects those must not take it for a pinhole.
+
+    Args:
+        covariance: Of the camera's parameters (``geometry.resection``), row by row, shape (64,),
+            where it is known; then ``covariance`` stands there.
+        size: Of its images, which such a covariance needs.
     """
     pan, tilt, roll = camera.pan_tilt_roll_degrees
     value = {
@@ -49,7 +60,64 @@ def camera_to_json(camera: Camera) -> dict[str, Any]:
         "rotation_matrix": [[float(item) for item in row] for row in camera.rotation],
         **_lens_to_json(camera),
     }
-    return value | ({"skew": float(camera.skew)} if camera.skew else {})
+    if camera.skew:
+        value["skew"] = float(camera.skew)
+    if covariance is not None and size is not None:
+        value[COVARIANCE] = covariance_to_json(covariance, camera, size)
+    return value
+
+
+def covariance_to_json(
+    covariance: Sequence[float], camera: Camera, size: ImageSize
+) -> list[list[float]]:
+    """How well a camera is known, in the units of its file, 8 x 8.
+
+    In this order: x, y and z of ``position_meters`` (pitch frame, metres), pan, tilt and roll
+    (degrees), focal length (pixels of ``size``), and k1, the first of ``radial_distortion``.
+
+    Args:
+        covariance: Of the camera's parameters (``geometry.resection``), row by row, shape (64,).
+        camera: With one radial term.
+        size: Of its images.
+    """
+    ways = _file_numbers(camera, size)
+    known = np.reshape(covariance, (PARAMETERS, PARAMETERS))
+    rows: list[list[float]] = (ways @ known @ ways.T).tolist()
+    return rows
+
+
+def covariance_from_json(
+    value: Mapping[str, Any], camera: Camera, size: ImageSize
+) -> tuple[float, ...] | None:
+    """Back from ``covariance_to_json``; None where the camera's file says nothing.
+
+    Raises:
+        ValueError: It is no covariance of eight numbers, or that of a wide lens.
+    """
+    found = value.get(COVARIANCE)
+    if found is None:
+        return None
+    if camera.is_wide:
+        raise ValueError("is that of a lens with one radial term, and the camera has another")
+    rows = [fields.numbers(row, PARAMETERS) for row in fields.sequence(found)]
+    if len(rows) != PARAMETERS:
+        raise ValueError(f"has {len(rows)} rows, not {PARAMETERS}")
+    known = np.reshape(camera_covariance(number for row in rows for number in row), (8, 8))
+    back = np.linalg.inv(_file_numbers(camera, size))
+    return camera_covariance(row_by_row(back @ known @ back.T))
+
+
+def _file_numbers(camera: Camera, size: ImageSize) -> FloatArray:
+    """Derivatives of a file's numbers by the camera's parameters, shape (8, 8)."""
+    focal = float(np.sqrt(camera.focal_length[0] * camera.focal_length[1]))
+    ways = np.zeros((PARAMETERS, PARAMETERS))
+    ways[:3, X : Z + 1] = np.eye(3)
+    ways[3:6, PAN : ROLL + 1] = np.degrees(np.eye(3))
+    ways[6, LOG_FOCAL] = focal
+    # k1 = kappa (f / half_diagonal)^2
+    ways[7, LOG_FOCAL] = 2 * camera.distortion[0]
+    ways[7, KAPPA] = (2 * focal / size.diagonal) ** 2
+    return ways
 
 
 def _lens_to_json(camera: Camera) -> dict[str, Any]:

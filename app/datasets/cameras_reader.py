@@ -7,10 +7,10 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import PurePosixPath
-from typing import Any
+from typing import Any, NamedTuple
 
 from app.datasets.camera_arrays import cameras_of_arrays, opencv_storage
-from app.datasets.camera_json import camera_from_json
+from app.datasets.camera_json import COVARIANCE, camera_from_json, covariance_from_json
 from app.datasets.camera_matrix import camera_from_matrices, holds_matrices
 from app.datasets.corner_origin import HALF
 from app.datasets.file_tree import DEFAULT_LIMITS, FileTree, Limits, Root
@@ -49,6 +49,8 @@ _NAMES = (
     "path", "view", "frame", "frame_id", "name", "id",
 )  # fmt: skip
 """Fields that name the image of a camera, those that say most first (TVCalib: image_ids)."""
+_ANY_SIZE = ImageSize(1920, 1080)
+"""What a covariance says is right or wrong whatever the size."""
 _TVCALIB = ("aov_radian", "loss_ndc_total")
 _CAMERA_FIELDS = ("tilt_degrees", "roll_degrees", "y_focal_length", "radial_distortion")
 _MEANT = (
@@ -62,6 +64,7 @@ def read_cameras(
     report: Report,
     limits: Limits = DEFAULT_LIMITS,
     sizes: dict[str, ImageSize] | None = None,
+    covariances: dict[str, Any] | None = None,
 ) -> dict[str, Camera]:
     """Every camera below ``path``, by key.
 
@@ -72,7 +75,8 @@ def read_cameras(
     (``camera_matrix``). The key is the stem of the file or the image, with
     ``<league>/<season>/<match>/`` before it where it lies that deep. In an export as
     sn-calibration ``match_info.json`` says where each frame came from: that is its key. ``sizes``
-    takes the size of the images of each camera whose file states it.
+    takes the size of the images of each camera whose file states it, ``covariances`` what a file
+    says of how well its camera is known (for ``covariance_from_json``).
     """
     with opened_tree(path, report, limits) as tree:
         if tree is None:
@@ -84,7 +88,8 @@ def read_cameras(
             report.note(
                 str(path), None, None, f"holds no camera files ({_ENDINGS}), but {_some(endings)}"
             )
-        cameras = cameras_of(tree, files, report, _places(tree, names), limits, sizes)
+        places = _places(tree, names)
+        cameras = cameras_of(tree, files, report, places, limits, sizes, covariances)
     report.imported += len(cameras)
     return cameras
 
@@ -96,16 +101,24 @@ def cameras_of(
     places: Mapping[str, str] | None = None,
     limits: Limits = DEFAULT_LIMITS,
     sizes: dict[str, ImageSize] | None = None,
+    covariances: dict[str, Any] | None = None,
 ) -> dict[str, Camera]:
     """The cameras of some files of a tree, by key: that of ``places``, or made from the name."""
     cameras: dict[str, Camera] = {}
-    stated = {} if sizes is None else sizes
+    stated = _Stated({} if sizes is None else sizes, {} if covariances is None else covariances)
     known = places or {}
     stems = Counter(_key(name, deep=False) for name in names)
     for name in names:
         deep = stems[_key(name, deep=False)] > 1
         _read_file(tree, name, known.get(name) or _key(name, deep), cameras, stated, report, limits)
     return cameras
+
+
+class _Stated(NamedTuple):
+    """What files say beside their cameras, by key."""
+
+    sizes: dict[str, ImageSize]
+    covariances: dict[str, Any]
 
 
 def _places(tree: FileTree, names: list[str]) -> dict[str, str]:
@@ -145,7 +158,7 @@ def _read_file(
     name: str,
     key: str,
     cameras: dict[str, Camera],
-    sizes: dict[str, ImageSize],
+    stated: _Stated,
     report: Report,
     limits: Limits,
 ) -> None:
@@ -164,14 +177,28 @@ def _read_file(
             called = _record_key(record, deep=stems[_record_key(record, deep=False)] > 1)
         try:
             camera = _camera(item, shown, record)
+            covariance = _covariance(item, camera, shown, record)
             if called in cameras:
                 problem = f'is a second camera called "{called}"; the first one is used'
                 raise DatasetFormatError(shown, record, None, problem)
             cameras[called] = camera
             if isinstance(item, dict) and (size := stated_size(item)) is not None:
-                sizes[called] = size
+                stated.sizes[called] = size
+            if covariance is not None:
+                stated.covariances[called] = covariance
         except DatasetFormatError as error:
             report.skip(error)
+
+
+def _covariance(item: Any, camera: Camera, shown: str, record: str | None) -> Any:
+    """What a file says of how well its camera is known, checked; None where it says nothing."""
+    value = _inner(item)
+    found = value.get(COVARIANCE) if isinstance(value, dict) else None
+    try:
+        covariance_from_json({COVARIANCE: found}, camera, _ANY_SIZE)
+    except ValueError as error:
+        raise DatasetFormatError(shown, record, COVARIANCE, str(error)) from error
+    return found
 
 
 def _record_key(record: str, deep: bool) -> str:

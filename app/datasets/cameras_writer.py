@@ -2,42 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterable, Mapping
+from collections.abc import Hashable, Iterable, Mapping, Sequence
 from pathlib import Path, PurePosixPath
 
 from app.datasets.camera_json import camera_to_json
 from app.datasets.export_names import folded, frame_claims
 from app.datasets.export_record import ExportRecord
 from app.datasets.frame_names import view_place
-from app.datasets.view_files import PutText, put_on_disk, write_below
+from app.datasets.view_files import PutText, put_on_disk
 from app.errors import InputError
 from app.finite import json_text
 from app.geometry.camera import Camera
+from app.soccer.frames import ImageSize
 from app.soccer.group import Group, View
 
 
-def camera_text(camera: Camera) -> str:
-    """The text of one camera file."""
-    return json_text(camera_to_json(camera), indent=1, ascii_=True) + "\n"
+def camera_text(
+    camera: Camera, covariance: Sequence[float] | None = None, size: ImageSize | None = None
+) -> str:
+    """The text of one camera file (``camera_to_json``)."""
+    return json_text(camera_to_json(camera, covariance, size), indent=1, ascii_=True) + "\n"
 
 
 def camera_name(key: str) -> str:
     """Relative path of a camera's file: frames of the same name stay in their folders."""
     place = PurePosixPath(key)
     return str(place.with_name(f"camera_{place.name}.json"))
-
-
-def write_cameras(root: Path, cameras: Mapping[str, Camera]) -> list[Path]:
-    """Write ``camera_<stem>.json`` per camera below an existing folder; the paths written.
-
-    A key with folders (``<league>/<season>/<match>/7_1``) becomes a file in those folders.
-
-    Raises:
-        UnsafePathError: A key that would leave the folder.
-    """
-    return [
-        write_below(root, camera_name(key), camera_text(camera)) for key, camera in cameras.items()
-    ]
 
 
 def write_camera_files(
@@ -76,7 +66,7 @@ def write_camera_files(
                     f" would both be called {name}"
                 )
             if len(written) > counts["cameras"]:
-                put(name, camera_text(camera))
+                put(name, camera_text(camera, record.covariance(view), view.size))
                 counts["cameras"] = len(written)
     return counts
 

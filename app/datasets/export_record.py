@@ -58,6 +58,11 @@ class ExportRecord:
         solved = self.view_solution(view)
         return solved.calibration.camera if solved else None
 
+    def covariance(self, view: View) -> tuple[float, ...] | None:
+        """Covariance of the parameters of a view's camera, row by row, where it is known, (64,)."""
+        solved = self.view_solution(view)
+        return None if solved is None else solved.calibration.known_covariance
+
     def is_calibrated(self, view: View) -> bool:
         """Whether the view has a camera that passed the gates on cameras."""
         solved = self.view_solution(view)

@@ -8,6 +8,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from app.datasets.camera_json import covariance_to_json
 from app.datasets.export_record import ExportRecord, chosen_box, frame_name
 from app.datasets.manifest import software_version
 from app.datasets.parquet import pyarrow_modules
@@ -117,6 +118,14 @@ def json_text(value: Any) -> str | None:
 
 def _camera(get: Callable[[Camera], Any]) -> Getter:
     return lambda row: None if row.camera is None else get(row.camera)
+
+
+def _camera_covariance(row: ViewRow) -> list[float] | None:
+    known = row.record.covariance(row.view)
+    if row.camera is None or known is None:
+        return None
+    rows = covariance_to_json(known, row.camera, row.view.size)
+    return [number for each in rows for number in each]
 
 
 def _fit(name: str) -> Getter:
@@ -257,6 +266,7 @@ COLUMNS: tuple[tuple[str, str, Getter], ...] = (
     ("rotation_matrix", LIST, _camera(lambda camera: camera.rotation.ravel().tolist())),
     ("distortion", LIST, _camera(lambda camera: camera.distortion.tolist())),
     ("lens", TEXT, _camera(lambda camera: camera.lens)),
+    ("camera_covariance", LIST, _camera_covariance),
     ("jac_0.5", NUMBER, _jac(0)),
     ("jac_1", NUMBER, _jac(1)),
     ("jac_2", NUMBER, _jac(2)),

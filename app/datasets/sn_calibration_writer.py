@@ -143,7 +143,8 @@ def write_sn_calibration(
                     info.add(f"{LINES}/{name}.jpg", said)
                     counts["frames"] += 1
                 if camera is not None and name not in with_camera:
-                    put(camera_name(f"{CAMERAS}/{name}"), camera_text(camera))
+                    text = camera_text(camera, record.covariance(view), view.size)
+                    put(camera_name(f"{CAMERAS}/{name}"), text)
                     with_camera.add(name)
     return counts | {"cameras": len(with_camera)}
 

@@ -144,8 +144,8 @@ class Ranked:
 
     @property
     def uncertain_m(self) -> float:
-        """Largest standard deviation of the position, metres."""
-        covariance = self.snapped.covariance
+        """Largest standard deviation of the position that the paint leaves, metres."""
+        covariance = self.snapped.planned
         if covariance is None:
             return np.inf
         return float(np.sqrt(np.linalg.eigvalsh(covariance[X : Z + 1, X : Z + 1])[-1]))

@@ -53,11 +53,12 @@ class Snapped:
         evidence: The paint at the end, marking by marking.
         error_px: Median distance of the paint to its marking, pixels; None without paint.
         covariance: Of the camera's parameters (``geometry.resection``), shape (8, 8); None where
-            the paint does not determine them.
+            the paint does not determine them. It knows that no pitch is quite the plan.
         moved_px: Median distance that the visible markings moved, or would have, pixels.
         reason: ``no_paint`` where too little is seen, ``paint_disagrees`` where it contradicts
             the start or itself; None where the camera is the paint's.
         size: Height and width of the picture, pixels.
+        planned: The same if the pitch was, which is what the paint itself leaves open.
     """
 
     camera: Camera
@@ -67,6 +68,7 @@ class Snapped:
     moved_px: float
     reason: str | None
     size: tuple[int, int]
+    planned: FloatArray | None = None
 
     @property
     def points(self) -> int:
@@ -137,7 +139,8 @@ def snap_reading(
     evidence = rounds.seek(parameters, windows[-1])
     if not _suffices(evidence, twice, least=least) or evidence.share < LEAST_SEEN:
         return _kept(rounds, evidence, NO_PAINT)
-    noise = rounds.problem.noise(parameters, rounds.seen(evidence))
+    places = evidence.traced.places[:, :2]
+    noise = rounds.problem.noise(parameters, rounds.seen(evidence), places, pitch)
     if noise is None:
         return _kept(rounds, evidence, NO_PAINT)
     camera, before = rounds.camera(parameters), rounds.seek(rounds.first, windows[-1])
@@ -149,7 +152,8 @@ def snap_reading(
         or evidence.share < KEPT_SHARE * before.share
     ):
         return _kept(rounds, evidence, PAINT_DISAGREES, error, moved)
-    return Snapped(camera, evidence, error, noise.parameters, moved, None, rounds.size)
+    own, size = noise.parameters, rounds.size
+    return Snapped(camera, evidence, error, own + noise.pitch, moved, None, size, planned=own)
 
 
 class _Rounds:

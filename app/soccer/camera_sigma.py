@@ -41,10 +41,8 @@ def camera_sigma(calibration: Calibration) -> CameraSigma | None:
     Example:
         Of a parameter log f with sigma 0.01, a focal length of 2000 px has a sigma of 20 px.
     """
-    camera, covariance = calibration.camera, calibration.covariance
+    camera, covariance = calibration.camera, calibration.known_covariance
     if camera is None or covariance is None:
-        return None
-    if not all(map(math.isfinite, covariance)):
         return None
     spread = np.array(covariance).reshape(PARAMETERS, PARAMETERS)
     sigma = np.sqrt(np.maximum(np.diag(spread), 0.0))

@@ -140,6 +140,9 @@ class Calibration:
         picture_covariance: Of a stretched or cropped picture: of the eight numbers of the camera as
             the picture was taken, the logarithm of the aspect and both shifts, 11 x 11, row by row.
             ``covariance`` is the nearest that eight numbers can say.
+        pitch_covariance: What ``covariance`` lacks where a camera was placed by paint: what nobody
+            knows of the pitch (its size, how it is laid and painted), 8 x 8, row by row. All cameras
+            of a match have it in common, so it says nothing of how their rays miss each other.
         goal: Which line of the goals the distances are to; JaC is told by their inner edges.
     """
 
@@ -155,12 +158,21 @@ class Calibration:
     picture: Picture | None = None
     paint: PaintFit | None = field(default=None, metadata={"later": True})
     picture_covariance: tuple[float, ...] | None = field(default=None, metadata={"later": True})
+    pitch_covariance: tuple[float, ...] | None = field(default=None, metadata={"later": True})
     goal: GoalEdge = field(default="inner", metadata={"later": True})
 
     @property
     def is_known(self) -> bool:
         """Whether a covariance says how exact the camera is; one of zeros says nothing."""
         return self.covariance is not None and sum(self.covariance[::9]) > 0
+
+    @property
+    def known_covariance(self) -> tuple[float, ...] | None:
+        """How exact the camera is, with what is not known of the pitch: as files and documents say it."""
+        known = self.covariance if self.camera is not None and self.is_known else None
+        if known is None or not all(map(math.isfinite, known)):
+            return None
+        return tuple(map(sum, zip(known, self.pitch_covariance or [0.0] * 64, strict=True)))
 
     @property
     def is_bare(self) -> bool:

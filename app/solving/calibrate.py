@@ -307,6 +307,7 @@ def calibrate_paint(
         source="paint",
         camera=resection.camera(found.parameters),
         covariance=row_by_row(found.covariance),
+        pitch_covariance=row_by_row(found.pitch),
         unobservable=_unobservable(found.covariance),
         paint=replace(fit, error_px=found.error_px),
     )

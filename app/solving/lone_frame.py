@@ -32,14 +32,14 @@ from app.solving.resect import CLICK_SIGMA_PX, MIN_CLICK_SIGMA_PX, WIDE, Resecti
 from app.solving.stadium_priors import (
     AS_TAKEN,
     LAWS_SIZE_SIGMA_M,
-    PAINT_SIZE_SIGMA_M,
+    SIZE_SIGMA_M,
     WARP_SIGMA,
 )
 
 SIZES, WARP = slice(PARAMETERS, PARAMETERS + 2), slice(PARAMETERS + 2, PARAMETERS + 5)
 WIDTH = PARAMETERS + 5
 PRIORS = {
-    "professional": np.append(PAINT_SIZE_SIGMA_M, AS_TAKEN),
+    "professional": np.append(SIZE_SIGMA_M, AS_TAKEN),
     "any": np.append(LAWS_SIZE_SIGMA_M, WARP_SIGMA),
 }
 """Standard deviations of the five, by what ``CalibrationPolicy.lone_frames`` says."""

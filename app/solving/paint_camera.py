@@ -26,6 +26,7 @@ from app.soccer.pitch import MARKINGS, Pitch
 from app.solving.main_position import MAIN_MEAN, STADIUM, is_main_position
 from app.solving.observations import pitch_curves, principal_point
 from app.solving.paint_noise import PaintNoise, PaintOffsets, marking_weights, paint_noise
+from app.solving.paint_terms import pitch_terms
 from app.solving.resect import ResectionProblem
 
 ROBUST_PX = 1.0
@@ -115,11 +116,21 @@ class PaintProblem:
         moved = parameters - self.first
         return float(moved @ self.information @ moved)
 
-    def noise(self, parameters: FloatArray, seen: PaintOffsets) -> PaintNoise | None:
-        """Noise of the paint and covariance at a minimum; None where it leaves the camera open."""
+    def noise(
+        self, parameters: FloatArray, seen: PaintOffsets, places: FloatArray, pitch: Pitch
+    ) -> PaintNoise | None:
+        """Noise of the paint and covariance at a minimum; None where it leaves the camera open.
+
+        Args:
+            parameters: At the minimum, shape (8,).
+            seen: The paint there.
+            places: Where on the pitch each of it lies, metres, shape (N, 2).
+            pitch: The pitch.
+        """
         robust = self._robust(seen.offsets, seen.sigmas, strict=True)
         prior = self.prior(parameters).sigma ** -2.0
-        return paint_noise(seen, robust, prior, self.information)
+        terms = pitch_terms(places, seen.marking, seen.jacobian, pitch)
+        return paint_noise(seen, robust, prior, self.information, terms)
 
     def prior(self, parameters: FloatArray) -> Prior:
         """The calibrator's: main cameras stand where main cameras stand, others anywhere."""
@@ -135,11 +146,13 @@ class PaintCamera:
     Attributes:
         parameters: Shape (8,).
         covariance: Of them, shape (8, 8).
+        pitch: What comes to it because no pitch is quite the plan, shape (8, 8).
         error_px: Median distance of the paint from its markings, pixels.
     """
 
     parameters: FloatArray
     covariance: FloatArray
+    pitch: FloatArray
     error_px: float
 
 
@@ -173,14 +186,17 @@ def solve_paint(problem: PaintProblem, evidence: PaintEvidence, pitch: Pitch) ->
         if strict and float(np.abs(seen.jacobian @ moved).max()) < SETTLED * sigmas.min():
             break
     seen = offsets_of(problem, parameters, sightings, sigmas, pitch)
-    noise, error = problem.noise(parameters, seen), float(np.median(np.abs(seen.offsets)))
+    camera = problem.resection.camera(parameters)
+    places = camera.on_ground(sightings.pixels + np.array(camera.principal_point))
+    noise = problem.noise(parameters, seen, np.nan_to_num(places), pitch)
+    error = float(np.median(np.abs(seen.offsets)))
     if (
         noise is None
         or error > problem.unit * WORST_PX
         or problem.surprise(parameters) > MOST_SURPRISING
     ):
         return None
-    return PaintCamera(parameters, noise.parameters, error)
+    return PaintCamera(parameters, noise.parameters, noise.pitch, error)
 
 
 def offsets_of(

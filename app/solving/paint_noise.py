@@ -2,7 +2,8 @@
 
 Lines are not painted quite where the plan has them, and all points of one marking share that:
 each residual is an offset of its marking and a part of its own, as for clicks
-(``solving.line_noise``, which estimates both).
+(``solving.line_noise``, which estimates both). What a pitch is other than the plan
+(``solving.paint_terms``) shows in no residual and is carried into the camera's covariance.
 """
 
 from __future__ import annotations
@@ -58,12 +59,14 @@ class PaintNoise:
     Attributes:
         variance: Of a residual in units of its sigma squared.
         share: Of it, what the points of a marking have in common.
-        parameters: Covariance of the camera's parameters, shape (8, 8).
+        parameters: Covariance of the camera's parameters if the pitch is the plan, shape (8, 8).
+        pitch: What comes to it because no pitch is, shape (8, 8).
     """
 
     variance: float
     share: float
     parameters: FloatArray
+    pitch: FloatArray
 
 
 def marking_weights(marking: IntArray, sigmas: FloatArray) -> FloatArray:
@@ -91,7 +94,8 @@ def paint_noise(
     seen: PaintOffsets,
     robust: FloatArray,
     prior: FloatArray,
-    information: FloatArray | None = None,
+    information: FloatArray | None,
+    terms: FloatArray,
 ) -> PaintNoise | None:
     """Noise of the paint and covariance of the camera; None where the paint leaves it open.
 
@@ -100,6 +104,8 @@ def paint_noise(
         robust: Weight of each point by its residual, shape (N,).
         prior: Information of the parameters' own prior, a diagonal, shape (8,).
         information: What the start knew of the parameters, shape (8, 8).
+        terms: How far one standard deviation of each number of the pitch moves the paint
+            (``paint_terms``), pixels, shape (N, M).
     """
     root = np.sqrt(robust) / seen.sigmas
     rows, rest = seen.jacobian * root[:, None], seen.offsets * root
@@ -119,4 +125,6 @@ def paint_noise(
     lens = weighted.T @ (seen.radii**2 * seen.jacobian[:, KAPPA] * root)
     meat = noise.variance * meat + LENS**2 * np.outer(lens, lens)
     covariance = bread @ (meat + known) @ bread
-    return PaintNoise(noise.variance, float(shares.mean()), 0.5 * (covariance + covariance.T))
+    covariance = 0.5 * (covariance + covariance.T)
+    moved = bread @ (weighted.T @ (terms * root[:, None]))
+    return PaintNoise(noise.variance, float(shares.mean()), covariance, moved @ moved.T)

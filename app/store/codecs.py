@@ -129,6 +129,11 @@ def covariance_from_json(value: Sequence[float] | None) -> tuple[float, ...] | N
     return camera_covariance(value)
 
 
+def logged_camera(body: Mapping[str, Any]) -> tuple[Camera, tuple[float, ...] | None]:
+    """The camera of an entry of the log, and its covariance where the entry has one."""
+    return camera_from_json(body["given"]), covariance_from_json(body.get("covariance"))
+
+
 def given_to_json(station: Station) -> Json:
     """The given camera of a station, with its covariance where there is one; or None."""
     if station.given is None:

@@ -20,6 +20,7 @@
  * @property {number[]} [thin_prism_distortion]
  * @property {string} [lens] `brown_conrady`, `fisheye` or `arctan_polynomial`
  * @property {number[] | null} [lens_coefficients]
+ * @property {number[][] | null} [covariance] position, angles, focal length, k1
  */
 
 /** @typedef {{x: number, y: number}} PointJson */

@@ -14,6 +14,8 @@ from tests.bench.ball import bench_ball
 from tests.bench.ball_noise import bench_ball_noise
 from tests.bench.browser import bench_browser
 from tests.bench.calibration import bench_calibration
+from tests.bench.clips import bench_clips
+from tests.bench.drawn import bench_drawn
 from tests.bench.geometry import bench_geometry
 from tests.bench.goals import bench_goals
 from tests.bench.line_coverage import bench_line_coverage
@@ -57,6 +59,8 @@ def main() -> None:
     if (REAL_DATA / "issia").is_dir():
         bench_people(REAL_DATA)
     bench_paint(REAL_DATA)
+    bench_drawn()
+    bench_clips(REAL_DATA)
     bench_propose(REAL_DATA)
     bench_requests()
     bench_listeners()

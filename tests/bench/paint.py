@@ -83,7 +83,7 @@ def bench_paint(data: Path) -> None:
     solutions = _through_a_dataset(scenes)
     for scene, solution in zip(scenes, solutions, strict=True):
         seen = {
-            key: replace(shot, solved=_calibration(solution, key)) for key, shot in _shots(scene)
+            key: replace(shot, solved=_calibration(solution, key)) for key, shot in shots_of(scene)
         }
         shots += seen.values()
         clicked, snapped, true = _balls(scene, seen)
@@ -136,7 +136,8 @@ def _calibration(solution: Solution, key: str) -> Calibration | None:
     return None if found is None else found.calibration
 
 
-def _shots(scene: Scene) -> Iterator[tuple[str, Shot]]:
+def shots_of(scene: Scene) -> Iterator[tuple[str, Shot]]:
+    """Each view of a scene that its clicks calibrate, with its key."""
     for view in scene.group.views:
         truth = scene.truth.view(view.key)
         found = calibrate(view.station.lines, PITCH, view.size, PAPER.calibration)
@@ -171,8 +172,8 @@ def _balls(scene: Scene, shots: dict[str, Shot]) -> tuple[float, float, float]:
         key = calibration_key(view.station, group.pitch, PAPER.calibration)
         found = replace(shot.clicked, camera=shot.truth)
         true[key] = measure(found, view.station.lines, group.pitch, view.size)
-        if shot.snapped.covariance is not None:
-            covariance = tuple(shot.snapped.covariance.ravel().tolist())
+        if shot.snapped.planned is not None:
+            covariance = tuple(shot.snapped.planned.ravel().tolist())
             found = replace(shot.clicked, camera=shot.snapped.camera, covariance=covariance)
             known[key] = measure(found, view.station.lines, group.pitch, view.size)
     return (
@@ -195,7 +196,7 @@ def _off(solution: Solution, scene: Scene) -> float:
 
 def _print_sample(shots: list[Shot], balls: FloatArray) -> None:
     rows = []
-    fields = np.array([[_field_error(c, s.truth, s.size) for c in _cameras(s)] for s in shots])
+    fields = np.array([[field_error(c, s.truth, s.size) for c in _cameras(s)] for s in shots])
     places = np.array(
         [[np.linalg.norm(c.position - s.truth.position) for c in _cameras(s)] for s in shots]
     )
@@ -244,15 +245,15 @@ def _cameras(shot: Shot) -> tuple[Camera, Camera, Camera]:
 def _apart(shot: Shot) -> float | None:
     """How far the dataset's camera is from that of snap, the most of its parameters, sigmas."""
     snapped, solved = shot.snapped, shot.solved
-    if snapped.covariance is None or solved is None or solved.source != "paint":
+    if snapped.planned is None or solved is None or solved.source != "paint":
         return None
     assert solved.camera is not None
     half = shot.size.diagonal / 2
     one, other = (parameters_from_camera(item, half) for item in (snapped.camera, solved.camera))
-    return float(np.abs((one - other) / np.sqrt(np.diag(snapped.covariance))).max())
+    return float(np.abs((one - other) / np.sqrt(np.diag(snapped.planned))).max())
 
 
-def _field_error(camera: Camera, truth: Camera, size: ImageSize) -> float:
+def field_error(camera: Camera, truth: Camera, size: ImageSize) -> float:
     """Median distance between both images of the grass in view, a point every 2 m, pixels."""
     true, found = truth.project(GRASS), camera.project(GRASS)
     x, y = true.T
@@ -264,7 +265,8 @@ def _holds(shot: Shot, column: int) -> bool | None:
     """Whether the 95 % ellipsoid of the position holds the truth."""
     found = (shot.clicked, None, shot.solved)[column]
     if column == 1:
-        covariance = shot.snapped.covariance
+        # The pitches of the sample are as planned.
+        covariance = shot.snapped.planned
     else:
         known = None if found is None else found.covariance
         covariance = None if known is None else np.reshape(known, (8, 8))

@@ -31,6 +31,7 @@ PLAIN_WORDS = """
     comment comments talk threads mentions bells past deeds window before after
     full tall scroll stalls settling exposure ends many naming tracing local lookup css
     cluster serving hosts executors packing day browser database
+    stadium priors
     private kept another smaller index
     stored tree trees safe path refusal attempt cookie fit
     categories corner finder ids joins like

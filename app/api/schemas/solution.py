@@ -76,6 +76,11 @@ class CameraDocument(Document):
         default=None,
         description="fisheye: k1 .. k4; arctan_polynomial: a0 .. a8; else null.",
     )
+    covariance: list[list[float]] | None = Field(
+        default=None,
+        description="How well it is known: 8 x 8, of x, y, z (metres), pan, tilt, roll (degrees), "
+        "focal length (pixels) and k1, as in camera files; null: nobody says.",
+    )
 
 
 class MarkingDocument(Document):
@@ -157,8 +162,14 @@ def _calibration(calibration: Calibration, pitch: Pitch, size: ImageSize) -> Cal
         }
         for fit in calibration.markings
     ]
+    camera = calibration.camera
     return CalibrationDocument.model_validate(
-        {**vars(calibration), "sigma": camera_sigma(calibration), "markings": markings}
+        {
+            **vars(calibration),
+            "camera": camera and camera_to_json(camera, calibration.known_covariance, size),
+            "sigma": camera_sigma(calibration),
+            "markings": markings,
+        }
     )
 
 

@@ -28,7 +28,7 @@ from app.soccer.picture import PictureGeometry
 from app.soccer.pitch import Pitch
 from app.soccer.policy import CLICKED, CalibrationPolicy
 from app.soccer.solution import Calibration
-from app.solving.calibrate import calibrate, look_alone
+from app.solving.calibrate import as_lone, calibrate, look_alone
 from app.solving.calibration_findings import calibration_findings, lone_findings
 from app.solving.leave_one_out import leave_one_out
 from app.solving.lone_frame import LoneFrame
@@ -215,7 +215,9 @@ def _frame(
     alone = replace(calibration, markings=())
     return CalibratedFrame(
         stem=stem,
-        camera=None if camera is None else camera_text(camera),
+        camera=None
+        if camera is None
+        else camera_text(camera, as_lone(calibration, lone).known_covariance, size),
         reason=calibration.reason,
         findings=tuple(findings),
         left_out=left_out,
@@ -233,7 +235,8 @@ def _in_picture(
     camera = frame.alone.camera
     if picture is None or camera is None:
         return frame
-    return replace(frame, camera=camera_text(picture.done(camera, size)))
+    known = frame.alone.known_covariance
+    return replace(frame, camera=camera_text(picture.done(camera, size), known, size))
 
 
 def _summary(frames: list[CalibratedFrame], report: Report, seconds: float) -> dict[str, Any]:

@@ -12,7 +12,7 @@ import numpy as np
 
 from app.config import Settings
 from app.datasets.cameras_reader import read_cameras
-from app.datasets.cameras_writer import camera_name, write_cameras
+from app.datasets.cameras_writer import camera_name, camera_text
 from app.datasets.file_tree import Limits
 from app.datasets.line_documents import read_line_documents
 from app.datasets.report import Report
@@ -21,9 +21,11 @@ from app.datasets.sn_calibration import LineFile
 from app.datasets.sn_calibration_reader import lines_from_json
 from app.datasets.sn_calibration_writer import write_line_files
 from app.datasets.trees import opened_tree
+from app.datasets.view_files import write_below
 from app.durable import replace_file
 from app.errors import GeometryError, InputError, ReviewError
 from app.finite import json_text
+from app.geometry.arrays import row_by_row
 from app.geometry.camera import Camera
 from app.geometry.lens import BROWN_CONRADY
 from app.paint.agreement import agreement
@@ -77,8 +79,8 @@ def snap_files(
     match = _Match(values, images, settings)
     rows: list[dict[str, Any]] = []
     for picture, frame, key in match.pictures(report):
-        row, camera, snapped = _snap_picture(picture, frame, values[key], report)
-        _keep(out, frame, camera, snapped)
+        row, text, snapped = _snap_picture(picture, frame, values[key], report)
+        _keep(out, frame, text, snapped)
         rows.append(row)
         if progress is not None:
             progress(len(rows))
@@ -176,7 +178,8 @@ def _line_values(lines: Path, settings: Settings, report: Report) -> dict[str, A
 
 def _snap_picture(
     picture: PictureFile, frame: str, value: Any, report: Report
-) -> tuple[dict[str, Any], Camera | None, Snapped | None]:
+) -> tuple[dict[str, Any], str | None, Snapped | None]:
+    """The row of a picture, the text of its camera's file, and how it lies on the paint."""
     if picture.image is None:
         return _row(frame, NOTHING, reason=picture.problem), None, None
     if isinstance(value, ReviewError):
@@ -193,15 +196,16 @@ def _snap_picture(
     clicked = calibrate(lines, Pitch(), size, CLICKED)
     if clicked.camera is None:
         return _row(frame, NOTHING, reason=clicked.reason), None, None
+    kept = camera_text(clicked.camera, clicked.known_covariance, size)
     field = field_of_play(picture.image)
     reason = why_no_field(picture.image, field)
     if reason is not None:
-        return _row(frame, UNSURE, reason=f"no_paint: {reason}"), clicked.camera, None
+        return _row(frame, UNSURE, reason=f"no_paint: {reason}"), kept, None
     try:
         snapped = _snapped(picture, field, clicked)
     except (GeometryError, np.linalg.LinAlgError) as error:
         broken = f"the paint cannot be solved ({error}): the camera of the clicks stays"
-        return _row(frame, UNSURE, reason=broken), clicked.camera, None
+        return _row(frame, UNSURE, reason=broken), kept, None
     spent = 1000 * (time.thread_time() - began)
     seen = agreement(snapped.camera, field, line_like(picture.image, field))
     row = _row(
@@ -215,7 +219,10 @@ def _snap_picture(
         moved_px=snapped.moved_px,
         reason=f"{snapped.reason}: {SENTENCES[snapped.reason]}" if snapped.reason else None,
     )
-    return row, snapped.camera, snapped if snapped.reason is None else None
+    known = snapped.covariance
+    if snapped.reason is not None or known is None:
+        return row, kept, None
+    return row, camera_text(snapped.camera, row_by_row(known), size), snapped
 
 
 def _snapped(picture: PictureFile, field: Any, clicked: Calibration) -> Snapped:
@@ -252,7 +259,7 @@ def _row(frame: str, outcome: str, **known: Any) -> dict[str, Any]:
     return {"frame": frame, "outcome": outcome, **empty, "points": 0, **known}
 
 
-def _keep(out: Path, stem: str, camera: Camera | None, snapped: Snapped | None) -> None:
+def _keep(out: Path, stem: str, text: str | None, snapped: Snapped | None) -> None:
     """Write the camera of a frame and the points that were snapped; what an earlier run left
     there goes where there is nothing to write."""
     old = resolve_inside(out, camera_name(stem))
@@ -260,11 +267,11 @@ def _keep(out: Path, stem: str, camera: Camera | None, snapped: Snapped | None) 
     try:
         if snapped is None:
             old_lines.unlink(missing_ok=True)
-        if camera is None:
+        if text is None:
             old.unlink(missing_ok=True)
             return
         out.mkdir(parents=True, exist_ok=True)
-        write_cameras(out, {stem: camera})
+        write_below(out, camera_name(stem), text)
         if snapped is not None:
             (out / "lines").mkdir(exist_ok=True)
             height, width = snapped.size

@@ -19,6 +19,7 @@ from app.datasets.safe_path import resolve_inside
 from app.durable import replace_file
 from app.errors import GeometryError, InputError
 from app.finite import json_text
+from app.geometry.arrays import row_by_row
 from app.geometry.camera import Camera
 from app.paint.frame_pitch import films, pitch_frame, pitch_of
 from app.paint.propose import FrameProposal, propose
@@ -157,10 +158,12 @@ def _propose_one(
         return row, None
     if found.outcome == "proposed" and found.camera is not None and picture.image is not None:
         camera = found.camera
+        height, width = picture.image.shape[:2]
         if size is not None:
-            height, width = picture.image.shape[:2]
             camera = camera.scaled(size.width / width, size.height / height)
-        _write(file, camera_text(camera))
+        spread = None if found.snapped is None else found.snapped.covariance
+        covariance = None if spread is None else row_by_row(spread)
+        _write(file, camera_text(camera, covariance, size or ImageSize(width, height)))
         return row, _Proposed(found.camera, agrees, pitch_frame(picture.image, found.camera, pitch))
     file.unlink(missing_ok=True)
     if found.camera is None or picture.image is None or not _is_likely(found):

@@ -15,8 +15,8 @@ from app.review.editing.replay import apply_entry
 from app.soccer.group import Group, Station, View
 from app.soccer.pitch import Pitch
 from app.store.codecs import (
-    camera_from_json,
     group_head_to_json,
+    logged_camera,
     station_from_json,
     view_from_json,
 )
@@ -106,8 +106,7 @@ class _Walk:
         for item in (item for item in items if item.station_id == entry.station_id):
             view = self.base.view(item.view.key)
             if view is not None:
-                given = camera_from_json(entry.body["given"])
-                station = view.station.with_given(given)
+                station = view.station.with_given(*logged_camera(entry.body))
                 self.base = self.base.with_view(replace(view, station=station))
 
     def _note(self, group: Group) -> None:

@@ -19,8 +19,8 @@ from app.review.editing.upstream import KIND
 from app.soccer.group import Group, Station
 from app.soccer.pitch import Pitch
 from app.store.codecs import (
-    camera_from_json,
     extras_from_json,
+    logged_camera,
     policy_from_json,
     positions_from_json,
     station_from_json,
@@ -204,7 +204,7 @@ def _camera(ledger: Ledger, entry: LogEntry) -> None:
     assert entry.station_id is not None
     record = ledger.stations[entry.station_id]
     edited = station_digest(record.station) != record.source_digest
-    station = record.station.with_given(camera_from_json(entry.body["given"]))
+    station = record.station.with_given(*logged_camera(entry.body))
     base = None if edited else station
     _save_station(ledger, record.dataset_id, entry.station_id, station, base)
     if entry.group_id is not None:

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from app.review.editing.upstream import KIND, FollowedStation, follow_station
 from app.soccer.group import Station
 from app.store.clock import now
-from app.store.codecs import camera_from_json, station_from_json, station_to_json
+from app.store.codecs import logged_camera, station_from_json, station_to_json
 from app.store.digest import station_digest
 from app.store.findings import replace_station_finding, station_finding
 from app.store.group_revisions import refresh_inputs_hashes
@@ -77,7 +77,7 @@ class SharedStations:
             if entry.kind == "station":
                 said = station_from_json(entry.body["base"] or entry.body["station"])
             elif entry.kind == "camera" and said is not None:
-                said = said.with_given(camera_from_json(entry.body["given"]))
+                said = said.with_given(*logged_camera(entry.body))
             if said is not None and station_digest(said) == stored.source_digest:
                 found = said
         return found

@@ -5,14 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import PurePosixPath
+from typing import Any, NamedTuple
 
+from app.datasets.camera_json import COVARIANCE, covariance_from_json
 from app.geometry.camera import Camera
 from app.review.datasets.dataset import get_dataset_head
 from app.review.importing.ingest import IngestReport, attempt
 from app.soccer.camera_size import other_size
 from app.soccer.frames import ImageSize
 from app.store.clock import now
-from app.store.codecs import camera_to_json
+from app.store.codecs import camera_to_json, covariance_to_json
 from app.store.group_revisions import bump_groups, refresh_inputs_hashes
 from app.store.log import Entry, append
 from app.store.queue import refresh_queue
@@ -37,6 +39,13 @@ class _Place:
     size: ImageSize
 
 
+class _Given(NamedTuple):
+    """A camera for a station, and its covariance where that is known."""
+
+    camera: Camera
+    covariance: tuple[float, ...] | None
+
+
 def ingest_cameras(
     store: Store,
     dataset: str,
@@ -46,6 +55,7 @@ def ingest_cameras(
     actor: str,
     size: ImageSize | None = None,
     sizes: Mapping[str, ImageSize] | None = None,
+    covariances: Mapping[str, Any] | None = None,
     dry_run: bool = False,
 ) -> IngestReport:
     """Attach given calibrations to what they name; attaching them again changes nothing.
@@ -62,6 +72,7 @@ def ingest_cameras(
         actor: Who imports.
         size: Size of the images that the cameras were made for; None: that of each view.
         sizes: The same by name, where their files state it: they count before ``size``.
+        covariances: How well they are known, by name, as ``read_cameras`` read it.
         dry_run: Dry run: report what would happen, change nothing.
 
     Returns:
@@ -74,7 +85,7 @@ def ingest_cameras(
     report, found = IngestReport(), get_dataset_head(store, dataset)
     with store.read() as session:
         places = _places(session, found.id)
-    known: list[tuple[_Place, Camera]] = []
+    known: list[tuple[_Place, _Given]] = []
     for name in sorted(cameras):
         fitting = _fitting(places, name)
         matches = {place.match for place in fitting}
@@ -97,7 +108,11 @@ def ingest_cameras(
             )
         made_for = stated or size
         report.problems.extend(_of_other_size(name, cameras[name], fitting, made_for))
-        known.extend((place, _sized(cameras[name], made_for, place.size)) for place in fitting)
+        told = {COVARIANCE: (covariances or {}).get(name)}
+        for place in fitting:
+            covariance = covariance_from_json(told, cameras[name], made_for or place.size)
+            camera = _sized(cameras[name], made_for, place.size)
+            known.append((place, _Given(camera, covariance)))
     for start in range(0, len(known), BATCH):
         with attempt(store, keep=not dry_run) as session:
             batch = known[start : start + BATCH]
@@ -165,7 +180,7 @@ def _of_other_size(
 def _attach_batch(
     session: Session,
     dataset_id: int,
-    batch: Sequence[tuple[_Place, Camera]],
+    batch: Sequence[tuple[_Place, _Given]],
     source: str,
     actor: str,
     report: IngestReport,
@@ -173,14 +188,18 @@ def _attach_batch(
     stations = read_stations(session, [place.station for place, _ in batch])
     touched: set[int] = set()
     entries, at = [], now()
-    for place, camera in batch:
+    for place, given in batch:
         stored = stations[place.station]
-        if stored.station.given == camera:
+        # A file that says nothing of its camera takes nothing of what is known of it.
+        known = given.covariance in (None, stored.station.given_covariance)
+        if stored.station.given == given.camera and known:
             report.unchanged += 1
             continue
-        station = stored.station.with_given(camera)
+        station = stored.station.with_given(*given)
         save_station(session, stored, station, source=None if stored.edited else station)
-        body = {"source": source, "given": camera_to_json(camera)}
+        body = {"source": source, "given": camera_to_json(given.camera)}
+        if given.covariance is not None:
+            body["covariance"] = covariance_to_json(given.covariance)
         entries.append(Entry("camera", actor, at, body, dataset_id, place.group, place.station))
         if place.group is not None:
             bump_groups(session, [place.group], at)

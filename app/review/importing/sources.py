@@ -301,7 +301,8 @@ def import_source(
     report, limits = Report(), Limits.of(settings)
     if source.format == "cameras":
         sizes: dict[str, ImageSize] = {}
-        cameras = read_cameras(source.path, report, limits, sizes)
+        covariances: dict[str, Any] = {}
+        cameras = read_cameras(source.path, report, limits, sizes, covariances)
         result = ingest_cameras(
             store,
             dataset,
@@ -310,6 +311,7 @@ def import_source(
             actor=actor,
             size=source.size,
             sizes=sizes,
+            covariances=covariances,
             dry_run=dry_run,
         )
         return Imported(source, report, result)

@@ -44,6 +44,8 @@ class TestPropose:
         }
         assert all(row["reason"] for row in rows if row["outcome"] == "nothing")
         assert sorted(file.name for file in out.iterdir()) == ["camera_good.json", "propose.json"]
+        known = json.loads((out / "camera_good.json").read_text())["covariance"]
+        assert all(0.1 < known[axis][axis] ** 0.5 < 3 for axis in range(3))
         assert set(rows[0]) >= {
             "frame", "outcome", "supported", "explained", "points", "error_px", "runner_up", "ms",
         }  # fmt: skip

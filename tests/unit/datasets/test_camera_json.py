@@ -8,12 +8,20 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from app.datasets.camera_json import camera_from_json, camera_to_json
+from app.datasets.camera_json import (
+    camera_from_json,
+    camera_to_json,
+    covariance_from_json,
+    covariance_to_json,
+)
 from app.datasets.cameras_writer import camera_text
 from app.errors import DatasetFormatError
+from app.geometry.arrays import row_by_row
 from app.geometry.camera import Camera
+from app.geometry.resection import camera_from_parameters, parameters_from_camera
 from app.geometry.rotation import rotation_from_pan_tilt_roll
-from tests.cameras import WIDE_LENSES, wide
+from app.soccer.frames import ImageSize
+from tests.cameras import CENTER, SIZE, WIDE_LENSES, looking, wide
 
 FINITE = st.floats(-1e6, 1e6)
 ANGLE = st.floats(-180, 180)
@@ -70,6 +78,70 @@ class TestCameraToJson:
     def test_what_is_written_comes_back_exactly(self, camera: Camera) -> None:
         again = camera_from_json(json.loads(camera_text(camera)), "f")
         assert again == camera
+
+
+MAIN = looking((3.0, 62.0, -16.0), (34.0, -4.0, 0.0), 2200.0, bend=0.02)
+SPREAD = np.diag([0.002, 0.003, 0.001, 0.4, 0.9, 0.3, 0.01, 0.004])
+SPREAD = row_by_row(SPREAD @ (0.5 * np.eye(8) + 0.5) @ SPREAD)
+"""Covariance of a camera's parameters in which all go together."""
+HALF_SIZE = ImageSize(SIZE.width // 2, SIZE.height // 2)
+
+
+class TestCovariance:
+    def test_it_is_that_of_the_numbers_of_the_file_in_their_units(self) -> None:
+        half = SIZE.diagonal / 2
+        steps = np.random.default_rng(3).multivariate_normal(
+            np.zeros(8), 1e-8 * np.reshape(SPREAD, (8, 8)), size=4000
+        )
+        first, drawn = parameters_from_camera(MAIN, half), []
+        for step in steps:
+            value = camera_to_json(camera_from_parameters(first + step, CENTER, half))
+            angles = [value[f"{name}_degrees"] for name in ("pan", "tilt", "roll")]
+            focal, k1 = value["x_focal_length"], value["radial_distortion"][0]
+            drawn.append([*value["position_meters"], *angles, focal, k1])
+        found = np.array(covariance_to_json(SPREAD, MAIN, SIZE))
+        sigma = np.sqrt(np.diag(found))
+        assert 1e4 * np.std(drawn, axis=0) == pytest.approx(sigma, rel=0.05)
+        shares = found / np.outer(sigma, sigma)
+        assert np.corrcoef(np.transpose(drawn)) == pytest.approx(shares, abs=0.05)
+
+    def test_a_file_brings_it_back(self) -> None:
+        value = json.loads(camera_text(MAIN, SPREAD, SIZE))
+        assert np.shape(value["covariance"]) == (8, 8)
+        assert camera_from_json(value, "f") == MAIN
+        assert covariance_from_json(value, MAIN, SIZE) == pytest.approx(SPREAD, rel=1e-9)
+
+    def test_another_size_of_the_same_pictures_is_the_same_knowledge(self) -> None:
+        value = camera_to_json(MAIN, SPREAD, SIZE)
+        half = MAIN.scaled(0.5, 0.5)
+        smaller = camera_to_json(half, SPREAD, HALF_SIZE)
+        assert smaller["covariance"][6][6] == pytest.approx(value["covariance"][6][6] / 4)
+        again = covariance_from_json(smaller, half, HALF_SIZE)
+        assert again == pytest.approx(SPREAD, rel=1e-9)
+
+    def test_where_nothing_is_known_nothing_stands(self) -> None:
+        value = camera_to_json(MAIN)
+        assert "covariance" not in value
+        assert covariance_from_json(value, MAIN, SIZE) is None
+
+    @pytest.mark.parametrize(
+        ("value", "problem"),
+        [
+            ([[1.0] * 8] * 7, "7 rows"),
+            ([[1.0] * 7] * 8, "7 numbers, not 8"),
+            ([[0.0] * 8] * 8, "above zero"),
+            (np.triu(np.ones((8, 8))).tolist(), "symmetric"),
+            (5, "not a list"),
+        ],
+    )
+    def test_what_is_none_is_refused(self, value: Any, problem: str) -> None:
+        with pytest.raises(ValueError, match=problem):
+            covariance_from_json({"covariance": value}, MAIN, SIZE)
+
+    def test_that_of_a_wide_lens_is_refused(self) -> None:
+        camera = wide((0.0, 60.0, -9.0), (0.0, 0.0, 0.0), "fisheye")
+        with pytest.raises(ValueError, match="another"):
+            covariance_from_json(camera_to_json(MAIN, SPREAD, SIZE), camera, SIZE)
 
 
 class TestCameraFromJson:

@@ -5,14 +5,17 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from app.datasets.camera_json import camera_to_json
 from app.datasets.cameras_reader import read_cameras
-from app.datasets.cameras_writer import camera_text, write_cameras
+from app.datasets.cameras_writer import camera_text
 from app.datasets.report import Report
+from app.geometry.arrays import row_by_row
 from app.geometry.camera import Camera
 from app.soccer.frames import ImageSize
+from tests.cameras import SIZE, looking, write_cameras
 
 
 class TestReadCameras:
@@ -47,6 +50,22 @@ class TestReadCameras:
         assert "camera_1.json, x_focal_length: is nan, not a finite number" in str(
             report.problems[0]
         )
+
+    def test_how_well_a_camera_is_known_is_read_with_it(
+        self, make_zip: Callable[..., Path], report: Report
+    ) -> None:
+        known = row_by_row(np.eye(8) * 1e-4)
+        camera = looking((0.0, 60.0, -15.0), (0.0, 0.0, 0.0), 1500.0)
+        text = camera_text(camera, known, SIZE)
+        value = json.loads(text)
+        broken = json.dumps({**value, "covariance": [[1.0]]})
+        path = make_zip(
+            {"camera_1.json": text, "camera_2.json": camera_text(camera), "camera_3.json": broken}
+        )
+        covariances: dict[str, Any] = {}
+        assert list(read_cameras(path, report, covariances=covariances)) == ["1", "2"]
+        assert covariances == {"1": value["covariance"]}
+        assert "camera_3.json, covariance: has 1 numbers" in str(report.problems[0])
 
     @pytest.mark.parametrize("wrapped", [False, True])
     @pytest.mark.parametrize("encoded", ["plain", "json", "python"])

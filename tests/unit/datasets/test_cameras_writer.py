@@ -1,16 +1,20 @@
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from app.datasets.cameras_reader import read_cameras
-from app.datasets.cameras_writer import write_camera_files, write_cameras
+from app.datasets.cameras_writer import write_camera_files
 from app.datasets.export_record import ExportRecord
 from app.datasets.report import Report
+from app.datasets.sn_calibration_writer import write_sn_calibration
 from app.errors import InputError, UnsafePathError
+from app.geometry.arrays import row_by_row
 from app.geometry.camera import Camera
 from app.soccer.group import Group
 
@@ -29,6 +33,25 @@ class TestWriteCameraFiles:
         assert read_cameras(tmp_path, report) == {
             f"{match}/{stem}": camera for stem in ("7", "7_1", "7_2")
         }
+
+    def test_what_is_known_of_a_computed_camera_stands_in_its_file(
+        self, tmp_path: Path, solved: Solved, soccer_group: Make, match: str
+    ) -> None:
+        record = solved(soccer_group(replays=1))
+        assert record.solution is not None
+        first, second = record.solution.views
+        spread = row_by_row(np.eye(8) * 1e-4)
+        known = replace(first, calibration=replace(first.calibration, covariance=spread))
+        record = replace(record, solution=replace(record.solution, views=(known, second)))
+        (tmp_path / "lines").mkdir()
+        write_camera_files(tmp_path / "cameras", [record])
+        write_sn_calibration(tmp_path / "lines", [record])
+        for root in ("cameras", "lines"):
+            files = [*(tmp_path / root).rglob("camera_*.json")]
+            told = [json.loads(path.read_text()).get("covariance") for path in files]
+            (found,) = (value for value in told if value is not None)
+            assert np.diag(found)[:3].tolist() == [1e-4] * 3
+            assert len(told) == 2
 
     def test_a_static_camera_is_written_once(
         self, tmp_path: Path, solved: Solved, issia_group: Make
@@ -53,9 +76,3 @@ class TestWriteCameraFiles:
         group = replace(soccer_group(), match="../..")
         with pytest.raises(UnsafePathError):
             write_camera_files(tmp_path, [solved(group)])
-
-
-class TestWriteCameras:
-    def test_a_key_that_leaves_the_folder_is_refused(self, tmp_path: Path, camera: Camera) -> None:
-        with pytest.raises(UnsafePathError):
-            write_cameras(tmp_path, {"../x": camera})

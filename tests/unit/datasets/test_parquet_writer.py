@@ -5,10 +5,12 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
 from app.datasets import parquet_writer
+from app.datasets.camera_json import camera_to_json
 from app.datasets.export_record import ExportRecord
 from app.datasets.parquet_writer import COLUMNS, write_parquet
 from app.geometry.camera import Camera
@@ -90,7 +92,10 @@ class TestWriteParquet:
             ImagePoint(3.0, 4.0), 5.0, 6.0, 7.0, Box(1.0, 2.0, 7.5, 7.5), 8.0, None, 9.0, 10.0
         )
         paint = PaintFit(supported=0.5, explained=0.25, points=9)
-        calibration = Calibration("lines", camera, jac=(0.1, 0.2, 0.3), error_px=11.0, paint=paint)
+        spread = tuple((np.eye(8) * 1e-4).ravel().tolist())
+        calibration = Calibration(
+            "lines", camera, None, (0.1, 0.2, 0.3), 11.0, covariance=spread, paint=paint
+        )
         first = ViewSolution(view.key, calibration, "k", True, "jac", fit)
         ball = replace(solution.ball, sigma_m=0.4, parallax_degrees=21.0)
         best = BestBall((1.0, 2.0, -3.0), (0.5,) * 9, 0.6, ("a", "b"))
@@ -113,6 +118,9 @@ class TestWriteParquet:
         expected = NUMBERED | {"pan_degrees": pan, "tilt_degrees": tilt, "roll_degrees": roll}
         assert {name: found[name] for name in expected} == expected
         assert len({pan, tilt, roll}) == 3
+        told = camera_to_json(camera, spread, view.size)["covariance"]
+        assert found["camera_covariance"] == np.ravel(told).tolist()
+        assert other["camera_covariance"] is None
         assert (other["frame_present"], other["in_valid_pair"]) == (False, True)
         assert counts["boxes"] == sum(row["box_width"] is not None for row in (found, other))
 

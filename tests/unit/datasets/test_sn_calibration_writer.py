@@ -12,7 +12,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from app.datasets.cameras_reader import read_cameras
-from app.datasets.cameras_writer import write_cameras
 from app.datasets.export_record import ExportRecord
 from app.datasets.report import Report
 from app.datasets.sn_calibration import DEFAULT_SIZE, LineFile, line_frame, spelling
@@ -25,6 +24,7 @@ from app.soccer.frames import ImageSize
 from app.soccer.group import Group, Station
 from app.soccer.media import Media
 from app.soccer.pitch import MARKINGS
+from tests.cameras import write_cameras
 
 MATCH = "l/s/m"
 UNIT = st.floats(-0.5, 1.5)

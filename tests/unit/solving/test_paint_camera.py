@@ -12,6 +12,7 @@ from app.geometry.camera import Camera
 from app.geometry.polyline import clip_polyline
 from app.geometry.rotation import rotation_from_pan_tilt_roll
 from app.soccer.annotation import make_lines
+from app.soccer.camera_sigma import camera_sigma
 from app.soccer.finding import Fix
 from app.soccer.frames import ImagePoint, ImageSize
 from app.soccer.group import Group, Station, View
@@ -92,6 +93,15 @@ class TestCamera:
         moved = found.camera.position - MAIN.position
         assert moved @ np.linalg.solve(covariance, moved) < 16.3
         assert found.position_sigma_m < clicks.position_sigma_m / 3
+
+    def test_files_and_documents_know_that_no_pitch_is_quite_the_plan(self):
+        """No click and no paint tells a crowned or a longer pitch from another camera."""
+        found = first(read(clicked()))
+        told, own = (np.sqrt(np.diag(np.reshape(item, (8, 8))))[3:6] for item in (
+            found.known_covariance, found.covariance
+        ))  # fmt: skip
+        assert 0.5 < np.linalg.norm(told) < 2 and np.linalg.norm(own) < 0.3
+        assert camera_sigma(found).position_meters == pytest.approx(tuple(told))
 
     def test_it_says_how_both_agree_and_is_measured_against_the_clicks(self):
         clicks, found = first(clicked()), first(read(clicked()))

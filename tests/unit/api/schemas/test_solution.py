@@ -100,6 +100,9 @@ class TestSolutionDocument:
         assert sigma is not None
         assert sigma.position_meters == pytest.approx((0.01, 0.01, 0.01))
         assert sigma.pan_degrees == pytest.approx(0.5729577951)
+        told = [document.calibration.camera.covariance for document in documents]
+        assert np.diag(told[0])[:4] == pytest.approx([1e-4] * 3 + [0.5729577951**2])
+        assert told[1] is None
         assert documents[1].calibration.sigma is None
 
     def test_a_wide_lens_is_named_with_its_coefficients(

@@ -2,6 +2,7 @@ import json
 import math
 from concurrent.futures import ThreadPoolExecutor
 
+import numpy as np
 import pytest
 
 from app.datasets.sn_calibration import LineFile
@@ -53,6 +54,10 @@ class TestCalibrateFiles:
             "camera_swapped.json",
         ]
         assert json.loads((tmp_path / "out" / "calibrate.json").read_text()) == summary
+        camera = json.loads((tmp_path / "out" / "camera_good.json").read_text())
+        sigma = np.sqrt(np.diag(camera["covariance"]))
+        apart = np.subtract(camera["position_meters"], BEHIND_GOAL.position)
+        assert (np.abs(apart) < 4 * sigma[:3]).all() and sigma[:3].max() < 2
 
     def test_findings_name_the_frame_and_the_marking(self, lines, tmp_path):
         run(lines, tmp_path / "out")

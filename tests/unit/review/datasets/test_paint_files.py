@@ -12,7 +12,6 @@ import pytest
 
 from app.config import Settings
 from app.datasets.cameras_reader import read_cameras
-from app.datasets.cameras_writer import write_cameras
 from app.datasets.report import Report
 from app.datasets.sn_calibration import LineFile
 from app.datasets.sn_calibration_reader import read_line_files
@@ -22,6 +21,7 @@ from app.review.datasets.paint_files import agree_files, snap_files
 from app.review.datasets.picture_files import UniqueNames
 from app.sample.render import render
 from app.soccer.frames import ImageSize
+from tests.cameras import write_cameras
 from tests.scenes import make_scenes
 
 SIZE = ImageSize(1280, 720)
@@ -74,7 +74,9 @@ class TestSnapFiles:
         for name in ("grey", "small", "crowd", "cut", "huge"):
             assert by_frame[name]["reason"], name
         assert json.loads((tmp_path / "snap.json").read_text()) == rows
-        assert set(read_cameras(tmp_path, Report())) >= {"good", "grey", "crowd"}
+        known: dict[str, object] = {}
+        assert set(read_cameras(tmp_path, Report(), covariances=known)) >= {"good", "grey", "crowd"}
+        assert set(known) == {"good", "grey", "crowd"}
         (file,) = (
             f for f in read_line_files(tmp_path / "lines", SIZE, Report()) if f.stem == "good"
         )

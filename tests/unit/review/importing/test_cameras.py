@@ -1,19 +1,28 @@
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
+from app.datasets.camera_json import covariance_to_json
+from app.datasets.cameras_writer import camera_text
 from app.errors import NotFoundError
+from app.geometry.arrays import row_by_row
 from app.review.datasets.dataset import get_dataset
 from app.review.editing.edit import SetLines, SetStationCamera
-from app.review.editing.recompute import stale_groups
+from app.review.editing.ledger import read_ledger
+from app.review.editing.recompute import solve_dataset, stale_groups
 from app.review.editing.replay import replay
 from app.review.editing.stations import load_station, submit_station
 from app.review.editing.submit import load, submit
+from app.review.exporting.export import export
 from app.review.importing.cameras import ingest_cameras
 from app.review.importing.ingest import ingest
+from app.review.importing.sources import Source, import_source
 from app.soccer.frames import ImageSize
+from tests.cameras import FULL_HD
 
 
 def attach(store, cameras):
@@ -59,6 +68,41 @@ class TestIngestCameras:
         assert (after.given, after.given_covariance) == (opposite, None)
         with store.read() as session:
             assert replay(session).stations[station.id].station == after
+
+    def test_how_well_it_is_known_comes_along_and_counts_for_the_ball(
+        self, store, state, tmp_path
+    ) -> None:
+        view, sigmas = state.group.view("7_1.png"), []
+        camera = state.solution.view("7_1.png").calibration.camera
+        for sigma in (1e-3, 1.0):
+            known = row_by_row(np.diag([1e-6] * 3 + [sigma**2] * 3 + [1e-6] * 2))
+            (tmp_path / "camera_7_1.json").write_text(camera_text(camera, known, view.size))
+            source = Source("cameras", tmp_path)
+            assert import_source(store, "demo", source, store.settings).result.changed == 1
+            again = import_source(store, "demo", source, store.settings).result
+            assert (again.changed, again.unchanged) == (0, 1)
+            solve_dataset(store, "demo")
+            after = load(store, state.id)
+            station = after.group.view("7_1.png").station
+            assert station.given_covariance == pytest.approx(known, rel=1e-9)
+            with store.read() as session:
+                assert replay(session) == read_ledger(session)
+            sigmas.append(after.solution.ball.sigma_m)
+        assert sigmas[1] > 2 * sigmas[0]
+        export(store, "demo", "cameras", tmp_path / "out", everything=True)
+        (file,) = (tmp_path / "out").rglob("camera_7_1.json")
+        told = json.loads(file.read_text())["covariance"]
+        assert np.diag(told)[:3] == pytest.approx([1.0] * 3)
+
+    def test_a_file_that_says_nothing_takes_nothing_of_what_is_known(
+        self, store, state, opposite
+    ) -> None:
+        known = {"7": covariance_to_json(row_by_row(np.eye(8) * 1e-4), opposite, FULL_HD)}
+        options = {"source": "x", "actor": "ann"}
+        ingest_cameras(store, "demo", {"7": opposite}, covariances=known, **options)
+        assert attach(store, {"7": opposite}).unchanged == 1
+        station = load(store, state.id).group.views[0].station
+        assert station.given_covariance is not None
 
     def test_names_that_match_no_view_or_several_are_reported(
         self, store, fill, make_group, opposite

@@ -12,7 +12,6 @@ from PIL import Image
 from sqlalchemy import select
 
 from app.datasets import issia_people
-from app.datasets.cameras_writer import write_cameras
 from app.datasets.soccernet_v3_writer import write_soccernet_v3
 from app.errors import InputError
 from app.review.datasets.dataset import dataset_id, get_dataset, list_datasets
@@ -30,6 +29,7 @@ from app.soccer.group import Group
 from app.store.store import Store
 from app.store.tables.groups import GroupModel
 from app.store.tables.log import LogModel
+from tests.cameras import write_cameras
 from tests.unit.datasets.test_issia_people import issia_folder
 
 SIZE = ImageSize(1280, 720)
