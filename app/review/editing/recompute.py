@@ -57,6 +57,15 @@ class SolveReport:
     passed: int = 0
     failed: list[tuple[str, str]] = field(default_factory=list)
 
+    def after(self, other: SolveReport) -> SolveReport:
+        """Both together, of different groups; the other was made before."""
+        return SolveReport(
+            other.total + self.total,
+            other.solved + self.solved,
+            other.passed + self.passed,
+            [*other.failed, *(one for one in self.failed if one not in other.failed)],
+        )
+
     @property
     def sentence(self) -> str:
         """How many groups pass, how many do not, and how many could not be solved."""
@@ -95,6 +104,7 @@ def solve_dataset(
     executor: Executor | None = None,
     progress: TellProgress | None = None,
     stop: Callable[[], bool] = lambda: False,
+    chosen: Callable[[Sequence[int]], Sequence[int]] = lambda ids: ids,
 ) -> SolveReport:
     """Solve what is stale in a dataset.
 
@@ -105,8 +115,9 @@ def solve_dataset(
         progress: Called after each chunk; an error that it raises ends the run, and nothing
             that was saved before is lost.
         stop: Asked every now and then; once it says so, what is done is saved, and no more.
+        chosen: Of the ids of stale groups those that are solved.
     """
-    found, ids = get_dataset_head(store, dataset), stale_groups(store, dataset)
+    found, ids = get_dataset_head(store, dataset), chosen(stale_groups(store, dataset))
     report = SolveReport(total=len(ids))
 
     def keep(results: Sequence[Result]) -> None:
@@ -118,7 +129,8 @@ def solve_dataset(
     for results in fan_out(retell_task, retell_tasks(store, found, ids), executor, stop):
         keep(results)
     if report.solved:
-        ids = stale_groups(store, dataset)
+        left = set(stale_groups(store, dataset))
+        ids = [number for number in ids if number in left]
     _calibrate_shared(store, found)
     largest = CHUNK if executor is not None else min(CHUNK, CHUNK_HERE)
     tasks = (_task(store, found, chunk) for chunk in _chunks(ids, largest))
