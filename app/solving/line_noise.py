@@ -234,7 +234,8 @@ class LineEstimate:
 
 
 def estimate_line_noise(found: Sequence[LineEvidence]) -> LineEstimate | None:
-    """The noise under which the residuals of all images are likeliest; None where there are none.
+    """The noise under which the residuals of all images are likeliest; None where there are none,
+    and where no noise that is tried explains them better than the first or the last one.
 
     Each image has its own variance, about that of the dataset: few images with wrong points
     change little. Of few images it is drawn towards what is expected of any.
@@ -253,6 +254,8 @@ def estimate_line_noise(found: Sequence[LineEvidence]) -> LineEstimate | None:
     blocks = blocks[:, blocks.sum(axis=0).min(axis=(1, 2)).argmin()]
     whole = blocks.sum(axis=0)
     log_sigma, share, known = _posterior(whole)
+    if not _LOGS[0] < log_sigma < _LOGS[-1]:
+        return None
     parts = np.array([_posterior(whole - part)[:2] for part in blocks])
     scatter, of_share = jackknife_variance(parts).tolist()
     numbers = sum(item.freedom for item in found)

@@ -21,9 +21,9 @@ STUDENT = 2.26
 standard deviations."""
 
 NORMAL_95 = 1.96
-SPREAD = 0.7
+SPREAD = 1.0
 """Standard deviation of the logarithm of a dataset's sigma, before its residuals are seen: that of one
-in twenty is less than a quarter of what is expected, or more than four times as much."""
+in twenty is less than a seventh of what is expected, or more than seven times as much."""
 AXES = 3
 """Of the ellipsoid that has to hold the truth."""
 
