@@ -58,12 +58,12 @@ class SolveReport:
     failed: list[tuple[str, str]] = field(default_factory=list)
 
     def after(self, other: SolveReport) -> SolveReport:
-        """Both together, of different groups; the other was made before."""
+        """Both together; the other was made before, and what failed there was tried again."""
         return SolveReport(
-            other.total + self.total,
+            other.total - len(other.failed) + self.total,
             other.solved + self.solved,
             other.passed + self.passed,
-            [*other.failed, *(one for one in self.failed if one not in other.failed)],
+            [*{**dict(other.failed), **dict(self.failed)}.items()],
         )
 
     @property

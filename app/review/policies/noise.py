@@ -30,6 +30,7 @@ from app.solving.ball_noise import BallNoise, Miss, Sigma
 from app.solving.dataset_noise import DatasetNoise, SeenGroup, estimate_noise
 from app.solving.line_noise import LineEstimate
 from app.solving.source_noise import BallSource, SourceFactors, SourceNoise, estimate_sources
+from app.store.copy_datasets import is_copy
 from app.store.noise import Factor, Factors, factor_of, read_factors
 from app.store.session import Session
 from app.store.solutions import present_solutions
@@ -168,9 +169,12 @@ def let_estimate(store: Store, dataset: str | int, actor: str) -> bool:
     """Whether the policy of a dataset has the noise estimated.
 
     A dataset that was judged by ``touchline`` before that estimated anything is judged by it as it
-    is now.
+    is now. Somebody's own copies have the numbers of what they are of.
     """
     state = read_policy(store, dataset)
+    with store.read() as session:
+        if is_copy(session, state.dataset_id):
+            return False
     if state.policy == replace(TOUCHLINE, noise=FIXED):
         state = change_policy(store, dataset, TOUCHLINE, if_match=state.etag, actor=actor)
     return state.policy.noise == ESTIMATED

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from app.errors import DegenerateGeometryError, InputError, NotFoundError
+from app.review.editing import recompute
 from app.review.editing.codec import edit_to_json
 from app.review.editing.edit import SetBall
 from app.review.editing.recompute import solve_dataset, stale_groups
@@ -317,6 +318,35 @@ class TestFollowing:
         solve_fully(store, "demo", None, nobody)
         policy = read_policy(store, "demo").policy
         assert policy.noise == "estimated" and policy.click_sigma_px > 2
+
+    def test_somebodys_own_copies_keep_the_numbers_of_what_they_are_of(
+        self, store: Store, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        make_lined(store, TOUCHLINE)
+        monkeypatch.setattr(noise, "is_copy", lambda *_: True)
+        solve_fully(store, "demo", None, nobody)
+        assert read_policy(store, "demo").policy == TOUCHLINE
+
+    def test_a_group_that_cannot_be_solved_is_told_once(
+        self, store: Store, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        make_lined(store, TOUCHLINE)
+        solve_fully(store, "demo", None, nobody)
+        ingest(
+            store,
+            "demo",
+            [blurred("bad", np.random.default_rng(2), given=False)],
+            source="more",
+            actor="ann",
+        )
+
+        def fails(*_: object) -> None:
+            raise ValueError("no")
+
+        monkeypatch.setattr(recompute, "solve_encoded", fails)
+        report = solve_fully(store, "demo", None, nobody)
+        assert (report.total, report.solved) == (1, 0)
+        assert report.failed == [("bad", "ValueError: no")]
 
     def test_paper_stays_as_it_is(self, store: Store) -> None:
         make_lined(store)
