@@ -28,7 +28,7 @@ from tests.bench.truth import SEED, compare, judge
 
 NOISES = ((0.5, 0.5), (1.0, 1.0), (2.0, 2.0), (3.0, 3.0), (1.2, 3.0))
 """Of lines and of balls, pixels at 1920 x 1080."""
-SIZES = ((10, 24), (30, 8), (150, 2))
+SIZES = ((10, 16), (30, 5), (150, 1))
 """Groups of a dataset, and how many datasets there are of each noise."""
 
 
