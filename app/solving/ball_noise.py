@@ -239,7 +239,9 @@ def _jackknifed(
     if not ENDS[0] < whole < ENDS[1]:
         return None
     block = np.arange(len(rows)) * BLOCKS // len(rows)
-    parts = np.array([_fit(rows[block != at], known)[:2] for at in np.unique(block)])
+    # One number alone has nothing to be left out of.
+    rests = [rest for at in np.unique(block) if len(rest := rows[block != at])] or [rows]
+    parts = np.array([_fit(rest, known)[:2] for rest in rests])
     scatter, of_share = jackknife_variance(parts).tolist()
     kept = _kept(rows, known)
     numbers = int(kept.sum())

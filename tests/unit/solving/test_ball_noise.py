@@ -107,20 +107,25 @@ class TestEstimateBallNoise:
         found = estimate_ball_noise([], PAPER)
         assert (found.click, found.share, found.given) == (None, None, None)
 
-    def test_each_further_group_moves_it_from_what_is_expected_to_what_is_seen(self):
+    def test_each_further_group_says_more(self):
         """No number of groups is the first that counts."""
-        sizes = 1, 3, 10, 100
-        found = [
-            np.median(
+        off = [
+            np.log(
                 [
                     estimate_ball_noise(dataset(3.0 * UNIT, groups=groups, seed=seed)).click.value
-                    for seed in range(20 if groups < 100 else 3)
+                    / 3
+                    for seed in range(12)
                 ]
             )
-            for groups in sizes
+            for groups in (1, 4, 16)
         ]
-        assert found[0] < found[1] < found[3]
-        assert found[3] == pytest.approx(3.0, rel=0.1)
+        one, four, many = (np.sqrt((logs**2).mean()) for logs in off)
+        assert one > four > many and many < 0.15
+
+    @pytest.mark.parametrize("miss", [0.0, 2.0, 40.0])
+    def test_one_number_is_enough_to_be_told(self, miss):
+        found = estimate_ball_noise([Miss(miss, 1.0, 100.0, 0.0, 0.1)]).click
+        assert found.low < found.value < found.high and found.high > 3 * found.low
 
     def test_of_few_numbers_it_is_wider_and_so_is_its_interval(self):
         """Ellipsoids must hold though nobody knows their size exactly."""
