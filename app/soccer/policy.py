@@ -10,6 +10,7 @@ from functools import cached_property
 from typing import Any, Literal, TypeVar, get_args, get_type_hints
 
 from app.geometry.arrays import FloatArray
+from app.soccer.pitch import Pitch
 from app.soccer.solution import GAMMAS_PERCENT, GATES
 
 Pixels = TypeVar("Pixels", float, FloatArray)
@@ -114,6 +115,22 @@ class CalibrationPolicy:
     )
     """0: each one, as the public evaluator does. Stubs of a few pixels at the border of a picture
     are none that people draw. Not in the ``repr``: ``calibration_key`` knows it where it is set."""
+
+    goal: Literal["inner", "middle"] = _threshold(
+        "inner",
+        CALIBRATION,
+        "What people click of a goal's frame",
+        choices=("inner", "middle"),
+        later=True,
+        told=False,
+    )
+    """``inner``: the inner edges of posts and crossbar, as the public evaluator has them;
+    ``middle``: their middle, where people click. JaC asks for the inner edges in either case. Not
+    in the ``repr``: ``calibration_key`` knows it where it is the middle."""
+
+    def fitted(self, pitch: Pitch) -> Pitch:
+        """A pitch with the goals that lines are fitted to."""
+        return pitch.with_goal(self.goal)
 
     @cached_property
     def spelling(self) -> str:
@@ -241,9 +258,16 @@ def _asked(policy: Policy | CalibrationPolicy) -> dict[str, Any]:
 
 
 PAPER = Policy()
-STRICT = Policy(name="strict", min_parallax_degrees=5.0, max_sigma_m=0.5)
-TOUCHLINE = Policy(name="touchline", noise=ESTIMATED, calibration=CalibrationPolicy(source="paint"))
-"""As ``paper``, with cameras from the paint of their pictures and the noise that its dataset shows."""
+CLICKED = CalibrationPolicy(goal="middle")
+"""How the commands without a dataset calibrate: as ``paper``, with goals where people click them."""
+STRICT = Policy(name="strict", calibration=CLICKED, min_parallax_degrees=5.0, max_sigma_m=0.5)
+TOUCHLINE = Policy(
+    name="touchline",
+    noise=ESTIMATED,
+    calibration=replace(CLICKED, source="paint", shortest_marking_px=5.0),
+)
+"""As ``paper``, with cameras from the paint of their pictures, goals where people click them,
+stubs that nobody draws not counted as missing, and the noise that its dataset shows."""
 POLICIES = {policy.name: policy for policy in (PAPER, STRICT, TOUCHLINE)}
 SIGMAS = ("click_sigma_px", "box_sigma_share", "given_sigma_px")
 LINE_SIGMAS = ("line_sigma_px", "line_share")

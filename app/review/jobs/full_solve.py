@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from concurrent.futures import Executor
 
+from app.plural import plural
 from app.progress import TellProgress
 from app.review.datasets.dataset import get_dataset_head
 from app.review.editing.pitches import estimate_pitches, stale_matches
 from app.review.editing.recompute import SolveReport, solve_dataset, stale_groups
-from app.review.policies.noise import follow_noise, let_estimate, noise_sample
+from app.review.policies.noise import follow_noise, is_followed, noise_sample
 from app.review.yields.store import AT_ONCE, YieldStore
 from app.soccer.actors import LOCAL_USER
 from app.store.store import Store
@@ -41,15 +42,21 @@ def solve_fully(
         follow: Whether noise is estimated; an edit leaves it as it is.
     """
     ahead = SolveReport()
-    if follow and let_estimate(store, dataset, actor):
+    if follow and is_followed(store, dataset):
         ahead = solve_dataset(store, dataset, executor, progress, stop, noise_sample)
         if not stop() and follow_noise(store, dataset, actor):
             ahead = SolveReport()
     report = solve_dataset(store, dataset, executor, progress, stop).after(ahead)
     total = report.total
     if not stop():
-        # It stays at the groups that are solved, and can be ended all the same.
-        estimate_pitches(store, dataset, executor, lambda *_: progress(total, total), stop)
+
+        def estimated(done: int, _total: int | None = None, _said: str = "") -> None:
+            report.estimated = done
+            # It stays at the groups that are solved, and can be ended all the same.
+            progress(total, total)
+
+        found = estimate_pitches(store, dataset, executor, estimated, stop)
+        report.proposed = len(found.proposals)
     return report
 
 
@@ -58,7 +65,7 @@ def left_undone(store: Store, dataset: str | int) -> str | None:
     groups, matches = len(stale_groups(store, dataset)), len(stale_matches(store, dataset))
     if groups:
         return f"{groups} are left to do"
-    many = "1 match" if matches == 1 else f"{matches} matches"
+    many = plural(matches, "match", "matches")
     return f"the pitch of {many} is left to estimate" if matches else None
 
 

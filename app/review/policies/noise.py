@@ -7,7 +7,7 @@ On request, or, where the policy says that noise is ``estimated``, with each sol
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -15,15 +15,13 @@ from app.errors import InputError
 from app.review.datasets.dataset import need_dataset, read_dataset_head, save_policy
 from app.review.editing.ball_noise import give_factors, read_placed
 from app.review.editing.state import GroupState, read_states
-from app.review.policies.policy import PolicyState, apply_policy, change_policy, read_policy
+from app.review.policies.policy import PolicyState, apply_policy, read_policy
 from app.review.policies.text import CUSTOM, policy_with
 from app.soccer.policy import (
     CALIBRATION,
     ESTIMATED,
-    FIXED,
     POLICIES,
     THRESHOLDS,
-    TOUCHLINE,
     Policy,
 )
 from app.solving.ball_noise import BallNoise, Miss, Sigma
@@ -165,19 +163,14 @@ def noise_sample(ids: Sequence[int]) -> Sequence[int]:
     return ids[:: max(-(-len(ids) // MAX_GROUPS), 1)]
 
 
-def let_estimate(store: Store, dataset: str | int, actor: str) -> bool:
-    """Whether the policy of a dataset has the noise estimated.
+def is_followed(store: Store, dataset: str | int) -> bool:
+    """Whether solving a dataset estimates its noise.
 
-    A dataset that was judged by ``touchline`` before that estimated anything is judged by it as it
-    is now. Somebody's own copies have the numbers of what they are of.
+    Somebody's own copies have the numbers of what they are of.
     """
-    state = read_policy(store, dataset)
     with store.read() as session:
-        if is_copy(session, state.dataset_id):
-            return False
-    if state.policy == replace(TOUCHLINE, noise=FIXED):
-        state = change_policy(store, dataset, TOUCHLINE, if_match=state.etag, actor=actor)
-    return state.policy.noise == ESTIMATED
+        found = read_dataset_head(session, dataset)
+        return found.policy.noise == ESTIMATED and not is_copy(session, found.id)
 
 
 def follow_noise(store: Store, dataset: str | int, actor: str) -> bool:
