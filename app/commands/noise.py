@@ -78,12 +78,5 @@ def _say(found: Noise) -> None:
                 f"Sigma of a ball {word} {one.source}: {one.sigma_px:.2f} px "
                 f"({one.low:.2f} to {one.high:.2f}){note}"
             )
-    if found.lines is not None:
-        lines = found.lines
-        say(
-            f"Sigma of a point on a line: {lines.sigma_px:.2f} px at 960x540 (half of "
-            f"{lines.views} images: {lines.low:.2f} to {lines.high:.2f}); points of one marking "
-            f"share {100 * lines.share:.0f} % of its variance"
-        )
     for sentence in found.notices:
         say(sentence)

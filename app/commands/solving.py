@@ -60,7 +60,7 @@ def solve(
         if chosen is not None:
             change_policy(store, dataset, chosen, if_match=None, actor=acting())
         with held_interrupts() as interrupted:
-            report = solve_fully(store, dataset, executor, progress, interrupted)
+            report = solve_fully(store, dataset, executor, progress, interrupted, actor=acting())
             left = left_undone(store, dataset) if interrupted() else None
             if left is not None:
                 complain(f"stopped; {plural(report.solved, 'group is', 'groups are')} kept, {left}")

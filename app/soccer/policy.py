@@ -18,6 +18,8 @@ Pixels = TypeVar("Pixels", float, FloatArray)
 CALIBRATION = "calibration"
 """Name of the policy's part that calibrations depend on; its thresholds are dotted."""
 BOXES, FINDINGS, NOISE, PITCH = "boxes", "findings", "noise", "pitch"
+FIXED: Literal["fixed"] = "fixed"
+ESTIMATED: Literal["estimated"] = "estimated"
 SUBJECTS = (*GATES, BOXES, FINDINGS, NOISE, PITCH, CALIBRATION)
 """What a threshold can be about, in the order in which people read a policy."""
 
@@ -197,6 +199,11 @@ class Policy:
         5.0, FINDINGS, "Finding: parallax below", "degrees", 0.0, 45.0
     )
     """Below: the finding ``low_parallax``; it is no gate of the policy ``paper``."""
+    noise: Literal["fixed", "estimated"] = _threshold(
+        FIXED, NOISE, "Noise of clicks", choices=(FIXED, ESTIMATED), later=True
+    )
+    """``fixed``: the sigmas of clicks are those that stand here, as in the paper; ``estimated``: they
+    are the dataset's own, and solving it sets them."""
     click_sigma_px: float = _threshold(
         1.0, NOISE, "Sigma of a clicked ball", "px at 1920x1080", 0.1, 10.0
     )
@@ -269,11 +276,31 @@ CLICKED = CalibrationPolicy(goal="middle")
 STRICT = Policy(name="strict", calibration=CLICKED, min_parallax_degrees=5.0, max_sigma_m=0.5)
 TOUCHLINE = Policy(
     name="touchline",
+    noise=ESTIMATED,
     calibration=replace(CLICKED, source="paint", shortest_marking_px=5.0, lone_frames="any"),
 )
 """As ``paper``, with cameras from the paint of their pictures, goals where people click them, stubs
-that nobody draws not counted as missing, and unsure of what nobody says of frames alone."""
+that nobody draws not counted as missing, unsure of what nobody says of frames alone, and the noise
+that its dataset shows."""
 POLICIES = {policy.name: policy for policy in (PAPER, STRICT, TOUCHLINE)}
+SIGMAS = ("click_sigma_px", "box_sigma_share", "given_sigma_px")
+LINE_SIGMAS = ("line_sigma_px", "line_share")
+"""What is estimated of a dataset: of its balls, and of the lines that cameras are made from."""
+
+
+def with_sigmas(policy: Policy, other: Policy) -> Policy:
+    """A policy with the noise of clicks that another one has."""
+    lines = {name: getattr(other.calibration, name) for name in LINE_SIGMAS}
+    balls = {name: getattr(other, name) for name in SIGMAS}
+    return replace(policy, **balls, calibration=replace(policy.calibration, **lines))
+
+
+def is_shipped(policy: Policy) -> bool:
+    """Whether a policy is the shipped one of its name; what is estimated is every dataset's own."""
+    shipped = POLICIES.get(policy.name)
+    if shipped is not None and shipped.noise == ESTIMATED:
+        policy = with_sigmas(policy, shipped)
+    return policy == shipped
 
 
 Asks = Literal["more than", "at least", "at most"]

@@ -13,7 +13,7 @@ from app.soccer.finding import Finding
 from app.soccer.frames import Box, ImagePoint, height_above_grass
 from app.soccer.pitch import GoalEdge
 
-SOLVER_VERSION = "8"
+SOLVER_VERSION = "9"
 """Part of every solution's key; raised by one whenever a number changes."""
 
 GAMMAS_PERCENT = (0.5, 1.0, 2.0)

@@ -2,8 +2,8 @@
 
 Rays that see one ball miss each other by what clicks and cameras are off. The part of that miss
 which no 3D point explains (one number for two views, two more for each further one) has a variance
-that is linear in the squared noise: its most likely value over many groups is the noise of a
-dataset.
+that is linear in the squared noise. What many groups say of it, with what is expected before any is
+seen, is the noise of a dataset: few groups move it little.
 
 Source: Hartley & Zisserman, sec. 12.5-12.6 (what a triangulation leaves of the measurements).
 """
@@ -18,14 +18,24 @@ import numpy as np
 from scipy.special import chdtri
 
 from app.geometry.arrays import BoolArray, FloatArray
-from app.soccer.policy import Policy
+from app.soccer.policy import PAPER, Policy
 from app.soccer.solution import Ball3D
 from app.solving.ball_covariance import CLICK_DIAGONAL, calibration_covariance
-from app.solving.noise_grid import BLOCKS, STUDENT, jackknife_variance, vertex
+from app.solving.noise_grid import (
+    BLOCKS,
+    NORMAL_95,
+    SPREAD,
+    STUDENT,
+    expected_cost,
+    held_log,
+    jackknife_variance,
+    posterior_variance,
+    vertex,
+)
 from app.solving.triangulate import Sighting
 
 MIN_NUMBERS = 20
-"""Fewer say too little."""
+"""Of one camera or person: fewer say too little."""
 LIMIT = 10.8
 """Squared, of one number: one honest pair in a thousand lies beyond. Farther ones are mistakes."""
 
@@ -44,15 +54,18 @@ HALF = _trimmed_variance(float(chdtri(1, 0.5)))
 SIGMAS = np.geomspace(0.1, 30.0, 191)
 """Noises that are tried, pixels at 1920 x 1080."""
 ENDS = float(np.log(SIGMAS[0])), float(np.log(SIGMAS[-1]))
-"""An estimate there is none."""
-SHARES = np.array([0.0, 0.01, 0.02, 0.03, 0.04, 0.05, 0.06, 0.08, 0.1, 0.13])
+"""An estimate there is none: what cannot be told from nothing, and what is no noise."""
+SHARES = np.linspace(0.0, 0.15, 16)
 """What the diameter of a ball adds, as a share of it."""
-SHARE_STEP = 0.01
-"""Between most of them."""
 SHARE_SIGMA = 0.02
-"""How far that share is expected to lie from the policy's."""
+"""How far that share is expected to lie from that of the policy ``paper``, as sigma is about its."""
+GIVEN_PX, GIVEN_SPREAD = 1.0, 1.5
+"""What a given camera is expected to add, at 1920 x 1080, and how far its logarithm may differ: some
+are exact, those of some rigs are ten pixels off."""
 _ROUNDS = 30
-_STEP = float(np.log(SIGMAS[1] / SIGMAS[0]))
+_LOGS: FloatArray = np.log(SIGMAS)
+_STEP = float(_LOGS[1] - _LOGS[0])
+_SHARE_STEP = float(SHARES[1] - SHARES[0])
 
 
 @dataclass(frozen=True)
@@ -78,7 +91,11 @@ class Miss:
 
 @dataclass(frozen=True)
 class Sigma:
-    """An estimated standard deviation with its 95 % interval, and what it rests on."""
+    """An estimated standard deviation with its 95 % interval, and what it rests on.
+
+    ``value`` is the one with which 95 % ellipsoids hold the truth: of few numbers it is above the
+    most likely one.
+    """
 
     value: float
     low: float
@@ -159,13 +176,30 @@ def misses_of(ball: Ball3D, sights: Sequence[Sighting]) -> tuple[Miss, ...]:
     return tuple(found)
 
 
-def estimate_ball_noise(misses: Sequence[Miss], policy: Policy) -> BallNoise:
+@dataclass(frozen=True)
+class _Expected:
+    """What is known of a sigma before its misses: its median and spread, and the diameter's share."""
+
+    sigma: float
+    spread: float
+    share: float
+
+    @property
+    def costs(self) -> FloatArray:
+        """Of each of ``SIGMAS``."""
+        return expected_cost(_LOGS, self.sigma, self.spread)
+
+
+def estimate_ball_noise(misses: Sequence[Miss], policy: Policy = PAPER) -> BallNoise:
     """The noise that explains the misses of a dataset best, mistakes left aside.
+
+    What is expected of it is what the policy ``paper`` assumes, whatever judges the dataset: so a
+    second estimate, after the first is used, is the same.
 
     Args:
         misses: Of many groups, in the order in which they were taken: neighbours in time err
             alike, so the interval comes from leaving out one tenth after the other.
-        policy: What is thought of the noise so far.
+        policy: Its click is taken where every camera is given, which cannot be told from it.
     """
     rows = np.array(
         [(one.miss, one.click, one.diameter, one.given, one.known) for one in misses], float
@@ -173,71 +207,88 @@ def estimate_ball_noise(misses: Sequence[Miss], policy: Policy) -> BallNoise:
     free = rows[:, 3] == 0
     clicked, rest = rows[free], rows[~free]
     click = share = given = interval = None
-    if len(clicked) >= MIN_NUMBERS:
-        found = _jackknifed(clicked, policy.box_sigma_share)
+    if len(clicked):
+        known = _Expected(PAPER.click_sigma_px, SPREAD, PAPER.box_sigma_share)
+        found = _jackknifed(clicked, known)
         if found is not None:
             click, share, interval = found
-    if len(rest) >= MIN_NUMBERS:
+    if len(rest):
         # What clicks explain is known by now, or thought to be; the cameras explain what is left.
         noise = policy.click_sigma_px if click is None else click.value
         thought = policy.box_sigma_share if share is None else share
-        known = rest[:, 4] + noise**2 * rest[:, 1] + thought**2 * rest[:, 2]
+        variance = rest[:, 4] + noise**2 * rest[:, 1] + thought**2 * rest[:, 2]
         nothing = np.zeros(len(rest))
-        found = _jackknifed(np.column_stack([rest[:, 0], rest[:, 3], nothing, nothing, known]), 0)
+        columns = np.column_stack([rest[:, 0], rest[:, 3], nothing, nothing, variance])
+        found = _jackknifed(columns, _Expected(GIVEN_PX, GIVEN_SPREAD, 0.0))
         given = None if found is None else found[0]
     return BallNoise(click, share, given, interval if clicked[:, 2].any() else None)
 
 
-def _jackknifed(rows: FloatArray, share: float) -> tuple[Sigma, float, tuple[float, float]] | None:
+def _jackknifed(
+    rows: FloatArray, known: _Expected
+) -> tuple[Sigma, float, tuple[float, float]] | None:
     """Sigma and share and its interval; intervals are from leaving out one block after the other.
 
     None where no sigma that is tried explains the rows better than the first or the last one.
 
     Args:
         rows: Of ``Miss``, the click's slope in the second column, shape (N, 5).
-        share: Of the diameter, as expected.
+        known: Before them.
     """
-    whole, found = _fit(rows, share)
+    whole, found, wide = _fit(rows, known)
     if not ENDS[0] < whole < ENDS[1]:
         return None
     block = np.arange(len(rows)) * BLOCKS // len(rows)
-    parts = np.array([_fit(rows[block != at], share) for at in range(BLOCKS)])
+    # One number alone has nothing to be left out of.
+    rests = [rest for at in np.unique(block) if len(rest := rows[block != at])] or [rows]
+    parts = np.array([_fit(rest, known)[:2] for rest in rests])
     scatter, of_share = jackknife_variance(parts).tolist()
-    # No sample of n independent numbers says more about its variance than this.
-    half = STUDENT * math.sqrt(max(scatter, 0.5 / len(rows)))
-    left_out = int((~_kept(rows, share)).sum())
+    kept = _kept(rows, known)
+    numbers = int(kept.sum())
+    variance = posterior_variance(scatter, numbers, known.spread)
+    half = STUDENT * math.sqrt(variance)
+    # Where neighbours err alike, there are fewer independent numbers than there seem to be.
+    told = posterior_variance(0.0, numbers, known.spread) / variance
+    sigma = math.exp(held_log(_LOGS, told * _costs(rows[kept], found) + known.costs))
+    wide = max(STUDENT * math.sqrt(of_share), wide)
     low, high = math.exp(whole - half), math.exp(whole + half)
-    wide = max(STUDENT * math.sqrt(of_share), SHARE_STEP / 2)
     interval = max(found - wide, 0.0), found + wide
-    return Sigma(math.exp(whole), low, high, len(rows), left_out), found, interval
+    return Sigma(sigma, low, high, len(rows), len(rows) - numbers), found, interval
 
 
-def _fit(rows: FloatArray, expected: float) -> tuple[float, float]:
-    """Logarithm of the most likely sigma, and the share of the diameter, near what is expected."""
-    kept = rows[_kept(rows, expected)]
-    fits = []
-    for share in SHARES if kept[:, 2].any() else [expected]:
-        costs = _costs(kept, share) + 0.5 * ((share - expected) / SHARE_SIGMA) ** 2
-        fits.append((*_lowest(costs), float(share)))
-    _, sigma, share = min(fits)
-    return sigma, share
+def _fit(rows: FloatArray, known: _Expected) -> tuple[float, float, float]:
+    """Logarithm of the most likely sigma, the share of the diameter, and half of the interval of the
+    share by the likelihood."""
+    kept = rows[_kept(rows, known)]
+    if not kept[:, 2].any():
+        return _lowest(_costs(kept, known.share) + known.costs)[1], known.share, 0.0
+    fits = [_lowest(_costs(kept, share) + known.costs) for share in SHARES]
+    told = ((SHARES - known.share) / SHARE_SIGMA) ** 2 / 2
+    costs = told + [least for least, _ in fits]
+    at = int(np.argmin(costs))
+    off = vertex(costs, at)[0]
+    share = float(SHARES[at]) + _SHARE_STEP * off
+    log = float(np.interp(share, SHARES, [log for _, log in fits]))
+    inside = np.clip(at, 1, len(SHARES) - 2)
+    bend = float(np.diff(costs[inside - 1 : inside + 2], 2)[0]) / _SHARE_STEP**2
+    return log, share, NORMAL_95 / math.sqrt(max(bend, SHARE_SIGMA**-2))
 
 
 def _lowest(costs: FloatArray) -> tuple[float, float]:
     """The lowest cost and the logarithm of its sigma, between the points of the grid."""
     place = int(np.argmin(costs))
     off, least = vertex(costs, place)
-    return least, float(np.log(SIGMAS[place])) + off * _STEP
+    return least, float(_LOGS[place]) + off * _STEP
 
 
-def _kept(rows: FloatArray, share: float) -> BoolArray:
+def _kept(rows: FloatArray, known: _Expected) -> BoolArray:
     """Numbers that are no mistakes, from the median outwards until no other one joins."""
     squared = rows[:, 0] ** 2
     kept: BoolArray = squared <= np.median(squared)
     trimmed = HALF
     for _ in range(_ROUNDS):
-        place = int(np.argmin(_costs(rows[kept], share, trimmed)))
-        variance = SIGMAS[place] ** 2 * rows[:, 1] + share**2 * rows[:, 2] + rows[:, 4]
+        place = int(np.argmin(_costs(rows[kept], known.share, trimmed) + known.costs))
+        variance = SIGMAS[place] ** 2 * rows[:, 1] + known.share**2 * rows[:, 2] + rows[:, 4]
         wider = squared <= LIMIT * variance
         trimmed = TRIMMED
         if (wider == kept).all():
@@ -248,7 +299,7 @@ def _kept(rows: FloatArray, share: float) -> BoolArray:
 
 def _costs(rows: FloatArray, share: float, trimmed: float = TRIMMED) -> FloatArray:
     """Negative log-likelihood for each of ``SIGMAS``; ``trimmed`` makes up for missing tails."""
-    known = rows[:, 4] + share**2 * rows[:, 2]
-    variance = SIGMAS[:, None] ** 2 * rows[:, 1] + known
+    explained = rows[:, 4] + share**2 * rows[:, 2]
+    variance = SIGMAS[:, None] ** 2 * rows[:, 1] + explained
     costs: FloatArray = 0.5 * (np.log(variance) + rows[:, 0] ** 2 / trimmed / variance).sum(axis=1)
     return costs

@@ -21,14 +21,23 @@ import numpy as np
 from scipy.special import gammaln
 
 from app.geometry.arrays import FloatArray, IntArray
-from app.solving.noise_grid import BLOCKS, STUDENT, jackknife_variance, vertex
+from app.solving.noise_grid import (
+    BLOCKS,
+    NORMAL_95,
+    STUDENT,
+    between,
+    expected_cost,
+    jackknife_variance,
+    posterior_variance,
+    vertex,
+)
 
 SHARES = np.array([0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9])
 """Values of rho that are weighed, all alike before the residuals speak."""
 SIGMA_FREEDOM = 4.0
 """Degrees of freedom that the prior of the variance is worth."""
-MIN_VIEWS = 20
-"""Images of which fewer say too little about a dataset."""
+EXPECTED_PX = 1.0
+"""Noise of a dataset before any of its clicks is seen, pixels at 960 x 540."""
 FREEDOMS = np.array([4.0, 8.0, 20.0, 1000.0])
 """How much alike the variances of a dataset's images may be, as degrees of freedom."""
 SIGMAS = np.geomspace(0.1, 10.0, 93)
@@ -225,16 +234,17 @@ class LineEstimate:
 
 
 def estimate_line_noise(found: Sequence[LineEvidence]) -> LineEstimate | None:
-    """The noise under which the residuals of all images are likeliest; None where they are few.
+    """The noise under which the residuals of all images are likeliest; None where there are none,
+    and where no noise that is tried explains them better than the first or the last one.
 
     Each image has its own variance, about that of the dataset: few images with wrong points
-    change little.
+    change little. Of few images it is drawn towards what is expected of any.
 
     Args:
         found: Of each image for ``SHARES``, pixels at 960 x 540, in the order in which they were
             taken: neighbours err alike, so intervals are from leaving out one block after another.
     """
-    if len(found) < MIN_VIEWS:
+    if not found:
         return None
     blocks = np.zeros((BLOCKS, len(FREEDOMS), len(SIGMAS), len(SHARES)))
     for at, item in enumerate(found):
@@ -243,28 +253,38 @@ def estimate_line_noise(found: Sequence[LineEvidence]) -> LineEstimate | None:
     # How alike the images are decides little: the likeliest holds for all blocks.
     blocks = blocks[:, blocks.sum(axis=0).min(axis=(1, 2)).argmin()]
     whole = blocks.sum(axis=0)
-    log_sigma, share = _lowest(whole)
-    parts = np.array([_lowest(whole - part) for part in blocks])
-    half, wide = (STUDENT * np.sqrt(jackknife_variance(parts))).tolist()
-    half = max(half, STUDENT * np.sqrt(0.5 / sum(item.freedom for item in found)))
-    wide = max(wide, _SHARE_STEP / 4)
+    log_sigma, share, known = _posterior(whole)
+    if not _LOGS[0] < log_sigma < _LOGS[-1]:
+        return None
+    parts = np.array([_posterior(whole - part)[:2] for part in blocks])
+    scatter, of_share = jackknife_variance(parts).tolist()
+    numbers = sum(item.freedom for item in found)
+    half = STUDENT * np.sqrt(posterior_variance(scatter, numbers))
+    wide = max(STUDENT * np.sqrt(of_share), NORMAL_95 * known, _SHARE_STEP / 4)
     sigma = Interval(*np.exp([log_sigma, log_sigma - half, log_sigma + half]).tolist())
     ends = max(share - wide, 0.0), min(share + wide, 1.0)
     return LineEstimate(sigma, Interval(share, *ends), len(found))
 
 
+_FINE = 20
+"""Shares between two of the grid at which the posterior is summed."""
+_LOGS: FloatArray = np.log(SIGMAS)
 _SHARE_STEP = float(SHARES[1] - SHARES[0])
-_SIGMA_STEP = float(np.log(SIGMAS[1] / SIGMAS[0]))
+_SIGMA_STEP = float(_LOGS[1] - _LOGS[0])
 
 
-def _lowest(cost: FloatArray) -> tuple[float, float]:
-    """Logarithm of sigma and share of the lowest cost, shape (S, R), between the grid's points."""
+def _posterior(cost: FloatArray) -> tuple[float, float, float]:
+    """Logarithm of sigma, share and its standard deviation from costs, shape (S, R)."""
+    cost = cost + expected_cost(_LOGS, EXPECTED_PX)[:, None]
     places = cost.argmin(axis=0).tolist()
     vertices = [vertex(cost[:, share], at) for share, at in enumerate(places)]
     off, least = np.transpose(vertices)
-    sigmas = np.log(SIGMAS[places]) + _SIGMA_STEP * off
-    at = int(least.argmin())
-    share = at + vertex(least, at)[0]
+    # Few images leave the share open: its mean, not the likeliest one, is at no end by chance.
+    steps = np.linspace(0, len(SHARES) - 1, _FINE * (len(SHARES) - 1) + 1)
+    fine, smooth = SHARES[0] + _SHARE_STEP * steps, between(least, steps)
+    weight = np.exp(smooth.min() - smooth)
+    weight /= weight.sum()
+    share = float(weight @ fine)
     # Sigma goes with the share: the more a marking has in common, the noisier its points.
-    sigma = np.interp(share, np.arange(len(SHARES)), sigmas)
-    return float(sigma), float(np.clip(SHARES[0] + _SHARE_STEP * share, 0.0, 1.0))
+    sigma = np.interp(share, SHARES, _LOGS[places] + _SIGMA_STEP * off)
+    return float(sigma), share, float(np.sqrt(weight @ (fine - share) ** 2))

@@ -20,10 +20,10 @@ import numpy as np
 
 from app.geometry.arrays import BoolArray, FloatArray, IntArray
 from app.solving.ball_noise import LIMIT, MIN_NUMBERS, TRIMMED, Miss
+from app.solving.noise_grid import NORMAL_95
 
 SPREAD = 0.5
 """Of the logarithm of a factor: sources differ by so much."""
-NORMAL_95 = 1.96
 DECIMALS = 2
 """Of a factor that is used: what lies below is no difference."""
 _ROUNDS, _LONGEST, _SETTLED = 30, 0.5, 1e-4

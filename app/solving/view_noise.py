@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from app.errors import DegenerateGeometryError
-from app.geometry.arrays import FloatArray
+from app.geometry.arrays import FloatArray, row_by_row
 from app.soccer.annotation import Lines
 from app.soccer.frames import ImageSize
 from app.soccer.pitch import Pitch
@@ -37,6 +37,17 @@ def view_line_evidence(
     problem, parameters = _at(calibration, size, policy)
     rows = problem.noise_rows(parameters, observe(lines, policy.fitted(pitch), size))
     return line_evidence(*rows).in_units(problem.unit)
+
+
+def view_line_covariance(
+    calibration: Calibration, lines: Lines, pitch: Pitch, size: ImageSize, policy: CalibrationPolicy
+) -> tuple[float, ...]:
+    """Covariance of the parameters of a view's camera under a policy's noise of lines, row by row, (64,).
+
+    Noise moves no camera: the calibration may be that of a policy with another one.
+    """
+    noise = view_line_noise(calibration, lines, pitch, size, policy)
+    return row_by_row(noise.parameters)
 
 
 def _at(

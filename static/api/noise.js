@@ -30,7 +30,7 @@ import { idempotencyKey, request } from './client.js';
  * @typedef {object} NoiseJson
  * @property {number} groups that were looked at
  * @property {number} solved
- * @property {{sigma_px: number, low: number, high: number, share: number, views: number} | null} lines
+ * @property {boolean} follows the policy uses the estimates, as of each solve of the dataset
  * @property {AdviceJson[]} advice
  * @property {{[name: string]: number}} values thresholds that would agree; empty where they do
  * @property {SourceNoiseJson[]} stations static cameras, the noisiest first

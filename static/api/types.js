@@ -264,6 +264,7 @@
  * @property {number} jac_gamma_percent
  * @property {number} min_baseline_m
  * @property {number} ball_diameter_m
+ * @property {'fixed' | 'estimated'} [noise] whose the sigmas of clicks are: the policy's, or the dataset's own
  * @property {{source?: string}} [calibration]
  */
 

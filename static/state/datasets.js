@@ -8,7 +8,7 @@ import { ApiError } from '../api/problem.js';
 import { pageDataset, param } from '../lib/router.js';
 import { stored } from '../lib/storage.js';
 
-/** @import {DatasetJson} from '../api/types.js' */
+/** @import {DatasetJson, PolicyJson} from '../api/types.js' */
 
 /** All datasets; null until they are known. */
 export const datasets = signal(/** @type {DatasetJson[] | null} */ (null));
@@ -39,6 +39,14 @@ export const dataset = computed(() => {
 export function isPainted(one) {
 	return one?.policy.calibration?.source === 'paint';
 }
+
+/** What is said beside σ where the policy assumes how noisy clicks are; nothing where its dataset's are estimated. @param {PolicyJson | undefined} policy */
+export function noiseWords(policy) {
+	return policy && policy.noise !== 'estimated' ? 'noise assumed' : '';
+}
+
+/** What these words mean. */
+export const NOISE_ASSUMED = 'σ follows from the noise of clicks that the policy assumes. The page Statistics shows what this dataset’s is; the policy “touchline” uses that';
 
 /** Read the list again. */
 export async function loadDatasets() {

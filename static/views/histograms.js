@@ -6,6 +6,7 @@ import { useState } from 'preact/hooks';
 
 import { withValue } from '../lib/field.js';
 import { plural } from '../lib/format.js';
+import { NOISE_ASSUMED } from '../state/datasets.js';
 import { rangeOf, withField } from '../state/query.js';
 import { queue, summary } from '../state/queue.js';
 import { BinAxis, endsOf, noneOf, short } from './bin_axis.js';
@@ -60,9 +61,9 @@ function Ends({ column, data, bins, choose }) {
 }
 
 /**
- * @param {{column: Column, data: Histogram, q: string, onQuery: (q: string) => void}} props
+ * @param {{column: Column, data: Histogram, q: string, onQuery: (q: string) => void, note: string}} props
  */
-function OneHistogram({ column, data, q, onQuery }) {
+function OneHistogram({ column, data, q, onQuery, note }) {
 	const [brush, setBrush] = useState(/** @type {[number, number] | null} */ (null));
 	const { counts } = data;
 	const known = counts.some((n) => n > 0);
@@ -99,7 +100,7 @@ function OneHistogram({ column, data, q, onQuery }) {
 	const filtered = range.low !== null || range.high !== null;
 	return html`
 		<section class="card histogram" aria-label=${column.label} data-known=${known}>
-			<h2 title=${column.title}><span class="histogram__label">${column.label}</span>${filtered ? html`<button type="button" class="histogram__clear" onClick=${() => onQuery(withField(q, column.field, []))}>clear<span class="hidden-text"> ${column.label}</span></button>` : null}</h2>
+			<h2 title=${column.title}><span class="histogram__label">${column.label}${note ? html` <small title=${NOISE_ASSUMED}>${note}</small>` : null}</span>${filtered ? html`<button type="button" class="histogram__clear" onClick=${() => onQuery(withField(q, column.field, []))}>clear<span class="hidden-text"> ${column.label}</span></button>` : null}</h2>
 			<svg
 				viewBox=${`0 0 ${WIDTH} ${HEIGHT}`} preserveAspectRatio="none" role="img"
 				aria-label=${known ? `${column.label}: ${counts.flatMap((n, bin) => (n ? [`${endsOf(data, bin)}: ${n}`] : [])).join('; ')}` : `${column.label}: no group has this number`}
@@ -116,8 +117,8 @@ function OneHistogram({ column, data, q, onQuery }) {
 	`;
 }
 
-/** @param {{q: string, painted: boolean, onQuery: (q: string) => void}} props `painted`: cameras are found from paint */
-export function Histograms({ q, painted, onQuery }) {
+/** @param {{q: string, painted: boolean, noise: string, onQuery: (q: string) => void}} props `painted`: cameras are found from paint; `noise`: what is said beside σ */
+export function Histograms({ q, painted, noise, onQuery }) {
 	const histograms = summary.value?.histograms ?? {};
 	const failed = queue.value.error !== null;
 	return html`
@@ -125,7 +126,7 @@ export function Histograms({ q, painted, onQuery }) {
 			const data = histograms[column.name];
 			if (!data && failed) return html`<section key=${column.name} class="card histogram" aria-label=${column.label} data-known="false"><h2>${column.label}</h2><p class="histogram__none">Not counted: the query fails.</p></section>`;
 			return data
-				? html`<${OneHistogram} key=${column.name} column=${column} data=${data} q=${q} onQuery=${onQuery} />`
+				? html`<${OneHistogram} key=${column.name} column=${column} data=${data} q=${q} onQuery=${onQuery} note=${column.name === 'sigma' ? noise : ''} />`
 				: html`<section key=${column.name} class="card histogram" aria-busy="true"><h2>${column.label}</h2><svg></svg><p class="bin-axis">–</p></section>`;
 		})}
 	`;

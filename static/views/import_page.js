@@ -25,8 +25,8 @@ import { SourceChoice, UploadField } from './source_choice.js';
 
 const POLICIES = [
 	{ name: '', label: 'by the pictures: touchline where most views have one, else paper' },
-	{ name: 'touchline', label: 'touchline: cameras from the paint of the pictures' },
-	{ name: 'paper', label: 'paper: cameras from the clicks, the thresholds of the paper' },
+	{ name: 'touchline', label: 'touchline: cameras from the paint of the pictures, noise estimated' },
+	{ name: 'paper', label: 'paper: cameras from the clicks, thresholds and noise of the paper' },
 	{ name: 'strict', label: 'strict: as paper, with rays 5° apart and σ below 0.5 m' },
 ];
 

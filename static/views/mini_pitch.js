@@ -10,6 +10,7 @@ import { ballCenter, ballOf } from '../geometry/preview.js';
 import { clipSegment, spreadApart, within as inBox } from '../geometry/spread.js';
 import { degrees, metres } from '../lib/format.js';
 import { useSize } from '../lib/hooks.js';
+import { NOISE_ASSUMED, noiseWords } from '../state/datasets.js';
 import { groupDocument, isPreview } from '../state/group.js';
 import { cycleEstimator, estimator } from '../state/workspace.js';
 import { uncertainViews } from './view_state.js';
@@ -151,8 +152,8 @@ function Drawing({ group, solution }) {
 	`;
 }
 
-/** @param {{solution: SolutionJson}} props */
-function Numbers({ solution }) {
+/** @param {{solution: SolutionJson, noise: string}} props */
+function Numbers({ solution, noise }) {
 	const { ball } = solution;
 	if (!ball) return html`<p class="mini-pitch__none">No 3D ball: no pair is valid.</p>`;
 	const [x, y] = ball.point;
@@ -163,6 +164,7 @@ function Numbers({ solution }) {
 			<div><dt>height</dt><dd data-number="height">${metres(ball.height_m)}</dd></div>
 			<div><dt>σ</dt><dd data-number="sigma">${metres(ball.sigma_m)}</dd></div>
 			<div><dt title="Parallax: angle between the rays">β</dt><dd data-number="parallax">${degrees(ball.parallax_degrees)}</dd></div>
+			${noise ? html`<div class="mini-pitch__noise" title=${NOISE_ASSUMED}><dt>of σ:</dt><dd>${noise}</dd></div>` : null}
 		</dl>
 	`;
 }
@@ -188,7 +190,7 @@ export function MiniPitch({ group, solution }) {
 			<h2>Pitch${solution?.best_ball && solution.ball ? html` <${Estimator} solution=${solution} />` : null}</h2>
 			${solution ? html`
 				<${Drawing} group=${group} solution=${solution} />
-				<${Numbers} solution=${solution} />` : html`<p class="empty-note">Not solved yet.</p>`}
+				<${Numbers} solution=${solution} noise=${noiseWords(group.policy)} />` : html`<p class="empty-note">Not solved yet.</p>`}
 		</section>
 	`;
 }

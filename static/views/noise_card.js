@@ -75,17 +75,6 @@ function Own({ noise }) {
 			${noise.is_new ? (shown ? ` The estimates differ from the dataset for ${shown}.` : ' The estimates show no differences.') : ''}</p>`;
 }
 
-/** @param {{lines: NonNullable<NoiseJson['lines']>}} props */
-function Lines({ lines }) {
-	return html`
-		<tr>
-			<th scope="row">Sigma of a point on a line, image by image<small> px at 960x540</small></th>
-			<td data-numeric="true">${lines.sigma_px.toFixed(2)}</td>
-			<td data-numeric="true">${lines.low.toFixed(2)} to ${lines.high.toFixed(2)}</td>
-			<td data-numeric="true">half of the images</td>
-		</tr>`;
-}
-
 /**
  * @param {{dataset: number, version?: string, children?: (noise: NoiseJson) => ComponentChildren}} props
  *   `version` of the policy: another one asks again; `children` draws what can be done about it
@@ -102,7 +91,6 @@ export function NoiseCard({ dataset, version = '', children }) {
 					<thead><tr><th>noise</th><th data-numeric="true">estimate</th><th data-numeric="true">interval</th><th data-numeric="true">policy</th></tr></thead>
 					<tbody>
 						${noise.advice.map((item) => html`<${Row} key=${item.name} item=${item} />`)}
-						${noise.lines ? html`<${Lines} lines=${noise.lines} />` : null}
 						${noise.stations?.map((one) => html`<${SourceRow} key=${`camera ${one.source}`} of="of camera" one=${one} />`)}
 						${noise.people?.map((one) => html`<${SourceRow} key=${`person ${one.source}`} of="placed by" one=${one} />`)}
 					</tbody>

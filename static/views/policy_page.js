@@ -72,7 +72,7 @@ function Shipped({ one, policy, etag, shipped, busy, send }) {
 					<tr key=${name}>
 						<th scope="row">${name}</th>
 						<td><span class="table__actions">
-							${hash === policy.hash ? html`<span class="note">in force</span>` : html`
+							${hash === policy.hash || (name === policy.name && policy.values.noise === 'estimated') ? html`<span class="note">in force</span>` : html`
 								<${JobButton} busy=${busy} act=${() => send(() => putPolicy(one.id, name, null, etag))} kind="button--small">Use ${name}<//>`}
 						</span></td>
 					</tr>`)}

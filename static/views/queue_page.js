@@ -7,7 +7,7 @@ import { useEffect, useRef } from 'preact/hooks';
 import { count } from '../lib/format.js';
 import { useKeys } from '../lib/hooks.js';
 import { navigate, param } from '../lib/router.js';
-import { dataset, datasets, failure, isPainted, loadDatasets, useDataset } from '../state/datasets.js';
+import { dataset, datasets, failure, isPainted, loadDatasets, noiseWords, useDataset } from '../state/datasets.js';
 import { queueAddress } from '../state/navigation.js';
 import { activeRow, closeQueue, openQueue, queue } from '../state/queue.js';
 import { followQueue } from '../state/queue_live.js';
@@ -92,7 +92,7 @@ export function QueuePage() {
 			<main class="queue__main">
 				<h1 class="hidden-text">Queue</h1>
 				${one ? html`
-					<div class="queue__cards" data-painted=${isPainted(one)}><${Histograms} q=${q} painted=${isPainted(one)} onQuery=${setQuery} /><${ProgressCard} dataset=${one} /></div>
+					<div class="queue__cards" data-painted=${isPainted(one)}><${Histograms} q=${q} painted=${isPainted(one)} noise=${noiseWords(one.policy)} onQuery=${setQuery} /><${ProgressCard} dataset=${one} /></div>
 					<${QueueTools} dataset=${one} q=${q} onQuery=${setQuery} />` : null}
 				${nothing ? html`<${QueueEmpty} q=${q} />` : html`<${QueueTable} q=${q} painted=${isPainted(one)} onQuery=${setQuery} />`}
 			</main>

@@ -5,6 +5,7 @@ import { html } from 'htm/preact';
 import { useRef, useState } from 'preact/hooks';
 
 import { count, plural } from '../lib/format.js';
+import { NOISE_ASSUMED } from '../state/datasets.js';
 import { queueAddress } from '../state/navigation.js';
 import { withField, wordsOf } from '../state/query.js';
 import { BinAxis, endsOf, noneOf } from './bin_axis.js';
@@ -23,15 +24,15 @@ function queryOf({ field, queries }, bin, q) {
 	return withField(q, field, wordsOf(queries[bin]));
 }
 
-/** What the picture does not say: how tall it is, and who is not in it. @param {{most: number, unknown: number, name: string}} props */
-function Aside({ most, unknown, name }) {
+/** What the picture does not say: how tall it is, and who is not in it. @param {{most: number, unknown: number, name: string, note: string}} props */
+function Aside({ most, unknown, name, note }) {
 	if (most === 0) return html`<p class="note">${noneOf(name)}</p>`;
 	const without = unknown ? ` · ${plural(unknown, 'group')} without this number` : '';
-	return html`<p class="note">Tallest bar: ${plural(most, 'group')}${without}</p>`;
+	return html`<p class="note">Tallest bar: ${plural(most, 'group')}${without}${note ? html` · <span title=${NOISE_ASSUMED}>${note}</span>` : null}</p>`;
 }
 
-/** @param {{spread: SpreadJson, dataset: string, q: string}} props */
-export function Spread({ spread, dataset, q }) {
+/** @param {{spread: SpreadJson, dataset: string, q: string, note?: string}} props */
+export function Spread({ spread, dataset, q, note = '' }) {
 	const { name, label, unit, edges, series } = spread;
 	const list = useRef(/** @type {HTMLUListElement | null} */ (null));
 	const [at, setAt] = useState(0);
@@ -65,7 +66,7 @@ export function Spread({ spread, dataset, q }) {
 				})}
 			</ul>
 			<${BinAxis} bins=${spread} />
-			<${Aside} most=${most} unknown=${unknown} name=${name} />
+			<${Aside} most=${most} unknown=${unknown} name=${name} note=${note} />
 		</section>
 	`;
 }

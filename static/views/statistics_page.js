@@ -9,6 +9,7 @@ import { count, plural } from '../lib/format.js';
 import { matchName } from '../lib/match_name.js';
 import { useResource } from '../lib/resource.js';
 import { address, navigate, pageDataset, param } from '../lib/router.js';
+import { noiseWords } from '../state/datasets.js';
 import { queueAddress } from '../state/navigation.js';
 import { pageAddress } from './dataset_menu.js';
 import { datasetPage } from './dataset_frame.js';
@@ -73,13 +74,14 @@ function isWorthIt({ name, series }) {
 	return name !== 'agreement' || series.some(({ counts }) => counts.some((count) => count > 0));
 }
 
-/** @param {{found: StatisticsJson, dataset: string, q: string}} props */
-function Body({ found, dataset, q }) {
+/** @param {{found: StatisticsJson, one: DatasetJson, q: string}} props */
+function Body({ found, one, q }) {
+	const dataset = one.name;
 	const names = found.histograms[0]?.series.map(({ split }) => split) ?? [];
 	return html`
 		<div class="page__title"><p>${plural(found.groups, 'group')}${q ? (found.groups === 1 ? ' matches' : ' match') : ''}. Choose a bar to open its groups in the queue.</p><${SplitLegend} names=${names} /></div>
 		<div class="statistics__grid">
-			${found.histograms.filter(isWorthIt).map((spread) => html`<${Spread} key=${spread.name} spread=${spread} dataset=${dataset} q=${q} />`)}
+			${found.histograms.filter(isWorthIt).map((spread) => html`<${Spread} key=${spread.name} spread=${spread} dataset=${dataset} q=${q} note=${spread.name === 'sigma' ? noiseWords(one.policy) : ''} />`)}
 		</div>
 		<div class="statistics__rest">
 			<${HeatMap} positions=${found.positions} dataset=${dataset} q=${q} />
@@ -97,7 +99,7 @@ function StatisticsOf({ one }) {
 		<div class="statistics__query"><${QueryBox} field=${field} invalid=${found.error?.status === 400} onQuery=${setQuery} /></div>
 		${found.error ? html`<${Trouble} title=${found.error.status === 400 ? 'The query cannot be read' : 'The statistics cannot be shown'} error=${found.error} retry=${found.reload} />` : null}
 		${found.value ? html`
-			<${Body} found=${found.value} dataset=${one.name} q=${q} />
+			<${Body} found=${found.value} one=${one} q=${q} />
 			<h2 class="statistics__whole">Whole dataset</h2>
 			<${MembersCard} dataset=${one.name} />
 			<${GuidelinesCard} dataset=${one} />

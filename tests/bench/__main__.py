@@ -30,6 +30,7 @@ from tests.bench.pitches import bench_pitches
 from tests.bench.propose import bench_propose
 from tests.bench.requests import bench_requests
 from tests.bench.rigs import bench_rigs
+from tests.bench.shipped import bench_shipped
 from tests.bench.truth import bench_truth
 
 REAL_DATA = Path(
@@ -42,6 +43,7 @@ def main() -> None:
     bench_ball()
     bench_ball_noise()
     bench_truth()
+    bench_shipped()
     bench_annotators()
     bench_pictures()
     bench_picture_power()

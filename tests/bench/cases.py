@@ -50,6 +50,10 @@ class Case:
         pitch: As it is; solved as 105 x 68 m.
         aspect: Width of a pixel of the last view by its height.
         shift: How far the last view's principal point is off, as a share of the width.
+        field_m: Smallest and largest width of the picture at the ball, metres.
+        clicks: Fewest and most points of a straight marking; circles have three to four more.
+        kappa: Smallest and largest displacement at the corner by the lens.
+        ball_share: Of the ball's diameter in the picture, added to the noise of its click.
         swapped: The last view's markings carry the names of the pitch turned by half a turn.
     """
 
@@ -65,6 +69,19 @@ class Case:
     aspect: float = 1.0
     shift: float = 0.0
     swapped: bool = False
+    field_m: tuple[float, float] = FIELD_M
+    clicks: tuple[int, int] = (2, 6)
+    kappa: tuple[float, float] = KAPPA
+    ball_share: float = BALL_SHARE
+
+    @property
+    def film(
+        self,
+    ) -> tuple[
+        tuple[int, int], tuple[float, float], Pitch, tuple[float, float], tuple[float, float]
+    ]:
+        """What cameras and balls depend on."""
+        return self.views, self.parallax, self.pitch, self.field_m, self.kappa
 
 
 @dataclass(frozen=True)
@@ -88,7 +105,7 @@ def make_case(case: Case, groups: int, seed: int) -> list[Made]:
 
 
 def _make(case: Case, number: int, seed: int) -> Made:
-    ball, velocity, cameras = _film(seed, number, case.views, case.parallax, case.pitch)
+    ball, velocity, cameras = _film(seed, number, *case.film)
     rng = np.random.default_rng([seed, number, 0xC1])
     shown = [*cameras[:-1], _deformed(cameras[-1], case)]
     views = []
@@ -100,13 +117,19 @@ def _make(case: Case, number: int, seed: int) -> Made:
             lines = make_lines({twin_marking(name): lines[name] for name in lines})
         key = f"{number}_{index}.png"
         station = Station(key, SIZE, lines=lines)
-        views.append(View(key, station, (_ball(rng, camera, there, case.ball_px),)))
+        views.append(View(key, station, (_ball(rng, camera, there, case),)))
     return Made(Group(f"{number}.png", tuple(views)), ball, tuple(shown))
 
 
 @cache
 def _film(
-    seed: int, number: int, views: tuple[int, int], parallax: tuple[float, float], pitch: Pitch
+    seed: int,
+    number: int,
+    views: tuple[int, int],
+    parallax: tuple[float, float],
+    pitch: Pitch,
+    field_m: tuple[float, float],
+    kappa: tuple[float, float],
 ) -> tuple[FloatArray, FloatArray, tuple[Camera, ...]]:
     """A ball, the direction in which it flies, and cameras that see it."""
     rng = np.random.default_rng([seed, number])
@@ -117,7 +140,7 @@ def _film(
         for _ in range(TRIALS):
             place = _place(rng, ball, pitch, is_main=not cameras)
             if place is not None and _stands_apart(place, cameras, ball, parallax):
-                camera = _aimed(rng, place, ball)
+                camera = _aimed(rng, place, ball, field_m, kappa)
                 if _in_picture(camera, ball) and _shows_enough(camera, pitch):
                     cameras.append(camera)
             if len(cameras) == count:
@@ -143,12 +166,18 @@ def _place(
     return np.array([x, y, -rng.uniform(2, 20)]) if beside else None
 
 
-def _aimed(rng: np.random.Generator, place: FloatArray, ball: FloatArray) -> Camera:
+def _aimed(
+    rng: np.random.Generator,
+    place: FloatArray,
+    ball: FloatArray,
+    field_m: tuple[float, float],
+    kappa: tuple[float, float],
+) -> Camera:
     """A camera that looks near the ball."""
     toward = ball + rng.normal(0, 3, 3) * (1, 1, 0) - place
     distance = float(np.linalg.norm(toward))
-    focal = SIZE.width * distance / rng.uniform(*FIELD_M)
-    k1 = rng.uniform(*KAPPA) * (focal / (SIZE.diagonal / 2)) ** 2
+    focal = SIZE.width * distance / rng.uniform(*field_m)
+    k1 = rng.uniform(*kappa) * (focal / (SIZE.diagonal / 2)) ** 2
     return Camera(
         rotation_from_pan_tilt_roll(
             np.arctan2(toward[0], -toward[1]),
@@ -220,19 +249,19 @@ def _clicks(rng: np.random.Generator, camera: Camera, case: Case) -> Lines:
     lines = {}
     own, common = np.sqrt(1 - case.together), np.sqrt(case.together)
     for name, pixels in _visible(camera, case.pitch, FINE_M):
-        count = int(rng.integers(5, 11)) if name in CIRCLES else int(rng.integers(2, 7))
+        few, many = case.clicks
+        circle = name in CIRCLES
+        count = int(rng.integers(few + 3 * circle, many + 1 + 4 * circle))
         places = np.linspace(0, len(pixels) - 1, count).round().astype(int)
         noise = own * rng.normal(size=(count, 2)) + common * rng.normal(size=2)
         lines[name] = (pixels[places] + case.line_px * noise).tolist()
     return make_lines(lines)
 
 
-def _ball(
-    rng: np.random.Generator, camera: Camera, ball: FloatArray, sigma: float
-) -> BallAnnotation:
+def _ball(rng: np.random.Generator, camera: Camera, ball: FloatArray, case: Case) -> BallAnnotation:
     depth = camera.pitch_to_camera(ball[None])[0, 2]
     diameter = BALL_M * camera.focal_length[1] / depth
-    x, y = camera.project(ball[None])[0] + np.hypot(sigma, BALL_SHARE * diameter) * rng.normal(
-        size=2
-    )
+    x, y = camera.project(ball[None])[0] + np.hypot(
+        case.ball_px, case.ball_share * diameter
+    ) * rng.normal(size=2)
     return BallAnnotation(box=Box.square(ImagePoint(float(x), float(y)), float(diameter)))

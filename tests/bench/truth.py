@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,11 +14,9 @@ from app.soccer.picture import OPEN
 from app.soccer.pitch import Pitch
 from app.soccer.policy import PAPER, Policy
 from app.soccer.solution import Ball3D, BestBall, Calibration, Solution
-from app.solving.ball_noise import Miss, estimate_ball_noise, misses_of
-from app.solving.line_noise import LineEvidence, estimate_line_noise
+from app.solving.ball_noise import Miss
+from app.solving.dataset_noise import SeenGroup, estimate_noise
 from app.solving.solve import solve
-from app.solving.triangulate import sights_of
-from app.solving.view_noise import view_line_evidence
 from tests.bench.cases import Case, Made, make_case
 from tests.bench.pitches import estimate_match
 from tests.bench.table import print_table
@@ -34,6 +32,12 @@ ORDINARY = Case("as assumed")
 STRATA = (
     ORDINARY,
     *(Case(f"ball noise {px:g} px", ball_px=px) for px in (0.5, 2.0, 3.0)),
+    Case("line errors half in common, balls 0.5 px", together=0.5, ball_px=0.5),
+    Case("tele", field_m=(14.0, 22.0)),
+    Case("wide, from afar", field_m=(60.0, 90.0)),
+    Case("two or three clicks a line", clicks=(2, 3)),
+    Case("lenses", kappa=(-0.1, 0.1)),
+    Case("box noise that grows, 0.08", ball_share=0.08),
     *(Case(f"{count} views", views=(count, count)) for count in (2, 3, 4)),
     *(
         Case(f"two views, parallax {low:g}-{high:g} degrees", views=(2, 2), parallax=(low, high))
@@ -127,7 +131,11 @@ def bench_truth() -> None:
 
 def judge(made: list[Made], policy: Policy) -> Row:
     """Solve groups and compare them with their truth."""
-    solutions = [solve(one.group, policy) for one in made]
+    return compare(made, [solve(one.group, policy) for one in made])
+
+
+def compare(made: Sequence[Made], solutions: Sequence[Solution]) -> Row:
+    """Solutions of groups beside their truth."""
     off = np.array([_error(s.ball, one) for s, one in zip(solutions, made, strict=True)])
     alarmed = np.array([any(f.kind in ALARMS for f in s.findings) for s in solutions])
     passes = np.array([s.passes for s in solutions])
@@ -170,36 +178,14 @@ def with_found_pitch(made: list[Made], case: Case) -> list[Made]:
 
 
 def with_noise(made: list[Made]) -> Policy:
-    """The policy ``paper`` with the noise that the groups themselves show: lines, then balls."""
-    policy = PAPER
-    told = [item for one in made for item in _line_evidence(one, solve(one.group, policy))]
-    lines = estimate_line_noise(told)
-    assert lines is not None
-    sigma, share = lines.sigma.value, lines.share.value
-    calibration = replace(PAPER.calibration, line_sigma_px=sigma, line_share=share)
-    policy = replace(PAPER, name="estimated", calibration=calibration)
-    misses = [miss for one in made for miss in misses_in(one, policy)]
-    found = estimate_ball_noise(misses, policy)
-    assert found.click is not None and found.share is not None
-    return replace(policy, click_sigma_px=found.click.value, box_sigma_share=found.share)
+    """The policy ``paper`` with the noise that the groups themselves show."""
+    seen = [SeenGroup.of(one.group, solve(one.group, PAPER), PAPER) for one in made]
+    return estimate_noise(seen, PAPER).used_by(replace(PAPER, name="estimated"))
 
 
 def misses_in(made: Made, policy: Policy) -> tuple[Miss, ...]:
     """What the rays to the ball of a group leave unexplained."""
-    solution = solve(made.group, policy)
-    if solution.ball is None:
-        return ()
-    calibrations = [view.calibration for view in solution.views]
-    return misses_of(solution.ball, sights_of(made.group.views, calibrations))
-
-
-def _line_evidence(made: Made, solution: Solution) -> Iterator[LineEvidence]:
-    for view, solved in zip(made.group.views, solution.views, strict=True):
-        found = solved.calibration
-        left_out = [suspect.marking for suspect in found.suspects]
-        lines = {name: at for name, at in view.station.lines.items() if name not in left_out}
-        if found.camera is not None and found.covariance is not None:
-            yield view_line_evidence(found, lines, Pitch(), view.size, PAPER.calibration)
+    return SeenGroup.of(made.group, solve(made.group, policy), policy).misses(policy)
 
 
 def _error(ball: Ball3D | None, made: Made) -> float:

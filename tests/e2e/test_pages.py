@@ -265,7 +265,33 @@ class TestNoise:
     ) -> None:
         card = open_page(f"/datasets/sample/{place}").get_by_label("Annotation noise")
         expect(card).to_contain_text("Sigma of a point on a line")
-        expect(card.get_by_role("row")).to_have_count(6)
+        # One line for each number, those of lines too: nothing contradicts them.
+        expect(card.get_by_role("row")).to_have_count(5)
+
+    @pytest.mark.parametrize(("noise", "said"), [("fixed", 1), ("estimated", 0)])
+    def test_beside_sigma_stands_whether_noise_is_assumed(
+        self, open_page: OpenPage, noise: str, said: int
+    ) -> None:
+        page = open_page(None)
+
+        def judged(route: Route) -> None:
+            answer = route.fetch()
+            body = answer.json()
+            for item in body.get("items", [body]):
+                item["policy"]["noise"] = noise
+            route.fulfill(response=answer, json=body)
+
+        page.route(re.compile(r"/api/v1/datasets(\?.*)?$"), judged)
+        page.route(re.compile(r"/api/v1/groups/\d+(\?.*)?$"), judged)
+        sigma_of = {
+            "/datasets/sample/statistics": "#spread-sigma",
+            "/groups?dataset=sample": ".histogram[aria-label='σ, m'] rect >> nth=0",
+            "/review/1": "[data-number=sigma]",
+        }
+        for address, sigma in sigma_of.items():
+            page.goto(address)
+            expect(page.locator(sigma)).to_be_visible()
+            expect(page.get_by_text("noise assumed")).to_have_count(said)
 
     def test_the_button_says_what_it_changes_and_the_noise_is_asked_once_for_each_policy(
         self, open_page: OpenPage
@@ -273,7 +299,7 @@ class TestNoise:
         page, asked, version = open_page(None), [], [1]
         share = {"name": "box_sigma_share", "label": "Of its diameter", "unit": "share"}
         numbers = {"present": 0.04, "estimate": 0.08, "low": 0.07, "high": 0.09, "agrees": False}
-        noise = {"groups": 3, "solved": 3, "ball": {}, "lines": None, "notices": []}
+        noise = {"groups": 3, "solved": 3, "ball": {}, "follows": False, "notices": []}
         own = [{"camera": "cam2", "person": None, "ratio": 1.8}]
         noise |= {"factors": own, "used": [], "is_new": True, "stations": [], "people": []}
         noise["stations"] = [

@@ -154,7 +154,7 @@ def _change(
     reply = Reply(asked, group_answer)
     with current_state(lambda: load_document(store, shown)):
         state = change(store, station, if_match=if_match, actor=actor, shown=shown, keep=reply.keep)
-    request_solve(services.jobs, store, state.dataset_id, actor=actor)
+    request_solve(services.jobs, store, state.dataset_id, actor=actor, edited=True)
     return reply.made or group_answer(solved(store, shown))
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pydantic import Field
 
 from app.api.schemas.document import Document
-from app.review.policies.noise import Advice, LineNoiseSummary
+from app.review.policies.noise import Advice
 from app.solving.ball_noise import Sigma
 from app.solving.line_noise import Interval
 
@@ -19,7 +19,7 @@ class SigmaDocument(Document, shows=Sigma):
 
 
 class BallNoiseDocument(Document):
-    """Noise of annotated balls; null where too few groups say anything."""
+    """Noise of annotated balls; null where no groups say anything."""
 
     click: SigmaDocument | None = Field(description="Of a coordinate of a ball's centre.")
     share: float | None = Field(description="What the ball's diameter adds, as a share of it.")
@@ -38,14 +38,6 @@ class SourceNoiseDocument(Document):
     ratio: float = Field(description="Of that to the dataset's.")
     numbers: float = Field(description="Independent numbers that speak of it alone.")
     differs: bool = Field(description="The interval leaves out the dataset's sigma.")
-
-
-class LineNoiseDocument(Document, shows=LineNoiseSummary):
-    """Noise of clicks on field lines: medians over images."""
-
-    sigma_px: float = Field(description="Pixels at 960 x 540.")
-    low: float = Field(description="Half of the images lie between this and `high`.")
-    share: float = Field(description="Of the variance, what points of a marking have in common.")
 
 
 class IntervalDocument(Document, shows=Interval):
@@ -92,8 +84,12 @@ class NoiseDocument(Document):
     )
     used: list[FactorDocument] = Field(description="Those that sigma uses now.")
     is_new: bool = Field(description="`factors` say something else than `used`.")
-    lines: LineNoiseDocument | None
-    line_estimate: LineEstimateDocument | None = Field(description="Null where images are few.")
+    line_estimate: LineEstimateDocument | None = Field(
+        description="Null where no lines make a camera."
+    )
+    follows: bool = Field(
+        description="The policy uses the estimates: each solve of the dataset sets them."
+    )
     advice: list[AdviceDocument]
     values: dict[str, float] = Field(
         description="To be sent to the policy; empty where it agrees already."

@@ -235,7 +235,7 @@ def _in_picture(
     camera = frame.alone.camera
     if picture is None or camera is None:
         return frame
-    known = frame.alone.known_covariance
+    known = as_lone(frame.alone, frame.lone).known_covariance
     return replace(frame, camera=camera_text(picture.done(camera, size), known, size))
 
 

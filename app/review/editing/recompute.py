@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from app.plural import plural
 from app.progress import TellProgress
@@ -73,6 +73,17 @@ class SolveReport:
     failing: Counter[str] = field(default_factory=Counter)
     advice: str = ""
 
+    def after(self, other: SolveReport) -> SolveReport:
+        """Both together; the other was made before, and what failed there was tried again."""
+        return replace(
+            self,
+            total=other.total - len(other.failed) + self.total,
+            solved=other.solved + self.solved,
+            passed=other.passed + self.passed,
+            failed=[*{**dict(other.failed), **dict(self.failed)}.items()],
+            failing=other.failing + self.failing,
+        )
+
     @property
     def sentence(self) -> str:
         """How many groups pass, how many do not and why, and how many could not be solved."""
@@ -116,6 +127,7 @@ def solve_dataset(
     executor: Executor | None = None,
     progress: TellProgress | None = None,
     stop: Callable[[], bool] = lambda: False,
+    chosen: Callable[[Sequence[int]], Sequence[int]] = lambda ids: ids,
 ) -> SolveReport:
     """Solve what is stale in a dataset.
 
@@ -126,8 +138,9 @@ def solve_dataset(
         progress: Called after each chunk; an error that it raises ends the run, and nothing
             that was saved before is lost.
         stop: Asked every now and then; once it says so, what is done is saved, and no more.
+        chosen: Of the ids of stale groups those that are solved.
     """
-    found, ids = get_dataset_head(store, dataset), stale_groups(store, dataset)
+    found, ids = get_dataset_head(store, dataset), chosen(stale_groups(store, dataset))
     report = SolveReport(total=len(ids))
 
     def keep(results: Sequence[Result]) -> None:
@@ -139,7 +152,8 @@ def solve_dataset(
     for results in fan_out(retell_task, retell_tasks(store, found, ids), executor, stop):
         keep(results)
     if report.solved:
-        ids = stale_groups(store, dataset)
+        left = set(stale_groups(store, dataset))
+        ids = [number for number in ids if number in left]
     _calibrate_shared(store, found)
     largest = CHUNK if executor is not None else min(CHUNK, CHUNK_HERE)
     tasks = (_task(store, found, chunk) for chunk in _chunks(ids, largest))

@@ -10,7 +10,9 @@ from app.progress import TellProgress
 from app.review.datasets.dataset import get_dataset_head
 from app.review.editing.pitches import estimate_pitches, stale_matches
 from app.review.editing.recompute import SolveReport, solve_dataset, stale_groups
+from app.review.policies.noise import follow_noise, is_followed, noise_sample
 from app.review.yields.store import AT_ONCE, YieldStore
+from app.soccer.actors import LOCAL_USER
 from app.store.store import Store
 
 
@@ -20,8 +22,14 @@ def solve_fully(
     executor: Executor | None,
     progress: TellProgress,
     stop: Callable[[], bool] = lambda: False,
+    *,
+    actor: str = LOCAL_USER,
+    follow: bool = True,
 ) -> SolveReport:
     """Solve what is stale, and estimate the pitches of matches; ``count_yield`` comes after it.
+
+    Where the policy says so the noise of clicks is estimated before: from some groups, so that
+    the others are solved once.
 
     Args:
         store: The database.
@@ -30,8 +38,15 @@ def solve_fully(
         progress: Called with groups solved and in all; an error that it raises ends the run, and
             nothing that was saved before is lost.
         stop: Asked every now and then; once it says so, what is done is saved, and no more.
+        actor: Who solves it.
+        follow: Whether noise is estimated; an edit leaves it as it is.
     """
-    report = solve_dataset(store, dataset, executor, progress, stop)
+    ahead = SolveReport()
+    if follow and is_followed(store, dataset):
+        ahead = solve_dataset(store, dataset, executor, progress, stop, noise_sample)
+        if not stop() and follow_noise(store, dataset, actor):
+            ahead = SolveReport()
+    report = solve_dataset(store, dataset, executor, progress, stop).after(ahead)
     total = report.total
     if not stop():
 

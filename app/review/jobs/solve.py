@@ -15,21 +15,24 @@ from app.review.jobs.full_solve import count_yield, solve_fully
 from app.review.jobs.jobs import Jobs, Pool
 from app.review.jobs.run import JobProgress, Work, counting
 from app.review.policies.policy import PolicyState, apply_policy
+from app.soccer.actors import LOCAL_USER
 from app.soccer.pitch import Pitch
 from app.soccer.policy import Policy
-from app.store.datasets import dataset_name
+from app.store.datasets import dataset_name, group_ids
 from app.store.jobs import Job
 from app.store.session import Session
 from app.store.solutions import unsolved_groups
 from app.store.store import Store
 from app.store.stored_json import Json
 
-KIND = "solve"
+KIND, EDITED = "solve", "edited"
 Changed = TypeVar("Changed")
 WORTH_A_POOL = 400
 """Groups from which on starting processes costs less than it saves the requests."""
 MATCHES_WORTH_A_POOL = 4
 """The same in matches whose pitch is estimated: that looks at all lines of a match."""
+MOSTLY = 0.5
+"""Of a dataset's groups: where more are stale, it was no edit that left them so."""
 NAMED = 20
 """Groups whose solving broke that are named in a result; all are counted."""
 
@@ -59,17 +62,22 @@ def request_solve(
     *,
     actor: str,
     title: str | None = None,
+    edited: bool = False,
     keep: Keep[Job] = keep_nothing,
 ) -> Job:
-    """Solve what is stale in a dataset, soon; one job a dataset waits at most."""
+    """Solve what is stale in a dataset, soon; one job a dataset waits at most.
+
+    ``edited``: by an edit, with which no noise is estimated anew.
+    """
     with store.read() as session:
         name = dataset_name(session, dataset_id)
     return jobs.submit(
         KIND,
         title or f"Solve {name}",
-        solve_work(store, dataset_id, jobs.pool),
+        solve_work(store, dataset_id, jobs.pool, actor=actor, edited=edited),
         dataset_id=dataset_id,
         actor=actor,
+        request={EDITED: True} if edited else None,
         once=True,
         keep=keep,
     )
@@ -171,7 +179,12 @@ def request_estimates(
 
 def resume_solving(jobs: Jobs, store: Store) -> None:
     """Let solving that an earlier server was at go on."""
-    jobs.resumes(KIND, lambda job: solve_work(store, job.dataset_id or 0, jobs.pool))
+
+    def work(job: Job) -> Work:
+        edited = bool(job.request and job.request.get(EDITED))
+        return solve_work(store, job.dataset_id or 0, jobs.pool, actor=job.actor, edited=edited)
+
+    jobs.resumes(KIND, work)
 
 
 def solve_leftovers(jobs: Jobs, store: Store, *, actor: str) -> None:
@@ -181,23 +194,38 @@ def solve_leftovers(jobs: Jobs, store: Store, *, actor: str) -> None:
             request_solve(jobs, store, dataset.id, actor=actor)
 
 
-def solve_work(store: Store, dataset_id: int, pool: Pool = nullcontext) -> Work:
+def solve_work(
+    store: Store,
+    dataset_id: int,
+    pool: Pool = nullcontext,
+    *,
+    actor: str = LOCAL_USER,
+    edited: bool = False,
+) -> Work:
     """The work itself: what to do is found in the data when it starts."""
 
     def work(progress: JobProgress) -> Json:
         found = get_dataset_head(store, dataset_id)
         progress(0, None, f"Solving {found.name}.")
+        stale, whole = len(stale_groups(store, dataset_id)), _group_count(store, dataset_id)
+        # A change of the policy may have met an edit's job that waited.
+        follow = not edited or stale > MOSTLY * whole
         large = (
-            len(stale_groups(store, dataset_id)) >= WORTH_A_POOL
-            or len(stale_matches(store, dataset_id)) >= MATCHES_WORTH_A_POOL
+            stale >= WORTH_A_POOL or len(stale_matches(store, dataset_id)) >= MATCHES_WORTH_A_POOL
         )
         with pool() if large else nullcontext() as executor:
-            report = solve_fully(store, dataset_id, executor, counting(progress, "groups solved"))
+            told = counting(progress, "groups solved")
+            report = solve_fully(store, dataset_id, executor, told, actor=actor, follow=follow)
         count_yield(store, dataset_id, report, progress)
         progress(report.total, report.total, report.sentence)
         return {"policy": found.policy.name, **_report(report)}
 
     return work
+
+
+def _group_count(store: Store, dataset_id: int) -> int:
+    with store.read() as session:
+        return len(group_ids(session, dataset_id))
 
 
 def _report(report: SolveReport) -> Json:

@@ -1,4 +1,8 @@
-"""The noise of a dataset: estimated from its own residuals, and put into its policy on request."""
+"""The noise of a dataset: estimated from its own residuals, and put into its policy.
+
+On request, or, where the policy says that noise is ``estimated``, with each solve of the dataset
+(``follow_noise``). An edit solves its group with the numbers that stand in the policy.
+"""
 
 from __future__ import annotations
 
@@ -7,19 +11,24 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from app.errors import DegenerateGeometryError, InputError
-from app.review.datasets.dataset import need_dataset
+from app.errors import InputError
+from app.review.datasets.dataset import need_dataset, read_dataset_head, save_policy
 from app.review.editing.ball_noise import give_factors, read_placed
 from app.review.editing.state import GroupState, read_states
 from app.review.policies.policy import PolicyState, apply_policy, read_policy
 from app.review.policies.text import CUSTOM, policy_with
-from app.soccer.policy import CALIBRATION, POLICIES, THRESHOLDS, Policy
-from app.solving.ball_noise import BallNoise, Miss, Sigma, estimate_ball_noise, misses_of
-from app.solving.line_noise import LineEstimate, LineEvidence, estimate_line_noise
-from app.solving.resect import REFERENCE_DIAGONAL
+from app.soccer.policy import (
+    CALIBRATION,
+    ESTIMATED,
+    POLICIES,
+    THRESHOLDS,
+    Policy,
+)
+from app.solving.ball_noise import BallNoise, Miss, Sigma
+from app.solving.dataset_noise import DatasetNoise, SeenGroup, estimate_noise
+from app.solving.line_noise import LineEstimate
 from app.solving.source_noise import BallSource, SourceFactors, SourceNoise, estimate_sources
-from app.solving.triangulate import sights_of
-from app.solving.view_noise import view_line_evidence, view_line_noise
+from app.store.copy_datasets import is_copy
 from app.store.noise import Factor, Factors, factor_of, read_factors
 from app.store.session import Session
 from app.store.solutions import present_solutions
@@ -29,26 +38,14 @@ MAX_GROUPS = 600
 """Groups that an estimate looks at, spread over the dataset: more say hardly more."""
 CHUNK = 100
 DECIMALS = 2
+NEAR, NEAR_SHARE = 0.05, 0.02
+"""Of a sigma that is followed, and of a share: a smaller change is none."""
 WANDER = 0.1
 """Of a factor: a smaller change is none."""
 
 
-@dataclass(frozen=True)
-class LineNoiseSummary:
-    """Noise of the clicks on field lines; each image has its own, these are the medians.
-
-    Attributes:
-        sigma_px: Distance from the line, pixels at 960 x 540; ``low`` and ``high`` hold the
-            middle half of the images.
-        share: Of its variance, what the points of a marking have in common.
-        views: Images that were looked at.
-    """
-
-    sigma_px: float
-    low: float
-    high: float
-    share: float
-    views: int
+ASSUMED_WORDS = "The policy assumes the noise of clicks, and does not estimate it."
+ESTIMATED_WORDS = "The policy uses the estimates, as they were when the dataset was last solved."
 
 
 @dataclass(frozen=True)
@@ -73,6 +70,14 @@ class Advice:
         return self.present is not None and self.low <= self.present <= self.high
 
     @property
+    def moved(self) -> bool:
+        """Whether an estimate that is followed is another by now than the present value."""
+        if self.present is None:
+            return True
+        near = NEAR_SHARE if not self.short_unit else NEAR * self.present
+        return abs(self.estimate - self.present) > near
+
+    @property
     def short_unit(self) -> str:
         """As it follows a number in a sentence: a share has none."""
         return " px" if self.unit.startswith("px") else ""
@@ -88,6 +93,7 @@ class Noise:
         people: The same of who placed balls last.
         factors: How noisy balls of both together are, where anything is unlike the dataset.
         used: The factors that the views of the dataset carry.
+        follows: Whether the policy takes the estimates over with each solve of the dataset.
         advice: Thresholds of the policy that the dataset says something about.
         notices: Sentences for people: what disagrees, and why nothing is known.
     """
@@ -101,15 +107,15 @@ class Noise:
     people: tuple[SourceNoise, ...]
     factors: Factors
     used: Factors
-    lines: LineNoiseSummary | None
     line_estimate: LineEstimate | None
+    follows: bool
     advice: tuple[Advice, ...]
     notices: tuple[str, ...]
 
     @property
     def values(self) -> dict[str, float]:
         """The thresholds that would make the policy agree; nothing where it does already."""
-        if all(item.agrees for item in self.advice):
+        if not any(item.moved if self.follows else not item.agrees for item in self.advice):
             return {}
         return {item.name: item.estimate for item in self.advice}
 
@@ -126,39 +132,67 @@ def read_noise(store: Store, dataset: str | int) -> Noise:
         NotFoundError: There is no such dataset.
     """
     state = read_policy(store, dataset)
-    misses: list[Miss] = []
-    seen: list[tuple[Miss, Mapping[str, Sequence[BallSource]]]] = []
-    lines: dict[str, _ViewLines] = {}
     ids = _solved(store, state.dataset_id)
-    chosen = ids[:: max(-(-len(ids) // MAX_GROUPS), 1)]
-    for group, placed in _groups(store, chosen):
-        told = _misses(group)
-        misses += told
-        sources = _sources_of(group, placed)
-        seen += [(miss, sources) for miss in told]
-        lines.update(_lines(group))
-    ball = estimate_ball_noise(misses, state.policy)
-    found = _sources(seen, ball, state.policy)
+    groups, sources, told = _estimated(store, ids, state.policy)
+    misses = zip(told.misses, sources, strict=True)
+    found = _sources(
+        [(miss, own) for some, own in misses for miss in some], told.ball, state.policy
+    )
     with store.read() as session:
         used = read_factors(session, state.dataset_id)
-    evidences = [item.evidence for item in lines.values() if item.evidence is not None]
-    estimate = estimate_line_noise(evidences)
-    advice = (*_advice(ball, state.policy), *_line_advice(estimate, state.policy))
+    advice = _advised_by(told, state.policy)
     return Noise(
         dataset_id=state.dataset_id,
         dataset=state.dataset,
-        groups=len(chosen),
+        groups=groups,
         solved=len(ids),
-        ball=ball,
+        ball=told.ball,
         stations=found.of("camera"),
         people=found.of("person"),
         factors=_factors(found),
         used=used,
-        lines=_summary([(item.sigma_px, item.share) for item in lines.values()]),
-        line_estimate=estimate,
+        line_estimate=told.lines,
+        follows=state.policy.noise == ESTIMATED,
         advice=advice,
-        notices=tuple(_notices(advice)),
+        notices=tuple(_notices(advice, state.policy)),
     )
+
+
+def noise_sample(ids: Sequence[int]) -> Sequence[int]:
+    """The groups of a dataset that its noise is estimated from, in its order."""
+    return ids[:: max(-(-len(ids) // MAX_GROUPS), 1)]
+
+
+def is_followed(store: Store, dataset: str | int) -> bool:
+    """Whether solving a dataset estimates its noise.
+
+    Somebody's own copies have the numbers of what they are of.
+    """
+    with store.read() as session:
+        found = read_dataset_head(session, dataset)
+        return found.policy.noise == ESTIMATED and not is_copy(session, found.id)
+
+
+def follow_noise(store: Store, dataset: str | int, actor: str) -> bool:
+    """Let the policy of a dataset, whose noise is ``estimated``, have what the dataset shows now.
+
+    A change too small to matter is none: the groups would all be solved again.
+
+    Returns:
+        Whether the policy changed, and everything is stale.
+    """
+    state = read_policy(store, dataset)
+    told = _estimated(store, _solved(store, state.dataset_id), state.policy)[2]
+    advice = _advised_by(told, state.policy)
+    if not any(item.moved for item in advice):
+        return False
+    values = {item.name: item.estimate for item in advice}
+    policy = policy_with(state.policy, {"noise": ESTIMATED, **values}, name=state.policy.name)
+    with store.write() as session:
+        # Where somebody chose another one meanwhile, its own solve looks again.
+        if read_dataset_head(session, state.dataset_id).policy == state.policy:
+            save_policy(session, state.dataset_id, policy, actor)
+    return True
 
 
 def apply_noise(store: Store, noise: Noise, *, actor: str) -> PolicyState:
@@ -181,7 +215,10 @@ def accept_noise(session: Session, noise: Noise, state: PolicyState, actor: str)
     Raises:
         StaleRevisionError: The policy is another by now.
     """
-    if noise.values:
+    if noise.values and state.policy.noise == ESTIMATED:
+        policy = policy_with(state.policy, {"noise": ESTIMATED, **noise.values})
+        save_policy(session, noise.dataset_id, policy, actor)
+    elif noise.values:
         name = CUSTOM if state.policy.name in POLICIES else state.policy.name
         policy = policy_with(state.policy, noise.values, name=name)
         apply_policy(session, noise.dataset_id, policy, if_match=state.etag, actor=actor)
@@ -256,51 +293,21 @@ def _are_apart(wanted: Factors, used: Factors) -> bool:
     return any(abs(new / old - 1) > WANDER for new, old in ratios)
 
 
-def _misses(state: GroupState) -> tuple[Miss, ...]:
-    solution = state.solution
-    if solution is None or solution.ball is None:
-        return ()
-    calibrations = [view.calibration for view in solution.views]
-    return misses_of(solution.ball, sights_of(state.group.views, calibrations))
+def _estimated(
+    store: Store, ids: Sequence[int], policy: Policy
+) -> tuple[int, list[Mapping[str, Sequence[BallSource]]], DatasetNoise]:
+    """How many groups were asked, the sources of the balls of each, and what all of them say."""
+    seen: list[SeenGroup] = []
+    sources: list[Mapping[str, Sequence[BallSource]]] = []
+    for state, placed in _groups(store, noise_sample(ids)):
+        if state.solution is not None:
+            seen.append(SeenGroup.of(state.group, state.solution, state.policy))
+            sources.append(_sources_of(state, placed))
+    return len(seen), sources, estimate_noise(seen, policy)
 
 
-@dataclass(frozen=True)
-class _ViewLines:
-    """Noise of the lines of a view, pixels at 960 x 540; its evidence where they made its camera."""
-
-    sigma_px: float
-    share: float
-    evidence: LineEvidence | None
-
-
-def _lines(state: GroupState) -> Iterator[tuple[str, _ViewLines]]:
-    """Noise of the lines of each calibration by its key."""
-    if state.solution is None:
-        return
-    for view, solved in zip(state.group.views, state.solution.views, strict=True):
-        calibration, size = solved.calibration, view.size
-        if calibration.source != "given" and calibration.covariance is not None:
-            left_out = {suspect.marking for suspect in calibration.suspects}
-            lines = {k: at for k, at in view.station.lines.items() if k not in left_out}
-            asked = calibration, lines, state.group.pitch, size, state.policy.calibration
-            picture = calibration.source != "lines" or view.station.picture is not None
-            try:
-                noise = view_line_noise(*asked)
-                evidence = None if picture else view_line_evidence(*asked)
-            except (DegenerateGeometryError, np.linalg.LinAlgError):
-                # Lines that leave the camera open say nothing of their noise.
-                continue
-            unit = size.diagonal / REFERENCE_DIAGONAL
-            sigma = float(np.sqrt(noise.variance)) / unit
-            yield solved.calibration_key, _ViewLines(sigma, noise.share, evidence)
-
-
-def _summary(found: Sequence[tuple[float, float]]) -> LineNoiseSummary | None:
-    if not found:
-        return None
-    sigmas, shares = np.transpose(found)
-    low, middle, high = np.percentile(sigmas, [25, 50, 75]).tolist()
-    return LineNoiseSummary(middle, low, high, float(np.median(shares)), len(sigmas))
+def _advised_by(told: DatasetNoise, policy: Policy) -> tuple[Advice, ...]:
+    return (*_advice(told.ball, policy), *_line_advice(told.lines, policy))
 
 
 def _advice(ball: BallNoise, policy: Policy) -> Iterator[Advice]:
@@ -333,12 +340,18 @@ def _advised(name: str, found: tuple[float, float, float], policy: Policy) -> Ad
     return Advice(name, threshold.label, threshold.unit, present, estimate, low, high)
 
 
-def _notices(advice: Sequence[Advice]) -> Iterator[str]:
+def _notices(advice: Sequence[Advice], policy: Policy) -> Iterator[str]:
     if not advice:
         yield (
             "Too few views agree on a ball to estimate the noise of its annotation: the sigma of the "
             "policy is used."
         )
+    if policy.noise == ESTIMATED:
+        moved = any(item.moved for item in advice)
+        yield ESTIMATED_WORDS + (" The next solve uses what they show now." if moved else "")
+        return
+    if policy.name in POLICIES:
+        yield ASSUMED_WORDS
     loose = [item for item in advice if item.present is None]
     if loose:
         known = " and ".join(f"{item.estimate:g}{item.short_unit}" for item in loose)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from app.review.datasets.dataset import read_dataset_head, save_policy
 from app.review.editing.etags import require_etag
-from app.soccer.policy import Policy
+from app.soccer.policy import ESTIMATED, Policy, with_sigmas
 from app.store.digest import digest
 from app.store.policies import PolicyVersion, policy_history
 from app.store.session import Session
@@ -73,6 +73,9 @@ def apply_policy(
     state = _read(session, dataset)
     if if_match is not None:
         require_etag(state.etag, if_match, f'the policy of "{state.dataset}"')
+    if policy.noise == state.policy.noise == ESTIMATED:
+        # What was estimated is the dataset's: it stays until the next solve.
+        policy = with_sigmas(policy, state.policy)
     if policy == state.policy:
         return state
     save_policy(session, state.dataset_id, policy, actor)

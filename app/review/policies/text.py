@@ -12,7 +12,18 @@ from typing import Any
 import yaml
 
 from app.errors import InputError
-from app.soccer.policy import CALIBRATION, PAPER, POLICIES, THRESHOLDS, Policy, Threshold
+from app.soccer.policy import (
+    CALIBRATION,
+    FIXED,
+    LINE_SIGMAS,
+    PAPER,
+    POLICIES,
+    SIGMAS,
+    THRESHOLDS,
+    Policy,
+    Threshold,
+    is_shipped,
+)
 from app.store.stored_json import Json
 
 MAX_CHARACTERS = 20_000
@@ -98,12 +109,21 @@ def policy_with(
     flat = dict(_flat(values, pointer))
     for key, value in flat.items():
         flat[key] = _checked(_BY_NAME[key], value, pointer)
+    if "noise" not in flat and any(flat.get(key, there) != there for key, there in _sigmas(policy)):
+        # Who says a number means it: no estimate takes its place.
+        flat["noise"] = FIXED
     inner = {key.partition(".")[2]: flat.pop(key) for key in list(flat) if "." in key}
     calibration = replace(policy.calibration, **inner)
     chosen = policy.name if name is None else _checked_name(name)
     changed = replace(policy, **{**flat, CALIBRATION: calibration, "name": chosen})
     _require_honest(changed)
     return changed
+
+
+def _sigmas(policy: Policy) -> Iterator[tuple[str, float | None]]:
+    """The noise of a policy by name."""
+    for name in (*SIGMAS, *(f"{CALIBRATION}.{name}" for name in LINE_SIGMAS)):
+        yield name, _BY_NAME[name].value(policy)
 
 
 def _flat(values: Mapping[str, Any], pointer: str) -> Iterator[tuple[str, Any]]:
@@ -161,8 +181,7 @@ def _checked_name(name: object) -> str:
 
 def _require_honest(policy: Policy) -> None:
     """Whoever reads the name of a shipped policy in an export must be able to rely on it."""
-    shipped = POLICIES.get(policy.name)
-    if shipped is not None and shipped.hash != policy.hash:
+    if policy.name in POLICIES and not is_shipped(policy):
         raise InputError(
             f'"{policy.name}" is the name of a policy with other thresholds',
             hint="Give yours a name of its own.",

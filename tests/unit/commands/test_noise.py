@@ -54,7 +54,7 @@ class TestWhatIsUnlike:
         )
         unlike = [line for line in told if line.endswith(", unlike the dataset's")]
         assert unlike[0].startswith("Sigma of a ball of camera b: ")
-        assert re.search(r"\nSigma of a point on a line: .* share \d+ % of its variance\n", out)
+        assert sum(line.startswith("Sigma of a point on a line") for line in told) <= 1
         assert told[-1].startswith(
             "Run it again with --apply to use the estimates: click_sigma_px to "
         )

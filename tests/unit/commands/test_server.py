@@ -324,9 +324,9 @@ class TestFollow:
     ) -> None:
         held, waiting, wait = threading.Event(), threading.Event(), Client.wait
 
-        def solve_later(*given: Any) -> Any:
+        def solve_later(*given: Any, **how: Any) -> Any:
             held.wait(SECONDS)
-            return solve_fully(*given)
+            return solve_fully(*given, **how)
 
         def wait_seen(*given: Any, **how: Any) -> Any:
             waiting.set()

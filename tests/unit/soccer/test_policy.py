@@ -72,6 +72,7 @@ class TestHash:
         assert painted.hash == "2e048fba4ca30dd4" not in (PAPER.hash, TOUCHLINE.hash)
         alone = replace(PAPER, calibration=CalibrationPolicy(source="paint", lone_frames="any"))
         assert alone.hash not in (painted.hash, TOUCHLINE.hash)
+        assert replace(TOUCHLINE, noise="fixed").hash != TOUCHLINE.hash
         assert painted.calibration_hash != PAPER.calibration_hash
 
     def test_the_paper_fits_the_inner_edges_of_goals_and_the_others_their_middle(self):

@@ -103,18 +103,54 @@ class TestEstimateBallNoise:
         wide, narrow = (estimate_ball_noise(item, PAPER).click for item in (alike, alone))
         assert wide.high / wide.low > 1.5 * narrow.high / narrow.low
 
-    def test_a_few_groups_say_nothing(self):
-        found = estimate_ball_noise(dataset(1.0, groups=3), PAPER)
+    def test_no_groups_say_nothing(self):
+        found = estimate_ball_noise([], PAPER)
         assert (found.click, found.share, found.given) == (None, None, None)
 
-    @pytest.mark.parametrize("miss", [0.0, 500.0], ids=["none", "enormous"])
-    def test_an_estimate_at_the_end_of_what_is_tried_is_none(self, miss):
+    def test_each_further_group_says_more(self):
+        """No number of groups is the first that counts."""
+        off = [
+            np.log(
+                [
+                    estimate_ball_noise(dataset(3.0 * UNIT, groups=groups, seed=seed)).click.value
+                    / 3
+                    for seed in range(12)
+                ]
+            )
+            for groups in (1, 4, 16)
+        ]
+        one, four, many = (np.sqrt((logs**2).mean()) for logs in off)
+        assert one > four > many and many < 0.15
+
+    @pytest.mark.parametrize("miss", [0.0, 2.0, 40.0])
+    def test_one_number_is_enough_to_be_told(self, miss):
+        found = estimate_ball_noise([Miss(miss, 1.0, 100.0, 0.0, 0.1)]).click
+        assert found.low < found.value < found.high and found.high > 3 * found.low
+
+    def test_of_few_numbers_it_is_wider_and_so_is_its_interval(self):
+        """Ellipsoids must hold though nobody knows their size exactly."""
+        few = estimate_ball_noise([Miss(1.0, 1.0, 0.0, 0.0, 0.0)] * 3).click
+        many = estimate_ball_noise([Miss(1.0, 1.0, 0.0, 0.0, 0.0)] * 300).click
+        assert few.value > 1.15 * many.value
+        assert few.low < 0.5 * many.low and few.high > 1.5 * many.high
+
+    def test_what_the_policy_has_plays_no_part_where_clicks_can_be_told(self):
+        """So what is estimated once it is used is the same."""
+        misses = dataset(2.0 * UNIT, groups=8)
+        other = replace(PAPER, click_sigma_px=5.0, box_sigma_share=0.2)
+        assert estimate_ball_noise(misses, other) == estimate_ball_noise(misses, PAPER)
+
+    def test_what_is_no_noise_is_none(self):
         rng = np.random.default_rng(6)
-        alike = [Miss(rng.normal(0, miss), 1.0, 0.0, 0.0, 1.0) for _ in range(100)]
+        alike = [Miss(rng.normal(0, 500.0), 1.0, 0.0, 0.0, 1.0) for _ in range(100)]
         found = estimate_ball_noise(alike, PAPER)
         assert (found.click, found.share) == (None, None)
         rest = [replace(item, given=1.0) for item in alike]
         assert estimate_ball_noise(rest, PAPER).given is None
+
+    def test_clicks_that_cannot_be_told_from_none_are_small(self):
+        exact = [Miss(0.0, 1.0, 0.0, 0.0, 1.0)] * 100
+        assert estimate_ball_noise(exact, PAPER).click.value < 0.5
 
     def test_the_estimate_moves_by_less_than_the_steps_that_are_tried(self):
         rng = np.random.default_rng(8)

@@ -3,7 +3,7 @@ import pytest
 from scipy.stats import chi2
 
 from app.solving.line_noise import (
-    MIN_VIEWS,
+    EXPECTED_PX,
     LinePrior,
     estimate_line_noise,
     line_evidence,
@@ -58,8 +58,25 @@ class TestEstimateLineNoise:
         bad = [evidence_of(0.3, 20.0, seed) for seed in range(6)]
         assert estimate_line_noise(good + bad).sigma.value == pytest.approx(1.0, rel=0.3)
 
-    def test_few_images_say_nothing(self):
-        assert estimate_line_noise([evidence_of(0.3)] * (MIN_VIEWS - 1)) is None
+    def test_no_image_says_nothing_and_neither_do_exact_lines(self):
+        assert estimate_line_noise([]) is None
+        assert estimate_line_noise([evidence_of(0.3, 1e-3, seed) for seed in range(30)]) is None
+
+    @pytest.mark.parametrize("sigma", [0.3, 3.0])
+    def test_each_further_image_moves_it_from_what_is_expected_to_what_is_seen(self, sigma):
+        """No number of images is the first that counts."""
+        found = [
+            estimate_line_noise([evidence_of(0.3, sigma, seed) for seed in range(count)]).sigma
+            for count in (1, 8, 40)
+        ]
+        off = [abs(np.log(one.value / sigma)) for one in found]
+        assert off[0] < abs(np.log(EXPECTED_PX / sigma)) and off[2] < 0.1
+        assert found[0].high / found[0].low > found[1].high / found[1].low
+        assert all(one.low < sigma < one.high for one in found)
+
+    def test_one_image_leaves_the_share_open(self):
+        found = estimate_line_noise([evidence_of(0.3)]).share
+        assert 0.05 < found.value < 0.6 and found.high - found.low > 0.25
 
     def test_pixels_of_a_larger_image_count_as_those_of_the_smaller(self):
         large = [evidence_of(0.3, 2.0, seed).in_units(2.0) for seed in range(30)]

@@ -4,18 +4,14 @@ from __future__ import annotations
 
 
 class TestGetNoise:
-    def test_three_groups_say_nothing_of_balls_and_something_of_lines(self, api) -> None:
+    def test_three_groups_say_little_of_balls_and_something_of_lines(self, api) -> None:
         answer = api.get("/api/v1/datasets/broadcast/noise")
         assert answer.status_code == 200
         found = answer.json()
-        assert (found["groups"], found["solved"], found["advice"], found["values"]) == (
-            3,
-            3,
-            [],
-            {},
-        )
-        assert found["lines"]["views"] >= 2
-        assert len(found["notices"]) == 1
+        assert (found["groups"], found["solved"], found["follows"]) == (3, 3, False)
+        click = found["advice"][0]
+        assert click["name"] == "click_sigma_px" and click["high"] > 2 * click["low"]
+        assert "assumes the noise" in found["notices"][0]
 
     def test_a_dataset_that_is_not_there_is_404(self, api) -> None:
         assert api.get("/api/v1/datasets/nothing/noise").status_code == 404

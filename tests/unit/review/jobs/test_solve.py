@@ -56,6 +56,35 @@ class TestRequestSolve:
         )
         assert stale_groups(store, "demo") == []
 
+    @pytest.mark.parametrize(
+        ("edited", "solved", "follows"),
+        [(False, True, True), (True, True, False), (True, False, True)],
+        ids=["asked for", "after an edit", "after an edit that met another policy"],
+    )
+    def test_an_edit_estimates_no_noise(
+        self,
+        jobs: Jobs,
+        store: Store,
+        fill,
+        make_group,
+        monkeypatch: pytest.MonkeyPatch,
+        edited: bool,
+        solved: bool,
+        follows: bool,
+    ) -> None:
+        asked: list[bool] = []
+
+        def solve(*_: object, follow: bool, **__: object) -> SolveReport:
+            asked.append(follow)
+            return SolveReport()
+
+        monkeypatch.setattr(solve_job, "solve_fully", solve)
+        fill(make_group(7), make_group(8), solved=solved)
+        found = get_dataset(store, "demo")
+        job = request_solve(jobs, store, found.id, actor="ann", edited=edited)
+        jobs.wait(job.id, SECONDS)
+        assert asked == [follows]
+
     @pytest.mark.parametrize(("worth", "made"), [(2, 1), (3, 0)])
     def test_many_matches_are_estimated_in_processes_of_their_own(
         self, store: Store, fill, make_group, monkeypatch: pytest.MonkeyPatch, worth, made

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from typing import Any
 
 import pytest
 
@@ -14,7 +15,7 @@ from app.review.policies.text import (
     policy_values,
     policy_with,
 )
-from app.soccer.policy import PAPER, POLICIES, STRICT, CalibrationPolicy, Policy
+from app.soccer.policy import PAPER, POLICIES, STRICT, TOUCHLINE, CalibrationPolicy, Policy
 
 
 class TestPolicyToYaml:
@@ -124,3 +125,25 @@ class TestPolicyWith:
 
     def test_values_of_a_policy_make_it_again(self) -> None:
         assert policy_with(PAPER, policy_values(STRICT), name="strict") == STRICT
+
+    @pytest.mark.parametrize(
+        ("values", "noise"),
+        [
+            ({"click_sigma_px": 1.3}, "fixed"),
+            ({"calibration": {"line_share": 0.4}}, "fixed"),
+            ({"tau_percent": 0.9, "click_sigma_px": TOUCHLINE.click_sigma_px}, "estimated"),
+            ({"click_sigma_px": 1.3, "noise": "estimated"}, "estimated"),
+        ],
+    )
+    def test_a_number_of_ones_own_takes_the_place_of_the_estimate(
+        self, values: dict[str, Any], noise: str
+    ) -> None:
+        assert policy_with(TOUCHLINE, values, name="mine").noise == noise
+
+    def test_what_a_dataset_shows_leaves_a_policy_the_shipped_one(self) -> None:
+        estimated = {"noise": "estimated", "click_sigma_px": 1.3, "calibration.line_sigma_px": 0.7}
+        assert policy_with(TOUCHLINE, estimated).name == "touchline"
+        with pytest.raises(InputError, match="a policy with other thresholds"):
+            policy_with(TOUCHLINE, {"click_sigma_px": 1.3})
+        with pytest.raises(InputError, match="a policy with other thresholds"):
+            policy_with(TOUCHLINE, {**estimated, "tau_percent": 0.9})

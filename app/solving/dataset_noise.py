@@ -1,0 +1,143 @@
+"""Dataset noise: of the clicks on lines and on balls of many groups, each known with the other's help.
+
+What lines are off makes cameras uncertain, and what those are off is no fault of the balls: first
+the lines of all images are asked, then every camera has the covariance that follows, and what
+rays leave unexplained beyond that is the balls'. No number of the policy's that is estimated takes
+part, so the estimate is the same before it is used and after.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from app.errors import DegenerateGeometryError
+from app.soccer.annotation import Lines, make_lines
+from app.soccer.group import Group, View
+from app.soccer.policy import Policy
+from app.soccer.solution import Ball3D, Calibration, Solution
+from app.solving.ball_noise import BallNoise, Miss, estimate_ball_noise, misses_of
+from app.solving.line_noise import LineEstimate, LineEvidence, estimate_line_noise
+from app.solving.triangulate import Sighting, sights_of
+from app.solving.view_noise import view_line_covariance, view_line_evidence
+
+
+@dataclass(frozen=True)
+class SeenView:
+    """A view of a solved group as far as noise asks.
+
+    Attributes:
+        key: Of its calibration: a static camera speaks of its lines once.
+        lines: Those that its camera is made from.
+        evidence: What these say; None where they make no camera, or leave it open.
+    """
+
+    key: str
+    view: View
+    calibration: Calibration
+    lines: Lines
+    evidence: LineEvidence | None
+
+
+@dataclass(frozen=True)
+class SeenGroup:
+    """A solved group as far as noise asks."""
+
+    group: Group
+    ball: Ball3D | None
+    views: tuple[SeenView, ...]
+
+    @staticmethod
+    def of(group: Group, solution: Solution, policy: Policy) -> SeenGroup:
+        """What a group and its solution under a policy say."""
+        views = (
+            _seen(group, view, solved.calibration_key, solved.calibration, policy)
+            for view, solved in zip(group.views, solution.views, strict=True)
+        )
+        return SeenGroup(group, solution.ball, tuple(views))
+
+    def misses(self, policy: Policy) -> tuple[Miss, ...]:
+        """What the rays leave unexplained, with cameras as certain as a policy's lines make them."""
+        return () if self.ball is None else misses_of(self.ball, self._sights(policy))
+
+    def _sights(self, policy: Policy) -> list[Sighting]:
+        found = [self._calibration(view, policy) for view in self.views]
+        return sights_of(self.group.views, found)
+
+    def _calibration(self, seen: SeenView, policy: Policy) -> Calibration:
+        # What paint says of a camera, and what is not known of a picture, hardly depends on clicks.
+        if seen.evidence is None or seen.calibration.source != "lines":
+            return seen.calibration
+        covariance = view_line_covariance(
+            seen.calibration, seen.lines, self.group.pitch, seen.view.size, policy.calibration
+        )
+        return replace(seen.calibration, covariance=covariance)
+
+
+@dataclass(frozen=True)
+class DatasetNoise:
+    """Noise of a dataset.
+
+    Attributes:
+        lines: Of clicks on lines; None where none makes a camera.
+        ball: Of annotated balls.
+        misses: What rays leave unexplained beyond the cameras, group by group.
+    """
+
+    lines: LineEstimate | None
+    ball: BallNoise
+    misses: tuple[tuple[Miss, ...], ...]
+
+    def used_by(self, policy: Policy) -> Policy:
+        """A policy with the estimates, as far as there are any."""
+        click, given, share = self.ball.click, self.ball.given, self.ball.share
+        policy = replace(
+            policy,
+            click_sigma_px=policy.click_sigma_px if click is None else click.value,
+            box_sigma_share=policy.box_sigma_share if share is None else share,
+            given_sigma_px=policy.given_sigma_px if given is None else given.value,
+        )
+        return policy if self.lines is None else _with_lines(policy, self.lines)
+
+
+def estimate_noise(groups: Sequence[SeenGroup], policy: Policy) -> DatasetNoise:
+    """The noise that many groups show.
+
+    Args:
+        groups: In the order in which they were taken.
+        policy: They are judged by; of its noise nothing is used that they say something of.
+    """
+    evidence = {
+        view.key: view.evidence
+        for group in groups
+        for view in group.views
+        if view.evidence is not None
+    }
+    lines = estimate_line_noise([*evidence.values()])
+    if lines is not None:
+        policy = _with_lines(policy, lines)
+    misses = tuple(group.misses(policy) for group in groups)
+    ball = estimate_ball_noise([miss for some in misses for miss in some], policy)
+    return DatasetNoise(lines, ball, misses)
+
+
+def _with_lines(policy: Policy, lines: LineEstimate) -> Policy:
+    sigma, share = lines.sigma.value, lines.share.value
+    known = replace(policy.calibration, line_sigma_px=sigma, line_share=share)
+    return replace(policy, calibration=known)
+
+
+def _seen(group: Group, view: View, key: str, calibration: Calibration, policy: Policy) -> SeenView:
+    left_out = {suspect.marking for suspect in calibration.suspects}
+    lines = make_lines({k: at for k, at in view.station.lines.items() if k not in left_out})
+    evidence = None
+    made = calibration.source != "given" and calibration.covariance is not None
+    if made and view.station.picture is None:
+        asked = calibration, lines, group.pitch, view.size, policy.calibration
+        # Lines that leave the camera open say nothing of their noise.
+        with suppress(DegenerateGeometryError, np.linalg.LinAlgError):
+            evidence = view_line_evidence(*asked)
+    return SeenView(key, view, replace(calibration, markings=()), lines, evidence)
