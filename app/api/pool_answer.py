@@ -1,4 +1,4 @@
-"""Pool answer: what a child pool makes for a request, for as long as whoever asked is there."""
+"""Pool answer: what a worker pool makes for a request, for as long as whoever asked is there."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 
 from fastapi import Request
 
-from app.child_pool import PoolTask
+from app.worker_pool import PoolTask
 
 LOOK_SECONDS = 0.25
 """Between two looks whether the client has left."""

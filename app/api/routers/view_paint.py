@@ -15,8 +15,8 @@ from app.api.problem import responses
 from app.api.routers.views import CLIENT_GONE, told_with_view
 from app.api.schemas.annotation import points_of
 from app.api.schemas.view_paint import PaintDocument, PaintRequest, ProposalDocument
-from app.child_pool import PoolTask
 from app.review.editing.view_paint import PaintQuestion, paint_question, proposal_question
+from app.worker_pool import PoolTask
 
 router = APIRouter(prefix="/views", tags=["views"])
 

@@ -22,7 +22,6 @@ from app.api.schemas.group import GroupDocument
 from app.api.schemas.view import NeighbourList, ViewEdit, frames_away
 from app.api.security.lanes import is_large
 from app.api.services import Services
-from app.child import ChildEnded
 from app.errors import ImageError, NotFoundError, StorageError, TooLargeError
 from app.review.editing.edit import (
     Edit,
@@ -39,6 +38,7 @@ from app.review.editing.view_paint import NO_FRAME_HINT
 from app.soccer.frame_number import FARTHEST
 from app.soccer.media import Media
 from app.store.frames import Frames, SentPicture
+from app.worker_process import WorkerEnded
 
 router = APIRouter(prefix="/views", tags=["views"])
 
@@ -225,7 +225,7 @@ async def _neighbours(request: Request, frames: Frames, view: FoundView) -> dict
                 return None
         task = frames.ask_neighbours(view.media, view.group_key, view.static)
         found: dict[int, Media] | None = await while_wanted(request, task)
-    except (ChildEnded, NotFoundError, ImageError, TooLargeError, StorageError):
+    except (WorkerEnded, NotFoundError, ImageError, TooLargeError, StorageError):
         return {}
     return found
 

@@ -11,7 +11,6 @@ from concurrent.futures import CancelledError
 from dataclasses import replace
 from time import monotonic
 
-from app.child import ChildEnded
 from app.errors import ReviewError
 from app.review.datasets.paint_reading import PaintTask, read_view_paint
 from app.slot import leave_slot
@@ -21,6 +20,7 @@ from app.soccer.policy import CalibrationPolicy
 from app.soccer.solution import Calibration
 from app.solving.calibrate import clicks_key, wanted_paint
 from app.store.frames import Frames
+from app.worker_process import WorkerEnded
 
 SECONDS = 5.0
 """Longer nobody waits for a frame; it is then read when paint is read again."""
@@ -63,7 +63,7 @@ class PaintFollower:
         for task, waiting in asked:
             try:
                 reading = waiting.future.result(max(end - monotonic(), 0.0))
-            except (TimeoutError, CancelledError, ChildEnded, ReviewError):
+            except (TimeoutError, CancelledError, WorkerEnded, ReviewError):
                 waiting.leave()
                 continue
             if reading is not None:

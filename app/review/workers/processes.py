@@ -7,8 +7,8 @@ from collections.abc import Iterator
 from concurrent.futures import Executor
 from contextlib import contextmanager
 
-from app.child import spawned_pool
 from app.errors import InputError
+from app.worker_process import spawned_pool
 
 
 @contextmanager

@@ -21,10 +21,10 @@ from app.api.routers.views import (
     get_neighbours,
     while_wanted,
 )
-from app.child_pool import PoolTask
 from app.errors import OverloadedError
 from app.review.importing.ingest import ingest
 from app.soccer.media import Media
+from app.worker_pool import PoolTask
 
 API = "/api/v1"
 
