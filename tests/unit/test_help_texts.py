@@ -57,10 +57,10 @@ PLAIN_WORDS = """
     folder folders follow form format formats found frozen gathered gestures glossary grass grid guess guide header
     headers heads health heat help histograms history hit home hooks idempotency identity if image images
     import imports in info init insight items jaccard json judged keep key keys known konva last latest lazy
-    least leftovers legend lens lesson lessons letter licence list listing live locks look lost loupe
+    least leftovers legend lens lesson lessons letter licence list listing live locks look loupe
     kernels profile trace
     main map markdown marks match matches matrix membership menu merge metrics migrate mini missing
-    model modules name names navigation neighbours nested notice nudge numbers object
+    model modules name names navigation neighbours notice nudge numbers object
     observability onnx open openapi opened options order origin orphans output overlap page pages
     paint palette parquet parse patch pen pins pitch pitches pixel place places plain plural png pointer
     policies pool popover pose position preview problem process progress projection props query rail reader reasons receiving
