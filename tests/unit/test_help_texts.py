@@ -31,7 +31,7 @@ PLAIN_WORDS = """
     full tall scroll stalls settling exposure ends many naming tracing local lookup css
     cluster serving hosts executors packing day browser database
     private kept another smaller index
-    stored tree trees safe path refusal attempt cookie fit
+    stored tree trees safe path attempt cookie fit
     categories corner finder ids joins like
     compiler dialect postgresql sqlite statements transfer triggers
     attempts lived processes shared sharing short shown web
