@@ -63,11 +63,11 @@ PLAIN_WORDS = """
     model modules name names navigation neighbours notice nudge numbers object
     observability onnx open openapi opened options order origin orphans output overlap page pages
     paint palette parquet parse patch pen pins pitch pitches pixel place places plain plural png pointer
-    policies pool popover pose position preview problem process progress projection props query rail reader reasons receiving
+    policies pool popover pose position preopen preview problem process progress projection props query rail reader reasons receiving
     recompute record remedies removal render reply report requests resect resource restore result
     revert reviewers rotation router row rows run runs sample save scale scene scene3d scenes score
     scoreboard sending server service session sets shadows sheet singular site smallest solve
-    solving soundness source sources slot sphere spill spread squares stacks stage staging standpoints starts
+    solving source sources slot sphere spill spread squares stacks stage staging standpoints starts
     state statistics steps storage store stream submit surface swap synloc tab table tally term
     terminal text textures threshold ticks tools triangulate truth types undo undrawn unknown upload uploads
     v3 v3d video viewport viewports virtual wal walk warm what when whiskers words worker write writer zip

@@ -16,6 +16,7 @@ from structlog.testing import capture_logs
 from app.config import Settings
 from app.errors import BusyError, DamagedError, InputError, StorageError
 from app.slot import hold_slot
+from app.store.dialect.dialect import dialect_of
 from app.store.dialect.sqlite import AGAIN_S, PRAGMAS
 from app.store.log import Entry, append, read_log
 from app.store.migrate import KNOWN_REVISIONS, migrate, migrations_folder
@@ -105,7 +106,9 @@ class TestRequireWhole:
         self, store: Store, monkeypatch
     ) -> None:
         store.require_whole()
-        monkeypatch.setattr("app.store.store.file_faults", lambda *_: ["Tree 5 is torn"])
+        monkeypatch.setattr(
+            type(dialect_of(store.settings)), "file_faults", lambda *_: ["Tree 5 is torn"]
+        )
         with pytest.raises(DamagedError, match=r"touchline\.db is damaged$"):
             store.require_whole()
         with pytest.raises(DamagedError, match="nothing can be changed now"):
