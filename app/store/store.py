@@ -12,9 +12,9 @@ from sqlalchemy import Engine, update
 from sqlalchemy.exc import DBAPIError
 from sqlalchemy.exc import TimeoutError as NoConnectionError
 
+from app.admission import release_admission
 from app.config import Settings
 from app.errors import EXAMINE, BusyError, DamagedError, StorageError
-from app.slot import leave_slot
 from app.store.dialect.dialect import dialect_in, dialect_of
 from app.store.dialect.sharing import AGAIN
 from app.store.engine import WRITE, make_engine, reported
@@ -192,7 +192,7 @@ class Store:
                 self._file.require_log()
             if lasting:
                 self.sharing.tell(session, COMMITTED)
-                leave_slot()
+                release_admission()
             session.commit()
             self._refused = None
             self._anchored(session)

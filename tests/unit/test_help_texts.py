@@ -46,7 +46,7 @@ PLAIN_WORDS = """
     adopt aliases asked concealment needs ownership rights sight
     actors
     candidate drawn proposal propose scoring search straight
-    3d accept action actions address adjust adjustments advice ahead anchor annotate answers app
+    3d accept admission action actions address adjust adjustments advice ahead anchor annotate answers app
     application archives arrays arrival ask axis backup bar bars batches best binned bodies
     bundle body boxes bulk button buttons cache calibrate canonical canvas caption card cards cell changes chart
     chip chooser class cli client clock codec codecs colours command comparison completion
@@ -67,7 +67,7 @@ PLAIN_WORDS = """
     recompute record remedies removal render reply report requests resect resource restore result
     revert reviewers rotation router row rows run runs sample save scale scene scene3d scenes score
     scoreboard sending server service session sets shadows sheet singular site smallest solve
-    solving source sources slot sphere spill spread squares stacks stage staging standpoints starts
+    solving source sources sphere spill spread squares stacks stage staging standpoints starts
     state statistics steps storage store stream submit surface swap synloc tab table tally term
     terminal text textures threshold ticks tools triangulate truth types undo undrawn unknown upload uploads
     v3 v3d video viewport viewports virtual wal walk warm what when whiskers words worker write writer zip

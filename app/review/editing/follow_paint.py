@@ -11,9 +11,9 @@ from concurrent.futures import CancelledError
 from dataclasses import replace
 from time import monotonic
 
+from app.admission import release_admission
 from app.errors import ReviewError
 from app.review.datasets.paint_reading import PaintTask, read_view_paint
-from app.slot import leave_slot
 from app.soccer.group import Group
 from app.soccer.paint_evidence import PaintReading
 from app.soccer.policy import CalibrationPolicy
@@ -50,7 +50,7 @@ class PaintFollower:
 
     def _read(self, tasks: list[PaintTask]) -> Iterator[tuple[str, PaintReading]]:
         """By view what was read of those whose picture could be read in time."""
-        leave_slot()
+        release_admission()
         end = monotonic() + SECONDS
         try:
             asked = [
