@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import asyncio
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Awaitable, Callable, Sequence
 from concurrent.futures import CancelledError, Future, ThreadPoolExecutor
 from itertools import takewhile
 from queue import LifoQueue
@@ -19,6 +20,8 @@ log = structlog.get_logger("touchline.workers")
 
 ABANDONED_SECONDS = 1.0
 """A task that nobody waits for runs so long before its worker is killed: a warm worker is worth more."""
+GONE_SECONDS = 0.25
+"""Between two looks whether whoever asked for a task is gone."""
 WARM_WAITING = 100
 """Tasks that may wait for a warm worker; before they do, they wait for their request's turn."""
 
@@ -46,6 +49,22 @@ class PoolTask:
         """Give the task up: it is not begun, or its worker is killed soon."""
         self._left.set()
         self.future.cancel()
+
+    async def result_unless(self, gone: Callable[[], Awaitable[bool]]) -> Any:
+        """The result; None where the task is given up because nobody waits for it any more.
+
+        Args:
+            gone: Whether whoever asked for it is gone, such as ``Request.is_disconnected``.
+        """
+        result: asyncio.Future[Any] = asyncio.wrap_future(self.future)
+        try:
+            while not result.done():
+                await asyncio.wait({result}, timeout=GONE_SECONDS)
+                if not result.done() and await gone():
+                    return None
+            return result.result()
+        finally:
+            self.leave()
 
     def run(
         self,

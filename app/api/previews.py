@@ -16,7 +16,6 @@ from starlette.concurrency import run_in_threadpool
 
 from app.api.edits import preview_edits
 from app.api.large_edits import LargeEdits
-from app.api.pool_answer import while_wanted
 from app.api.schemas.preview import PreviewDocument, PreviewRequest
 from app.api.schemas.solution import SolutionDocument
 from app.api.security.lanes import PREVIEWS, is_large
@@ -70,7 +69,7 @@ class Previews:
         worker = least_busy(self._large.workers if large else self.workers)
         if worker is not None:
             task = worker.submit(solve_apart, self._settings, group_id, changes)
-            found: bytes | None = await while_wanted(request, task)
+            found: bytes | None = await task.result_unless(request.is_disconnected)
             if found is not None:
                 return found
             if await request.is_disconnected():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import os
 import time
 from collections.abc import Iterator
@@ -121,6 +122,25 @@ class TestSubmit:
         with pytest.raises(ImageError, match=r"^7\.png made its process crash$"):
             task.future.result(60)
         assert pool.submit(os.getpid).future.result(60) != os.getpid()
+
+
+class TestResultUnless:
+    def test_is_the_result_while_somebody_waits(self, pool: WorkerPool) -> None:
+        async def here() -> bool:
+            return False
+
+        async def ask() -> int:
+            return await pool.submit(os.getpid).result_unless(here)
+
+        assert asyncio.run(ask()) != os.getpid()
+
+    def test_a_task_that_nobody_waits_for_is_given_up(self) -> None:
+        async def gone() -> bool:
+            return True
+
+        task = PoolTask(lambda error: error)
+        assert asyncio.run(task.result_unless(gone)) is None
+        assert task.future.cancelled()
 
 
 class TestCounts:

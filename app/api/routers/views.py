@@ -13,7 +13,6 @@ from fastapi import APIRouter, Body, Query, Request, Response
 
 from app.api.deps import Actor, AppServices, Id, IfMatch, etag_matches
 from app.api.paging import paged
-from app.api.pool_answer import while_wanted
 from app.api.problem import Responses, responses
 from app.api.reply import AskedUnder, KeyedRequest
 from app.api.routers.groups import CHANGED, CONFLICTS, change_group, load_document_of_view
@@ -221,10 +220,10 @@ async def _neighbours(request: Request, frames: Frames, view: FoundView) -> dict
     try:
         if view.media.frame is not None:
             indexing = await to_thread.run_sync(frames.ask_fetch, view.media)
-            if indexing is not None and not await while_wanted(request, indexing):
+            if indexing is not None and not await indexing.result_unless(request.is_disconnected):
                 return None
         task = frames.ask_neighbours(view.media, view.group_key, view.static)
-        found: dict[int, Media] | None = await while_wanted(request, task)
+        found: dict[int, Media] | None = await task.result_unless(request.is_disconnected)
     except (WorkerEnded, NotFoundError, ImageError, TooLargeError, StorageError):
         return {}
     return found
@@ -253,11 +252,10 @@ async def _picture(
         if found is not None:
             return found
         fetching = await to_thread.run_sync(frames.ask_fetch, view.media)
-        if fetching is not None and not await while_wanted(request, fetching):
+        if fetching is not None and not await fetching.result_unless(request.is_disconnected):
             return None
-        made: SentPicture | None = await while_wanted(
-            request, frames.ask(view.media, width, view.flipped)
-        )
+        task = frames.ask(view.media, width, view.flipped)
+        made: SentPicture | None = await task.result_unless(request.is_disconnected)
         return made
 
 
