@@ -15,7 +15,7 @@ from sqlalchemy.exc import TimeoutError as NoConnectionError
 from app.admission import release_admission
 from app.config import Settings
 from app.errors import EXAMINE, BusyError, DamagedError, StorageError
-from app.store.dialect.dialect import dialect_in, dialect_of
+from app.store.dialect.dialect import dialect_of
 from app.store.dialect.sharing import AGAIN
 from app.store.engine import WRITE, make_engine, reported
 from app.store.home import make_file
@@ -251,7 +251,7 @@ class Store:
         """
         dialect = dialect_of(self.settings)
         with self.read() as session, dialect.interrupted(session, lambda: not wanted()):
-            faults = dialect_in(session).file_faults(session, 1)
+            faults = dialect.file_faults(session, 1)
             if faults:
                 file = self.settings.database_file
                 log.error("the database is damaged", file=str(file), fault=faults[0])

@@ -64,15 +64,13 @@ def examine(store: Store) -> list[Check]:
 
 def _file(session: Session, restore: str) -> Check:
     """The database's own look at its pages and indexes, and at references to rows that are gone."""
-    faults, lost = (
-        dialect_in(session).file_faults(session),
-        dialect_in(session).count_lost_references(session),
-    )
+    dialect = dialect_in(session)
+    faults, lost = dialect.file_faults(session), dialect.count_lost_references(session)
     if faults:
         return Check("file", False, f"SQLite finds it damaged: {'; '.join(faults)}", restore)
     if lost:
         return Check("file", False, f"{lost} rows refer to rows that are gone", restore)
-    return Check("file", True, dialect_in(session).no_fault)
+    return Check("file", True, dialect.no_fault)
 
 
 def _texts(session: Session) -> Check:
