@@ -184,6 +184,7 @@ PROPERTIES: Mapping[str, str] = {
     "gamma_percent": "Tolerance in per cent of the image diagonal.",
     "gate": "Name of the gate.",
     "gates": "The gates in their order, and which of them the group passes.",
+    "goal": "Which line of a goal lines are fitted to: `inner` edges or `middle` of posts and bar.",
     "group": "Id of the group.",
     "AuditEntryDocument.group": "Key of the group; null where it concerns none.",
     "CaseDocument.group": "The group.",

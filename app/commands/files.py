@@ -47,7 +47,13 @@ def import_(
     lines: Annotated[
         Path | None, typer.Option(exists=True, help="ISSIA: line files of the static cameras.")
     ] = None,
-    calibration: Annotated[CalibrationChoice, typer.Option(help="Which one counts.")] = "given",
+    calibration: Annotated[
+        CalibrationChoice | None,
+        typer.Option(
+            help="Which one counts; said of ISSIA, given leaves the lines of given cameras aside.",
+            show_default="given",
+        ),
+    ] = None,
     frame_offset: Annotated[
         str, typer.Option(help="ISSIA: XGTF frame minus video frame; 8, or 1=8,2=9 by camera.")
     ] = "8",
@@ -67,6 +73,14 @@ def import_(
     ball_category: Annotated[
         str,
         typer.Option(metavar="NAME", help="COCO: the category that is the ball; default: by name."),
+    ] = "",
+    group_by: Annotated[
+        str,
+        typer.Option(
+            metavar="folder|PATTERN",
+            help="frames: which pictures are one group, by folder or by a pattern of their names, "
+            "{instant}_{camera}.jpg; default: each is one.",
+        ),
     ] = "",
     policy: Annotated[
         str | None,
@@ -97,11 +111,12 @@ def import_(
         from app.commands import remote_files
 
         options: dict[str, Any] = {
-            "calibration": calibration,
+            **({} if calibration is None else {"calibration": calibration}),
             "frame_offset": parse_frame_offset(frame_offset),
             "flipped": sorted(parse_cameras(flip)),
             "size": None if size is None else [size.width, size.height],
             **({"ball_category": ball_category} if ball_category else {}),
+            **({"grouping": group_by} if group_by else {}),
         }
         with connected(server) as client, show_progress("Importing") as progress:
             values, nothing = remote_files.import_values(
@@ -128,6 +143,7 @@ def import_(
         flipped=parse_cameras(flip),
         frames=None if frames is None else _root(settings, frames),
         ball_category=ball_category,
+        grouping=group_by,
     )
     source.check(policy=policy is not None)
     chosen = read_policy_option(policy or "paper")
@@ -161,8 +177,13 @@ def export(
     everything: Annotated[
         bool, typer.Option("--all", help="Every group, failed and rejected too.")
     ] = False,
-    boxes: Annotated[BoxKind, typer.Option(help="Which ball box is written.")] = "optimized",
-    images: Annotated[PicturesWritten, typer.Option(help="What happens to frames.")] = "none",
+    boxes: Annotated[
+        BoxKind,
+        typer.Option(help="coco, parquet, soccernet-v3d and yolo: which ball box is written."),
+    ] = "optimized",
+    images: Annotated[
+        PicturesWritten, typer.Option(help="What happens to frames; touchline holds none.")
+    ] = "none",
     views: Annotated[
         TrainingViews, typer.Option(help="coco and yolo: balls that no other view confirms, too?")
     ] = "valid",

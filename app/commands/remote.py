@@ -51,8 +51,11 @@ def solve_values(
     result = done["result"]
     failed = [[item["group"], item["problem"]] for item in result["failures"]]
     values = {"total": result["groups"], "solved": result["solved"], "passed": result["passed"]}
-    sentence = outcome_sentence(result["solved"], result["passed"], result["failed"])
-    return {**values, "failed": failed}, sentence
+    failing = result["failing"]
+    sentence = outcome_sentence(result["solved"], result["passed"], result["failed"], failing)
+    if result["advice"]:
+        sentence += f". {result['advice']}"
+    return {**values, "failed": failed, "failing": failing, "advice": result["advice"]}, sentence
 
 
 def policy_values(client: Client, dataset: str) -> tuple[str, dict[str, Any]]:

@@ -13,12 +13,14 @@ from app.datasets.file_tree import DEFAULT_LIMITS, FileTree, Limits, Root
 from app.datasets.folder_tree import FolderTree
 from app.datasets.frame_names import IMAGE_SUFFIXES, VIDEO_SUFFIXES
 from app.datasets.issia import CALIBRATION, DEFAULT_OFFSET, DEFAULT_SIZE, MATCH, FramePersons
+from app.datasets.issia_people import mirrored_people, turned
 from app.datasets.report import Report
 from app.datasets.sn_calibration import LineFile
 from app.datasets.sn_calibration_reader import line_files_of, read_line_files
 from app.datasets.trees import opened_tree
 from app.datasets.viper_reader import ViperTrack, is_viper, read_viper
 from app.geometry.camera import Camera
+from app.plural import plural
 from app.soccer.annotation import BallAnnotation, Extras
 from app.soccer.frames import Box, ImageSize
 from app.soccer.group import Group, Station, View
@@ -47,14 +49,15 @@ class IssiaOptions:
             by camera.
         flipped: Cameras whose frames are mirrored; annotations and calibration are not.
         lines: Folder (or zip) of ``cam1.json`` .. with the field lines of the static cameras.
-        calibration: What counts for a camera that has both: ``given`` or ``lines``.
+        calibration: What counts for a camera that has both: ``lines``, or ``given``, and its lines are
+            left aside; None: the given one, which is measured by its lines.
         size: Size of the annotated images; None: as the XGTF file says, else ISSIA's.
     """
 
     frame_offset: int | Mapping[int, int] = DEFAULT_OFFSET
     flipped: frozenset[int] = frozenset()
     lines: Root | None = None
-    calibration: str = "given"
+    calibration: str | None = None
     size: ImageSize | None = None
 
     def size_of(self, track: ViperTrack) -> ImageSize:
@@ -181,6 +184,15 @@ def complete(
     for camera, size in sizes.items():
         station = _station(camera, given.get(camera), lines.get(camera), options, size)
         found.stations[camera] = station
+    widths = {camera: size.width for camera, size in sizes.items()}
+    mirrored = mirrored_people(found.tracks, given, widths)
+    for camera in mirrored:
+        found.tracks[camera] = turned(found.tracks[camera], widths[camera])
+    if mirrored:
+        report.remark(
+            f"People of {' and '.join(f'cam{camera}' for camera in mirrored)} are turned left to "
+            "right: ISSIA's files hold them mirrored, and the balls as the cameras see them."
+        )
     _tell_unused(found, {"camera": list(given), "line file": list(drawn)}, report)
 
 
@@ -256,8 +268,7 @@ def _cameras(
             shown,
             f"source {number} ({track.source})",
             None,
-            f"is left out with {balls} ball{'' if balls == 1 else 's'} and "
-            f"{persons} person{'' if persons == 1 else 's'}: no name "
+            f"is left out with {plural(balls, 'ball')} and {plural(persons, 'person')}: no name "
             "of a camera in it tells it from the first source",
         )
 
@@ -343,13 +354,14 @@ def _station(
     options: IssiaOptions,
     size: ImageSize,
 ) -> Station:
+    left_aside = options.calibration == "given" and given is not None
     return Station(
         key=f"cam{camera}",
         size=size,
         shared=True,
-        lines=lines.lines if lines else {},
+        lines=lines.lines if lines and not left_aside else {},
         given=given,
-        calibration=options.calibration,
+        calibration=options.calibration or "given",
         flipped=camera in options.flipped,
     )
 

@@ -90,7 +90,7 @@ def _side(
     lines: Lines, drawn: Lines, pitch: Pitch, size: ImageSize, policy: CalibrationPolicy
 ) -> _Side:
     camera = calibrate(lines, pitch, size, policy).camera
-    fits = measure(Calibration("lines", camera), drawn, pitch, size).markings
+    fits = measure(Calibration("lines", camera), drawn, policy.fitted(pitch), size).markings
     apart = {fit.marking: fit.largest_px for fit in fits if fit.largest_px is not None}
     return _Side(lines, {name: apart.get(name, np.inf) for name in sorted(drawn)})
 

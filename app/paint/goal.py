@@ -14,11 +14,10 @@ from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
 from app.soccer.annotation import Lines, make_lines
 from app.soccer.frames import ImagePoint
-from app.soccer.pitch import MARKINGS, Pitch
+from app.soccer.pitch import GOAL_PARTS, Pitch
 
 Image = npt.NDArray[np.uint8]
 
-PARTS = tuple(name for name in MARKINGS if name.startswith("Goal"))
 WORK_WIDTH = 960
 WINDOW_PX = 5.0
 """To either side that a part is sought, at ``WORK_WIDTH``, like the next two."""
@@ -45,15 +44,15 @@ def goal_lines(image: Image, camera: Camera, pitch: Pitch) -> Lines:
     Args:
         image: Red green blue, shape (H, W, 3).
         camera: On the paint of the picture.
-        pitch: The pitch.
+        pitch: The pitch; the middle of the frame of its goals is sought.
     """
     height, width = image.shape[:2]
     unit = max(width / WORK_WIDTH, 1.0)
     least = image.min(axis=2).astype(np.float32)
     level = np.asarray(cv2.GaussianBlur(least, (0, 0), SMOOTH_PX * unit), np.float32)
-    found = {}
-    for name in PARTS:
-        places = pitch.sample(name, 0.02, 0.02)
+    found, frame = {}, pitch.with_goal("middle")
+    for name in GOAL_PARTS:
+        places = frame.sample(name, 0.02, 0.02)
         pixels = camera.project(places, folded=True)
         inside = (pixels > 2.0).all(axis=1) & (pixels < [width - 3.0, height - 3.0]).all(axis=1)
         if np.count_nonzero(inside) < 2:

@@ -7,8 +7,9 @@ Metres, origin at the centre mark, x to the right goal, y to the touchline of th
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Literal
 
 import numpy as np
 
@@ -23,6 +24,8 @@ PENALTY_MARK_DISTANCE = 11.0
 CIRCLE_RADIUS = 9.15
 GOAL_WIDTH = 7.32
 GOAL_HEIGHT = 2.44
+FRAME_WIDTH = 0.12
+"""Of posts and crossbar: the Laws allow no more, and nobody builds less."""
 LENGTH_RANGE = (90.0, 120.0)
 WIDTH_RANGE = (45.0, 90.0)
 
@@ -55,6 +58,7 @@ MARKINGS: tuple[str, ...] = (
     "Small rect. right top",
 )
 CIRCLES = ("Circle central", "Circle left", "Circle right")
+GOAL_PARTS = tuple(name for name in MARKINGS if name.startswith("Goal"))
 WITHOUT_GEOMETRY = ("Line unknown", "Goal unknown")
 
 
@@ -129,12 +133,22 @@ class Arc:
         return self.last - self.first >= 2 * math.pi - 1e-12
 
 
+GoalEdge = Literal["inner", "middle"]
+"""Which line along posts and crossbar stands for them: their inner edges, 7.32 x 2.44 m, as the
+public evaluator has it, or their middle, 7.44 x 2.50 m, where people click."""
+
+
 @dataclass(frozen=True)
 class Pitch:
-    """A pitch of the given size; everything else is fixed by the Laws of the Game."""
+    """A pitch of the given size; everything else is fixed by the Laws of the Game.
+
+    ``goal`` says which line of a goal's frame its markings are. It is no property of a pitch, so
+    nothing of it is stored: ``CalibrationPolicy.fitted`` chooses it where lines are fitted.
+    """
 
     length: float = 105.0
     width: float = 68.0
+    goal: GoalEdge = field(default="inner", repr=False, kw_only=True)
 
     def __post_init__(self) -> None:
         for name, value, (low, high) in (
@@ -147,7 +161,12 @@ class Pitch:
     @cached_property
     def shapes(self) -> dict[str, Segment | Arc]:
         """Geometry of each marking, by name."""
-        return _shapes(self.length / 2, self.width / 2)
+        beside = FRAME_WIDTH / 2 if self.goal == "middle" else 0.0
+        return _shapes(self.length / 2, self.width / 2, beside)
+
+    def with_goal(self, goal: GoalEdge) -> Pitch:
+        """The same pitch with that line of its goals."""
+        return self if goal == self.goal else replace(self, goal=goal)
 
     def sample(self, marking: str, spacing: float, circle_spacing: float) -> FloatArray:
         """Points along a marking, pitch frame, shape (N, 3).
@@ -180,7 +199,8 @@ def _sample_arc(arc: Arc, spacing: float) -> FloatArray:
     return np.column_stack([x, y, np.zeros_like(x)])
 
 
-def _shapes(half_length: float, half_width: float) -> dict[str, Segment | Arc]:
+def _shapes(half_length: float, half_width: float, beside: float) -> dict[str, Segment | Arc]:
+    """All shapes; those of goals lie ``beside`` their inner edges, metres."""
     shapes: dict[str, Segment | Arc] = {
         "Side line top": _grass((-half_length, -half_width), (half_length, -half_width)),
         "Side line bottom": _grass((-half_length, half_width), (half_length, half_width)),
@@ -209,9 +229,10 @@ def _shapes(half_length: float, half_width: float) -> dict[str, Segment | Arc]:
             (mark, 0.0), CIRCLE_RADIUS, facing - half_opening, facing + half_opening
         )
         # Posts are named as seen from the pitch.
-        post_left, post_right = -sign * GOAL_WIDTH / 2, sign * GOAL_WIDTH / 2
-        top_left = (goal_line, post_left, -GOAL_HEIGHT)
-        top_right = (goal_line, post_right, -GOAL_HEIGHT)
+        half, height = GOAL_WIDTH / 2 + beside, GOAL_HEIGHT + beside
+        post_left, post_right = -sign * half, sign * half
+        top_left = (goal_line, post_left, -height)
+        top_right = (goal_line, post_right, -height)
         crossbar = (top_right, top_left) if side == "left" else (top_left, top_right)
         shapes[f"Goal {side} crossbar"] = Segment(*crossbar)
         shapes[f"Goal {side} post left"] = Segment(top_left, (goal_line, post_left, 0.0))

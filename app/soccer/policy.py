@@ -5,11 +5,12 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import asdict, dataclass, field, fields, replace
 from functools import cached_property
 from typing import Any, Literal, TypeVar, get_args, get_type_hints
 
 from app.geometry.arrays import FloatArray
+from app.soccer.pitch import Pitch
 from app.soccer.solution import GAMMAS_PERCENT, GATES
 
 Pixels = TypeVar("Pixels", float, FloatArray)
@@ -112,6 +113,22 @@ class CalibrationPolicy:
     )
     """0: each one, as the public evaluator does. Stubs of a few pixels at the border of a picture
     are none that people draw. Not in the ``repr``: ``calibration_key`` knows it where it is set."""
+
+    goal: Literal["inner", "middle"] = _threshold(
+        "inner",
+        CALIBRATION,
+        "What people click of a goal's frame",
+        choices=("inner", "middle"),
+        later=True,
+        told=False,
+    )
+    """``inner``: the inner edges of posts and crossbar, as the public evaluator has them;
+    ``middle``: their middle, where people click. JaC asks for the inner edges in either case. Not
+    in the ``repr``: ``calibration_key`` knows it where it is the middle."""
+
+    def fitted(self, pitch: Pitch) -> Pitch:
+        """A pitch with the goals that lines are fitted to."""
+        return pitch.with_goal(self.goal)
 
     @cached_property
     def spelling(self) -> str:
@@ -234,9 +251,14 @@ def _asked(policy: Policy | CalibrationPolicy) -> dict[str, Any]:
 
 
 PAPER = Policy()
-STRICT = Policy(name="strict", min_parallax_degrees=5.0, max_sigma_m=0.5)
-TOUCHLINE = Policy(name="touchline", calibration=CalibrationPolicy(source="paint"))
-"""As ``paper``, with cameras from the paint of their pictures."""
+CLICKED = CalibrationPolicy(goal="middle")
+"""How the commands without a dataset calibrate: as ``paper``, with goals where people click them."""
+STRICT = Policy(name="strict", calibration=CLICKED, min_parallax_degrees=5.0, max_sigma_m=0.5)
+TOUCHLINE = Policy(
+    name="touchline", calibration=replace(CLICKED, source="paint", shortest_marking_px=5.0)
+)
+"""As ``paper``, with cameras from the paint of their pictures, goals where people click them, and
+stubs that nobody draws not counted as missing."""
 POLICIES = {policy.name: policy for policy in (PAPER, STRICT, TOUCHLINE)}
 
 

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from app.geometry.camera import Camera
 from app.soccer.finding import Finding
 from app.soccer.frames import Box, ImagePoint, height_above_grass
+from app.soccer.pitch import GoalEdge
 
 SOLVER_VERSION = "8"
 """Part of every solution's key; raised by one whenever a number changes."""
@@ -139,6 +140,7 @@ class Calibration:
         picture_covariance: Of a stretched or cropped picture: of the eight numbers of the camera as
             the picture was taken, the logarithm of the aspect and both shifts, 11 x 11, row by row.
             ``covariance`` is the nearest that eight numbers can say.
+        goal: Which line of the goals the distances are to; JaC is told by their inner edges.
     """
 
     source: str
@@ -153,6 +155,7 @@ class Calibration:
     picture: Picture | None = None
     paint: PaintFit | None = field(default=None, metadata={"later": True})
     picture_covariance: tuple[float, ...] | None = field(default=None, metadata={"later": True})
+    goal: GoalEdge = field(default="inner", metadata={"later": True})
 
     @property
     def is_known(self) -> bool:

@@ -9,7 +9,7 @@ camera calibration for sports", 2024.
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -20,7 +20,7 @@ from app.geometry.camera import Camera
 from app.geometry.polyline import clip_polyline, distance_to_polyline, inside_image
 from app.soccer.annotation import Lines
 from app.soccer.frames import ImageSize
-from app.soccer.pitch import MARKINGS, Pitch, twin_marking
+from app.soccer.pitch import GOAL_PARTS, MARKINGS, Pitch, twin_marking
 
 SPACING_M = 0.9
 CIRCLE_SPACING_M = 0.2
@@ -48,18 +48,21 @@ class ProjectedMarking:
         return float(np.hypot(*np.diff(self.polyline, axis=0).T).sum())
 
 
-def project_markings(camera: Camera, pitch: Pitch, size: ImageSize) -> dict[str, FloatArray]:
+def project_markings(
+    camera: Camera, pitch: Pitch, size: ImageSize, names: tuple[str, ...] = MARKINGS
+) -> dict[str, FloatArray]:
     """The visible markings as clipped polylines, in the order of ``MARKINGS``.
 
     Args:
         camera: In the pitch frame.
         pitch: Its size, metres.
         size: Of the picture, pixels.
+        names: The markings to look for.
 
     Returns:
         Of each marking that is seen its places in the picture, pixels, shape (N, 2).
     """
-    samples, limits = _samples(pitch)
+    samples, limits = _samples(pitch, names)
     pixels = camera.project(samples, folded=True)
     seen = inside_image(pixels, size.width, size.height)
     return {
@@ -83,6 +86,31 @@ def measure_markings(projected: dict[str, FloatArray], lines: Lines) -> dict[str
             apart, nearest = distance_to_polyline(np.array(lines[marking]), polyline)
         measured[marking] = ProjectedMarking(polyline, apart, nearest)
     return measured
+
+
+def evaluated(
+    camera: Camera,
+    pitch: Pitch,
+    size: ImageSize,
+    lines: Lines,
+    measured: Mapping[str, ProjectedMarking],
+) -> dict[str, ProjectedMarking]:
+    """Visible markings as the public evaluator has them: its goals are their inner edges.
+
+    Args:
+        camera: In the pitch frame.
+        pitch: The pitch with the goals that ``measured`` is about.
+        size: Of the picture, pixels.
+        lines: The annotated points of each marking, pixels.
+        measured: Of ``measure_markings`` for that pitch.
+    """
+    judged = pitch.with_goal("inner")
+    if judged == pitch:
+        return dict(measured)
+    projected = project_markings(camera, judged, size, GOAL_PARTS)
+    goals = measure_markings(projected, lines)
+    both = {name: one for name, one in measured.items() if name not in GOAL_PARTS} | goals
+    return {name: both[name] for name in MARKINGS if name in both}
 
 
 def outcomes(
@@ -139,7 +167,7 @@ def camera_jaccard(
     *,
     symmetric: bool = False,
 ) -> tuple[float, ...]:
-    """JaC of a camera at each threshold.
+    """JaC of a camera at each threshold, by the evaluator's goals whatever those of the pitch.
 
     Args:
         camera: The camera to measure.
@@ -150,7 +178,7 @@ def camera_jaccard(
         symmetric: Benchmark mode: the better of the labels as given and turned by 180 degrees.
             Never for curation, where a wrong side is an error to be found.
     """
-    projected = project_markings(camera, pitch, size)
+    projected = project_markings(camera, pitch.with_goal("inner"), size)
     measured = measure_markings(projected, lines)
     values = tuple(jaccard(outcomes(measured, lines, gamma)) for gamma in gammas_px)
     if not symmetric:
@@ -162,9 +190,11 @@ def camera_jaccard(
 
 
 @lru_cache(maxsize=8)
-def _samples(pitch: Pitch) -> tuple[FloatArray, tuple[tuple[str, int, int], ...]]:
+def _samples(
+    pitch: Pitch, names: tuple[str, ...] = MARKINGS
+) -> tuple[FloatArray, tuple[tuple[str, int, int], ...]]:
     parts, limits, count = [], [], 0
-    for marking in MARKINGS:
+    for marking in names:
         part = pitch.sample(marking, SPACING_M, CIRCLE_SPACING_M)
         parts.append(part)
         limits.append((marking, count, count + len(part)))

@@ -52,5 +52,5 @@ def error_without(
     if camera is None:
         return None
     problem = ResectionProblem.of(size, policy)
-    seen = observe(make_lines({marking: lines[marking]}), pitch, size)
+    seen = observe(make_lines({marking: lines[marking]}), policy.fitted(pitch), size)
     return float(problem.distances(problem.parameters(camera), seen).max())

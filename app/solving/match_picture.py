@@ -118,7 +118,7 @@ class _Seen:
     @staticmethod
     def of(frame: PictureFrame, policy: CalibrationPolicy) -> _Seen:
         problem = ResectionProblem.of(frame.size, policy)
-        observations = observe(frame.lines, frame.pitch, frame.size)
+        observations = observe(frame.lines, policy.fitted(frame.pitch), frame.size)
         return _Seen(problem, observations, problem.resect(observations).parameters)
 
     def at(self, warp: FloatArray) -> _Seen:

@@ -124,7 +124,7 @@ def estimate_pitch(
         DegenerateGeometryError: Too few frames show enough markings, or frames that nobody says
             are of one match show pitches of several sizes.
     """
-    pitch = Pitch()
+    pitch = policy.fitted(Pitch())
     seen = [_Seen.of(frames[index], pitch, policy) for index in choose_frames(frames)]
     if len(seen) < MIN_FRAMES:
         raise DegenerateGeometryError(
@@ -324,7 +324,7 @@ def _moved(pitch: Pitch, by: FloatArray) -> Pitch:
     ends = np.array([LENGTH_RANGE, WIDTH_RANGE])
     low, high = ends[:, 0] + _END_M / 2, ends[:, 1] - _END_M / 2
     length, width = np.clip(np.array([pitch.length, pitch.width]) + by, low, high).tolist()
-    return Pitch(length, width)
+    return replace(pitch, length=length, width=width)
 
 
 def _other(now: float, found: float | None, sigma: float | None) -> float | None:

@@ -110,7 +110,7 @@ class Rig:
         cameras: In the order of the rows of parameters.
         rays: Of the balls.
         times: Of the instants, frames, shape (F,).
-        pitch: The pitch.
+        pitch: The pitch, with the goals that lines are fitted to.
     """
 
     cameras: tuple[RigCamera, ...]
@@ -169,7 +169,8 @@ def make_rig(
         )
     for camera in sharing:
         _require_adjustable(camera)
-    rig = Rig(tuple(sharing), *_rays(sharing, frames, policy), pitch)
+    fitted = policy.calibration.fitted(pitch)
+    rig = Rig(tuple(sharing), *_rays(sharing, frames, policy), fitted)
     points = best_points(rig.start, rig.rays, np.inf)
     at = linearize(rig.start, points, rig.rays)
     apart = np.hypot(*at.residuals.T) * rig.rays.sigma

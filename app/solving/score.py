@@ -60,6 +60,7 @@ class Score:
 
 def score_frame(camera: Camera, lines: Lines, pitch: Pitch, size: ImageSize) -> FrameScore:
     """One camera against the lines of its frame, pixels of ``size``."""
+    pitch = pitch.with_goal("inner")
     measured = measure_markings(project_markings(camera, pitch, size), lines)
     jac = tuple(
         jaccard(outcomes(measured, lines, gamma / 100 * size.diagonal)) for gamma in GAMMAS_PERCENT

@@ -23,7 +23,7 @@ def view_line_noise(
         DegenerateGeometryError: It has no camera, or its lines leave that open.
     """
     problem, parameters = _at(calibration, size, policy)
-    return problem.line_noise(parameters, observe(lines, pitch, size))
+    return problem.line_noise(parameters, observe(lines, policy.fitted(pitch), size))
 
 
 def view_line_evidence(
@@ -35,7 +35,7 @@ def view_line_evidence(
         DegenerateGeometryError: It has no camera, or its lines leave that open.
     """
     problem, parameters = _at(calibration, size, policy)
-    rows = problem.noise_rows(parameters, observe(lines, pitch, size))
+    rows = problem.noise_rows(parameters, observe(lines, policy.fitted(pitch), size))
     return line_evidence(*rows).in_units(problem.unit)
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from app.soccer.frames import height_above_grass
 from app.soccer.group import Group
-from app.soccer.solution import BallFit, Gate, Pair, Solution, ViewSolution
+from app.soccer.solution import BallFit, Gate, Solution, ViewSolution
 
 
 @dataclass(frozen=True)
@@ -20,9 +20,10 @@ class SolutionSummary:
             threshold (``solution.margin_of``), negative when it fails.
         value: The margin without its sign: how close the group is to passing, or to failing.
             Where it is small, a small mistake decides.
-        min_jac: The lowest JaC of the views at the policy's gamma.
-        error_px: The largest reprojection error of the ball, or, without a ball, that of the
-            best pair; ``error_percent`` the same in per cent of the diagonal.
+        min_jac: The lowest JaC of the views at 0.5 %.
+        parallax_degrees: Of the ball, like ``sigma_m`` and ``height_m``.
+        error_px: The larger reprojection error of the best pair, which the gate of that name judges;
+            ``error_percent`` the same in per cent of the diagonal.
         size_ratio: Annotated over optimised diameter, the one farthest from 1.
         findings: Kinds, each once.
         distance_m: Of the ball from the camera of the first view that it comes from.
@@ -63,7 +64,7 @@ def summarize(group: Group, solution: Solution) -> SolutionSummary:
         error_px=error_px,
         error_percent=error_percent,
         sigma_m=_finite(ball.sigma_m) if ball else None,
-        parallax_degrees=ball.parallax_degrees if ball else _parallax(solution.pairs),
+        parallax_degrees=ball.parallax_degrees if ball else None,
         size_ratio=_size_ratio(solution),
         height_m=height_above_grass(ball.point[2]) if ball else None,
         findings=tuple(dict.fromkeys(finding.kind for finding in solution.findings)),
@@ -126,24 +127,15 @@ def _agreement(group: Group, solution: Solution) -> float | None:
 
 
 def _error(group: Group, solution: Solution) -> tuple[float | None, float | None]:
-    fits = [fit for fit in _fits(solution) if fit.error_percent is not None]
-    if fits:
-        worst = max(fits, key=lambda fit: fit.error_percent or 0.0)
-        return worst.error_px, worst.error_percent
-    ranked = sorted(_pair_error(group, pair) for pair in solution.pairs)
-    if not ranked or not math.isfinite(ranked[0][0]):
-        return None, None
-    return ranked[0][1], ranked[0][0]
-
-
-def _pair_error(group: Group, pair: Pair) -> tuple[float, float]:
-    errors = []
-    for key, error in zip((pair.a, pair.b), pair.errors_px, strict=True):
-        view = group.view(key)
-        diagonal = view.size.diagonal if view else math.nan
-        percent = 100.0 * error / diagonal
-        errors.append((percent if math.isfinite(percent) else math.inf, error))
-    return max(errors)
+    """What the gate of the reprojection judges, in pixels and in per cent of its view's diagonal."""
+    judged = (gate.value for gate in solution.gates if gate.name == "reprojection")
+    error = next(judged, None)
+    for pair in solution.pairs:
+        for key, apart in zip((pair.a, pair.b), pair.errors_px, strict=True):
+            view = group.view(key)
+            if apart == error and view is not None:
+                return error, 100.0 * apart / view.size.diagonal
+    return _finite(error), None
 
 
 def _fits(solution: Solution) -> list[BallFit]:
@@ -152,10 +144,6 @@ def _fits(solution: Solution) -> list[BallFit]:
         return []
     views = (view for view in solution.views if view.view in solution.ball.views)
     return [view.ball for view in views if view.ball is not None]
-
-
-def _parallax(pairs: tuple[Pair, ...]) -> float | None:
-    return max((pair.parallax_degrees for pair in pairs), default=None)
 
 
 def _size_ratio(solution: Solution) -> float | None:

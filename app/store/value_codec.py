@@ -88,6 +88,8 @@ def _compiled(hint: Any) -> Codec:
         return _optional_codec(arguments)
     if origin is tuple:
         return _tuple_codec(arguments)
+    if origin is typing.Literal:
+        return _same, _same
     raise TypeError(f"no codec for {hint}")
 
 

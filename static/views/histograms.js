@@ -7,7 +7,7 @@ import { useState } from 'preact/hooks';
 import { withValue } from '../lib/field.js';
 import { plural } from '../lib/format.js';
 import { rangeOf, withField } from '../state/query.js';
-import { summary } from '../state/queue.js';
+import { queue, summary } from '../state/queue.js';
 import { BinAxis, endsOf, noneOf, short } from './bin_axis.js';
 
 /** @import {Histogram} from '../api/types.js' */
@@ -15,7 +15,7 @@ import { BinAxis, endsOf, noneOf, short } from './bin_axis.js';
 const COLUMNS = [
 	{ name: 'jac', field: 'jac', label: 'min JaC 0.5 %', title: 'The lowest share of field lines that fit, of the views of a group' },
 	{ name: 'agreement', field: 'agreement', label: 'paint agrees', title: 'The least agreement of a camera with the paint of its picture, of the views of a group: supported times explained' },
-	{ name: 'error_percent', field: 'error_percent', label: 'ball error, %', title: 'Reprojection error of the ball, in per cent of the picture’s diagonal; logarithmic' },
+	{ name: 'error_percent', field: 'error_percent', label: 'ball error, %', title: 'Reprojection error of the best pair of views, in per cent of the picture’s diagonal; logarithmic' },
 	{ name: 'sigma', field: 'sigma', label: 'σ, m', title: 'Uncertainty of the ball’s position, metres; logarithmic' },
 	{ name: 'parallax', field: 'parallax', label: 'parallax, °', title: 'The largest angle between two rays to the ball' },
 	{ name: 'size_ratio', field: 'size_ratio', label: 'ball Ø ratio', title: 'Drawn diameter of the ball over the expected one' },
@@ -119,9 +119,11 @@ function OneHistogram({ column, data, q, onQuery }) {
 /** @param {{q: string, painted: boolean, onQuery: (q: string) => void}} props `painted`: cameras are found from paint */
 export function Histograms({ q, painted, onQuery }) {
 	const histograms = summary.value?.histograms ?? {};
+	const failed = queue.value.error !== null;
 	return html`
 		${COLUMNS.filter(({ name }) => painted || name !== 'agreement').map((column) => {
 			const data = histograms[column.name];
+			if (!data && failed) return html`<section key=${column.name} class="card histogram" aria-label=${column.label} data-known="false"><h2>${column.label}</h2><p class="histogram__none">Not counted: the query fails.</p></section>`;
 			return data
 				? html`<${OneHistogram} key=${column.name} column=${column} data=${data} q=${q} onQuery=${onQuery} />`
 				: html`<section key=${column.name} class="card histogram" aria-busy="true"><h2>${column.label}</h2><svg></svg><p class="bin-axis">–</p></section>`;

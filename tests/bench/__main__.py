@@ -15,10 +15,12 @@ from tests.bench.ball_noise import bench_ball_noise
 from tests.bench.browser import bench_browser
 from tests.bench.calibration import bench_calibration
 from tests.bench.geometry import bench_geometry
+from tests.bench.goals import bench_goals
 from tests.bench.line_coverage import bench_line_coverage
 from tests.bench.listeners import bench_listeners
 from tests.bench.page_loads import bench_page_loads
 from tests.bench.paint import bench_paint
+from tests.bench.people import bench_people
 from tests.bench.picture_power import bench_picture_power
 from tests.bench.pictures import bench_pictures
 from tests.bench.pitches import bench_pitches
@@ -45,10 +47,13 @@ def main() -> None:
     bench_geometry()
     if (REAL_DATA / "sn22-dev" / "lines.zip").is_file():
         bench_calibration(REAL_DATA)
+        bench_goals(REAL_DATA)
     else:
         print(f"\nCalibration on real lines: no data in {REAL_DATA}, left out")
     if (REAL_DATA / "issia-lines").is_dir():
         bench_rigs(REAL_DATA)
+    if (REAL_DATA / "issia").is_dir():
+        bench_people(REAL_DATA)
     bench_paint(REAL_DATA)
     bench_propose(REAL_DATA)
     bench_requests()

@@ -7,9 +7,12 @@ import json
 import os
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from app.config import Settings
+from app.datasets.issia_reader import IssiaOptions, open_issia
+from app.datasets.report import Report
 from app.review.datasets.dataset import get_dataset
 from app.review.editing.recompute import solve_dataset
 from app.review.editing.state import GroupState, read_states
@@ -19,6 +22,7 @@ from app.review.queue.listing import list_ids
 from app.soccer.policy import PAPER
 from app.soccer.solution import Solution
 from app.store.store import Store
+from tests.bench.people import apart as people_apart
 from tests.homes import copy_home
 
 DATA = (
@@ -82,6 +86,18 @@ class TestSolve:
             item for item in solutions["1200"].findings if item.kind == "implausible_ball"
         ]
         assert finding.number == pytest.approx(10.2, abs=0.2)
+
+
+class TestPeople:
+    """Those of cameras 2 and 6 are mirrored in the files (``datasets.issia_people``)."""
+
+    @pytest.mark.parametrize("cameras", [(1, 2), (5, 6), (2, 4), (4, 6), (3, 4)])
+    def test_the_same_person_stands_at_one_place_in_two_cameras(self, cameras):
+        report = Report()
+        apart = people_apart(open_issia(DATA, IssiaOptions(), report), *cameras, 20)
+        assert len(apart) > 50
+        assert np.median(apart) < 2.0
+        assert [text for text in report.remarks if text.startswith("People of cam2 and cam6")]
 
 
 class TestExport:

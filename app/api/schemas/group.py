@@ -15,7 +15,6 @@ from app.review.editing.state import GroupState
 from app.soccer.choices import CalibrationChoice, VerdictState
 from app.soccer.frame_number import counts_time
 from app.soccer.group import Group, View, view_letter
-from app.soccer.pitch import Pitch
 from app.soccer.reasons import LeftOut
 
 
@@ -26,8 +25,11 @@ class DatasetName(Document):
     name: str
 
 
-class PitchSize(Document, shows=Pitch):
+class PitchSize(Document):
     """Length and width of the pitch, metres."""
+
+    length: float
+    width: float
 
 
 class VerdictDocument(Document):

@@ -42,9 +42,11 @@ class ImportOptions(BaseModel):
 
     model_config = ConfigDict(extra="forbid")
 
-    calibration: CalibrationChoice = Field(
-        default="given",
-        description="Which calibration counts where a view has a given camera and lines.",
+    calibration: CalibrationChoice | None = Field(
+        default=None,
+        description="Which calibration counts where a view has a given camera and lines; null: the "
+        "given one. Of `issia` and `issia-3d`, `given` leaves the lines of given cameras aside, "
+        "which otherwise measure them.",
     )
     frame_offset: Offset | dict[Camera, Offset] = Field(
         default=8, description="ISSIA: XGTF frame minus video frame, for all or by camera."
@@ -61,6 +63,11 @@ class ImportOptions(BaseModel):
         default="",
         description="COCO: name or id of the category that is the ball; empty: by names such as "
         "ball, sports_ball and soccer-ball.",
+    )
+    grouping: Annotated[str, Field(max_length=200)] = Field(
+        default="",
+        description="frames: which pictures are one group: `folder`, or a pattern of their names such "
+        "as `{instant}_{camera}.jpg`; empty: each picture is a group.",
     )
     lines: ImportPlace | None = Field(
         default=None, description="ISSIA: line files of the static cameras."

@@ -68,7 +68,10 @@ class GroupRow(Document):
         "the gate fails; null where there is no such share."
     )
     min_jac: float | None
-    error_px: float | None
+    error_px: float | None = Field(
+        description="Larger reprojection error of the best pair, as the gate `reprojection` judges "
+        "it, pixels; null where there is no pair to judge."
+    )
     error_percent: float | None
     sigma_m: float | None
     parallax_degrees: float | None

@@ -147,7 +147,8 @@ def _calibration(calibration: Calibration, pitch: Pitch, size: ImageSize) -> Cal
     """The document of a calibration, with its markings where they are seen."""
     seen = {}
     if calibration.camera is not None:
-        seen = project_markings(calibration.camera, pitch, size)
+        drawn = pitch.with_goal(calibration.goal)
+        seen = project_markings(calibration.camera, drawn, size)
     markings = [
         {
             **vars(fit),

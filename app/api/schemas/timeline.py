@@ -22,7 +22,7 @@ class TimelineDocument(BaseModel):
         description="Number of the video frame; null where the key of the group is none."
     )
     error_px: list[float | None] = Field(
-        description="The largest reprojection error of the ball, or of the best pair."
+        description="The larger reprojection error of the best pair, with or without a ball."
     )
     passes: list[bool | None] = Field(description="null while the group is not solved.")
     gate: list[str | None] = Field(description="The first failing gate.")

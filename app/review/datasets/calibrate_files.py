@@ -26,7 +26,7 @@ from app.soccer.finding import Finding
 from app.soccer.frames import ImageSize
 from app.soccer.picture import PictureGeometry
 from app.soccer.pitch import Pitch
-from app.soccer.policy import CalibrationPolicy
+from app.soccer.policy import CLICKED, CalibrationPolicy
 from app.soccer.solution import Calibration
 from app.solving.calibrate import calibrate
 from app.solving.calibration_findings import calibration_findings
@@ -105,7 +105,7 @@ def calibrate_files(
         files = as_taken(files, geometry)
     named = None if matches is None else read_matches(matches)
     sharing = guess or named is not None
-    policy = CalibrationPolicy(check_labels=labels == "checked")
+    policy = replace(CLICKED, check_labels=labels == "checked")
     chunks = [files[start : start + CHUNK] for start in range(0, len(files), CHUNK)]
     rounds = 2 if sharing else 1
 

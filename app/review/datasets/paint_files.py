@@ -37,7 +37,7 @@ from app.review.datasets.picture_files import PictureFile, UniqueNames, picture_
 from app.soccer.frames import ImageSize
 from app.soccer.paint_evidence import PROPOSAL_OUTCOMES
 from app.soccer.pitch import Pitch
-from app.soccer.policy import CalibrationPolicy
+from app.soccer.policy import CLICKED
 from app.soccer.solution import Calibration
 from app.solving.calibrate import calibrate
 
@@ -190,7 +190,7 @@ def _snap_picture(
     except ReviewError as error:
         return _row(frame, NOTHING, reason=error.message), None, None
     began = time.thread_time()
-    clicked = calibrate(lines, Pitch(), size, CalibrationPolicy())
+    clicked = calibrate(lines, Pitch(), size, CLICKED)
     if clicked.camera is None:
         return _row(frame, NOTHING, reason=clicked.reason), None, None
     field = field_of_play(picture.image)

@@ -15,7 +15,7 @@ from app.datasets.sn_calibration_reader import read_line_files
 from app.errors import DatasetFormatError, GeometryError
 from app.soccer.frames import ImageSize
 from app.soccer.picture import PictureGeometry
-from app.soccer.policy import CalibrationPolicy
+from app.soccer.policy import CLICKED
 from app.solving.match_picture import PictureEstimate, PictureFrame, estimate_match_picture
 
 
@@ -86,7 +86,7 @@ def as_taken(files: Sequence[LineFile], picture: PictureGeometry | None) -> list
 
 def _estimated(files: Sequence[LineFile], size: ImageSize) -> PictureEstimate:
     frames = [PictureFrame(file.lines, size) for file in files]
-    return estimate_match_picture(frames, CalibrationPolicy())
+    return estimate_match_picture(frames, CLICKED)
 
 
 def _values(found: PictureEstimate) -> dict[str, Any]:

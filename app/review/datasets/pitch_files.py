@@ -8,7 +8,7 @@ from typing import Any
 from app.datasets.report import Report
 from app.datasets.sn_calibration_reader import read_line_files
 from app.soccer.frames import ImageSize
-from app.soccer.policy import CalibrationPolicy
+from app.soccer.policy import CLICKED
 from app.solving.pitch_size import PitchFrame, estimate_pitch
 
 
@@ -23,7 +23,7 @@ def estimate_pitch_of_files(source: Path, *, size: ImageSize) -> dict[str, Any]:
     frames = [PitchFrame(file.lines, size) for file in read_line_files(source, size, report)]
     if not frames:
         raise report.refusal(f"{source} holds no line files")
-    found = estimate_pitch(frames, CalibrationPolicy())
+    found = estimate_pitch(frames, CLICKED)
     return {
         "length_m": found.length,
         "width_m": found.width,

@@ -12,6 +12,7 @@ from app.soccer.policy import CalibrationPolicy
 from app.soccer.solution import GAMMAS_PERCENT
 from app.solving.calibrate import calibrate_station, shortest_px
 from app.solving.jaccard import (
+    evaluated,
     jaccard,
     measure_markings,
     not_missing,
@@ -69,14 +70,15 @@ def _seen_by(
     camera: Camera, marking: str, station: Station, pitch: Pitch, policy: CalibrationPolicy
 ) -> tuple[tuple[float, ...], float | None]:
     """JaC of the other markings, and the largest distance of this one."""
-    measured = measure_markings(project_markings(camera, pitch, station.size), station.lines)
-    shortest = shortest_px(policy, station.size)
-    for short in not_missing(measured, station.lines, station.not_visible, shortest):
-        del measured[short]
+    pitch, size, lines = policy.fitted(pitch), station.size, station.lines
+    measured = measure_markings(project_markings(camera, pitch, size), lines)
+    judged = evaluated(camera, pitch, size, lines, measured)
+    for short in not_missing(judged, lines, station.not_visible, shortest_px(policy, size)):
+        del judged[short]
     values = []
     for gamma in GAMMAS_PERCENT:
-        found = outcomes(measured, station.lines, gamma / 100 * station.size.diagonal)
+        found = outcomes(judged, lines, gamma / 100 * size.diagonal)
         found.pop(marking, None)
         values.append(jaccard(found))
-    seen = measured.get(marking)
+    seen = measured.get(marking) or judged.get(marking)
     return tuple(values), None if seen is None else float(seen.distances.max())

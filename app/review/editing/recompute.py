@@ -5,10 +5,12 @@ Killed anywhere it loses nothing but the chunks in hand.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, field
 
+from app.plural import plural
 from app.progress import TellProgress
 from app.review.datasets.dataset import (
     DatasetHead,
@@ -17,6 +19,7 @@ from app.review.datasets.dataset import (
     read_dataset_head,
 )
 from app.review.datasets.fan_out import fan_out
+from app.review.editing.given_cameras import contradicted, sentence_of
 from app.review.editing.known import calibration_keys
 from app.review.editing.smaller_tau import retell_task, retell_tasks
 from app.review.editing.solve_encoded import Result, solve_encoded
@@ -42,6 +45,7 @@ from app.store.stations import read_stations, station_pitches
 from app.store.store import Store
 from app.store.stored_json import pack, unpack
 
+_AGAIN = "importing the files again with `--calibration given`"
 FIRST_CHUNK, CHUNK, CHUNK_HERE = 2, 40, 8
 """Groups a task: a second of work, or a few when lines must be calibrated. The first ones are
 small, so that a run that is killed early, again and again, comes to its end all the same. Without
@@ -50,28 +54,45 @@ other processes a chunk is what Ctrl+C has to wait for."""
 
 @dataclass
 class SolveReport:
-    """What was done; ``failed`` are groups whose solving itself broke, with the reason."""
+    """What was done.
+
+    Attributes:
+        failed: Groups whose solving itself broke, with the reason.
+        estimated: Matches whose pitch was estimated.
+        proposed: Matches of the dataset for which another pitch is proposed, then.
+        failing: How many of those that do not pass fail first at a gate, by its name.
+        advice: What to do about them; empty where nothing is known.
+    """
 
     total: int = 0
     solved: int = 0
     passed: int = 0
     failed: list[tuple[str, str]] = field(default_factory=list)
+    estimated: int = 0
+    proposed: int = 0
+    failing: Counter[str] = field(default_factory=Counter)
+    advice: str = ""
 
     @property
     def sentence(self) -> str:
-        """How many groups pass, how many do not, and how many could not be solved."""
-        return outcome_sentence(self.solved, self.passed, len(self.failed))
+        """How many groups pass, how many do not and why, and how many could not be solved."""
+        said = outcome_sentence(self.solved, self.passed, len(self.failed), self.failing)
+        return f"{said}. {self.advice}" if self.advice else said
 
 
-def outcome_sentence(solved: int, passed: int, errors: int) -> str:
-    """How many groups pass, how many do not, and how many could not be solved.
+def outcome_sentence(
+    solved: int, passed: int, errors: int, failing: Mapping[str, int] | None = None
+) -> str:
+    """How many groups pass, how many do not and at which gates, and how many could not be solved.
 
     Example:
-        >>> outcome_sentence(solved=60, passed=52, errors=1)
-        '52 pass, 8 do not; 1 error'
+        >>> outcome_sentence(solved=60, passed=52, errors=1, failing={"jac": 8})
+        '52 pass, 8 do not (first failing gate: jac 8); 1 error'
     """
-    rest = solved - passed
-    return f"{passed} pass, {rest} do not; {errors} error{'' if errors == 1 else 's'}"
+    ranked = sorted((failing or {}).items(), key=lambda item: -item[1])
+    gates = ", ".join(f"{gate} {count:,}" for gate, count in ranked)
+    why = f" (first failing gate: {gates})" if gates else ""
+    return f"{passed} pass, {solved - passed} do not{why}; {plural(errors, 'error')}"
 
 
 @dataclass(frozen=True)
@@ -124,6 +145,11 @@ def solve_dataset(
     tasks = (_task(store, found, chunk) for chunk in _chunks(ids, largest))
     for results in fan_out(solve_task, tasks, executor, stop):
         keep(results)
+    if report.failing["jac"]:
+        with store.read() as session:
+            off = contradicted(_shared(session, found.id), found.policy)
+        where = f"{report.failing['jac']:,} of {report.solved:,} groups fail first at the gate jac"
+        report.advice = sentence_of(off, where, _AGAIN) if off else ""
     return report
 
 
@@ -160,6 +186,8 @@ def _save(store: Store, results: Sequence[Result], report: SolveReport) -> None:
         refresh_queue(session, [key.group_id for key, _ in solutions])
     report.solved += len(solutions)
     report.passed += sum(item.passes for item in results)
+    gates = (item.solution.summary.gate for item in results if item.solution is not None)
+    report.failing.update(gate for gate in gates if gate is not None)
     report.failed += [(item.group, item.problem) for item in results if item.solution is None]
 
 

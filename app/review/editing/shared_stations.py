@@ -23,15 +23,24 @@ class SharedStations:
     """The shared stations of a dataset within one write transaction.
 
     ``changed`` names those that were there and changed, ``kept`` those with edits that stayed.
+    ``lines_left``: what comes without lines has none, and does not keep those of before.
     """
 
-    def __init__(self, session: Session, dataset_id: int, source: str, actor: str):
+    def __init__(
+        self,
+        session: Session,
+        dataset_id: int,
+        source: str,
+        actor: str,
+        *,
+        lines_left: bool = False,
+    ):
         self.changed: list[str] = []
         self.kept: list[str] = []
         self.ids: dict[str, int] = {}
         """By key."""
         self._session, self._dataset_id = session, dataset_id
-        self._source, self._actor = source, actor
+        self._source, self._actor, self._lines_left = source, actor, lines_left
         self._stored: dict[str, StoredStation] = {}
         self._seen: dict[str, Station] = {}
         for stored in shared_stations(session, dataset_id):
@@ -52,7 +61,8 @@ class SharedStations:
         if stored is None:
             self._insert(incoming)
             return
-        followed = follow_station(stored, incoming, self._source_of(stored))
+        source = self._source_of(stored)
+        followed = follow_station(stored, incoming, source, lines_left=self._lines_left)
         changed = followed.station != stored.station
         if changed or station_digest(followed.base) != stored.source_digest:
             self._save(stored, followed)

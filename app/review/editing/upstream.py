@@ -70,7 +70,11 @@ def follow_group(stored: StoredGroup, incoming: Group) -> Followed:
 
 
 def follow_station(
-    stored: StoredStation, incoming: Station, source: Station | None = None
+    stored: StoredStation,
+    incoming: Station,
+    source: Station | None = None,
+    *,
+    lines_left: bool = False,
 ) -> FollowedStation:
     """The stored station brought up to the incoming one, unless a person edited it.
 
@@ -82,8 +86,15 @@ def follow_station(
         stored: The station as it is.
         incoming: The station as the dataset brings it now.
         source: The station as the dataset brought it before, where that is known.
+        lines_left: Whether its lines were left aside on purpose.
     """
-    if incoming.shared and not incoming.lines and source is not None and source.lines:
+    if (
+        not lines_left
+        and incoming.shared
+        and not incoming.lines
+        and source is not None
+        and source.lines
+    ):
         incoming = replace(incoming, lines=source.lines, calibration=source.calibration)
     # Under an edit the stored camera may be a person's; that of the dataset is the source's.
     brought = stored.station if source is None else source

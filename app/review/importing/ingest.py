@@ -11,6 +11,7 @@ from pathlib import Path
 from app.datasets.report import Report
 from app.errors import ConflictError
 from app.object_store.address import is_address
+from app.plural import plural
 from app.progress import TellProgress
 from app.review.datasets.dataset import insert_dataset
 from app.review.datasets.paint_reading import outdated_where_people_moved
@@ -51,7 +52,7 @@ class IngestReport:
 
     Attributes:
         changed: Groups, and static cameras that many groups share.
-        findings: Edits that a changed source met.
+        findings: Edits that a changed source met, and pictures of another shape than declared.
         without_picture: Groups of which no view has a picture.
         missing: Groups that this source brought before and does not bring any more; they stay.
         problems: What to tell about single groups, or about the missing ones.
@@ -73,6 +74,7 @@ class Origin:
     dataset_id: int
     source: str
     actor: str
+    lines_left: bool = False
 
 
 def ingest(
@@ -86,6 +88,7 @@ def ingest(
     dry_run: bool = False,
     policy: Policy | None = PAPER,
     told: Report | None = None,
+    lines_left: bool = False,
 ) -> IngestReport:
     """Bring groups into a dataset, which the first of them makes when there is none of that name.
 
@@ -101,6 +104,8 @@ def ingest(
         progress: Called after each batch.
         dry_run: Dry run: report what would happen, change nothing.
         policy: Of a dataset that is made; None: as its first pictures suggest.
+        lines_left: Whether lines of static cameras that do not come were left aside, so that those of
+            an earlier import go.
         told: What the files hold; hears what of a group is left out, beyond its ``GroupLimits``.
     """
     report, seen, done = IngestReport(), set[str](), 0
@@ -109,7 +114,7 @@ def ingest(
     while batch := list(islice(sound, BATCH)):
         with attempt(store, keep=not dry_run) as session:
             identity = _ensure_dataset(session, dataset, actor, policy or first_policy(batch))
-            origin = Origin(identity, source, actor)
+            origin = Origin(identity, source, actor, lines_left)
             ingest_batch(session, origin, batch, report, stations)
         done += len(batch)
         if progress is not None:
@@ -168,7 +173,7 @@ def _note_missing(
         }
     report.missing = len(missing)
     if report.missing:
-        groups = "1 group" if report.missing == 1 else f"{report.missing} groups"
+        groups = plural(report.missing, "group")
         report.problems.append(f"{groups} of an earlier import did not come again; all stay")
     return missing
 
@@ -220,7 +225,9 @@ def ingest_batch(
             "this dataset holds one person's own annotations; nothing is imported into it",
             hint="Import into the dataset that they are of.",
         )
-    shared = SharedStations(session, origin.dataset_id, origin.source, origin.actor)
+    shared = SharedStations(
+        session, origin.dataset_id, origin.source, origin.actor, lines_left=origin.lines_left
+    )
     for group in batch:
         shared.follow(view.station for view in group.views)
     report.changed += len(set(shared.changed) - stations)

@@ -14,7 +14,7 @@ from app.datasets.coco_reader import read_coco
 from app.datasets.file_tree import Limits, Root
 from app.datasets.format_names import ImportFormat
 from app.datasets.frame_list import read_frame_list
-from app.datasets.frames_reader import read_frames
+from app.datasets.frames_reader import check_grouping, read_frames
 from app.datasets.gamestate_reader import read_gamestate
 from app.datasets.guess_format import guess_format, holds_videos_alone
 from app.datasets.issia_3d_reader import open_issia_3d
@@ -27,14 +27,17 @@ from app.datasets.sn_calibration_reader import read_sn_calibration
 from app.datasets.soccernet_v3_reader import read_soccernet_v3
 from app.datasets.soccernet_v3d_reader import read_soccernet_v3d
 from app.errors import DatasetFormatError, InputError
+from app.plural import plural
 from app.progress import TellProgress
 from app.review.importing.cameras import ingest_cameras
 from app.review.importing.ingest import IngestReport, ingest
 from app.review.importing.picture_check import PictureCheck
 from app.review.importing.spare import SpareFrame, ingest_spare
 from app.soccer.annotation import Extras
+from app.soccer.choices import CalibrationChoice
 from app.soccer.frames import ImageSize
 from app.soccer.group import Group
+from app.soccer.pitch import Pitch
 from app.soccer.policy import PAPER, Policy
 from app.store.image_header import check_size, read_header
 from app.store.store import Store
@@ -49,6 +52,7 @@ USERS: Mapping[str, tuple[str, ...]] = {
     "frame_offset": ("issia",),
     "flipped": STATIC,
     "ball_category": ("coco",),
+    "grouping": ("frames",),
     "frames": _OF_GROUPS,
     "policy": _OF_GROUPS,
 }
@@ -56,6 +60,7 @@ USERS: Mapping[str, tuple[str, ...]] = {
 _TYPED = {
     "ball_category": "--ball-category",
     "frame_offset": "--frame-offset",
+    "grouping": "--group-by",
     "flipped": "--flip",
 }
 
@@ -90,7 +95,7 @@ class BallTally:
             f'"{name[:40]}" ({count:,})' for name, count in self.classes.most_common(12)
         )
         boxes = f"; its boxes are of {most}" if most else ""
-        groups = "the 1 group" if self.groups == 1 else f"any of {self.groups:,} groups"
+        groups = f"{'the' if self.groups == 1 else 'any of'} {plural(self.groups, 'group')}"
         return f"no ball was read from {groups}{boxes}"
 
 
@@ -111,7 +116,8 @@ class Source:
         format: One of ``FORMATS``.
         path: Folder, zip or file.
         lines: ISSIA: folder of the line files of the static cameras.
-        calibration: Which calibration counts where there are both.
+        calibration: Which calibration counts where there are both: ``given``, as where nothing is
+            said, or ``lines``. Said of static cameras, ``given`` leaves the lines of given ones aside.
         frame_offset: ISSIA: number in the XGTF file minus number in video, also by camera.
         flipped: ISSIA: cameras whose frames are mirrored.
         size: Size of the annotated images, for formats that do not say it; None: the usual one. Of
@@ -120,18 +126,20 @@ class Source:
             the labels.
         name: What people call it; the log keeps it. Empty: the path.
         ball_category: COCO: name or id of the category that is the ball; empty: by its name.
+        grouping: Pictures: which are one group (``frames_reader``); empty: each is one.
     """
 
     format: str
     path: Root
     size: ImageSize | None = None
     lines: Root | None = None
-    calibration: str = "given"
+    calibration: CalibrationChoice | None = None
     frame_offset: int | Mapping[int, int] = 8
     flipped: frozenset[int] = frozenset()
     frames: Root | None = None
     name: str = ""
     ball_category: str = ""
+    grouping: str = ""
 
     def check(self, *, policy: bool = False) -> None:
         """Refuse an option that the format does not use.
@@ -140,8 +148,9 @@ class Source:
             policy: Whether a policy was named for the dataset.
 
         Raises:
-            InputError: Naming the option, and the formats that use it.
+            InputError: Naming the option, and the formats that use it; or the grouping is none.
         """
+        check_grouping(self.grouping)
         usual = Source(self.format, self.path)
         given = {
             name
@@ -335,8 +344,15 @@ def import_source(
         dry_run=dry_run,
         policy=policy,
         told=report,
+        lines_left=folder is not None and source.calibration == "given",
     )
     result.problems += check.remarks()
+    if dry_run or not result.new + result.changed + result.unchanged:
+        result.findings += len(check.found)
+    else:
+        result.findings += check.note(store, dataset)
+    if folder is not None and source.calibration is None:
+        _tell_contradicted(folder, dataset, source, report)
     if folder is not None and not dry_run:
         ingest_spare(store, dataset, _spare(folder), source=source.label, actor=actor)
     if source.format not in BALLS_ELSEWHERE and (sentence := tally.without_ball()):
@@ -351,7 +367,7 @@ def _size_of_picture(settings: Settings, data: bytes, name: str) -> ImageSize:
 
 
 def _groups(source: Source, settings: Settings, report: Report, limits: Limits) -> Iterator[Group]:
-    path, calibration = source.path, source.calibration
+    path, calibration = source.path, source.calibration or "given"
     match source.format:
         case "soccernet-v3":
             return read_soccernet_v3(path, report, limits)
@@ -370,7 +386,8 @@ def _groups(source: Source, settings: Settings, report: Report, limits: Limits) 
         case "parquet":
             return read_parquet(path, report, limits=limits)
         case "frames":
-            return read_frames(path, partial(_size_of_picture, settings), report, limits)
+            size_of = partial(_size_of_picture, settings)
+            return read_frames(path, size_of, report, limits, source.grouping)
         case _:
             size = source.size or DEFAULT_SIZE
             return read_sn_calibration(path, size, report, calibration=calibration, limits=limits)
@@ -386,6 +403,26 @@ def _static(source: Source, report: Report, limits: Limits) -> IssiaFolder:
     )
     read = open_issia if source.format == "issia" else open_issia_3d
     return read(source.path, options, report, limits)
+
+
+def _tell_contradicted(folder: IssiaFolder, dataset: str, source: Source, report: Report) -> None:
+    """Say of which static cameras the lines do not fit the given camera, and what to do."""
+    from app.review.editing.given_cameras import contradicted, sentence_of
+
+    stations = {station.key: number for number, station in folder.stations.items()}
+    off = contradicted(((one, Pitch()) for one in folder.stations.values()), PAPER)
+    showing = [folder.tracks[stations[key]].balls.keys() for key in off]
+    groups = {frame for track in folder.tracks.values() for frame in track.balls}
+    if not off:
+        return
+    lines = "" if source.lines is None else f" --lines {source.lines}"
+    command = (
+        f"touchline import {source.format} {source.path} --dataset {dataset}{lines} "
+        "--calibration given"
+    )
+    shown = len(set[int]().union(*showing))
+    where = f"{shown:,} of {len(groups):,} groups show {'it' if len(off) == 1 else 'one of them'}, and it fails there at the gate jac"
+    report.remark(sentence_of(off, where, f"`{command}`"))
 
 
 def _spare(folder: IssiaFolder) -> Iterator[SpareFrame]:

@@ -9,6 +9,7 @@ from typing import Any
 from app.config import Settings
 from app.datasets.file_tree import Root
 from app.errors import InputError, TooLargeError
+from app.plural import plural
 from app.progress import TellProgress
 from app.review.answers.keep import Keep, keep_nothing
 from app.review.datasets.dataset import get_dataset_head
@@ -49,7 +50,7 @@ class ImportRequest:
         lines: The same for ISSIA's line files, or None.
         frames: The same for a list of frames, or None.
         options: ``calibration``, ``frame_offset``, ``flipped``, ``size`` ([width, height]),
-            ``ball_category``.
+            ``ball_category``, ``grouping``.
         policy: Name of a shipped one for a dataset that is made; None: as its pictures suggest.
     """
 
@@ -246,7 +247,7 @@ def _following(
 def _step(progress: JobProgress, sentence: str) -> TellProgress:
     def step(done: int, _total: int | None = None, said: str = "") -> None:
         more = f" {said}" if said else ""
-        progress(done, None, f"{sentence}{more} {done:,} groups so far.")
+        progress(done, None, f"{sentence}{more} {plural(done, 'group')} so far.")
 
     return step
 
@@ -298,11 +299,12 @@ def source_of(settings: Settings, request: ImportRequest) -> Source:
         size=None if size is None else ImageSize(*size),
         lines=None if request.lines is None else _place(settings, request.lines)[0],
         frames=None if request.frames is None else _place(settings, request.frames)[0],
-        calibration=options.get("calibration", "given"),
+        calibration=options.get("calibration"),
         frame_offset=offset,
         flipped=frozenset(options.get("flipped", ())),
         name=name,
         ball_category=options.get("ball_category", ""),
+        grouping=options.get("grouping", ""),
     )
     source.check(policy=request.policy is not None)
     return source

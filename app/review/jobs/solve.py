@@ -208,4 +208,8 @@ def _report(report: SolveReport) -> Json:
         "passed": report.passed,
         "failed": len(report.failed),
         "failures": named,
+        "estimated": report.estimated,
+        "proposed": report.proposed,
+        "failing": dict(report.failing),
+        "advice": report.advice,
     }

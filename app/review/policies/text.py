@@ -24,7 +24,8 @@ _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9 ._+-]{0,79}")
 
 
 def policy_from_yaml(text: str) -> Policy:
-    """The policy that a YAML text describes; thresholds that it does not name are as in ``paper``.
+    """The policy that a YAML text describes; thresholds that it does not name are those of
+    the shipped policy of its name, else as in ``paper``.
 
     Raises:
         InputError: It is no plain YAML, or a field is unknown or impossible; ``pointer`` says
@@ -42,7 +43,7 @@ def policy_from_yaml(text: str) -> Policy:
     if not isinstance(value, dict):
         raise InputError("a policy in YAML consists of lines `name: value`")
     name = value.pop("name", CUSTOM)
-    return policy_with(PAPER, value, name=name)
+    return policy_with(POLICIES.get(str(name), PAPER), value, name=name)
 
 
 def unknown_policy(name: str, otherwise: str, *, pointer: str | None = None) -> InputError:

@@ -21,7 +21,7 @@ class Timeline:
 
     Attributes:
         frame: Number of the video frame where the key of the group is one, else None.
-        error_px: The largest reprojection error of the ball, or of the best pair without a ball.
+        error_px: The larger reprojection error of the best pair, with or without a ball.
         passes: None while the group is not solved.
         gate: The first failing gate.
         point: The 3D ball, pitch frame, metres, z down.

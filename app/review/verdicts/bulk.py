@@ -13,6 +13,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from app.errors import ConflictError
+from app.plural import plural
 from app.review.answers.keep import Keep, keep_nothing
 from app.review.answers.saved_progress import SavedProgress
 from app.review.queue.fields import asks_blind
@@ -213,7 +214,7 @@ def _left(rows: Sequence[Any], begun: Mapping[str, Any]) -> list[Any]:
 def _require_expected(found: SortedOut, expected: int | None) -> None:
     if expected is not None and expected != len(found.change):
         raise ConflictError(
-            f"{len(found.change)} groups would change, not {expected}",
+            f"{plural(len(found.change), 'group')} would change, not {expected}",
             hint="Look at what would happen once more (dry_run=true).",
         )
 

@@ -13,6 +13,7 @@ from app.datasets.sn_calibration import LineFile
 from app.datasets.sn_calibration_writer import write_line_files
 from app.review.editing.submit import load
 from app.soccer.picture import PictureGeometry
+from app.soccer.pitch import Pitch
 from app.store.store import Store
 from tests.cameras import SIZE, looking
 from tests.unit.commands.match_home import ingest_match
@@ -20,14 +21,18 @@ from tests.unit.solving.conftest import BEND, click
 
 Run = Callable[..., tuple[int, str, str]]
 MATCH, TRUE = "cup", PictureGeometry(1.06)
+PAPER, CLICKED = Pitch(), Pitch(goal="middle")
+"""With the goals that the policy of a new dataset fits, and those of the commands on files."""
 
 
-def frames() -> list[LineFile]:
+def frames(pitch: Pitch) -> list[LineFile]:
     """Four frames of one match whose pictures are 6 % too wide."""
     files = []
     for number in range(4):
         camera = looking((1.0, 62.0, -16.0), (-30.0 + 20.0 * number, -4.0, 0.0), 1300.0, bend=BEND)
-        files.append(LineFile(f"{number}", SIZE, click(TRUE.done(camera, SIZE), 0.7, number)))
+        files.append(
+            LineFile(f"{number}", SIZE, click(TRUE.done(camera, SIZE), 0.7, number, pitch))
+        )
     return files
 
 
@@ -35,7 +40,7 @@ def frames() -> list[LineFile]:
 def filled(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A home with that match as the dataset ``demo``."""
     home = tmp_path_factory.mktemp("filled")
-    ingest_match(home, MATCH, frames())
+    ingest_match(home, MATCH, frames(PAPER))
     return home
 
 
@@ -48,7 +53,7 @@ def run(touchline: Run) -> Run:
 class TestPicture:
     def test_of_line_files_is_one_estimate(self, run: Run, tmp_path: Path) -> None:
         lines, size = tmp_path / "lines", f"{SIZE.width}x{SIZE.height}"
-        write_line_files(lines, frames())
+        write_line_files(lines, frames(CLICKED))
         code, out, _ = run("picture", lines, "--size", size, "--json")
         found = json.loads(out)
         assert (code, found["frames"], found["changed"]) == (0, 4, True)
@@ -87,7 +92,7 @@ class TestPicture:
         assert (found, sentence in err) == (code, True)
 
     def test_a_file_of_something_else_is_refused(self, run: Run, tmp_path: Path) -> None:
-        write_line_files(tmp_path / "lines", frames())
+        write_line_files(tmp_path / "lines", frames(PAPER))
         (tmp_path / "other.json").write_text("[1]")
         code, _, err = run(
             "calibrate", tmp_path / "lines", tmp_path / "out", "--picture", tmp_path / "other.json"

@@ -7,14 +7,15 @@ import numpy as np
 import pytest
 
 from app.geometry.camera import Camera
-from app.paint.goal import PARTS, goal_lines
-from app.soccer.pitch import Pitch
+from app.paint.goal import goal_lines
+from app.soccer.pitch import GOAL_PARTS, Pitch
 from tests.cameras import looking
 
-PITCH = Pitch()
+PITCH = Pitch(goal="middle")
+"""Posts and bars are painted about their middle, and sought there whatever is fitted."""
 CAMERA = looking((35.0, 55.0, -12.0), (49.0, 0.0, 0.0), 1500.0)
 WIDTH, HEIGHT = 1280, 720
-RIGHT = tuple(name for name in PARTS if "right" in name.split()[1])
+RIGHT = tuple(name for name in GOAL_PARTS if "right" in name.split()[1])
 
 
 def picture(
@@ -40,7 +41,7 @@ def off(camera: Camera, part: str, points: np.ndarray) -> float:
 
 class TestGoalLines:
     def test_the_parts_that_are_seen_are_found_to_less_than_a_pixel(self) -> None:
-        found = goal_lines(picture(*RIGHT), CAMERA, PITCH)
+        found = goal_lines(picture(*RIGHT), CAMERA, Pitch())
         assert sorted(found) == sorted(RIGHT) and len(RIGHT) == 3
         for part, points in found.items():
             assert len(points) == 4

@@ -4,8 +4,10 @@ from typing import get_args
 import pytest
 
 from app.soccer.choices import PolicyName
+from app.soccer.pitch import Pitch, Segment
 from app.soccer.policy import (
     CALIBRATION,
+    CLICKED,
     PAPER,
     POLICIES,
     STRICT,
@@ -53,7 +55,10 @@ class TestHash:
 
     def test_a_threshold_that_came_later_changes_no_hash_until_it_asks_for_something(self):
         """Versions that are frozen must verify: these are the hashes of before."""
-        assert (PAPER.hash, STRICT.hash) == ("b6b4891b3d9960d2", "172d8def1c011aaa")
+        strict = Policy(name="strict", min_parallax_degrees=5.0, max_sigma_m=0.5)
+        assert (PAPER.hash, strict.hash) == ("b6b4891b3d9960d2", "172d8def1c011aaa")
+        clicked = replace(PAPER, calibration=CLICKED)
+        assert clicked.hash != PAPER.hash and clicked.calibration_hash != PAPER.calibration_hash
         assert replace(PAPER, point="best").hash != PAPER.hash
         assert replace(PAPER, min_p_value=0.001).hash != PAPER.hash
         assert replace(PAPER, min_agreement=0.4).hash != PAPER.hash
@@ -63,8 +68,16 @@ class TestHash:
         short = replace(PAPER, calibration=CalibrationPolicy(shortest_marking_px=5.0))
         assert short.hash != PAPER.hash and short.calibration_hash != PAPER.calibration_hash
         painted = replace(PAPER, calibration=CalibrationPolicy(source="paint"))
-        assert painted.hash == TOUCHLINE.hash != PAPER.hash
+        # What touchline was before it left stubs out.
+        assert painted.hash == "2e048fba4ca30dd4" not in (PAPER.hash, TOUCHLINE.hash)
         assert painted.calibration_hash != PAPER.calibration_hash
+
+    def test_the_paper_fits_the_inner_edges_of_goals_and_the_others_their_middle(self):
+        goals = {name: policy.calibration.goal for name, policy in POLICIES.items()}
+        assert goals == {"paper": "inner", "strict": "middle", "touchline": "middle"}
+        post = CLICKED.fitted(Pitch(100.0, 64.0)).shapes["Goal left post left"]
+        assert isinstance(post, Segment) and post.start == pytest.approx((-50.0, 3.72, -2.5))
+        assert PAPER.calibration.fitted(Pitch()) == Pitch()
 
     def test_sharing_positions_has_no_part_in_what_keys_calibrations(self):
         """Those that were kept before it came stay known; the position itself keys the others."""

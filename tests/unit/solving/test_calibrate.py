@@ -5,9 +5,11 @@ import pytest
 
 from app.soccer.annotation import make_lines
 from app.soccer.group import Station
-from app.soccer.pitch import Pitch
-from app.soccer.policy import POLICIES, CalibrationPolicy
+from app.soccer.pitch import GOAL_PARTS, Pitch
+from app.soccer.policy import CLICKED, POLICIES, CalibrationPolicy
 from app.solving.calibrate import calibrate, calibrate_station, calibration_key
+from app.solving.jaccard import camera_jaccard
+from app.solving.leave_one_out import error_without
 from tests.cameras import SIZE, looking
 from tests.unit.solving.conftest import BEHIND_GOAL, BEND, MAIN, OPPOSITE, PITCH, click
 
@@ -203,9 +205,13 @@ class TestNotMissing:
         ]
         assert jacs[0] == jacs[1] < 1.0 == jacs[2]
 
-    @pytest.mark.parametrize("policy", POLICIES.values(), ids=POLICIES.keys())
-    def test_every_policy_begins_as_the_public_evaluator_counts(self, policy):
-        assert policy.calibration.shortest_marking_px == 0.0
+    @pytest.mark.parametrize(
+        ("name", "shortest"), [("paper", 0.0), ("strict", 0.0), ("touchline", 5.0)]
+    )
+    def test_curation_leaves_stubs_out_and_the_paper_counts_as_the_public_evaluator(
+        self, name, shortest
+    ):
+        assert POLICIES[name].calibration.shortest_marking_px == shortest
 
     def test_the_key_knows_both_and_is_as_ever_without(self):
         plain = station_of(click(MAIN))
@@ -221,3 +227,58 @@ class TestNotMissing:
 
 def replace_point(point, down: float):
     return point._replace(y=point.y + down)
+
+
+class TestGoals:
+    """People click the middle of posts and bars; JaC asks for their inner edges."""
+
+    NEAR = looking((40.0, -30.0, -9.0), (50.0, 2.0, 0.0), 2200.0, bend=BEND)
+    """So near that 6 cm of a goal are several pixels."""
+    LINES = click(NEAR, pitch=PITCH.with_goal("middle"))
+
+    def errors(self, policy):
+        fits = calibrate(self.LINES, PITCH, SIZE, policy).markings
+        return [max(fit.distances_px) for fit in fits if fit.marking in GOAL_PARTS]
+
+    def test_the_middle_is_fitted_where_the_policy_says_so(self):
+        assert len(self.errors(CLICKED)) == 3
+        assert max(self.errors(CLICKED)) < 0.3
+        assert max(self.errors(POLICY)) > 1.5
+        off = [
+            np.linalg.norm(
+                calibrate(self.LINES, PITCH, SIZE, one).camera.position - self.NEAR.position
+            )
+            for one in (CLICKED, POLICY)
+        ]
+        assert off[0] < 0.05 < off[1]
+
+    @pytest.mark.parametrize("policy", [POLICY, CLICKED], ids=["inner", "middle"])
+    def test_jac_is_that_of_the_evaluator_whatever_is_fitted(self, policy):
+        found = calibrate(self.LINES, PITCH, SIZE, policy)
+        gammas = tuple(gamma / 100 * SIZE.diagonal for gamma in (0.5, 1.0, 2.0))
+        for pitch in (PITCH, PITCH.with_goal("middle")):
+            assert found.jac == camera_jaccard(found.camera, self.LINES, pitch, SIZE, gammas)
+
+    def test_near_goals_do_not_fit_the_evaluator_though_they_fit_the_camera(self):
+        # From here 6 cm of a goal are farther apart than the smallest gamma.
+        closer = looking((45.0, -12.0, -4.0), (52.5, 0.0, -1.2), 3500.0)
+        lines = click(closer, pitch=PITCH.with_goal("middle"))
+        found = calibrate_station(Station("a", SIZE, lines=lines, given=closer), PITCH, CLICKED)
+        goals = [fit for fit in found.markings if fit.marking in GOAL_PARTS and fit.distances_px]
+        assert "fp" in {fit.outcome for fit in goals}
+        assert max(fit.largest_px for fit in goals) < 0.1
+        assert found.goal == "middle"
+
+    def test_a_left_out_marking_is_predicted_by_what_is_fitted(self):
+        name = "Small rect. right main"
+        middle, inner = (
+            error_without(self.LINES, name, PITCH, SIZE, one) for one in (CLICKED, POLICY)
+        )
+        assert middle < 0.3 < inner
+        post = "Goal right post left"
+        assert error_without(self.LINES, post, PITCH, SIZE, CLICKED) < 0.3
+
+    def test_its_key_is_its_own(self):
+        station = Station("a", SIZE, lines=self.LINES)
+        keys = {calibration_key(station, PITCH, one) for one in (POLICY, CLICKED)}
+        assert len(keys) == 2

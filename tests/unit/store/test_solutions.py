@@ -208,7 +208,7 @@ class TestSummary:
 
     def test_numbers_come_from_the_ball_and_the_views_behind_it(self, group, solution) -> None:
         found = summarize(group, solution)
-        assert (found.error_px, found.error_percent, found.size_ratio) == (3.5, 0.25, 1.25)
+        assert found.size_ratio == 1.25
         assert (found.sigma_m, found.parallax_degrees, found.height_m) == (0.3, 75.0, 0.5)
         assert found.min_jac == 0.9
         assert found.findings == ("low_parallax", "bad_point")
@@ -225,13 +225,19 @@ class TestSummary:
         unseen = painted_views(solution, (PaintFit(None, None, 0, reason="no_frame"), None, None))
         assert summarize(group, unseen).agreement is None
 
-    def test_without_a_ball_the_best_pair_speaks(self, group, solution) -> None:
-        found = summarize(group, replace(solution, ball=None))
+    def test_the_error_is_that_of_the_gate_with_and_without_a_ball(self, group, solution) -> None:
+        judged = replace(solution.gates[1], value=3.5)
         diagonal = group.views[0].size.diagonal
-        assert found.error_px == 3.5
-        assert found.error_percent == pytest.approx(350 / diagonal)
-        assert found.parallax_degrees == 75.0
-        assert found.height_m is None
+        for ball in (solution.ball, None):
+            found = summarize(group, replace(solution, ball=ball, gates=(judged,)))
+            assert found.error_px == 3.5
+            assert found.error_percent == pytest.approx(350 / diagonal)
+        unjudged = summarize(group, replace(solution, gates=(replace(judged, value=None),)))
+        assert (unjudged.error_px, unjudged.error_percent) == (None, None)
+
+    def test_without_a_ball_there_is_no_parallax_of_it(self, group, solution) -> None:
+        found = summarize(group, replace(solution, ball=None))
+        assert (found.parallax_degrees, found.height_m) == (None, None)
 
     def test_a_group_without_anything_has_no_numbers(self, group) -> None:
         found = summarize(group, Solution((), (), None, ()))

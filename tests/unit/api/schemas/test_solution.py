@@ -13,8 +13,10 @@ from app.geometry.polyline import distance_to_polyline
 from app.review.editing.codec import edit_from_json
 from app.soccer.finding import Finding, Fix
 from app.soccer.group import Group
-from app.soccer.policy import PAPER
+from app.soccer.pitch import GOAL_PARTS
+from app.soccer.policy import PAPER, STRICT
 from app.soccer.solution import Calibration, Solution
+from app.solving.jaccard import project_markings
 from app.solving.solve import solve
 from tests.cameras import WIDE_LENSES, wide
 
@@ -62,6 +64,23 @@ class TestSolutionDocument:
         told = [SolutionDocument.of(solution, one).views[0] for one in (group, narrow, group)]
         drawn = [[fit.polyline for fit in one.calibration.markings] for one in told]
         assert drawn[0] == drawn[2] != drawn[1]
+
+    def test_goals_are_drawn_where_they_were_fitted(self, group: Group) -> None:
+        parts, drawn = set[str](), 0
+        for policy in (PAPER, STRICT):
+            pitch = policy.calibration.fitted(group.pitch)
+            solved = solve(group, policy)
+            for view, document in zip(
+                group.views, SolutionDocument.of(solved, group).views, strict=True
+            ):
+                camera = solved.view(view.key).calibration.camera
+                seen = project_markings(camera, pitch, view.size)
+                for fit in document.calibration.markings:
+                    if fit.marking in GOAL_PARTS and fit.polyline:
+                        assert np.allclose(fit.polyline, seen[fit.marking], atol=1e-3)
+                        parts.add(fit.marking)
+                        drawn += 1
+        assert drawn >= 2 * len(parts) > 0
 
     def test_where_no_camera_is_nothing_is_drawn(self, solution: Solution, group: Group) -> None:
         first = solution.views[0]

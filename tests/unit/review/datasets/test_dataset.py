@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from app.errors import InputError, NotFoundError
@@ -68,7 +70,8 @@ class TestSavePolicy:
             raise AssertionError("calibrated again")
 
         monkeypatch.setattr("app.solving.solve.calibrate_view", refuse)
-        change_policy(store, "demo", STRICT, if_match=None, actor="ann")
+        stricter = replace(STRICT, name="stricter", calibration=PAPER.calibration)
+        change_policy(store, "demo", stricter, if_match=None, actor="ann")
         assert solve_dataset(store, "demo").failed == []
 
     def test_back_to_a_policy_everything_is_solved_already(self, store, state) -> None:

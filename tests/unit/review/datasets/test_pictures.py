@@ -15,6 +15,7 @@ from app.errors import DatasetFormatError
 from app.review.datasets.calibrate_files import calibrate_files
 from app.review.datasets.pictures import estimate_picture_of_files, picture_for, read_picture
 from app.soccer.picture import PictureGeometry
+from app.soccer.pitch import Pitch
 from tests.cameras import SIZE, looking
 from tests.unit.solving.conftest import BEND, click
 
@@ -27,7 +28,7 @@ def write(folder: Path, aspect: float = 1.06, count: int = 4) -> list[LineFile]:
     for number in range(count):
         camera = looking(POSITION, (-30.0 + 20.0 * number, -4.0, 0.0), 1300.0, bend=BEND)
         shown = PictureGeometry(aspect).done(camera, SIZE)
-        files.append(LineFile(f"{number}", SIZE, click(shown, 0.7, number)))
+        files.append(LineFile(f"{number}", SIZE, click(shown, 0.7, number, Pitch(goal="middle"))))
     write_line_files(folder, files)
     return files
 

@@ -6,10 +6,12 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from PIL import Image
 from sqlalchemy import select
 
+from app.datasets import issia_people
 from app.datasets.cameras_writer import write_cameras
 from app.datasets.soccernet_v3_writer import write_soccernet_v3
 from app.errors import InputError
@@ -28,6 +30,7 @@ from app.soccer.group import Group
 from app.store.store import Store
 from app.store.tables.groups import GroupModel
 from app.store.tables.log import LogModel
+from tests.unit.datasets.test_issia_people import issia_folder
 
 SIZE = ImageSize(1280, 720)
 Fill = Callable[..., list[int]]
@@ -439,7 +442,7 @@ class TestCheck:
     def test_the_browser_offers_the_options_that_a_format_uses(self) -> None:
         text = Path("static/state/import_formats.js").read_text(encoding="utf-8")
         names = {"CALIBRATION": "calibration", "SIZE": "size", "OFFSET": "frame_offset"}
-        names |= {"FLIPPED": "flipped", "CATEGORY": "ball_category"}
+        names |= {"FLIPPED": "flipped", "CATEGORY": "ball_category", "GROUPING": "grouping"}
         offered = re.findall(
             r"name: '([a-z0-9-]+)', label: .*?, options: \[(.*?)\]( , lines|, lines)?", text
         )
@@ -454,3 +457,93 @@ class TestCheck:
         with pytest.raises(InputError, match="coco does not use --size"):
             import_source(store, "new", source, store.settings)
         assert list_datasets(store) == []
+
+
+class TestLinesOfAnotherDay:
+    """Lines of static cameras that do not fit the cameras that were given."""
+
+    @pytest.fixture
+    def source(self, tmp_path: Path) -> Source:
+        """Two cameras, both given, and lines that were drawn before they were moved."""
+        folder, lines = issia_folder(tmp_path / "issia"), tmp_path / "lines"
+        lines.mkdir()
+        for name in ("cam1", "cam2"):
+            points = [{"x": 100.0 + 90 * n, "y": 900.0 - 7 * n * n} for n in range(9)]
+            drawn = {"Middle line": points[:4], "Side line top": points[4:]}
+            (lines / f"{name}.json").write_text(json.dumps(drawn))
+        return Source("issia", folder, lines=lines)
+
+    def test_import_and_solve_say_what_does_not_pass_and_how_to_take_the_given(
+        self, store: Store, source: Source
+    ) -> None:
+        imported = import_source(store, "old", source, store.settings)
+        (told,) = [text for text in imported.report.remarks if "do not fit" in text]
+        assert told.startswith(
+            "The lines of cam1, cam2 do not fit the given cameras (JaC 0.00): 1 of 1"
+        )
+        assert (
+            f"`touchline import issia {source.path} --dataset old --lines {source.lines} "
+            "--calibration given` takes the given cameras"
+        ) in told
+        solved = solve_dataset(store, "old")
+        assert (solved.passed, solved.failing) == (0, {"jac": 1})
+        assert (
+            "0 pass, 1 do not (first failing gate: jac 1); 0 errors. The lines of"
+            in solved.sentence
+        )
+        assert "1 of 1 groups fail first at the gate jac" in solved.sentence
+        assert "importing the files again with `--calibration given`" in solved.sentence
+
+    def test_given_asked_for_leaves_them_aside_also_those_of_before(
+        self, store: Store, source: Source
+    ) -> None:
+        import_source(store, "old", source, store.settings)
+        given = replace(source, calibration="given")
+        for name in ("old", "new"):
+            imported = import_source(store, name, given, store.settings)
+            assert not [text for text in imported.report.remarks if "do not fit" in text]
+            solved = solve_dataset(store, name)
+            assert (solved.solved, solved.failing["jac"], solved.advice) == (1, 0, "")
+            (group,) = groups_of(store, name).values()
+            assert [(view.station.lines, view.station.calibration) for view in group.views] == [
+                ({}, "given"), ({}, "given"),
+            ]  # fmt: skip
+
+    def test_without_the_option_lines_of_an_earlier_import_stay(
+        self, store: Store, source: Source
+    ) -> None:
+        import_source(store, "old", source, store.settings)
+        import_source(store, "old", replace(source, lines=None), store.settings)
+        (group,) = groups_of(store, "old").values()
+        assert all(view.station.lines for view in group.views)
+
+
+class TestMirroredPeople:
+    """People of ISSIA's camera 2, who are mirrored in its files (``datasets.issia_people``)."""
+
+    def test_importing_again_mends_a_dataset_of_before_and_turns_nobody_twice(
+        self, store: Store, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        source = Source("issia", issia_folder(tmp_path / "issia"))
+
+        def people() -> list[list[float]]:
+            (group,) = groups_of(store, "old").values()
+            view = group.view("cam2")
+            assert view is not None
+            dataset = get_dataset(store, "old").id
+            with store.read() as session:
+                spare = [one for one in spare_frames(session, dataset) if one.camera == "cam2"]
+            every = (view.extras, *(one.extras for one in spare))
+            return [[box["points"]["x1"] for box in extras.boxes] for extras in every]
+
+        with monkeypatch.context() as before:
+            before.setattr(issia_people, "MIRRORED", frozenset())
+            import_source(store, "old", source, store.settings)
+        mirrored = people()
+        again = import_source(store, "old", source, store.settings)
+        assert again.result.changed == 1
+        right = [[1920 - 20.0 - x for x in frame] for frame in mirrored]
+        assert np.array(people()) == pytest.approx(np.array(right))
+        third = import_source(store, "old", source, store.settings)
+        assert (third.result.changed, third.result.unchanged) == (0, 1)
+        assert np.array(people()) == pytest.approx(np.array(right))

@@ -15,7 +15,24 @@ IMPORTED = {"new": 2, "changed": 1, "unchanged": 0, "skipped": [{}], "more_skipp
 YOLO = {"groups": 4, "labels": 8, "images": 0, "images_missing": 8}
 RESULTS = [
     ("solve", SOLVED, "60 groups solved: 52 pass, 8 do not; 0 errors."),
+    (
+        "solve",
+        {**SOLVED, "failing": {"jac": 7, "ball": 1}, "advice": "Look at cam3."},
+        "60 groups solved: 52 pass, 8 do not (first failing gate: jac 7, ball 1); 0 errors. Look at "
+        "cam3.",
+    ),
     ("solve", {**SOLVED, "solved": 0, "passed": 0}, "Nothing was left to solve."),
+    (
+        "solve",
+        {**SOLVED, "solved": 0, "passed": 0, "estimated": 4, "proposed": 1},
+        "The pitch of 4 matches was estimated: another size is proposed for 1 match.",
+    ),
+    (
+        "solve",
+        {**SOLVED, "estimated": 1, "proposed": 0},
+        "60 groups solved: 52 pass, 8 do not; 0 errors. The pitch of 1 match was estimated: no "
+        "other size is proposed.",
+    ),
     (
         "import",
         {**IMPORTED, "dry_run": False},
