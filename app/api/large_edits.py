@@ -13,18 +13,18 @@ from collections.abc import Callable, Mapping
 from concurrent.futures import CancelledError
 from typing import TypeVar
 
-from app.api.warm_child import WarmChild, least_busy
-from app.child import Allowance, ChildEnded
 from app.config import Settings
 from app.errors import OverloadedError
 from app.soccer.group import Group
 from app.soccer.policy import Policy
 from app.soccer.solution import Calibration
 from app.solving.warm import warm_up
+from app.worker_pool import WarmWorker, least_busy
+from app.worker_process import WorkerEnded, WorkerLimits
 
 Solved = TypeVar("Solved")
 
-ALLOWANCE = Allowance(memory=2 * 2**30, processor=60.0, silence=120.0)
+LIMITS = WorkerLimits(memory=2 * 2**30, processor=60.0, silence=120.0)
 """For one; the first one of a process may have to wait for kernels to be compiled."""
 NICENESS = 5
 
@@ -38,7 +38,7 @@ class LargeEdits:
 
     def __init__(self, settings: Settings):
         apart = settings.solves_apart
-        self.children = [WarmChild("large", ALLOWANCE, _ended, make_ready)] if apart else []
+        self.workers = [WarmWorker("large", LIMITS, _ended, make_ready)] if apart else []
 
     def run(
         self,
@@ -52,10 +52,10 @@ class LargeEdits:
         Raises:
             OverloadedError: The process ended.
         """
-        child = least_busy(self.children)
-        if child is None:
+        worker = least_busy(self.workers)
+        if worker is None:
             return work(group, policy, known)
-        task = child.submit(work, group, policy, known)
+        task = worker.submit(work, group, policy, known)
         try:
             found: Solved = task.future.result()
         except CancelledError as error:
@@ -67,8 +67,8 @@ class LargeEdits:
 
     def close(self) -> None:
         """End the process."""
-        for child in self.children:
-            child.close()
+        for worker in self.workers:
+            worker.close()
 
 
 def make_ready() -> None:
@@ -79,5 +79,5 @@ def make_ready() -> None:
     gc.freeze()
 
 
-def _ended(error: ChildEnded) -> OverloadedError:
+def _ended(error: WorkerEnded) -> OverloadedError:
     return OverloadedError(f"solving this {error}", hint="Nothing was saved. Try it again.")

@@ -22,10 +22,10 @@ from app.api.events import Counts
 from app.api.pages import ELSEWHERE
 from app.api.security.lanes import Doors
 from app.api.services import Services
-from app.child_figures import FIGURES
 from app.errors import StorageError
 from app.review.jobs.vitals import Home, read_home
 from app.store.store import Store
+from app.worker_process import COUNTS
 
 MAX_ADDRESSES = 2000
 """Whose routes are remembered: addresses hold names of datasets, too."""
@@ -106,7 +106,7 @@ class DatabaseCollector(Collector):
 
 
 class ProcessCollector(Collector):
-    """Reads the numbers of this process: its requests at work, its event streams, its children."""
+    """Reads the numbers of this process: its requests at work, its event streams, its worker processes."""
 
     def __init__(self, app: FastAPI, doors: Doors):
         self._app, self._doors = app, doors
@@ -120,7 +120,7 @@ class ProcessCollector(Collector):
         services: Services = self._app.state.services
         yield from self._lanes()
         yield from _streams(services.events.counts)
-        yield from _children()
+        yield from _workers()
 
     def _lanes(self) -> Iterator[Metric]:
         doors = self._doors.all
@@ -195,18 +195,18 @@ def _streams(counts: Counts) -> Iterator[Metric]:
     yield _counter("event_stream", text, "what", ended)
 
 
-def _children() -> Iterator[Metric]:
-    busy = {kind: figures.busy for kind, figures in FIGURES.items()}
-    yield _gauges("children_busy", "Tasks at work in processes of their own.", "kind", busy)
-    waiting = {kind: figures.waiting for kind, figures in FIGURES.items()}
-    yield _gauges("children_waiting", "Tasks that wait for such a process.", "kind", waiting)
+def _workers() -> Iterator[Metric]:
+    busy = {kind: counts.busy for kind, counts in COUNTS.items()}
+    yield _gauges("worker_busy", "Tasks at work in worker processes.", "kind", busy)
+    waiting = {kind: counts.waiting for kind, counts in COUNTS.items()}
+    yield _gauges("worker_waiting", "Tasks that wait for a worker process.", "kind", waiting)
     ended = CounterMetricFamily(
-        "touchline_children_ended",
-        "Such processes that ended in the midst of a task.",
+        "touchline_worker_ended",
+        "Worker processes that ended in the midst of a task.",
         labels=["kind", "reason"],
     )
-    for kind, figures in FIGURES.items():
-        for reason, number in figures.ended.items():
+    for kind, counts in COUNTS.items():
+        for reason, number in counts.ended.items():
             ended.add_metric([kind, reason], number)
     yield ended
 

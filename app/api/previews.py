@@ -16,12 +16,9 @@ from starlette.concurrency import run_in_threadpool
 
 from app.api.edits import preview_edits
 from app.api.large_edits import LargeEdits
-from app.api.pool_answer import while_wanted
 from app.api.schemas.preview import PreviewDocument, PreviewRequest
 from app.api.schemas.solution import SolutionDocument
 from app.api.security.lanes import PREVIEWS, is_large
-from app.api.warm_child import WarmChild, least_busy
-from app.child import Allowance, ChildEnded
 from app.config import Settings
 from app.errors import OverloadedError
 from app.log import log_to_stderr
@@ -32,8 +29,10 @@ from app.soccer.group import Group
 from app.solving.solve import solve
 from app.solving.warm import warm_up
 from app.store.store import Store
+from app.worker_pool import WarmWorker, least_busy
+from app.worker_process import WorkerEnded, WorkerLimits
 
-ALLOWANCE = Allowance(memory=2 * 2**30, processor=60.0, silence=120.0)
+LIMITS = WorkerLimits(memory=2 * 2**30, processor=60.0, silence=120.0)
 """For one preview; the first one of a process may have to wait for kernels to be compiled."""
 
 _stores: dict[str, Store] = {}
@@ -53,9 +52,8 @@ class Previews:
     def __init__(self, settings: Settings, store: Store, paint: PaintFollower, large: LargeEdits):
         self._settings, self._store, self._paint, self._large = settings, store, paint, large
         places = PREVIEWS.apart if settings.solves_apart else None
-        self.children = [
-            WarmChild("previews", ALLOWANCE, _ended, make_ready, settings)
-            for _ in range(places or 0)
+        self.workers = [
+            WarmWorker("previews", LIMITS, _ended, make_ready, settings) for _ in range(places or 0)
         ]
 
     async def answer(self, request: Request, group_id: int, changes: PreviewRequest) -> bytes:
@@ -68,10 +66,10 @@ class Previews:
             OverloadedError: The process ended.
         """
         large = is_large(request.scope)
-        child = least_busy(self._large.children if large else self.children)
-        if child is not None:
-            task = child.submit(solve_apart, self._settings, group_id, changes)
-            found: bytes | None = await while_wanted(request, task)
+        worker = least_busy(self._large.workers if large else self.workers)
+        if worker is not None:
+            task = worker.submit(solve_apart, self._settings, group_id, changes)
+            found: bytes | None = await task.result_unless(request.is_disconnected)
             if found is not None:
                 return found
             if await request.is_disconnected():
@@ -82,8 +80,8 @@ class Previews:
 
     def close(self) -> None:
         """End the processes."""
-        for child in self.children:
-            child.close()
+        for worker in self.workers:
+            worker.close()
 
 
 def make_ready(settings: Settings) -> None:
@@ -124,5 +122,5 @@ def _solve(
     return document.model_dump_json().encode()
 
 
-def _ended(error: ChildEnded) -> OverloadedError:
+def _ended(error: WorkerEnded) -> OverloadedError:
     return OverloadedError(f"this preview {error}", hint="Nothing was changed. Try it again.")

@@ -11,8 +11,7 @@ from starlette.responses import RedirectResponse, StreamingResponse
 from app.api.deps import etag_matches
 from app.config import Settings
 from app.object_store.address import split_address, unseal
-from app.object_store.refusal import ChangedObjectError
-from app.object_store.store import ObjectStore, Stored, open_store
+from app.object_store.store import ChangedObjectError, ObjectStore, Stored, open_store
 
 SECONDS = 60
 """How long a signed address is good."""

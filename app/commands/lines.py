@@ -62,7 +62,7 @@ def calibrate(
 ) -> None:
     """Calibrate line files (folder or zip) to camera files; needs no dataset."""
     from app.review.datasets.calibrate_files import calibrate_files
-    from app.review.workers.processes import process_pool
+    from app.review.workers.executors import process_pool
 
     named, shape = _file(matches, "--matches"), _file(picture, "--picture")
     pool = process_pool(workers or read_settings().workers)

@@ -55,7 +55,7 @@ def paint(
                     dataset,
                     None if match is None else [match],
                     actor=acting(),
-                    children=workers,
+                    workers=workers,
                     progress=progress,
                 )
     print_sentences(of_match(found.items, match), json_)

@@ -98,7 +98,7 @@ def _propose_for_views(
                 say(f"{name}{said}, {item['accepted']} accepted")
             return
         with show_progress("Proposing") as progress:
-            run = propose_views(store, dataset, matches, children=workers, progress=progress)
+            run = propose_views(store, dataset, matches, workers=workers, progress=progress)
     print_values(asdict(run), json_)
 
 

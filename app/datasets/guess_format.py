@@ -10,8 +10,8 @@ from pathlib import Path, PurePosixPath
 
 from app.datasets.frame_names import IMAGE_SUFFIXES, VIDEO_SUFFIXES, is_system_file
 from app.datasets.safe_path import MAX_PART
-from app.datasets.zip_names import first_names
 from app.object_store.path import StoredPath
+from app.zip_file import first_names
 
 MAX_NAMES = 2000
 """Names that are looked at; a large folder must not hold a request up."""

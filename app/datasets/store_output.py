@@ -19,9 +19,9 @@ from app.datasets.manifest import MANIFEST
 from app.datasets.output import MAX_MANIFEST, foreign, listed, output_tree, write_zip
 from app.durable import PARTIAL
 from app.errors import InputError, NotFoundError, StorageError, TooLargeError
-from app.nested_zip import open_zip_elsewhere
 from app.object_store.path import StoredPath
 from app.progress import TellProgress, told
+from app.zip_file import open_zip
 
 _CHUNK = 1024 * 1024
 
@@ -125,7 +125,7 @@ def _is_earlier_zip(out: StoredPath) -> bool:
     except NotFoundError:
         return True
     try:
-        with open_zip_elsewhere(present) as archive:
+        with open_zip(present) as archive:
             if archive.getinfo(MANIFEST).file_size > MAX_MANIFEST:
                 return False
             return set(archive.namelist()) <= listed(archive.read(MANIFEST))

@@ -10,9 +10,10 @@ from app.datasets.report import Report
 from app.datasets.safe_path import check_name, is_hidden
 from app.datasets.zip_tree import ZipTree
 from app.errors import DatasetFormatError, TooLargeError, UnsafePathError
-from app.object_store.path import RangeReads, StoredPath
+from app.object_store.path import StoredPath
 from app.object_store.store import Stored
 from app.soccer.media import Media
+from app.zip_file import FilePart
 
 STREAM = 4 * 1024**2
 """Bytes that are fetched at once of a file that is read from its beginning to its end."""
@@ -60,7 +61,8 @@ class StoreTree:
 
     def open(self, name: str) -> IO[bytes]:
         """The content as a stream."""
-        return io.BufferedReader(_Stream(self.path.of(self._get(name)).reads(STREAM)))
+        path = self.path.of(self._get(name))
+        return io.BufferedReader(FilePart(path.reads(STREAM).pread, 0, path.size))
 
     def shown(self, name: str) -> str:
         """Its address."""
@@ -86,22 +88,3 @@ class StoreTree:
         if stored is None:
             raise DatasetFormatError(self.shown(name), None, None, "is not in the store")
         return stored
-
-
-class _Stream(io.RawIOBase):
-    """An object from its beginning to its end."""
-
-    def __init__(self, reads: RangeReads):
-        super().__init__()
-        self._reads, self._at = reads, 0
-
-    def readable(self) -> bool:
-        """Always true."""
-        return True
-
-    def readinto(self, buffer: memoryview) -> int:  # type: ignore[override]
-        """Fill a buffer as far as the object goes."""
-        data = self._reads.pread(len(buffer), self._at)
-        buffer[: len(data)] = data
-        self._at += len(data)
-        return len(data)

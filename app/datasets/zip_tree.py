@@ -10,13 +10,12 @@ from dataclasses import replace
 from typing import IO
 
 from app.datasets.file_tree import BROKEN, Limits, Root, read_capped
-from app.datasets.lost_members import lost_members
 from app.datasets.report import Report
 from app.datasets.safe_path import check_name, is_hidden
 from app.errors import DatasetFormatError, UnsafePathError
-from app.nested_zip import UNREADABLE, open_nested, open_zip, open_zip_elsewhere
 from app.object_store.path import StoredPath
 from app.soccer.media import Media
+from app.zip_file import UNREADABLE, count_truncated, open_nested, open_zip
 
 _RATIO_FLOOR = 1024 * 1024
 _UTF_8 = 0x800
@@ -122,7 +121,7 @@ class ZipTree:
     def _checked(self, report: Report) -> dict[str, zipfile.ZipInfo]:
         members = self._archive.infolist()
         self._check_totals(members)
-        if lost := lost_members(self._archive):
+        if lost := count_truncated(self._archive):
             damage = (
                 f"has a damaged list of members: it should have {len(members) + lost:,} and has"
                 f" {len(members):,}; copy it again, or read the folder that it was made of"
@@ -191,7 +190,7 @@ def member_name(member: zipfile.ZipInfo) -> str:
 
 def _open_zip(path: Root) -> zipfile.ZipFile:
     try:
-        return open_zip_elsewhere(path) if isinstance(path, StoredPath) else open_zip(path)
+        return open_zip(path)
     except (*BROKEN, ValueError, UnicodeError) as error:
         problem = "is not a complete zip file; was it cut off while it was copied?"
         raise DatasetFormatError(str(path), None, None, problem) from error

@@ -163,7 +163,3 @@ class RangeReads:
         stored = self._path.stored
         assert stored is not None
         return self._path.store.read(stored.key, start, end, stored.etag)
-
-    def close(self) -> None:
-        """Let go of what was fetched."""
-        self._span = b""

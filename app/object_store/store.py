@@ -5,7 +5,9 @@ Every request has a time limit.
 
 from __future__ import annotations
 
+import configparser
 import importlib
+import re
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass
@@ -13,10 +15,9 @@ from datetime import timedelta
 from functools import lru_cache
 from typing import IO, TYPE_CHECKING, Any, cast
 
-from app.errors import NotFoundError, StorageError, TooLargeError
+from app.errors import InputError, NotFoundError, StorageError, TooLargeError
 from app.object_store.address import SCHEME
-from app.object_store.keys import read_keys
-from app.object_store.refusal import told
+from app.private_file import is_open_to_others
 
 if TYPE_CHECKING:
     from app.config import Settings, StoreSettings
@@ -28,6 +29,15 @@ PART_SECONDS = 120.0
 """Longest time that a part may take to be written."""
 LISTED = 1000
 """Objects that one request lists."""
+OPERATOR = "Ask the operator: touchline doctor says what is wrong with a store."
+_CODE = re.compile(r"<Code>(\w{1,60})</Code>")
+_KEYS_REFUSED = frozenset(
+    {"AccessDenied", "ExpiredToken", "InvalidAccessKeyId", "InvalidToken", "SignatureDoesNotMatch", "TokenRefreshRequired"}
+)  # fmt: skip
+
+
+class ChangedObjectError(NotFoundError):
+    """The object is not the one that was meant any more."""
 
 
 @dataclass(frozen=True)
@@ -102,7 +112,7 @@ class ObjectStore:
             NotFoundError: Nothing.
             StorageError: The store cannot be asked.
         """
-        with self._told(key):
+        with self._translated(key):
             return _stored(self._engine.head(self._store, key))
 
     def read(self, key: str, start: int, end: int, etag: str) -> bytes:
@@ -113,7 +123,7 @@ class ObjectStore:
             StorageError: The store cannot be asked, or ends in the midst of it.
         """
         options = {"range": (start, end), "if_match": etag}
-        with self._told(key):
+        with self._translated(key):
             data = bytes(self._engine.get(self._store, key, options=options).bytes())
         if len(data) != end - start:
             raise StorageError(f"{self.address(key)} came in part only", hint="Try again.")
@@ -131,7 +141,7 @@ class ObjectStore:
             TooLargeError: It is larger.
             NotFoundError, StorageError: As of ``read``.
         """
-        with self._told(key):
+        with self._translated(key):
             answer = self._engine.get(self._store, key, options={"if_match": etag} if etag else {})
             found = _stored(answer.meta)
             if found.size > limit:
@@ -147,7 +157,7 @@ class ObjectStore:
         Raises:
             StorageError: The store cannot be asked.
         """
-        with self._told(folder):
+        with self._translated(folder):
             for some in self._engine.list(self._store, folder or None, chunk_size=LISTED):
                 yield from map(_stored, some)
 
@@ -157,7 +167,7 @@ class ObjectStore:
         Raises:
             StorageError: The store cannot be asked.
         """
-        with self._told(folder):
+        with self._translated(folder):
             found = self._engine.list_with_delimiter(self._store, folder or None)
         names = [prefix.rsplit("/", 1)[-1] for prefix in found["common_prefixes"]]
         return names, [_stored(item) for item in found["objects"]]
@@ -168,7 +178,7 @@ class ObjectStore:
         Raises:
             StorageError: The store refuses.
         """
-        with self._told(key):
+        with self._translated(key):
             self._engine.put(self._slow, key, content)
 
     @contextmanager
@@ -184,7 +194,7 @@ class ObjectStore:
         Raises:
             StorageError: The store refuses.
         """
-        with self._told(key):
+        with self._translated(key):
             file = self._engine.open_writer(
                 self._slow,
                 key,
@@ -193,38 +203,38 @@ class ObjectStore:
                 max_concurrency=PARTS_AT_ONCE,
             )
         try:
-            yield cast(IO[bytes], _Written(file, lambda: self._told(key)))
+            yield cast(IO[bytes], _Written(file, lambda: self._translated(key)))
         except BaseException as error:
             # The parts that are there already are taken back, if the store can be asked.
             with suppress(OSError, self._engine.exceptions.BaseError):
                 file.__exit__(type(error), error, error.__traceback__)
             raise
-        with self._told(key):
+        with self._translated(key):
             file.close()
 
     def delete(self, key: str) -> None:
         """Delete an object; one that is gone already stays so."""
-        with self._told(key):
+        with self._translated(key):
             self._engine.delete(self._store, key)
 
     def signed(self, key: str, seconds: int) -> str:
         """An address of the store itself under which a browser gets an object for so long."""
-        with self._told(key):
+        with self._translated(key):
             return str(self._engine.sign(self._store, "GET", key, timedelta(seconds=seconds)))
 
-    def _told(self, key: str) -> AbstractContextManager[None]:
-        return told(self.name, self.address(key), self._engine.exceptions)
+    def _translated(self, key: str) -> AbstractContextManager[None]:
+        return translated_errors(self.name, self.address(key), self._engine.exceptions)
 
 
 class _Written:
     """What is written to an object; nothing is sent but parts of their full size, and the last one."""
 
-    def __init__(self, file: Any, told: Callable[[], AbstractContextManager[None]]):
-        self._file, self._told = file, told
+    def __init__(self, file: Any, translated: Callable[[], AbstractContextManager[None]]):
+        self._file, self._translated = file, translated
 
     def write(self, data: bytes) -> int:
         """Take some more bytes."""
-        with self._told():
+        with self._translated():
             return int(self._file.write(data))
 
     def flush(self) -> None:
@@ -275,3 +285,86 @@ def open_configured(name: str, settings: StoreSettings) -> ObjectStore:
 @lru_cache(maxsize=64)
 def _open(name: str, settings: StoreSettings, keys: tuple[str, ...] | None) -> ObjectStore:
     return ObjectStore(name, settings, keys)
+
+
+def read_keys(settings: StoreSettings) -> tuple[str, ...] | None:
+    """Access key, secret and token, or None of a public store.
+
+    They are read anew each time, for keys in a file are changed there.
+
+    Raises:
+        StorageError: The file of keys cannot be used.
+    """
+    if settings.anonymous:
+        return None
+    if settings.key_file is not None:
+        return _keys_of_file(settings)
+    given = (settings.key, settings.secret, settings.token)
+    return tuple("" if value is None else value.get_secret_value() for value in given)
+
+
+def _keys_of_file(settings: StoreSettings) -> tuple[str, ...]:
+    path, parser = settings.key_file, configparser.ConfigParser(interpolation=None)
+    assert path is not None
+    try:
+        if is_open_to_others(path.stat()):
+            raise StorageError(
+                "other users can read the file of a store's keys",
+                hint=f"Run chmod 600 {path.name}.",
+            )
+        parser.read_string(path.read_text("utf-8"))
+        section = parser[settings.profile]
+        return (
+            section["aws_access_key_id"],
+            section["aws_secret_access_key"],
+            section.get("aws_session_token", ""),
+        )
+    except (OSError, KeyError, UnicodeDecodeError, configparser.Error):
+        # The text of the file is in no message.
+        raise StorageError("the file of a store's keys cannot be read", hint=OPERATOR) from None
+
+
+@contextmanager
+def translated_errors(store: str, address: str, wrong: Any) -> Iterator[None]:
+    """Raise errors of the library as ours, in sentences without keys, buckets or endpoints.
+
+    Args:
+        store: Its name.
+        address: What it was asked for, as people call it.
+        wrong: The errors of the library that speaks to it.
+
+    Raises:
+        ChangedObjectError, NotFoundError: The object is another, or not there.
+        InputError: It cannot be the address of an object.
+        StorageError: The store cannot be asked, or refuses.
+    """
+    try:
+        yield
+    except FileNotFoundError as error:
+        raise NotFoundError(f"{address} is not in its store") from error
+    except wrong.PreconditionError as error:
+        raise ChangedObjectError(
+            f"{address} was changed in its store since it was imported",
+            hint="Import it again to take the new one, or put the old one back.",
+        ) from error
+    except (wrong.BaseError, OSError) as error:
+        raise _refusal(store, error, wrong) from error
+    except ValueError as error:
+        raise InputError(f"{address} cannot be the address of an object") from error
+
+
+def _refusal(name: str, error: Exception, wrong: Any) -> StorageError:
+    """The error of a store that cannot be asked."""
+    found = _CODE.search(str(error))
+    code = f" ({found[1]})" if found else ""
+    denied = isinstance(error, wrong.PermissionDeniedError | wrong.UnauthenticatedError)
+    if denied or (found and found[1] in _KEYS_REFUSED):
+        return StorageError(
+            f'the store "{name}" refuses the keys of this server{code}', hint=OPERATOR
+        )
+    if code:
+        return StorageError(f'the store "{name}" cannot do what it was asked{code}', hint=OPERATOR)
+    return StorageError(
+        f'the store "{name}" cannot be reached, or does not answer in time',
+        hint="Try again in a moment. " + OPERATOR,
+    )

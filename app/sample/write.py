@@ -16,7 +16,6 @@ from typing import TypeVar
 
 import cv2
 
-from app.child import spawned_pool
 from app.datasets.match_frames import ARCHIVE
 from app.datasets.soccernet_v3_writer import write_soccernet_v3
 from app.durable import PARTIAL
@@ -28,6 +27,7 @@ from app.sample.order import GROUPS, SEED
 from app.sample.render import render
 from app.sample.scenes import make_match
 from app.sample.truth import TRUTH, TruthWriter, truth_to_json
+from app.worker_process import spawned_pool
 
 JPEG_QUALITY = 85
 GROUPS_PER_JOB = 3

@@ -10,8 +10,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 from app.errors import ImageError, NotFoundError, StorageError, TooLargeError
-from app.nested_zip import nested_name, open_nested, open_zip, open_zip_elsewhere
 from app.object_store.path import StoredPath
+from app.zip_file import nested_name, open_nested, open_zip
 
 MAX_OPEN = 16
 
@@ -103,7 +103,7 @@ class Archives:
 
 def _open(path: _Place) -> zipfile.ZipFile:
     try:
-        return open_zip_elsewhere(path) if isinstance(path, StoredPath) else open_zip(path)
+        return open_zip(path)
     except (zipfile.BadZipFile, NotImplementedError, ValueError) as error:
         raise ImageError(f"{path.name} is no complete zip archive") from error
     except OSError as error:

@@ -20,20 +20,22 @@ from pathlib import Path
 from typing import IO, Any
 
 import pysqlite3.dbapi2
+from sqlalchemy import inspect, text
 
 from app.config import Settings
 from app.durable import PARTIAL, sync
-from app.errors import EXAMINE, InputError, StorageError
+from app.errors import EXAMINE, DamagedError, InputError, StorageError
 from app.finite import json_text
-from app.store.anchor import require_own_database
 from app.store.clock import now
-from app.store.dialect.dialect import dialect_of
+from app.store.dialect.dialect import dialect_in, dialect_of
 from app.store.engine import make_engine, reported
-from app.store.examination import examine_database
-from app.store.first_look import require_sound, signs_of_use
 from app.store.home import refused
 from app.store.leftovers import is_half_written
 from app.store.locks import DatabaseLock
+from app.store.log import verify_chain
+from app.store.recovery.anchor import Anchor, anchor_of, require_own_database
+from app.store.recovery.preopen_check import require_sound, signs_of_use
+from app.store.session import Session
 
 FORMAT, FORMAT_VERSION = "touchline-backup", 1
 DATABASE, MANIFEST = "touchline.db", "manifest.json"
@@ -42,6 +44,8 @@ FRAMES = ("uploads", "sample", "practice")
 EXPORTS = ("exports",)
 _CHUNK = 1 << 20
 _QUICK = 1
+_COUNTED = ("dataset", "groups", "view", "station", "verdict", "version", "solution", "log")
+"""Tables whose rows a backup counts."""
 
 
 @dataclass(frozen=True)
@@ -81,7 +85,7 @@ def back_up(settings: Settings, out: Path, folders: Sequence[str] = ()) -> Backu
         InputError: The home has no database, or it is a server's.
     """
     require_file(settings, "backed up", "pg_dump --format=custom --file=OUT DATABASE")
-    if not settings.database_file.exists() and not any(signs_of_use(settings)):
+    if not settings.database_file.exists() and not signs_of_use(settings):
         raise InputError(f"there is no database in {settings.home}", hint="Set TOUCHLINE_HOME.")
     lock = DatabaseLock(settings)
     try:
@@ -176,6 +180,51 @@ def verify_backup(path: Path) -> BackupManifest:
             f"{path} is damaged or no backup of Touchline ({error})", hint="Take another one."
         ) from error
     return manifest
+
+
+def examine_database(
+    settings: Settings, file: Path, known_as: Path
+) -> tuple[Anchor, dict[str, int]]:
+    """Look at every page of a database that nobody else has open, and at the log's hash chain.
+
+    Args:
+        settings: Any.
+        file: The database.
+        known_as: What complaints call it.
+
+    Returns:
+        What its anchor is, and its rows by table.
+
+    Raises:
+        DamagedError: Something is not as it was written.
+    """
+    own = settings.model_copy(update={"database_url": f"sqlite+pysqlite:///{file}"})
+    engine = make_engine(own)
+    try:
+        with reported(own), Session(engine) as session:
+            dialect, tables = dialect_in(session), set(inspect(session).get_table_names())
+            if "alembic_version" not in tables or "log" not in tables:
+                raise DamagedError(f"{known_as} is no database of Touchline", hint=EXAMINE)
+            if faults := dialect.file_faults(session, 3, thorough=True):
+                raise DamagedError(f"{known_as} is damaged: {'; '.join(faults)}", hint=EXAMINE)
+            if dialect.count_lost_references(session):
+                problem = f"{known_as} has rows that refer to rows that are gone"
+                raise DamagedError(problem, hint=EXAMINE)
+            verify_chain(session)
+            counts = {
+                name: session.execute(text(f"SELECT count(*) FROM {name}")).scalar_one()
+                for name in _COUNTED
+                if name in tables
+            }
+            return anchor_of(session) or _without_installation(session), counts
+    finally:
+        engine.dispose()
+
+
+def _without_installation(session: Session) -> Anchor:
+    schema = session.execute(text("SELECT version_num FROM alembic_version")).scalar_one()
+    last = session.execute(text("SELECT id, hash FROM log ORDER BY id DESC LIMIT 1")).first()
+    return Anchor("", "", schema, *(tuple(last) if last else (0, "")))
 
 
 def _require_place(out: Path, replace: bool) -> None:

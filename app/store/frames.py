@@ -19,9 +19,6 @@ from time import monotonic
 from typing import Any
 
 from app.canonical import digest_of
-from app.child import Allowance, ChildEnded
-from app.child_figures import FIGURES
-from app.child_pool import ChildPool, Explain, PoolTask
 from app.config import Settings
 from app.errors import (
     ImageError,
@@ -47,18 +44,20 @@ from app.store.media import (
 from app.store.neighbours import neighbours
 from app.store.object_frames import fetch_frame, is_kept, is_stored
 from app.store.video_index import Times, remember_index, remembered_index
+from app.worker_pool import Explain, PoolTask, WorkerPool
+from app.worker_process import COUNTS, WorkerEnded, WorkerLimits
 
-ALLOWANCE = Allowance(memory=1024 * 2**20, processor=10.0, silence=60.0)
+LIMITS = WorkerLimits(memory=1024 * 2**20, processor=10.0, silence=60.0)
 """For one picture: one of 50 megapixels takes a few hundred MiB and two seconds."""
-READING = Allowance(memory=2 * 2**30, processor=60.0, silence=180.0)
+READING = WorkerLimits(memory=2 * 2**30, processor=60.0, silence=180.0)
 """For reading what a picture shows; the first time it is compiled, which takes eleven seconds."""
 READERS = 2
 """Pictures that are read at once; apart from those that are made, so that nobody's view waits."""
-FETCHING = Allowance(memory=1024 * 2**20, processor=20.0, silence=120.0)
+FETCHING = WorkerLimits(memory=1024 * 2**20, processor=20.0, silence=120.0)
 """For one frame of an object store; the time that a store may take is a setting of it."""
 FETCHERS = 2
 """Frames that are fetched from stores at once; apart, so that a slow store delays no other frame."""
-INDEXING = Allowance(memory=1024 * 2**20, processor=3600.0, silence=3600.0)
+INDEXING = WorkerLimits(memory=1024 * 2**20, processor=3600.0, silence=3600.0)
 """For decoding a whole video once, so that its frames are found: 1080p takes 4 ms a frame."""
 INDEXERS = 1
 UNKEPT = 8
@@ -68,9 +67,9 @@ TELL_SECONDS = 1.0
 WAITING = 64
 """Pictures that may wait; one more is told to come back."""
 REMEMBERED = 256
-"""Frames that went beyond the allowance and are not tried again, in whatever width."""
+"""Frames that went beyond the limits and are not tried again, in whatever width."""
 REMEMBERED_SECONDS = {"memory": inf, "processor": inf, "silence": 300.0}
-"""How long, by the way in which a frame went beyond the allowance: a busy machine is silent, too.
+"""How long, by the way in which a frame went beyond the limits: a busy machine is silent, too.
 Whatever else ends a process is the machine's doing, and the frame is tried again."""
 
 
@@ -99,11 +98,11 @@ class Frames:
 
     def __init__(self, settings: Settings):
         self._settings = settings
-        self._pool = ChildPool(
-            ALLOWANCE, settings.image_workers, WAITING, "pictures", FIGURES["pictures"]
+        self._pool = WorkerPool(
+            LIMITS, settings.image_workers, WAITING, "pictures", COUNTS["pictures"]
         )
-        self._readers = ChildPool(READING, READERS, WAITING, "pictures", FIGURES["readers"])
-        self._fetchers = ChildPool(FETCHING, FETCHERS, WAITING, "pictures", FIGURES["fetchers"])
+        self._readers = WorkerPool(READING, READERS, WAITING, "pictures", COUNTS["readers"])
+        self._fetchers = WorkerPool(FETCHING, FETCHERS, WAITING, "pictures", COUNTS["fetchers"])
         self._videos = VideoIndexer(settings)
         self._refused: OrderedDict[str, tuple[ReviewError, float]] = OrderedDict()
         self._lock = threading.Lock()
@@ -117,7 +116,7 @@ class Frames:
 
         Raises:
             NotFoundError: The file is not there.
-            TooLargeError: It was tried before, and went beyond the allowance.
+            TooLargeError: It was tried before, and went beyond the limits.
         """
         self._require_untried(media)
         data = cached_frame(media, width, flipped, self._settings)
@@ -156,7 +155,7 @@ class Frames:
     def ask_neighbours(self, media: Media, group: str, static: bool) -> PoolTask:
         """Have ``neighbours`` called, which opens videos and archives.
 
-        Its future may have ``ChildEnded``.
+        Its future may have ``WorkerEnded``.
 
         Raises:
             OverloadedError: Too many wait.
@@ -182,7 +181,7 @@ class Frames:
             OverloadedError: Too many wait.
         """
 
-        def explain(error: ChildEnded) -> ReviewError:
+        def explain(error: WorkerEnded) -> ReviewError:
             return refused_picture(frame_name(media), error)
 
         return self._read(media, work, media, flipped, self._settings, *arguments, explain=explain)
@@ -190,7 +189,7 @@ class Frames:
     def ask_to(self, media: Media | None, work: Callable[..., Any], *arguments: Any) -> PoolTask:
         """Have a function called that reads a frame itself, ``work(*arguments, settings)``.
 
-        Its future may have ``ChildEnded``, or say why its video cannot be indexed.
+        Its future may have ``WorkerEnded``, or say why its video cannot be indexed.
 
         Args:
             media: The frame; None: it reads none.
@@ -249,7 +248,7 @@ class Frames:
         if not is_stored(media) or is_kept(media, self._settings):
             return None
 
-        def explain(error: ChildEnded) -> ReviewError:
+        def explain(error: WorkerEnded) -> ReviewError:
             return StorageError(f"{frame_name(media)} {error}", hint="Try again in a moment.")
 
         return self._fetchers.submit(
@@ -257,7 +256,7 @@ class Frames:
         )
 
     def _submit(self, media: Media, width: int | None, flipped: bool, *, bounded: bool) -> PoolTask:
-        def explain(error: ChildEnded) -> ReviewError:
+        def explain(error: WorkerEnded) -> ReviewError:
             refusal = refused_picture(frame_name(media), error)
             if error.reason in REMEMBERED_SECONDS:
                 self._remember(media, refusal, REMEMBERED_SECONDS[error.reason])
@@ -273,7 +272,7 @@ class Frames:
         )
 
     def _require_untried(self, media: Media) -> None:
-        """Raise the refusal of a frame that went beyond the allowance, while it is remembered."""
+        """Raise the refusal of a frame that went beyond the limits, while it is remembered."""
         with self._lock:
             refusal, until = self._refused.get(frame_stamp(media), (None, 0.0))
         if refusal is not None and monotonic() < until:
@@ -291,7 +290,7 @@ class VideoIndexer:
 
     def __init__(self, settings: Settings):
         self._settings = settings
-        self.pool = ChildPool(INDEXING, INDEXERS, WAITING, "videos", FIGURES["indexers"])
+        self.pool = WorkerPool(INDEXING, INDEXERS, WAITING, "videos", COUNTS["indexers"])
         self._running: dict[str, PoolTask] = {}
         self._unkept: OrderedDict[str, tuple[str, Times]] = OrderedDict()
         self._lock = threading.Lock()
@@ -308,7 +307,7 @@ class VideoIndexer:
         if media.frame is None or self._is_ready(media):
             return None
 
-        def explain(error: ChildEnded) -> ReviewError:
+        def explain(error: WorkerEnded) -> ReviewError:
             return refused_picture(frame_name(replace(media, frame=None)), error)
 
         with self._lock:
@@ -392,9 +391,9 @@ def _pass_on(waiting: Future[Any], done: Future[Any]) -> None:
             waiting.set_exception(error)
 
 
-def refused_picture(name: str, error: ChildEnded) -> ReviewError:
+def refused_picture(name: str, error: WorkerEnded) -> ReviewError:
     """What the end of a process over a picture says: of the picture, or of the machine."""
-    if error.reason in ("killed", "told"):
+    if error.reason in ("killed", "terminated"):
         more = " Where it happens often, give more memory." if error.reason == "killed" else ""
         return OverloadedError(f"{name} {error}", hint=f"Try again in a moment.{more}")
     kind = ImageError if error.reason == "crash" else TooLargeError

@@ -13,8 +13,8 @@ from app.config import Settings
 from app.durable import PARTIAL
 from app.errors import DamagedError, StorageError
 from app.private_file import keep_private
-from app.store.anchor import read_anchor
 from app.store.dialect.dialect import dialect_of
+from app.store.recovery.anchor import read_anchor
 
 NETWORK_FILE_SYSTEMS = frozenset(
     {"nfs", "nfs4", "cifs", "smb3", "smbfs", "afs", "fuse.sshfs", "fuse.s3fs", "9p", "glusterfs"}
@@ -119,7 +119,7 @@ def _of_database(home: Path, database: Path) -> Iterator[Path]:
 def _is_ours(file: Path) -> bool:
     """Whether a file is the database of the installation that is named beside it."""
     # It needs numpy, and commands that only print a help text come by here.
-    from app.store.wal import read_header
+    from app.store.recovery.wal import read_header
 
     try:
         header, anchor = read_header(file), read_anchor(file)

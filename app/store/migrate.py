@@ -10,13 +10,13 @@ from sqlalchemy import Connection, Engine, inspect, text
 from app.config import Settings
 from app.errors import StorageError
 from app.folders import own_folder
-from app.store.anchor import renew_anchor, require_own_database
 from app.store.backup import write_backup
 from app.store.dialect.dialect import Dialect, dialect_of
 from app.store.engine import WRITE, make_engine, reported
-from app.store.first_look import require_sound
 from app.store.home import make_file
 from app.store.locks import DatabaseLock
+from app.store.recovery.anchor import renew_anchor, require_own_database
+from app.store.recovery.preopen_check import require_sound
 
 KNOWN_REVISIONS = (
     "0001",

@@ -14,20 +14,20 @@ from pathlib import Path, PurePosixPath
 from app.config import Settings
 from app.durable import sync
 from app.errors import DamagedError, InputError
-from app.store.anchor import Anchor, anchor_file, make_anchor
 from app.store.backup import (
     DATABASE,
     EXPORTS,
     FRAMES,
+    examine_database,
     require_file,
     verify_backup,
 )
-from app.store.examination import examine_database
-from app.store.first_look import log_file
 from app.store.home import ASIDE, FOLDER_MODE, RESTORING, make_private, refused
 from app.store.locks import database_alone, server_lock
 from app.store.migrate import KNOWN_REVISIONS, newer_schema
-from app.store.wal import MAGIC, read_header, read_log
+from app.store.recovery.anchor import Anchor, anchor_file, make_anchor
+from app.store.recovery.preopen_check import log_file
+from app.store.recovery.wal import MAGIC, read_header, read_log
 
 
 @dataclass(frozen=True)

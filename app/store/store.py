@@ -12,21 +12,12 @@ from sqlalchemy import Engine, update
 from sqlalchemy.exc import DBAPIError
 from sqlalchemy.exc import TimeoutError as NoConnectionError
 
+from app.admission import release_admission
 from app.config import Settings
 from app.errors import EXAMINE, BusyError, DamagedError, StorageError
-from app.slot import leave_slot
-from app.store.anchor import (
-    Anchor,
-    move_anchor,
-    read_anchor,
-    renew_anchor,
-    require_own_database,
-    sync_anchor,
-)
 from app.store.dialect.dialect import dialect_of
 from app.store.dialect.sharing import AGAIN
 from app.store.engine import WRITE, make_engine, reported
-from app.store.first_look import require_sound
 from app.store.home import make_file
 from app.store.locks import DatabaseLock
 from app.store.migrate import (
@@ -36,9 +27,17 @@ from app.store.migrate import (
     newer_schema,
     schema_revision,
 )
-from app.store.opened_file import OpenedFile
+from app.store.recovery.anchor import (
+    Anchor,
+    move_anchor,
+    read_anchor,
+    renew_anchor,
+    require_own_database,
+    sync_anchor,
+)
+from app.store.recovery.opened_file import OpenedFile
+from app.store.recovery.preopen_check import require_sound
 from app.store.session import Session
-from app.store.soundness import file_faults
 from app.store.tables.installation import InstallationModel
 
 log = structlog.get_logger("touchline.store")
@@ -193,7 +192,7 @@ class Store:
                 self._file.require_log()
             if lasting:
                 self.sharing.tell(session, COMMITTED)
-                leave_slot()
+                release_admission()
             session.commit()
             self._refused = None
             self._anchored(session)
@@ -252,7 +251,7 @@ class Store:
         """
         dialect = dialect_of(self.settings)
         with self.read() as session, dialect.interrupted(session, lambda: not wanted()):
-            faults = file_faults(session, 1)
+            faults = dialect.file_faults(session, 1)
             if faults:
                 file = self.settings.database_file
                 log.error("the database is damaged", file=str(file), fault=faults[0])

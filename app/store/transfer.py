@@ -21,7 +21,6 @@ from sqlalchemy import Connection, Engine, Table, func, insert, inspect, select,
 from app.config import Settings
 from app.errors import DamagedError, InputError
 from app.plural import plural
-from app.store.anchor import anchor_of
 from app.store.dialect.dialect import Dialect, dialect_of
 from app.store.engine import WRITE, make_engine, reported
 from app.store.home import make_file
@@ -34,6 +33,7 @@ from app.store.null_characters import (
     named,
     without_null_characters,
 )
+from app.store.recovery.anchor import anchor_of
 from app.store.session import Session
 from app.store.store import Store
 from app.store.tables import Base

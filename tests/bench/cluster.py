@@ -14,7 +14,7 @@ from pathlib import Path
 from app.config import Settings
 from app.review.editing.recompute import solve_dataset
 from app.review.workers.cluster import Cluster, SchedulerPlace
-from app.review.workers.processes import process_pool
+from app.review.workers.executors import process_pool
 from app.store.store import Store
 from tests.bench.table import print_table
 from tests.e2e.service import run_touchline

@@ -21,7 +21,7 @@ from app.cli import main
 from app.store import migrate
 from app.store.store import Store
 from tests.databases import SQLITE, Databases, databases_of, opened_databases
-from tests.kept_child import USERS, KeptChild
+from tests.kept_worker import USERS, KeptWorker
 from tests.schemas import copied_schemas, make_schema
 from tests.spawning import ANEW
 
@@ -90,11 +90,11 @@ class Cost:
 
 
 @pytest.fixture(scope="session", autouse=True)
-def _children_are_kept() -> Iterator[None]:
-    """Who asks a child for something gets one that an earlier test has left, if there is one."""
+def _workers_are_kept() -> Iterator[None]:
+    """Who asks a worker for something gets one that an earlier test has left, if there is one."""
     with pytest.MonkeyPatch.context() as patch:
         for module in USERS:
-            patch.setattr(f"{module}.Child", KeptChild)
+            patch.setattr(f"{module}.WorkerProcess", KeptWorker)
         yield
 
 
@@ -116,8 +116,8 @@ def _schemas_are_copied() -> Iterator[None]:
 
 
 @pytest.fixture
-def children_start_anew(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Children start as the product starts them: for tests of that, and of what they may use."""
+def workers_start_anew(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Workers start as the product starts them: for tests of that, and of what they may use."""
     monkeypatch.setattr(SpawnProcess, "_Popen", staticmethod(ANEW))
 
 

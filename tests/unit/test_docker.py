@@ -16,7 +16,7 @@ import pytest
 import yaml
 
 from app.config import Settings, StoreSettings
-from app.object_store.keys import read_keys
+from app.object_store.store import read_keys
 from app.review.workers.cluster import read_place
 from tests.team_at_scale import FOLDER, make_secrets, settings_of, together
 

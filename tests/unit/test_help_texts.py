@@ -33,7 +33,7 @@ PLAIN_WORDS = """
     cluster serving hosts executors packing day browser database
     stadium priors
     private kept another smaller index
-    stored tree trees safe path refusal attempt cookie fit
+    stored tree trees safe path attempt cookie fit
     categories corner finder ids joins like
     compiler dialect postgresql sqlite statements transfer triggers
     attempts lived processes shared sharing short shown web
@@ -48,10 +48,10 @@ PLAIN_WORDS = """
     adopt aliases asked concealment needs ownership rights sight
     actors
     candidate drawn proposal propose scoring search straight
-    3d accept action actions address adjust adjustments advice ahead anchor annotate answers app
+    3d accept admission action actions address adjust adjustments advice ahead anchor annotate answers app
     application archives arrays arrival ask axis backup bar bars batches best binned bodies
     bundle body boxes bulk button buttons cache calibrate canonical canvas caption card cards cell changes chart
-    child chip chooser class cli client clock codec codecs colours command comparison completion
+    chip chooser class cli client clock codec codecs colours command comparison completion
     conditions config confirm connections contact copy cross csv cursor curve damped delete deps details
     detect diagram dialog diff doctor document documents drags drawing durable editor empty
     encoded engine estimator etags evaluate event events exact examination export
@@ -59,20 +59,20 @@ PLAIN_WORDS = """
     folder folders follow form format formats found frozen gathered gestures glossary grass grid guess guide header
     headers heads health heat help histograms history hit home hooks idempotency identity if image images
     import imports in info init insight items jaccard json judged keep key keys known konva last latest lazy
-    least leftovers legend lens lesson lessons letter licence list listing live locks look lost loupe
+    least leftovers legend lens lesson lessons letter licence list listing live locks look loupe
     kernels profile trace
     main map markdown marks match matches matrix membership menu merge metrics migrate mini missing
-    model modules name names navigation neighbours nested notice nudge numbers object
+    model modules name names navigation neighbours notice nudge numbers object
     observability onnx open openapi opened options order origin orphans output overlap page pages
     paint palette parquet parse patch pen pins pitch pitches pixel place places plain plural png pointer
-    policies pool popover pose position preview problem progress projection props query rail reader reasons receiving
+    policies pool popover pose position preopen preview problem process progress projection props query rail reader reasons receiving
     recompute record remedies removal render reply report requests resect resource restore result
     revert reviewers rotation router row rows run runs sample save scale scene scene3d scenes score
     scoreboard sending server service session sets shadows sheet singular site smallest solve
-    solving soundness source sources slot sphere spill spread squares stacks stage staging standpoints starts
+    solving source sources sphere spill spread squares stacks stage staging standpoints starts
     state statistics steps storage store stream submit surface swap synloc tab table tally term
     terminal text textures threshold ticks tools triangulate truth types undo undrawn unknown upload uploads
-    v3 v3d video viewport viewports virtual wal walk warm what when whiskers words write writer zip
+    v3 v3d video viewport viewports virtual wal walk warm what when whiskers words worker write writer zip
 """
 PLAIN = frozenset(PLAIN_WORDS.split())
 """Words of file names that are plain English, or that every programmer knows; any other has to be

@@ -10,13 +10,12 @@ from anyio import to_thread
 from fastapi import APIRouter, Request, Response
 
 from app.api.deps import AppServices, Id
-from app.api.pool_answer import while_wanted
 from app.api.problem import responses
 from app.api.routers.views import CLIENT_GONE, told_with_view
 from app.api.schemas.annotation import points_of
 from app.api.schemas.view_paint import PaintDocument, PaintRequest, ProposalDocument
-from app.child_pool import PoolTask
 from app.review.editing.view_paint import PaintQuestion, paint_question, proposal_question
+from app.worker_pool import PoolTask
 
 router = APIRouter(prefix="/views", tags=["views"])
 
@@ -62,4 +61,4 @@ async def propose_lines(
 async def _answer(request: Request, question: PaintQuestion, ask: Callable[[], PoolTask]) -> Any:
     """What was found, or None where nobody waits for it any more."""
     with told_with_view(question.view.key):
-        return await while_wanted(request, ask())
+        return await ask().result_unless(request.is_disconnected)

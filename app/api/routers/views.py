@@ -13,7 +13,6 @@ from fastapi import APIRouter, Body, Query, Request, Response
 
 from app.api.deps import Actor, AppServices, Id, IfMatch, etag_matches
 from app.api.paging import paged
-from app.api.pool_answer import while_wanted
 from app.api.problem import Responses, responses
 from app.api.reply import AskedUnder, KeyedRequest
 from app.api.routers.groups import CHANGED, CONFLICTS, change_group, load_document_of_view
@@ -22,7 +21,6 @@ from app.api.schemas.group import GroupDocument
 from app.api.schemas.view import NeighbourList, ViewEdit, frames_away
 from app.api.security.lanes import is_large
 from app.api.services import Services
-from app.child import ChildEnded
 from app.errors import ImageError, NotFoundError, StorageError, TooLargeError
 from app.review.editing.edit import (
     Edit,
@@ -39,6 +37,7 @@ from app.review.editing.view_paint import NO_FRAME_HINT
 from app.soccer.frame_number import FARTHEST
 from app.soccer.media import Media
 from app.store.frames import Frames, SentPicture
+from app.worker_process import WorkerEnded
 
 router = APIRouter(prefix="/views", tags=["views"])
 
@@ -221,11 +220,11 @@ async def _neighbours(request: Request, frames: Frames, view: FoundView) -> dict
     try:
         if view.media.frame is not None:
             indexing = await to_thread.run_sync(frames.ask_fetch, view.media)
-            if indexing is not None and not await while_wanted(request, indexing):
+            if indexing is not None and not await indexing.result_unless(request.is_disconnected):
                 return None
         task = frames.ask_neighbours(view.media, view.group_key, view.static)
-        found: dict[int, Media] | None = await while_wanted(request, task)
-    except (ChildEnded, NotFoundError, ImageError, TooLargeError, StorageError):
+        found: dict[int, Media] | None = await task.result_unless(request.is_disconnected)
+    except (WorkerEnded, NotFoundError, ImageError, TooLargeError, StorageError):
         return {}
     return found
 
@@ -253,11 +252,10 @@ async def _picture(
         if found is not None:
             return found
         fetching = await to_thread.run_sync(frames.ask_fetch, view.media)
-        if fetching is not None and not await while_wanted(request, fetching):
+        if fetching is not None and not await fetching.result_unless(request.is_disconnected):
             return None
-        made: SentPicture | None = await while_wanted(
-            request, frames.ask(view.media, width, view.flipped)
-        )
+        task = frames.ask(view.media, width, view.flipped)
+        made: SentPicture | None = await task.result_unless(request.is_disconnected)
         return made
 
 

@@ -21,11 +21,11 @@ from starlette.datastructures import Headers
 from starlette.responses import HTMLResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from app.admission import hold_admission
 from app.api.problem import make_problem, problem_response
 from app.api.security.access import login_of
 from app.api.security.origin import SAFE_METHODS
 from app.api.security.turns import Turns
-from app.slot import hold_slot
 
 PATIENCE = 10.0
 """Seconds that a request waits for its turn."""
@@ -74,7 +74,7 @@ READS = Lane("reads", min(4, max(2, os.cpu_count() or 2)), 200, each=1)
 person of a team asks is read one after the other: two long lists at once take the server from all others."""
 EDITS = Lane("edits", 1, 100, served=3)
 """What people do to one group, view or lease all day: read, solved and encoded one after the other. Who
-waits for the disk or a picture has left already (``app.slot``)."""
+waits for the disk or a picture has left already (``app.admission``)."""
 CHANGES = Lane("changes", 3, 100)
 """All others; they may take their time."""
 PREVIEWS = Lane("previews", 1, 100, apart=2, each=1)
@@ -238,7 +238,7 @@ class Lanes:
     """Lets each request wait for its turn; 503 where too many of its kind wait already.
 
     The turn ends when the answer begins, for sending it to a slow client takes nobody's place; and
-    before, where the work says that it waits for something else (``leave_slot``).
+    before, where the work says that it waits for something else (``release_admission``).
     """
 
     def __init__(self, app: ASGIApp, doors: Doors):
@@ -255,7 +255,7 @@ class Lanes:
             await _refusal(scope, door.lane)(scope, receive, send)
             return
         place = _Place(door, who)
-        hold_slot(place.leave_from_anywhere)
+        hold_admission(place.leave_from_anywhere)
 
         async def watch(message: Message) -> None:
             place.end()

@@ -1,4 +1,4 @@
-"""Paint reading: what is kept of the paint in the picture of one view; runs in a child."""
+"""Paint reading: what is kept of the paint in the picture of one view; runs in a worker process."""
 
 from __future__ import annotations
 

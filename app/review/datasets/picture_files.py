@@ -10,15 +10,15 @@ from pathlib import Path, PurePosixPath
 import numpy as np
 import numpy.typing as npt
 
-from app.child import Child, ChildEnded
 from app.config import Settings
 from app.datasets.file_tree import Limits
 from app.datasets.frame_names import IMAGE_SUFFIXES
 from app.datasets.report import Report
 from app.datasets.trees import opened_tree
 from app.errors import ReviewError
-from app.store.frames import ALLOWANCE
+from app.store.frames import LIMITS
 from app.store.media import decode_picture
+from app.worker_process import WorkerEnded, WorkerProcess
 
 
 class UniqueNames:
@@ -62,7 +62,7 @@ def read_pictures(
     Args:
         report: Hears what could not be opened at all.
     """
-    with closing(Child(ALLOWANCE)) as child:
+    with closing(WorkerProcess(LIMITS)) as worker:
         for source in sources:
             with opened_tree(source, report, Limits.of(settings)) as tree:
                 if tree is None:
@@ -73,11 +73,11 @@ def read_pictures(
                     stem = str(PurePosixPath(name).with_suffix(""))
                     try:
                         data = tree.read_bytes(name)
-                        image = child.run(decode_picture, data, settings, PurePosixPath(name).name)
+                        image = worker.run(decode_picture, data, settings, PurePosixPath(name).name)
                         yield PictureFile(stem, image)
                     except ReviewError as error:
                         yield PictureFile(stem, None, error.message)
-                    except ChildEnded as error:
+                    except WorkerEnded as error:
                         yield PictureFile(stem, None, f"{PurePosixPath(name).name} {error}")
 
 

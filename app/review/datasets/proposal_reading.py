@@ -1,4 +1,4 @@
-"""Proposal reading: what is proposed for one view from its picture; runs in a child."""
+"""Proposal reading: what is proposed for one view from its picture; runs in a worker process."""
 
 from __future__ import annotations
 

@@ -12,13 +12,13 @@ from app.review.editing.ledger import Ledger, read_ledger
 from app.review.editing.recompute import stale_groups
 from app.review.editing.replay import replay
 from app.store.codecs import paint_to_json
+from app.store.dialect.dialect import dialect_in
 from app.store.digest import group_inputs_hash, station_digest, view_digest
 from app.store.log import newest_entry
 from app.store.null_characters import find_null_characters, named
 from app.store.projection import all_groups, all_stations
 from app.store.queue import rows_apart
 from app.store.session import Session
-from app.store.soundness import count_lost_references, file_faults, no_fault, restoring
 from app.store.store import Store
 
 REBUILD = "Run touchline doctor --rebuild: it writes these tables anew from the log."
@@ -44,7 +44,7 @@ def examine(store: Store) -> list[Check]:
     log is broken: then nothing follows from it.
     """
     with store.read() as session:
-        restore = restoring(session)
+        restore = dialect_in(session).restoring
         checks = [_file(session, restore)]
         entries = newest_entry(session)
         try:
@@ -64,12 +64,13 @@ def examine(store: Store) -> list[Check]:
 
 def _file(session: Session, restore: str) -> Check:
     """The database's own look at its pages and indexes, and at references to rows that are gone."""
-    faults, lost = file_faults(session), count_lost_references(session)
+    dialect = dialect_in(session)
+    faults, lost = dialect.file_faults(session), dialect.count_lost_references(session)
     if faults:
         return Check("file", False, f"SQLite finds it damaged: {'; '.join(faults)}", restore)
     if lost:
         return Check("file", False, f"{lost} rows refer to rows that are gone", restore)
-    return Check("file", True, no_fault(session))
+    return Check("file", True, dialect.no_fault)
 
 
 def _texts(session: Session) -> Check:

@@ -18,13 +18,13 @@ from app.review.doctor.stores import examine_stores
 from app.review.people.identities import linked_admins
 from app.review.people.provider import Provider
 from app.review.people.sign_on_rules import read_rules
-from app.store.anchor import read_anchor
 from app.store.clock import text_of
 from app.store.dialect.sqlite import MIN_SQLITE
 from app.store.home import open_to_others
 from app.store.leftovers import leftovers
 from app.store.log import entries_after, last_time
 from app.store.orphans import spare_calibrations, unread_uploads
+from app.store.recovery.anchor import read_anchor
 from app.store.session import Session
 from app.store.store import Store
 

@@ -7,8 +7,7 @@ from itertools import islice
 
 from app.config import Settings
 from app.errors import ReviewError
-from app.object_store.refusal import ChangedObjectError
-from app.object_store.store import ObjectStore, open_store
+from app.object_store.store import ChangedObjectError, ObjectStore, open_store
 from app.review.doctor.check import Check
 
 KEYS = "Correct TOUCHLINE_STORES or the file of keys: docs/operations.md says what a store needs."

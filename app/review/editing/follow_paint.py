@@ -11,16 +11,16 @@ from concurrent.futures import CancelledError
 from dataclasses import replace
 from time import monotonic
 
-from app.child import ChildEnded
+from app.admission import release_admission
 from app.errors import ReviewError
 from app.review.datasets.paint_reading import PaintTask, read_view_paint
-from app.slot import leave_slot
 from app.soccer.group import Group
 from app.soccer.paint_evidence import PaintReading
 from app.soccer.policy import CalibrationPolicy
 from app.soccer.solution import Calibration
 from app.solving.calibrate import clicks_key, sought_key, wanted_paint
 from app.store.frames import Frames
+from app.worker_process import WorkerEnded
 
 SECONDS = 5.0
 """Longer nobody waits for a frame; it is then read when paint is read again."""
@@ -50,7 +50,7 @@ class PaintFollower:
 
     def _read(self, tasks: list[PaintTask]) -> Iterator[tuple[str, PaintReading]]:
         """By view what was read of those whose picture could be read in time."""
-        leave_slot()
+        release_admission()
         end = monotonic() + SECONDS
         try:
             asked = [
@@ -63,7 +63,7 @@ class PaintFollower:
         for task, waiting in asked:
             try:
                 reading = waiting.future.result(max(end - monotonic(), 0.0))
-            except (TimeoutError, CancelledError, ChildEnded, ReviewError):
+            except (TimeoutError, CancelledError, WorkerEnded, ReviewError):
                 waiting.leave()
                 continue
             if reading is not None:

@@ -12,9 +12,6 @@ from contextlib import closing
 from dataclasses import dataclass, replace
 from typing import Any
 
-from app.child import Allowance
-from app.child_figures import FIGURES
-from app.child_pool import ChildPool
 from app.errors import ConflictError, ImageError, TooLargeError
 from app.progress import TellProgress
 from app.review.datasets.dataset import DatasetHead, need_dataset, require_matches
@@ -44,11 +41,13 @@ from app.store.paint import (
 )
 from app.store.session import Session
 from app.store.store import Store
+from app.worker_pool import WorkerPool
+from app.worker_process import COUNTS, WorkerLimits
 
-ALLOWANCE = Allowance(memory=2 * 2**30, processor=60.0, silence=180.0)
+LIMITS = WorkerLimits(memory=2 * 2**30, processor=60.0, silence=180.0)
 """For one picture; the first one of a process may have to wait for kernels to be compiled."""
-_A_CHILD = 6
-"""Groups that each child gets before they are written."""
+_PER_WORKER = 6
+"""Groups that each worker gets before they are written."""
 _BATCH = 100
 MOST_COMPARED = 1000
 """Groups with paint whose lines are compared with those that it was read for, when somebody asks
@@ -140,7 +139,7 @@ def read_paint(
     *,
     actor: str,
     run: str | None = None,
-    children: int | None = None,
+    workers: int | None = None,
     progress: TellProgress | None = None,
     require_wanted: Callable[[], None] | None = None,
 ) -> DatasetPaint:
@@ -154,7 +153,7 @@ def read_paint(
         matches: By name; None: all.
         actor: Who wants it.
         run: Name of this reading, by which it is taken back; None: the time.
-        children: How many pictures are read at once; None: as the settings say.
+        workers: How many pictures are read at once; None: as the settings say.
         progress: Called with groups done and in all; an error that it raises ends the run.
         require_wanted: Called in each transaction that gives something, before it does; what is
             not wanted any more it stops with an error.
@@ -167,13 +166,13 @@ def read_paint(
     found = require_readable(store, dataset, matches)
     with store.read() as session:
         ids = group_ids(session, found.id, matches)
-    run, count, done = run or now(), children or store.settings.image_workers, 0
+    run, count, done = run or now(), workers or store.settings.image_workers, 0
     with (
         closing(VideoIndexer(store.settings)) as videos,
-        closing(ChildPool(ALLOWANCE, count, 0, "pictures", FIGURES["paint"])) as pool,
+        closing(WorkerPool(LIMITS, count, 0, "pictures", COUNTS["paint"])) as pool,
     ):
-        for start in range(0, len(ids), _A_CHILD * count):
-            some = ids[start : start + _A_CHILD * count]
+        for start in range(0, len(ids), _PER_WORKER * count):
+            some = ids[start : start + _PER_WORKER * count]
             tasks = _tasks(store, some, found)
             views = [task.view.media for of_group in tasks.values() for task in of_group]
             videos.make_ready(views, done, len(ids), progress)
@@ -305,7 +304,7 @@ def _group_tasks(
 
 def _readings(
     store: Store,
-    pool: ChildPool,
+    pool: WorkerPool,
     videos: VideoIndexer,
     tasks: Mapping[int, Sequence[PaintTask]],
 ) -> dict[int, dict[str, PaintReading]]:

@@ -1,6 +1,6 @@
-"""Picture task: what a child makes of one picture, where a dataset's pictures are read.
+"""Picture task: what a worker process makes of one picture, where a dataset's pictures are read.
 
-A child that ends over a picture says something of the picture; one that is killed from outside says
+A worker that ends over a picture says something of the picture; one that is killed from outside says
 something of the machine. It is asked once more then, and a second time ends the run: what is written
 down of a picture must hold tomorrow.
 """
@@ -11,22 +11,22 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
-from app.child import ChildEnded
-from app.child_pool import ChildPool
 from app.errors import OverloadedError, ReviewError
 from app.store.frames import refused_picture
+from app.worker_pool import WorkerPool
+from app.worker_process import WorkerEnded
 
 
 class PictureTask:
-    """A function of a module that reads one picture, called in a child from now on.
+    """A function of a module that reads one picture, called in a worker process from now on.
 
     Args:
-        pool: The children.
+        pool: The workers.
         work: The function.
         arguments: What it is called with.
     """
 
-    def __init__(self, pool: ChildPool, work: Callable[..., Any], *arguments: Any):
+    def __init__(self, pool: WorkerPool, work: Callable[..., Any], *arguments: Any):
         self._ask = partial(pool.submit, work, *arguments, explain=_explained, bounded=False)
         self._task = self._ask()
 
@@ -43,5 +43,5 @@ class PictureTask:
             return self._ask().future.result()
 
 
-def _explained(error: ChildEnded) -> ReviewError:
+def _explained(error: WorkerEnded) -> ReviewError:
     return refused_picture("the picture", error)

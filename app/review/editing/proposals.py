@@ -12,9 +12,6 @@ from contextlib import closing
 from dataclasses import dataclass, replace
 from typing import Any
 
-from app.child import Allowance
-from app.child_figures import FIGURES
-from app.child_pool import ChildPool
 from app.errors import ImageError, NotFoundError, TooLargeError
 from app.paint.propose import SEARCH_VERSION
 from app.progress import TellProgress
@@ -39,11 +36,13 @@ from app.store.proposals import (
 )
 from app.store.proposals import Proposal as Proposal
 from app.store.store import Store
+from app.worker_pool import WorkerPool
+from app.worker_process import COUNTS, WorkerLimits
 
-ALLOWANCE = Allowance(memory=2 * 2**30, processor=120.0, silence=240.0)
+LIMITS = WorkerLimits(memory=2 * 2**30, processor=120.0, silence=240.0)
 """For one picture; the first one of a process may have to wait for kernels to be compiled."""
-_A_CHILD = 4
-"""Groups that each child gets before they are written."""
+_PER_WORKER = 4
+"""Groups that each worker gets before they are written."""
 
 
 @dataclass(frozen=True)
@@ -124,7 +123,7 @@ def propose_views(
     dataset: str | int,
     matches: Collection[str] | None = None,
     *,
-    children: int | None = None,
+    workers: int | None = None,
     progress: TellProgress | None = None,
     require_wanted: Callable[[], None] | None = None,
 ) -> ProposalRun:
@@ -137,7 +136,7 @@ def propose_views(
         store: The database.
         dataset: Name or id.
         matches: By name; None: all.
-        children: How many pictures are looked at at once; None: as the settings say.
+        workers: How many pictures are looked at at once; None: as the settings say.
         progress: Called with views done and in all; an error that it raises ends the run.
         require_wanted: Called in each transaction that keeps something, before it does; what is
             not wanted any more it stops with an error.
@@ -148,14 +147,14 @@ def propose_views(
     with store.read() as session:
         found = require_matches(session, dataset, matches)
         asked = views_to_look_at(session, found.id, matches)
-    count, total = children or store.settings.image_workers, sum(len(views) for _, views in asked)
+    count, total = workers or store.settings.image_workers, sum(len(views) for _, views in asked)
     run = ProposalRun()
     with (
         closing(VideoIndexer(store.settings)) as videos,
-        closing(ChildPool(ALLOWANCE, count, 0, "pictures", FIGURES["proposals"])) as pool,
+        closing(WorkerPool(LIMITS, count, 0, "pictures", COUNTS["proposals"])) as pool,
     ):
-        for start in range(0, len(asked), _A_CHILD * count):
-            tasks = _tasks(store, found, dict(asked[start : start + _A_CHILD * count]))
+        for start in range(0, len(asked), _PER_WORKER * count):
+            tasks = _tasks(store, found, dict(asked[start : start + _PER_WORKER * count]))
             views = [task.media for task in tasks]
             videos.make_ready(views, run.views, total, progress)
             answers = _answers(store, pool, videos, tasks)
@@ -227,7 +226,7 @@ def _task(
 
 
 def _answers(
-    store: Store, pool: ChildPool, videos: VideoIndexer, tasks: Sequence[ProposalTask]
+    store: Store, pool: WorkerPool, videos: VideoIndexer, tasks: Sequence[ProposalTask]
 ) -> list[Proposal | None]:
     asked = [
         PictureTask(pool, *videos.with_index(task.media, read_proposal, task, store.settings))

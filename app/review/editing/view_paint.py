@@ -10,7 +10,6 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from app.child_pool import PoolTask
 from app.errors import NotFoundError
 from app.geometry.camera import Camera
 from app.geometry.lens import BROWN_CONRADY
@@ -32,6 +31,7 @@ from app.store.groups import StoredGroup, group_of_view, read_groups
 from app.store.pitches import groups_of_match
 from app.store.session import Session
 from app.store.store import Store
+from app.worker_pool import PoolTask
 
 MOST_KNOWN = 12
 """Groups of a match whose cameras say where to look first; one stand needs no more."""

@@ -6,9 +6,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from app.child import Allowance, ChildEnded
-from app.child_figures import FIGURES
-from app.child_pool import ChildPool
 from app.config import Settings
 from app.datasets.file_tree import Limits
 from app.errors import DatasetFormatError, InputError, TooLargeError
@@ -21,6 +18,8 @@ from app.evaluation.prediction_files import (
 from app.evaluation.prediction_run import ReadPredictions
 from app.soccer.frames import ImageSize
 from app.store.uploads import upload_path
+from app.worker_pool import WorkerPool
+from app.worker_process import COUNTS, WorkerEnded, WorkerLimits
 
 SECONDS, SILENCE = 120.0, 300.0
 """Of processor time, and by the clock, for one set: five million boxes take less."""
@@ -131,9 +130,9 @@ class PredictionReader:
     """Reads files of somebody else in a process of its own, one set at a time."""
 
     def __init__(self, settings: Settings):
-        allowance = Allowance(settings.import_memory, SECONDS, SILENCE)
-        figures = FIGURES["predictions"]
-        self._pool = ChildPool(allowance, 1, WAITING, "sets of predictions", figures)
+        worker_limits = WorkerLimits(settings.import_memory, SECONDS, SILENCE)
+        counts = COUNTS["predictions"]
+        self._pool = WorkerPool(worker_limits, 1, WAITING, "sets of predictions", counts)
 
     def read(self, files: PredictionFiles, names: FrameNames, limits: Limits) -> Found:
         """``read_files``, within limits.
@@ -145,7 +144,7 @@ class PredictionReader:
         """
         name = files.first.name
 
-        def explain(error: ChildEnded) -> TooLargeError:
+        def explain(error: WorkerEnded) -> TooLargeError:
             return TooLargeError(f"{name} {error}", hint=LIMITS_HINT)
 
         task = self._pool.submit(read_files, files, names, limits, explain=explain)

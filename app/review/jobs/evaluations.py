@@ -11,9 +11,8 @@ from app.review.datasets.dataset import get_dataset_head
 from app.review.evaluating.accept import AcceptReport, AcceptRequest, accept, plan_accept
 from app.review.evaluating.evaluation import list_evaluations
 from app.review.evaluating.evaluation_run import EvaluationRequest, check_evaluation, run_evaluation
-from app.review.jobs.child import carry_out_apart
 from app.review.jobs.jobs import Jobs
-from app.review.jobs.run import JobProgress, Work
+from app.review.jobs.run import JobProgress, Work, run_job_in_worker
 from app.store.evaluations import StoredEvaluation
 from app.store.jobs import Job
 from app.store.store import Store
@@ -108,7 +107,7 @@ def evaluation_work(store: Store, dataset_id: int, request: EvaluationRequest, a
     """The work of evaluating; its result names the evaluation."""
 
     def work(progress: JobProgress) -> Json:
-        return carry_out_apart(
+        return run_job_in_worker(
             store,
             "evaluating",
             "the evaluation",
@@ -127,7 +126,7 @@ def accept_work(store: Store, dataset_id: int, request: AcceptRequest, actor: st
     """The work of accepting; its result counts what changed."""
 
     def work(progress: JobProgress) -> Json:
-        return carry_out_apart(
+        return run_job_in_worker(
             store,
             "accepting",
             "the acceptance",

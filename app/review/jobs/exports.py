@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
+from app.datasets.file_tree import Root
 from app.datasets.safe_path import check_name
 from app.datasets.store_output import require_absent
 from app.errors import InputError, NotFoundError
@@ -13,13 +15,13 @@ from app.object_store.path import StoredPath, target_path
 from app.plural import plural
 from app.review.answers.keep import Keep, keep_nothing
 from app.review.datasets.dataset import get_dataset_head
-from app.review.exporting.child import export_asked
-from app.review.exporting.export import require_possible
+from app.review.exporting.export import ExportReport, export, require_possible
 from app.review.exporting.folder import ExportFolder
-from app.review.jobs.child import carry_out_apart
 from app.review.jobs.jobs import Jobs
-from app.review.jobs.run import JobProgress, Work, counting
-from app.store.frames import Frames
+from app.review.jobs.run import JobProgress, Work, counting, run_job_in_worker
+from app.soccer.media import Media
+from app.store.database_worker import Caller
+from app.store.frames import Frames, SentPicture
 from app.store.jobs import EXPORT, Job
 from app.store.store import Store
 from app.store.stored_json import Json
@@ -98,18 +100,18 @@ def export_work(
         progress(0, None, f"Writing {request['format']}.")
         content = folder.content(name)
         with folder.writing(name) as beside:
-            report = carry_out_apart(
+            report = run_job_in_worker(
                 store,
                 "exports",
                 "the export",
-                export_asked,
+                _export,
                 dataset_id,
                 content if to is None else _target(store, to),
                 beside,
                 request,
                 dataset_id=dataset_id,
                 progress=progress,
-                told=counting(progress, "groups written"),
+                report=counting(progress, "groups written"),
                 answer=lambda frame: frames.read(*frame),
             )
         # It is done, also where somebody cancels it now.
@@ -126,6 +128,41 @@ def export_work(
         }
 
     return work
+
+
+def _export(
+    store: Store,
+    dataset_id: int,
+    out: Root,
+    beside: Path,
+    request: Mapping[str, Any],
+    caller: Caller,
+) -> ExportReport:
+    """``export`` in a worker process, as it was requested.
+
+    Frames are untrusted files: the caller has them made where they are made for requests.
+    """
+
+    def read(media: Media, width: int | None, flipped: bool) -> SentPicture:
+        picture: SentPicture = caller.ask((media, width, flipped))
+        return picture
+
+    version = request.get("version")
+    return export(
+        store,
+        dataset_id,
+        request["format"],
+        out,
+        everything=request["all"],
+        boxes=request["boxes"],
+        images=request["images"],
+        # Earlier requests do not name the views.
+        views=request.get("views", "valid"),
+        version=None if version is None else str(version),
+        progress=caller,
+        read=read,
+        beside=beside,
+    )
 
 
 def _target(store: Store, address: str) -> StoredPath:

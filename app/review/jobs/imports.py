@@ -2,39 +2,43 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 from app.config import Settings
 from app.datasets.file_tree import Root
-from app.errors import InputError
+from app.errors import InputError, TooLargeError
 from app.plural import plural
 from app.progress import TellProgress
 from app.review.answers.keep import Keep, keep_nothing
 from app.review.datasets.dataset import get_dataset_head
 from app.review.datasets.naming import require_name
 from app.review.editing.paint import has_pictures
-from app.review.importing.child import Outcome, import_apart
 from app.review.importing.folders import resolve_folder
-from app.review.importing.sources import FORMATS, Source
-from app.review.jobs.child import left_to_the_next
+from app.review.importing.sources import FORMATS, Source, import_source
 from app.review.jobs.jobs import Jobs
 from app.review.jobs.paint import PAINT
 from app.review.jobs.proposals import PROPOSALS
-from app.review.jobs.run import FailedWithReportError, JobProgress, Work
+from app.review.jobs.run import FailedWithReportError, JobProgress, Work, left_to_next_server
 from app.review.jobs.solve import request_solve
 from app.soccer.frames import ImageSize
-from app.soccer.policy import POLICIES
+from app.soccer.policy import POLICIES, Policy
+from app.store.database_worker import SILENCE, run_in_worker
 from app.store.datasets import find_dataset
 from app.store.jobs import Job
 from app.store.store import Store
 from app.store.stored_json import Json
 from app.store.uploads import get_upload, keep_upload, upload_path
+from app.worker_process import WorkerEnded, WorkerLimits
 
 KIND = "import"
 SHOWN = 500
 """Left-out records that a job's result names; all are counted."""
+LIMITS_HINT = (
+    "Import it in parts, or have the operator raise TOUCHLINE_IMPORT_MEMORY or "
+    "TOUCHLINE_IMPORT_SECONDS. What was imported before it ended stays, and is not brought twice."
+)
 
 
 @dataclass(frozen=True)
@@ -71,6 +75,21 @@ class ImportRequest:
             "dry_run": self.dry_run,
             "policy": self.policy,
         }
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """The result of an import.
+
+    Attributes:
+        values: The report, as plain values.
+        fresh: Whether there is something new to solve.
+        nothing: Why nothing was read, with what to do about it; None where something was.
+    """
+
+    values: dict[str, Any]
+    fresh: bool
+    nothing: tuple[str, str] | None
 
 
 def request_import(
@@ -134,8 +153,8 @@ def import_work(
         if not request.dry_run and "upload" in request.source:
             # Frames are read where they are, so the file must stay from the first group on.
             keep_upload(settings, request.source["upload"])
-        with left_to_the_next(progress):
-            outcome = import_apart(
+        with left_to_next_server(progress):
+            outcome = import_in_worker(
                 store,
                 request.dataset,
                 source,
@@ -156,6 +175,55 @@ def import_work(
         return _result(outcome, request, **_following(jobs, store, request, actor))
 
     return work
+
+
+def import_in_worker(
+    store: Store,
+    dataset: str,
+    source: Source,
+    *,
+    actor: str,
+    dry_run: bool,
+    progress: TellProgress,
+    stop: Callable[[], None],
+    policy: Policy | None = None,
+) -> Outcome:
+    """``import_source`` in a worker process, within the limits of the settings.
+
+    The process reads the files and writes the database in the short transactions of an import.
+
+    Args:
+        stop: Called every now and then; an error that it raises ends the import.
+
+    Raises:
+        DamagedError: The worker met damage; from then on this process refuses changes, too.
+        TooLargeError: It went beyond the limits, or made the process crash.
+    """
+    limits = WorkerLimits(store.settings.import_memory, store.settings.import_seconds, SILENCE)
+    given = import_here, dataset, source, actor, dry_run, policy
+    try:
+        return run_in_worker(store, "imports", *given, limits=limits, progress=progress, stop=stop)
+    except WorkerEnded as error:
+        raise TooLargeError(f"{source.label} {error}", hint=LIMITS_HINT) from error
+
+
+def import_here(
+    store: Store,
+    dataset: str,
+    source: Source,
+    actor: str,
+    dry_run: bool,
+    policy: Policy | None,
+    progress: TellProgress,
+) -> Outcome:
+    """The import itself, in this process."""
+    settings = store.settings
+    imported = import_source(
+        store, dataset, source, settings, progress, actor=actor, dry_run=dry_run, policy=policy
+    )
+    result = imported.result
+    nothing = None if imported.something else imported.nothing_read()
+    return Outcome(imported.values(), bool(result.new + result.changed), nothing)
 
 
 def _following(

@@ -1,24 +1,46 @@
-"""The work of one job in this process, how far it is, and how it ended."""
+"""The work of one job, in this process or in a worker process, how far it is, and how it ended."""
 
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, TypeVar
 
 import structlog
 
-from app.errors import JobCancelled, ReviewError
+from app.errors import JobCancelled, OverloadedError, ReviewError, TooLargeError
 from app.progress import TellProgress
 from app.review.jobs.endings import ending
+from app.store.database_worker import no_answer, run_here, run_in_worker, with_grace
+from app.store.datasets import has_more_groups
 from app.store.jobs import CANCELLED, DONE, FAILED
+from app.store.store import Store
 from app.store.stored_json import Json
+from app.worker_process import EndReason, WorkerEnded
 
 log = structlog.get_logger("touchline.jobs")
 
 Work = Callable[["JobProgress"], Json]
 """What a job does; returns its result. It must be safe to start again from the beginning."""
+Result = TypeVar("Result")
+
+SMALL = 100
+"""Work on a dataset of at most so many groups is done here: to start a process takes longer."""
+STOP_SECONDS = 2.0
+"""A server may be told to stop so long after its worker processes."""
+_AGAIN = "Start it again."
+_MEMORY = f"{_AGAIN} Where it happens often, give more memory."
+_ENDS: dict[EndReason, tuple[str, str]] = {
+    "memory": ("needs more memory than there is", _MEMORY),
+    "killed": ("was killed, most likely for want of memory", _MEMORY),
+    "terminated": ("was told to end", _AGAIN),
+    "crash": ("crashed", f"{_AGAIN} Where it crashes again, report it."),
+    "processor": ("took too long to work out", _AGAIN),
+    "silence": ("came to no next step", f"{_AGAIN} The disk or a store may not answer."),
+}
+"""How a process ended, and what to do about it."""
 
 
 class FailedWithReportError(ReviewError):
@@ -183,3 +205,63 @@ class RunQueue:
             for items in (self.waiting, self.running)
         )
         return RunQueue(waiting, running)
+
+
+def run_job_in_worker(
+    store: Store,
+    kind: str,
+    what: str,
+    work: Callable[..., Result],
+    *arguments: Any,
+    dataset_id: int | None,
+    progress: JobProgress,
+    report: TellProgress | None = None,
+    answer: Callable[[Any], Any] = no_answer,
+) -> Result:
+    """Call ``work(store, *arguments, caller)`` in a worker process (``database_worker.run_in_worker``).
+
+    Args:
+        store: The database.
+        kind: What is done; see ``worker_process.KINDS``.
+        what: The same in a sentence.
+        work: A function of a module.
+        arguments: Its arguments between the database and the caller.
+        dataset_id: What it works on; where that is small, it is done here. None: never here.
+        progress: Of the job; the work ends when the job is cancelled.
+        report: Receives the progress of the work; None: the job's progress itself.
+        answer: Answers the work's questions.
+
+    Raises:
+        OverloadedError: The process did not come to its end, or could not be started.
+        ReviewError: As the work raised it.
+    """
+    report = report or progress
+    if dataset_id is not None and _is_small(store, dataset_id):
+        return run_here(store, work, *arguments, progress=report, answer=answer)
+    stop = with_grace(progress.check)
+    try:
+        with left_to_next_server(progress):
+            return run_in_worker(
+                store, kind, work, *arguments, progress=report, stop=stop, answer=answer
+            )
+    except WorkerEnded as error:
+        ended, hint = _ENDS[error.reason]
+        raise OverloadedError(f"the process of {what} {ended}", hint=hint) from error
+
+
+@contextmanager
+def left_to_next_server(progress: JobProgress) -> Iterator[None]:
+    """Let the next server go on where a process ended because this server is about to stop.
+
+    A service manager may end the processes of a service first.
+    """
+    try:
+        yield
+    except (WorkerEnded, OverloadedError, TooLargeError):
+        progress.check_within(STOP_SECONDS)
+        raise
+
+
+def _is_small(store: Store, dataset_id: int) -> bool:
+    with store.read() as session:
+        return not has_more_groups(session, dataset_id, SMALL)

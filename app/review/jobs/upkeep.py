@@ -14,12 +14,12 @@ from app.errors import ReviewError
 from app.review.datasets.spare_calibrations import delete_spare_calibrations
 from app.review.exporting.folder import ExportFolder
 from app.review.jobs.jobs import Jobs
-from app.store.anchor import sync_anchor
 from app.store.answers import forget_answers, shorten_answers
 from app.store.clock import text_of
 from app.store.jobs import forget_jobs
 from app.store.leftovers import delete_leftovers
 from app.store.orphans import expire_cache
+from app.store.recovery.anchor import sync_anchor
 from app.store.store import Store
 from app.store.uploads import expire_uploads
 from app.store.webhooks import forget_deliveries, has_old_deliveries

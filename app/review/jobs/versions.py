@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from typing import Any
 
-from app.child import ChildEnded
 from app.errors import OverloadedError
 from app.progress import TellProgress
 from app.review.answers.keep import Keep, keep_nothing
 from app.review.datasets.dataset import get_dataset_head
-from app.review.jobs.child import carry_out_apart
 from app.review.jobs.jobs import Jobs
-from app.review.jobs.run import JobProgress, Work
+from app.review.jobs.run import JobProgress, Work, run_job_in_worker
 from app.review.versions.freeze import FreezeRequest, freeze, plan_freeze
 from app.review.versions.verify import keep_failure, verify_and_keep
 from app.review.versions.version import FREEZE, Version, get_version, list_versions
@@ -19,6 +17,7 @@ from app.soccer.split import Split
 from app.store.jobs import DONE, Job
 from app.store.store import Store
 from app.store.stored_json import Json
+from app.worker_process import WorkerEnded
 
 VERIFY = "verify"
 MOST_LOOKED_AT = 1000
@@ -94,7 +93,7 @@ def freeze_work(store: Store, dataset_id: int, request: FreezeRequest, actor: st
 
     def work(progress: JobProgress) -> Json:
         progress(0, None, f"Freezing {_called(request)}.")
-        return carry_out_apart(
+        return run_job_in_worker(
             store,
             "freezing",
             "the freeze",
@@ -116,7 +115,7 @@ def verify_work(store: Store, version_id: int, actor: str) -> Work:
         version = get_version(store, version_id)
         progress(0, None, f"Verifying {version.name}.")
         try:
-            return carry_out_apart(
+            return run_job_in_worker(
                 store,
                 "verifying",
                 "the verification",
@@ -128,7 +127,7 @@ def verify_work(store: Store, version_id: int, actor: str) -> Work:
             )
         except OverloadedError as error:
             # A process that ended did not come to keeping it; one that never began says nothing.
-            if isinstance(error.__cause__, ChildEnded):
+            if isinstance(error.__cause__, WorkerEnded):
                 keep_failure(store, version_id, error.message, actor=actor)
             raise
 

@@ -9,10 +9,10 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 
 from app.config import Settings
-from app.store.first_look import log_file
 from app.store.jobs import count_jobs
 from app.store.listing import count_unsolved
 from app.store.log import newest_entry
+from app.store.recovery.preopen_check import log_file
 from app.store.store import Store
 
 

@@ -22,9 +22,8 @@ from app.review.datasets.delete import delete_dataset
 from app.review.editing.recompute import solve_dataset
 from app.review.editing.state import GroupState, read_states
 from app.review.importing.sources import Source, import_source
-from app.review.jobs.child import carry_out_apart
 from app.review.jobs.jobs import Jobs
-from app.review.jobs.run import JobProgress, Work
+from app.review.jobs.run import JobProgress, Work, run_job_in_worker
 from app.review.people.names import note
 from app.review.people.roles import Role
 from app.review.practice.lessons import Feedback, judge, kind_of
@@ -130,7 +129,7 @@ def practice_work(store: Store, *, again: bool, actor: str, person: str | None) 
     """The work itself; its result names the dataset and its first group."""
 
     def work(progress: JobProgress) -> Json:
-        return carry_out_apart(
+        return run_job_in_worker(
             store,
             "practice",
             "the practice groups",

@@ -7,9 +7,9 @@ from collections.abc import Iterable
 from app.errors import StorageError
 from app.review.doctor.check import Check, compared
 from app.review.talk.comments import COMMENT
+from app.store.dialect.dialect import dialect_in
 from app.store.log import LogEntry, entries_of_kinds
 from app.store.session import Session
-from app.store.soundness import restoring
 from app.store.store import Store
 from app.store.stored_json import as_written
 from app.store.threads import ThreadRecord, all_threads
@@ -23,7 +23,7 @@ def examine_threads(store: Store) -> Check:
     When a thread began and whom it mentions stands in the tables alone.
     """
     with store.read() as session:
-        return _examine(session, restoring(session))
+        return _examine(session, dialect_in(session).restoring)
 
 
 def _examine(session: Session, restore: str) -> Check:

@@ -11,11 +11,11 @@ from app.review.versions.hash import version_hash
 from app.review.versions.version import calibration_names
 from app.store.aliases import shown_entries
 from app.store.codecs import policy_from_json
+from app.store.dialect.dialect import dialect_in
 from app.store.frozen import SAID, SOLUTION, fitting_key, json_of, known_frozen, named_texts
 from app.store.frozen_rows import frozen_batches, lost_calibrations, members_without_content
 from app.store.log import LogEntry, entries_of_kinds
 from app.store.session import Session
-from app.store.soundness import restoring
 from app.store.store import Store
 from app.store.stored_json import as_written, parse, unpack
 from app.store.versions import all_versions, said_rows
@@ -29,7 +29,7 @@ def examine_versions(store: Store) -> list[Check]:
     Whether solutions would come out as they were frozen is what ``verify`` tells.
     """
     with store.read() as session:
-        restore = restoring(session)
+        restore = dialect_in(session).restoring
         versions = all_versions(session)
         apart = [*_apart(session, versions)]
         count, changed = _frozen(session)

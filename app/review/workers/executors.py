@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor
 from contextlib import AbstractContextManager, contextmanager
 
 from app.config import Settings
+from app.errors import InputError
 from app.review.workers.cluster import Cluster, read_place
-from app.review.workers.processes import process_pool
+from app.worker_process import spawned_pool
 
 
 @contextmanager
@@ -40,6 +42,23 @@ def server_pool(settings: Settings) -> Callable[[], AbstractContextManager[Execu
         return lambda: _cluster_of(settings)
     # One processor is left for the requests.
     return lambda: process_pool(max(1, settings.workers - 1))
+
+
+@contextmanager
+def process_pool(workers: int) -> Iterator[Executor]:
+    """Processes that solve; what is not done when the work fails is found again by the next run.
+
+    Raises:
+        InputError: They could not even enter the present folder.
+    """
+    if not os.access(".", os.X_OK):
+        raise InputError(
+            "this user may not enter the folder in which the command was given, and processes"
+            " that solve begin there",
+            hint="Change to another folder first (cd /), or solve with --workers 1.",
+        )
+    with spawned_pool(workers) as pool:
+        yield pool
 
 
 def _cluster_of(settings: Settings) -> Cluster:

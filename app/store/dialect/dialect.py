@@ -108,8 +108,14 @@ class Dialect(Protocol):
     def settle(self, connection: Connection, tables: Sequence[Table], key: str) -> None:
         """Count ids on from rows that were copied, and belong to the installation of a key."""
 
-    def file_faults(self, session: Session, most: int, *, thorough: bool) -> list[str]:
-        """What is wrong with the file, each a line; see ``soundness``."""
+    def file_faults(self, session: Session, most: int = 5, *, thorough: bool = False) -> list[str]:
+        """What is wrong with pages and indexes of the file, each a line; a server looks after its own.
+
+        Args:
+            session: Any.
+            most: Lines; SQLite may fail altogether where it goes on after the first.
+            thorough: Compare each index with its table, too, which takes several times as long.
+        """
 
     def count_lost_references(self, session: Session) -> int:
         """How many rows refer to rows that are gone."""

@@ -182,7 +182,7 @@ class PostgreSQL:
                     f' max(id) IS NOT NULL) FROM "{name}"'
                 )
 
-    def file_faults(self, session: Session, most: int, *, thorough: bool) -> list[str]:
+    def file_faults(self, session: Session, most: int = 5, *, thorough: bool = False) -> list[str]:
         """See ``Dialect``; a server looks after its own files."""
         return []
 

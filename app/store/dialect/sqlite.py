@@ -128,10 +128,10 @@ class SQLite:
         return nullcontext()
 
     def settle(self, connection: Connection, tables: Sequence[Table], key: str) -> None:
-        """See ``Dialect``; ids follow the rows, and the first page says whose they are (``wal``)."""
+        """See ``Dialect``; ids follow the rows, and the first page says whose they are (``recovery.wal``)."""
         connection.exec_driver_sql(f"PRAGMA application_id = {int(key[:7], 16)}")
 
-    def file_faults(self, session: Session, most: int, *, thorough: bool) -> list[str]:
+    def file_faults(self, session: Session, most: int = 5, *, thorough: bool = False) -> list[str]:
         """See ``Dialect``."""
         check = "integrity_check" if thorough else "quick_check"
         found = session.scalars(text(f"PRAGMA {check}({most})")).all()

@@ -26,7 +26,7 @@ from app.review.datasets.dataset import dataset_id
 from app.review.exporting.export import export
 from app.review.exporting.folder import ExportFolder
 from app.review.importing.sources import Source, import_source
-from app.review.jobs import child as job_child
+from app.review.jobs import run as job_run
 from app.review.jobs.exports import export_work
 from app.review.jobs.run import JobProgress
 from app.soccer.media import Media
@@ -184,8 +184,8 @@ class Apart:
     """Exports of the dataset, each by a process of its own."""
 
     def __init__(self, store: Store, monkeypatch: pytest.MonkeyPatch):
-        monkeypatch.setattr(job_child, "SMALL", 0)
-        monkeypatch.setattr(job_child, "STOP_SECONDS", 0.0)
+        monkeypatch.setattr(job_run, "SMALL", 0)
+        monkeypatch.setattr(job_run, "STOP_SECONDS", 0.0)
         self._store, self._folder = store, ExportFolder(store.settings.exports)
         self.processes: set[int] = set()
         self.killed = False

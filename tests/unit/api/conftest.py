@@ -24,7 +24,7 @@ from app.config import Settings
 from app.geometry.camera import Camera
 from app.review.editing.recompute import solve_dataset
 from app.review.importing.ingest import ingest
-from app.review.jobs import child as job_child
+from app.review.jobs import run as job_run
 from app.soccer.annotation import Lines, make_lines
 from app.soccer.group import Group, Station, View
 from app.soccer.media import Media
@@ -193,7 +193,7 @@ def api(app: FastAPI, client_of) -> TestClient:
     return client_of(app)
 
 
-@pytest.fixture(params=[job_child.SMALL, 0], ids=["here", "apart"])
+@pytest.fixture(params=[job_run.SMALL, 0], ids=["here", "apart"])
 def wherever(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
     """Long jobs work in this process, and once more in one of their own."""
-    monkeypatch.setattr(job_child, "SMALL", request.param)
+    monkeypatch.setattr(job_run, "SMALL", request.param)

@@ -14,6 +14,7 @@ import uvicorn
 from sqlalchemy import update
 from structlog.testing import capture_logs
 
+from app.admission import release_admission
 from app.api.idempotency import Idempotency
 from app.api.routers import verdicts
 from app.api.security.lanes import EDITS
@@ -21,7 +22,6 @@ from app.api.server import Server, listen
 from app.errors import StorageError
 from app.review.answers import answers
 from app.review.verdicts.verdict import set_verdict
-from app.slot import leave_slot
 from app.store.answers import shorten_answers
 from app.store.tables.jobs import AnswerModel
 from tests.waiting import SECONDS
@@ -235,7 +235,7 @@ class TestRepetitionsThatWait:
 
         def slow(store: Any, group: int, *said: Any, **options: Any) -> Any:
             if group == 1:
-                leave_slot()
+                release_admission()
                 assert finish.wait(SECONDS)
             return set_verdict(store, group, *said, **options)
 

@@ -12,10 +12,10 @@ import pytest
 from fastapi import FastAPI
 
 from app.api.large_edits import NICENESS, LargeEdits
-from app.child_figures import FIGURES
 from app.errors import OverloadedError
 from app.review.editing.solve_encoded import solve_encoded
 from app.review.editing.state import read_record
+from app.worker_process import COUNTS
 from tests.waiting import SECONDS
 
 API = "/api/v1"
@@ -61,7 +61,7 @@ def ready(app: FastAPI) -> Iterator[LargeEdits]:
     with closing(LargeEdits(services.settings.model_copy(update={"team": True}))) as made:
         app.state.services = replace(services, large=made)
         end = time.monotonic() + SECONDS
-        while not made.children[0].begin():
+        while not made.workers[0].begin():
             assert time.monotonic() < end, "there is no process for large edits"
             time.sleep(0.02)
         yield made
@@ -71,13 +71,13 @@ def test_who_runs_a_server_alone_has_no_process(app: FastAPI, api) -> None:
     before = multiprocessing.active_children()
     assert draw(api, large_lines()).status_code == 200
     assert multiprocessing.active_children() == before
-    assert app.state.services.large.children == []
+    assert app.state.services.large.workers == []
 
 
 def test_its_process_solves_a_large_edit_as_the_server_does(app, ready, api, monkeypatch) -> None:
     apart = solution_of(draw(api, large_lines()))
     draw(api, {"lines": {"Middle line": []}})
-    monkeypatch.setattr(ready.children[0], "is_ready", False)
+    monkeypatch.setattr(ready.workers[0], "is_ready", False)
     assert apart == solution_of(draw(api, large_lines()))
 
 
@@ -106,10 +106,10 @@ def test_what_takes_the_place_of_one_that_broke_down_is_made_ready_too(ready) ->
         ready.run(break_down, None, None, {})
     assert ready.run(solve_here, None, None, {}) == os.getpid()
     end = time.monotonic() + SECONDS
-    while not ready.children[0].begin():
+    while not ready.workers[0].begin():
         assert time.monotonic() < end, "no other took its place"
         time.sleep(0.02)
-    task = ready.children[0].submit(os.getpriority, os.PRIO_PROCESS, 0)
+    task = ready.workers[0].submit(os.getpriority, os.PRIO_PROCESS, 0)
     assert task.future.result(SECONDS) == os.getpriority(os.PRIO_PROCESS, 0) + NICENESS
 
 
@@ -120,11 +120,11 @@ def test_what_people_draw_is_solved_by_the_server(app, ready, api, monkeypatch) 
 
 
 def test_one_that_is_not_begun_when_the_server_closes_is_told_to_come_again(ready) -> None:
-    blocking = ready.children[0].submit(signal.pause)
+    blocking = ready.workers[0].submit(signal.pause)
     with ThreadPoolExecutor() as threads:
         waiting = threads.submit(ready.run, solve_nothing, None, None, {})
         end = time.monotonic() + SECONDS
-        while not FIGURES["large"].waiting:
+        while not COUNTS["large"].waiting:
             assert time.monotonic() < end, "it does not wait"
             time.sleep(0.02)
         ready.close()

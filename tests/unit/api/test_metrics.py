@@ -25,12 +25,11 @@ from app.api.large_edits import LargeEdits
 from app.api.previews import Previews
 from app.api.security.lanes import EDITS, LANES
 from app.api.services import Services
-from app.child import ChildEnded
-from app.child_figures import KINDS
-from app.child_pool import ChildPool
 from app.errors import DamagedError, StorageError
 from app.review.importing.ingest import ingest
 from app.store.store import Store
+from app.worker_pool import WorkerPool
+from app.worker_process import KINDS, WorkerEnded
 from tests.waiting import SECONDS
 
 API = "/api/v1"
@@ -175,29 +174,29 @@ POOLS: dict[str, Callable[[Services, Previews], Any]] = {
     "fetchers": lambda services, _: services.frames._fetchers,
     "indexers": lambda services, _: services.frames._videos.pool,
     "predictions": lambda services, _: services.predictions._pool,
-    "previews": lambda _, previews: previews.children[0]._pool,
-    "large": lambda _, previews: previews._large.children[0]._pool,
+    "previews": lambda _, previews: previews.workers[0],
+    "large": lambda _, previews: previews._large.workers[0],
 }
 
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_every_kind_of_children_begins_with_nobody(read, kind: str) -> None:
     for name in ("busy", "waiting"):
-        assert read(f"touchline_children_{name}", kind=kind) == 0
+        assert read(f"touchline_worker_{name}", kind=kind) == 0
 
 
 @pytest.mark.parametrize("kind", POOLS)
-def test_a_child_that_ends_in_the_midst_of_its_task_counts_for_its_pool(
+def test_a_worker_that_ends_in_the_midst_of_its_task_counts_for_its_pool(
     app: FastAPI, read, previews: Previews, kind: str
 ) -> None:
     def ended() -> dict[str, float]:
-        name = "touchline_children_ended_total"
+        name = "touchline_worker_ended_total"
         return {other: read(name, kind=other, reason="crash") for other in KINDS}
 
     before, pool = ended(), POOLS[kind](app.state.services, previews)
-    assert isinstance(pool, ChildPool)
-    with pytest.raises(ChildEnded):
-        pool.submit(break_down).future.result(SECONDS)
+    assert isinstance(pool, WorkerPool)
+    with pytest.raises(WorkerEnded):
+        pool.submit(break_down, explain=lambda error: error).future.result(SECONDS)
     assert ended() == {**before, kind: before[kind] + 1}
 
 

@@ -74,7 +74,7 @@ def ready(apart: Previews, large: LargeEdits, api) -> Previews:
     """It, once all its processes answer."""
     assert preview(api).status_code == 200
     end = time.monotonic() + SECONDS
-    while not all(child.begin() for child in (*apart.children, *large.children)):
+    while not all(worker.begin() for worker in (*apart.workers, *large.workers)):
         assert time.monotonic() < end, "there are no processes for previews"
         time.sleep(0.02)
     return apart
@@ -90,18 +90,18 @@ class TestAlone:
         before = multiprocessing.active_children()
         assert preview(api).status_code == 200
         assert multiprocessing.active_children() == before
-        assert app.state.services.previews.children == []
+        assert app.state.services.previews.workers == []
 
 
 class TestApart:
     def test_who_begins_is_answered_before_the_process_is_there(self, apart, api) -> None:
         answer = preview(api)
-        assert (answer.status_code, apart.children[0].is_ready) == (200, False)
+        assert (answer.status_code, apart.workers[0].is_ready) == (200, False)
 
     def test_the_process_answers_as_the_server_does(self, app, ready, api, monkeypatch) -> None:
         asked = ({}, {"group": 99}, {"view": "no such view"})
         apart = [alike(preview(api, **one)) for one in asked]
-        for child in ready.children:
+        for child in ready.workers:
             monkeypatch.setattr(child, "is_ready", False)
         assert apart == [alike(preview(api, **one)) for one in asked]
         assert [status for status, *_ in apart] == [200, 404, 400]
@@ -118,7 +118,7 @@ class TestApart:
 
     def test_two_people_drag_at_once(self, ready, api) -> None:
         """Each with a process; the one that has less to do is asked."""
-        first, second = ready.children
+        first, second = ready.workers
         task = first.submit(signal.pause)
         assert preview(api).status_code == 200
         assert (first.tasks, second.tasks) == (1, 0)
@@ -128,10 +128,10 @@ class TestApart:
     def test_large_ones_and_drags_keep_each_other_waiting_in_neither_way(
         self, ready, large, api
     ) -> None:
-        drags = [child.submit(signal.pause) for child in ready.children]
+        drags = [child.submit(signal.pause) for child in ready.workers]
         assert large_preview(api).status_code == 200
         ready.close()
-        edit = large.children[0].submit(signal.pause)
+        edit = large.workers[0].submit(signal.pause)
         assert preview(api).status_code == 200
         large.close()
         assert all(task.future.done() for task in (*drags, edit))
@@ -141,7 +141,7 @@ class TestApart:
     ) -> None:
         apart = large_preview(api)
         with monkeypatch.context() as without:
-            without.setattr(large.children[0], "is_ready", False)
+            without.setattr(large.workers[0], "is_ready", False)
             assert alike(apart) == alike(large_preview(api))
         monkeypatch.setattr("app.api.previews.solve_apart", break_down)
         answer = large_preview(api)

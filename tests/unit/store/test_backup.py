@@ -45,7 +45,7 @@ class TestBackUp:
     ) -> None:
         say(store, 3)
         examine = "app.store.backup.examine_database"
-        from app.store.examination import examine_database
+        from app.store.backup import examine_database
 
         def meanwhile(*arguments):
             say(store, 4)

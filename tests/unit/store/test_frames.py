@@ -15,16 +15,16 @@ import cv2
 import numpy as np
 import pytest
 
-from app.child import Allowance
 from app.config import Settings
 from app.errors import ImageError, NotFoundError, OverloadedError, TooLargeError
 from app.soccer.media import Media
 from app.store import frames as module
 from app.store.frames import Frames, make_picture
+from app.worker_process import WorkerLimits
 
 PICTURE = np.full((90, 160, 3), 90, np.uint8)
 PNG = cv2.imencode(".png", PICTURE)[1].tobytes()
-LITTLE = Allowance(450 * 2**20, 60.0, 60.0)
+LITTLE = WorkerLimits(450 * 2**20, 60.0, 60.0)
 """Above what a process holds that has loaded the libraries, some 300 MiB, and below a deep picture besides."""
 
 
@@ -86,7 +86,7 @@ class TestFrames:
     ) -> None:
         path = tmp_path / "deep.png"
         path.write_bytes(deep_png(7000))
-        monkeypatch.setattr(module, "ALLOWANCE", LITTLE)
+        monkeypatch.setattr(module, "LIMITS", LITTLE)
         frames = Frames(settings)
         try:
             frames.read(media, None, False)
@@ -99,7 +99,7 @@ class TestFrames:
     def test_a_decoder_that_takes_want_of_memory_for_damage_is_not_believed(
         self, tmp_path: Path, settings: Settings, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        monkeypatch.setattr(module, "ALLOWANCE", LITTLE)
+        monkeypatch.setattr(module, "LIMITS", LITTLE)
         monkeypatch.setattr(module, "make_picture", decode_nothing)
         frames = Frames(settings)
         try:
@@ -164,7 +164,7 @@ class TestFrames:
     ) -> None:
         with monkeypatch.context() as patch:
             patch.setattr(module, "make_picture", sleep_on)
-            patch.setattr(frames._pool._children[0], "allowance", Allowance(2**30, 10.0, 0.01))
+            patch.setattr(frames._pool._workers[0], "limits", WorkerLimits(2**30, 10.0, 0.01))
             with pytest.raises(TooLargeError, match="without a result"):
                 frames.read(media, None, False)
         with pytest.raises(TooLargeError, match="without a result"):

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 from sqlalchemy import insert, select
 
+from app.store.dialect.dialect import dialect_in
 from app.store.projection import (
     all_groups,
     all_noticed,
@@ -11,7 +12,6 @@ from app.store.projection import (
     rewrite,
 )
 from app.store.proposals import Proposal, read_proposals, save_proposals
-from app.store.soundness import count_lost_references
 from app.store.spare import put_spare
 from app.store.store import Store
 from app.store.tables.groups import GroupModel, ImportFindingModel, StationModel, ViewModel
@@ -62,7 +62,7 @@ class TestRewrite:
             assert [item.group.label for item in all_groups(session)] == ["anew"]
             assert list(all_spare(session)) == []
             assert len(list(all_verdicts(session))) == 1
-            assert count_lost_references(session) == 0
+            assert dialect_in(session).count_lost_references(session) == 0
 
     def test_what_nobody_said_stays_with_the_views_that_are_there_again(
         self, filled: Store

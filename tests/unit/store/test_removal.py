@@ -5,6 +5,7 @@ from sqlalchemy import text
 
 from app.soccer.finding import Dismissal
 from app.store.datasets import dataset_rows
+from app.store.dialect.dialect import dialect_in
 from app.store.dismissals import insert_dismissal
 from app.store.group_rows import next_id
 from app.store.log import Entry, append
@@ -13,7 +14,6 @@ from app.store.removal import (
     delete_rows,
     keep_used_ids,
 )
-from app.store.soundness import count_lost_references
 from app.store.store import Store
 from app.store.tables.groups import GroupModel
 from tests.databases import said_for_sqlite
@@ -52,7 +52,7 @@ class TestDismissals:
         with dismissed.write() as session:
             append(session, [Entry("dataset_deleted", "ann", "2026-01-02", {}, 1)])
             delete_rows(session, 1)
-            assert count_lost_references(session) == 0
+            assert dialect_in(session).count_lost_references(session) == 0
             assert session.scalar(text("SELECT count(*) FROM dismissal")) == 0
 
 
@@ -68,5 +68,5 @@ class TestRemoval:
             keep_used_ids(session)
             delete_rows(session, 1)
             assert dataset_rows(session) == []
-            assert count_lost_references(session) == 0
+            assert dialect_in(session).count_lost_references(session) == 0
             assert next_id(session, GroupModel) == 2

@@ -13,9 +13,10 @@ import pytest
 from sqlalchemy import text
 from structlog.testing import capture_logs
 
+from app.admission import hold_admission
 from app.config import Settings
 from app.errors import BusyError, DamagedError, InputError, StorageError
-from app.slot import hold_slot
+from app.store.dialect.dialect import dialect_of
 from app.store.dialect.sqlite import AGAIN_S, PRAGMAS
 from app.store.log import Entry, append, read_log
 from app.store.migrate import KNOWN_REVISIONS, migrate, migrations_folder
@@ -105,7 +106,9 @@ class TestRequireWhole:
         self, store: Store, monkeypatch
     ) -> None:
         store.require_whole()
-        monkeypatch.setattr("app.store.store.file_faults", lambda *_: ["Tree 5 is torn"])
+        monkeypatch.setattr(
+            type(dialect_of(store.settings)), "file_faults", lambda *_: ["Tree 5 is torn"]
+        )
         with pytest.raises(DamagedError, match=r"touchline\.db is damaged$"):
             store.require_whole()
         with pytest.raises(DamagedError, match="nothing can be changed now"):
@@ -194,7 +197,7 @@ class TestWrite:
         left: list[list[str]] = []
 
         def write(*, lasting: bool) -> None:
-            hold_slot(lambda: left.append(names(store)))
+            hold_admission(lambda: left.append(names(store)))
             with store.write(lasting=lasting) as session:
                 session.execute(text(INSERT.format(f"lasting {lasting}")))
 

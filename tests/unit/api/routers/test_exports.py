@@ -18,7 +18,7 @@ from app.review.datasets.dataset import dataset_id
 from app.review.editing.recompute import solve_dataset
 from app.review.exporting.formats import FORMATS
 from app.review.importing.ingest import ingest
-from app.review.jobs import child as job_child
+from app.review.jobs import run as job_run
 from app.review.jobs.jobs import Jobs
 from app.review.jobs.upkeep import tidy
 from app.review.versions.freeze import FreezeRequest, freeze
@@ -325,7 +325,7 @@ class TestRestart:
         here = api.get(job["content"]).content
 
         # A process of its own asks for the same frames, and writes the same bytes.
-        monkeypatch.setattr(job_child, "SMALL", 0)
+        monkeypatch.setattr(job_run, "SMALL", 0)
         again = api.post(API, json=order).json()
         assert services.jobs.wait(again["id"], SECONDS).state == "done"
         assert read[2:] == read[:2]

@@ -19,12 +19,11 @@ from app.api.routers.views import (
     MIN_WIDTH,
     clamp_width,
     get_neighbours,
-    while_wanted,
 )
-from app.child_pool import PoolTask
 from app.errors import OverloadedError
 from app.review.importing.ingest import ingest
 from app.soccer.media import Media
+from app.worker_pool import PoolTask
 
 API = "/api/v1"
 
@@ -323,15 +322,6 @@ class TestImage:
         first = api.get(f"{API}/groups/{row['id']}").json()["views"][0]
         answer = api.get(first["image"])
         assert (answer.status_code, answer.headers["retry-after"]) == (503, "5")
-
-    def test_a_picture_that_nobody_waits_for_is_given_up(self) -> None:
-        class Gone:
-            async def is_disconnected(self) -> bool:
-                return True
-
-        task = PoolTask(lambda error: error)
-        assert asyncio.run(while_wanted(Gone(), task)) is None
-        assert task.future.cancelled()
 
     def test_frames_around_that_nobody_waits_for_are_given_up(
         self, app, api, frames, monkeypatch

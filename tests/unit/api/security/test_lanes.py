@@ -13,6 +13,7 @@ import pytest
 from starlette.testclient import TestClient
 from starlette.types import Receive, Scope, Send
 
+from app.admission import release_admission
 from app.api.application import PREFIX
 from app.api.security import lanes
 from app.api.security.access import LOGIN
@@ -37,7 +38,6 @@ from app.api.security.lanes import (
     Lanes,
     lane_of,
 )
-from app.slot import leave_slot
 
 DRAG = f"{PREFIX}/groups/1/preview"
 EDIT = f"{PREFIX}/views/1/ball"
@@ -147,7 +147,7 @@ class Work:
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         self.begun.append(scope["path"])
         if self.away:
-            await asyncio.to_thread(leave_slot)
+            await asyncio.to_thread(release_admission)
         await self.may_answer.wait()
         await send({"type": "http.response.start", "status": 200, "headers": []})
         await self.may_end.wait()

@@ -29,8 +29,8 @@ from app.review.yields.store import YieldStore
 from app.soccer.annotation import BallAnnotation, Extras
 from app.soccer.frames import Box
 from app.soccer.policy import PAPER
+from app.store.dialect.dialect import dialect_in
 from app.store.log import verify_chain
-from app.store.soundness import count_lost_references
 from app.store.store import Store
 from app.store.tables import Base
 from app.store.tables.log import LogModel
@@ -97,7 +97,7 @@ class TestDeleteDataset:
         assert list_groups(two, 2, limit=500) == before
         assert load(two, before.items[0].id).solution is not None
         with two.read() as session:
-            assert count_lost_references(session) == 0
+            assert dialect_in(session).count_lost_references(session) == 0
             for table in Base.metadata.sorted_tables:
                 if "dataset_id" in table.c and table.name not in ("log", "job"):
                     owners = set(session.scalars(select(table.c.dataset_id)))
@@ -183,7 +183,7 @@ class TestDeleteDataset:
         with two.read() as session:
             assert read_roles(session, person.id, Role.VIEWER).single == {3: Role.NONE}
             assert replay(session) == read_ledger(session)
-            assert count_lost_references(session) == 0
+            assert dialect_in(session).count_lost_references(session) == 0
         assert [one.dataset for one in AccessTokens(two).of_person(person.id)] == ["demo"]
 
     def test_verdicts_can_be_deleted_only_with_their_dataset(self, two: Store) -> None:

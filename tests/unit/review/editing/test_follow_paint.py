@@ -8,8 +8,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.child import Allowance, ChildEnded
-from app.child_pool import PoolTask
 from app.errors import OverloadedError
 from app.review.editing.edit import SetBall, SetLines
 from app.review.editing.follow_paint import PaintFollower
@@ -22,6 +20,8 @@ from app.review.editing.submit import load, preview, submit
 from app.review.editing.undo import redo, undo
 from app.review.policies.policy import change_policy
 from app.soccer.policy import PAPER
+from app.worker_pool import PoolTask
+from app.worker_process import WorkerEnded, WorkerLimits
 from tests.unit.review.editing import test_paint
 from tests.unit.review.editing.test_paint import calibrations, kinds, scenes
 
@@ -111,7 +111,11 @@ class TestFollow:
 
     @pytest.mark.parametrize(
         "problem",
-        [OverloadedError("too many"), ChildEnded("memory", Allowance(1, 1.0, 1.0)), TimeoutError()],
+        [
+            OverloadedError("too many"),
+            WorkerEnded("memory", WorkerLimits(1, 1.0, 1.0)),
+            TimeoutError(),
+        ],
         ids=["too many wait", "its process ended", "it took too long"],
     )
     def test_where_no_frame_can_be_read_the_edit_is_saved_all_the_same(self, painted, problem):

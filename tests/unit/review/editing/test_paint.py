@@ -11,7 +11,6 @@ import cv2
 import numpy as np
 import pytest
 
-from app.child_pool import PoolTask
 from app.errors import ConflictError, NotFoundError
 from app.review.datasets import paint_reading
 from app.review.editing import paint as editing
@@ -42,6 +41,7 @@ from app.soccer.policy import PAPER, TOUCHLINE
 from app.store import media
 from app.store.groups import read_groups
 from app.store.store import Store
+from app.worker_pool import PoolTask
 from tests.scenes import make_scenes
 
 
@@ -92,7 +92,7 @@ class Here:
 
 @pytest.fixture
 def here(monkeypatch) -> Iterator[type[Here]]:
-    monkeypatch.setattr(editing, "ChildPool", Here)
+    monkeypatch.setattr(editing, "WorkerPool", Here)
     Here.read = 0
     yield Here
 
@@ -382,21 +382,21 @@ class TestReadPaint:
     ):
         ingest(store, "demo", groups(pictures), source="files", actor="ann")
         change_policy(store, "demo", TOUCHLINE, if_match=None, actor="ann")
-        monkeypatch.setattr(editing, "_A_CHILD", 1)
+        monkeypatch.setattr(editing, "_PER_WORKER", 1)
 
         def stop(done, _total):
             raise KeyboardInterrupt
 
         with pytest.raises(KeyboardInterrupt):
-            read_paint(store, "demo", actor="ann", children=1, progress=stop)
+            read_paint(store, "demo", actor="ann", workers=1, progress=stop)
         assert (len(looked), state(store).read) == (2, 2)
-        read_paint(store, "demo", actor="ann", children=1)
+        read_paint(store, "demo", actor="ann", workers=1)
         assert (len(looked), state(store).read) == (4, 4)
 
     def test_pictures_are_read_in_processes_of_their_own(self, store, pictures, looked):
         ingest(store, "demo", groups(pictures)[:1], source="files", actor="ann")
         change_policy(store, "demo", TOUCHLINE, if_match=None, actor="ann")
-        read_paint(store, "demo", actor="ann", children=1)
+        read_paint(store, "demo", actor="ann", workers=1)
         assert (state(store).painted, looked) == (2, [])
 
 

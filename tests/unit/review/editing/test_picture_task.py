@@ -10,21 +10,20 @@ from pathlib import Path
 
 import pytest
 
-from app.child import Allowance
-from app.child_figures import ChildFigures
-from app.child_pool import ChildPool
 from app.errors import ImageError, OverloadedError, TooLargeError
 from app.review.editing.picture_task import PictureTask
+from app.worker_pool import WorkerPool
+from app.worker_process import WorkerCounts, WorkerLimits
 
 MEBI = 2**20
 
 
 @pytest.fixture
-def pool() -> Iterator[ChildPool]:
+def pool() -> Iterator[WorkerPool]:
     """One child, with little of everything."""
     # Above what a process holds that has loaded the libraries, some 300 MiB.
-    allowance = Allowance(450 * MEBI, 1.0, 60.0)
-    with closing(ChildPool(allowance, 1, 2, "pictures", ChildFigures())) as made:
+    allowance = WorkerLimits(450 * MEBI, 1.0, 60.0)
+    with closing(WorkerPool(allowance, 1, 2, "pictures", WorkerCounts())) as made:
         yield made
 
 
@@ -48,18 +47,18 @@ def take_all(_: Path) -> int:
     return len(bytearray(600 * MEBI))
 
 
-def test_who_was_killed_is_asked_once_more(pool: ChildPool, tmp_path: Path) -> None:
+def test_who_was_killed_is_asked_once_more(pool: WorkerPool, tmp_path: Path) -> None:
     assert PictureTask(pool, be_killed_once, tmp_path / "seen").result() == "read"
 
 
-def test_killed_twice_it_says_nothing_of_the_picture(pool: ChildPool, tmp_path: Path) -> None:
+def test_killed_twice_it_says_nothing_of_the_picture(pool: WorkerPool, tmp_path: Path) -> None:
     with pytest.raises(OverloadedError, match="killed, most likely for want of memory"):
         PictureTask(pool, be_killed, tmp_path).result()
 
 
 @pytest.mark.parametrize(("work", "kind"), [(crash, ImageError), (take_all, TooLargeError)])
 def test_a_picture_over_which_a_child_ends_by_itself_is_unreadable(
-    pool: ChildPool, tmp_path: Path, work: object, kind: type[Exception]
+    pool: WorkerPool, tmp_path: Path, work: object, kind: type[Exception]
 ) -> None:
     with pytest.raises(kind, match="the picture"):
         PictureTask(pool, work, tmp_path).result()  # type: ignore[arg-type]

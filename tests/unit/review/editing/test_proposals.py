@@ -83,7 +83,7 @@ def groups(tmp_path: Path) -> list[Group]:
 @pytest.fixture(autouse=True)
 def here(monkeypatch: pytest.MonkeyPatch) -> None:
     """In place of processes: pictures are looked at where the test is."""
-    monkeypatch.setattr(editing, "ChildPool", Here)
+    monkeypatch.setattr(editing, "WorkerPool", Here)
 
 
 @pytest.fixture
@@ -232,7 +232,7 @@ class TestProposeViews:
         assert counts(store) == (1, 1, 1, 0, 0, 0)
 
     def test_killed_midway_it_goes_on_where_it_was(self, store, asked, tmp_path, monkeypatch):
-        monkeypatch.setattr(editing, "_A_CHILD", 1)
+        monkeypatch.setattr(editing, "_PER_WORKER", 1)
         many = [
             Group(str(number), (view(f"{number}.png", draw(tmp_path / f"{number}.png")),))
             for number in range(3)
@@ -243,9 +243,9 @@ class TestProposeViews:
             raise JobCancelled
 
         with pytest.raises(JobCancelled):
-            propose_views(store, "demo", children=1, progress=stop)
+            propose_views(store, "demo", workers=1, progress=stop)
         told = []
-        run = propose_views(store, "demo", children=1, progress=lambda *at: told.append(at))
+        run = propose_views(store, "demo", workers=1, progress=lambda *at: told.append(at))
         assert (run.left, run.proposed, len(asked)) == (1, 2, 3)
         assert told == [(1, 3), (2, 3), (3, 3)]
 

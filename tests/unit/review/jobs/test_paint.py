@@ -60,7 +60,7 @@ def test_it_counts_solves_and_is_taken_back(asked: Store) -> None:
 def test_a_reading_that_is_taken_back_while_it_runs_gives_nothing_more(
     asked: Store, monkeypatch
 ) -> None:
-    monkeypatch.setattr(editing, "_A_CHILD", 1)
+    monkeypatch.setattr(editing, "_PER_WORKER", 1)
     jobs, looked = Jobs(asked), Held(editing._readings, calls=2)
     monkeypatch.setattr(editing, "_readings", looked)
     job = PAINT.request(jobs, asked, "demo", None, actor="ann")
@@ -118,7 +118,7 @@ def test_a_record_that_nobody_works_on_keeps_nothing_from_being_taken_back(asked
 
 
 def test_a_server_that_stops_leaves_it_to_the_next_one(asked: Store, monkeypatch) -> None:
-    monkeypatch.setattr(editing, "_A_CHILD", 1)
+    monkeypatch.setattr(editing, "_PER_WORKER", 1)
     first = Jobs(asked)
     with stopped_at_its_first_step(paint_job, "read_paint", first):
         job = PAINT.request(first, asked, "demo", None, actor="ann")

@@ -27,7 +27,7 @@ VIEWS = 5
 @pytest.fixture
 def gone(store: Store, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Store:
     """Views without lines whose pictures are gone; no process looks for them."""
-    monkeypatch.setattr(editing, "ChildPool", Here)
+    monkeypatch.setattr(editing, "WorkerPool", Here)
     groups = [
         Group(f"{n}", (View("a", Station(f"{n}", SIZE), media=Media(str(tmp_path / f"{n}.png"))),))
         for n in range(VIEWS)
@@ -60,7 +60,7 @@ def test_a_job_is_asked_for_without_a_count_of_every_match(gone: Store, monkeypa
 
 
 def test_what_a_search_finds_after_all_is_forgotten_is_not_kept(gone: Store, monkeypatch) -> None:
-    monkeypatch.setattr(editing, "_A_CHILD", 2)
+    monkeypatch.setattr(editing, "_PER_WORKER", 2)
     jobs, looked = Jobs(gone), Held(editing._answers, calls=2)
     monkeypatch.setattr(editing, "_answers", looked)
     job = PROPOSALS.request(jobs, gone, "demo", None, actor="ann")
@@ -75,9 +75,9 @@ def test_what_a_search_finds_after_all_is_forgotten_is_not_kept(gone: Store, mon
 
 
 def test_a_server_that_stops_leaves_it_to_the_next_one(gone: Store, monkeypatch) -> None:
-    monkeypatch.setattr(editing, "_A_CHILD", 1)
+    monkeypatch.setattr(editing, "_PER_WORKER", 1)
     first = Jobs(gone)
-    with stopped_at_its_first_step(proposals_job, "propose_views", first, children=1):
+    with stopped_at_its_first_step(proposals_job, "propose_views", first, workers=1):
         job = PROPOSALS.request(first, gone, "demo", None, actor="ann")
     assert get_proposals(gone, "demo").count("looked") == 1
     second = Jobs(gone)

@@ -8,14 +8,14 @@ from typing import Any
 
 import pytest
 
-from app.child import Child
 from app.errors import JobCancelled, OverloadedError
-from app.review.jobs import child as job_child
+from app.review.jobs import run as job_run
 from app.review.jobs.run import JobProgress
 from app.review.jobs.versions import verify_work
 from app.review.versions.freeze import FreezeRequest, freeze
 from app.review.versions.version import Version, get_version
 from app.store.store import Store
+from app.worker_process import WorkerProcess
 
 
 @pytest.fixture
@@ -43,8 +43,8 @@ class Killed(JobProgress):
 
 @pytest.fixture(autouse=True)
 def _apart(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(job_child, "SMALL", 0)
-    monkeypatch.setattr(job_child, "STOP_SECONDS", 0.0)
+    monkeypatch.setattr(job_run, "SMALL", 0)
+    monkeypatch.setattr(job_run, "STOP_SECONDS", 0.0)
 
 
 class TestVerifyWork:
@@ -61,11 +61,11 @@ class TestVerifyWork:
     def test_one_whose_process_cannot_be_started_leaves_what_was_kept(
         self, store: Store, version: Version, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        def refuse(_child: Child, *_: Any, **__: Any) -> None:
+        def refuse(_child: WorkerProcess, *_: Any, **__: Any) -> None:
             raise OverloadedError("no process could be started for this") from OSError(12, "memory")
 
         verify_work(store, version.id, "ann")(JobProgress(1, threading.Event()))
-        monkeypatch.setattr("app.store.child.Child.run", refuse)
+        monkeypatch.setattr("app.store.database_worker.WorkerProcess.run", refuse)
         with pytest.raises(OverloadedError, match="no process"):
             verify_work(store, version.id, "ben")(JobProgress(2, threading.Event()))
         kept = get_version(store, version.id).verified

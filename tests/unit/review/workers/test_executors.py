@@ -1,9 +1,13 @@
-"""Where batches are solved, as the settings say."""
+"""Where batches are solved, as the settings say, and processes that solve."""
 
 from __future__ import annotations
 
+import os
+import time
+from collections.abc import Callable
 from concurrent.futures import Executor
 from contextlib import contextmanager
+from multiprocessing import active_children
 from pathlib import Path
 
 import pytest
@@ -11,7 +15,8 @@ import pytest
 from app.config import Settings
 from app.errors import InputError
 from app.review.workers import executors
-from app.review.workers.executors import executor_of, server_pool
+from app.review.workers.executors import executor_of, process_pool, server_pool
+from tests.waiting import SECONDS
 
 
 @pytest.fixture
@@ -60,3 +65,53 @@ def test_where_a_cluster_is_named_it_solves_and_no_process_of_this_machine(
     with pytest.raises(InputError, match="nonsense"), server_pool(settings)():
         pass
     assert opened == []
+
+
+class TestProcessPool:
+    def test_who_stands_in_a_folder_that_they_may_not_enter_is_told_before_processes_start(
+        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        """As with sudo from somebody else's home: each process would end with a traceback."""
+
+        def solve() -> str:
+            with pytest.raises(InputError) as refused, process_pool(2):
+                pass
+            return f"{refused.value.message} {refused.value.hint}"
+
+        closed = tmp_path / "closed"
+        closed.mkdir()
+        monkeypatch.chdir(closed)
+        closed.chmod(0)
+        said = as_nobody(solve)
+        closed.chmod(0o700)
+        assert "may not enter the folder" in said
+        assert "cd /" in said
+
+    def test_processes_end_with_the_work_that_fails_however_much_they_have_to_do(self) -> None:
+        end = time.monotonic() + SECONDS
+        with pytest.raises(LookupError), process_pool(1) as pool:
+            pid = pool.submit(os.getpid).result()
+            pool.submit(time.sleep, 3 * SECONDS)
+            pool.submit(time.sleep, 3 * SECONDS)
+            raise LookupError
+        while pid in {child.pid for child in active_children()}:
+            time.sleep(0.01)
+        assert time.monotonic() < end
+
+
+def as_nobody(work: Callable[[], str]) -> str:
+    """What a function says in a process of somebody else than root."""
+    read, write = os.pipe()
+    child = os.fork()
+    if not child:
+        try:
+            if os.getuid() == 0:
+                os.setuid(65534)
+            os.write(write, work().encode())
+        finally:
+            os._exit(0)
+    os.close(write)
+    with os.fdopen(read, encoding="utf-8") as said:
+        found = said.read()
+    os.waitpid(child, 0)
+    return found

@@ -1,4 +1,4 @@
-"""An import in a child does the same as one here, and ends within limits or when it is told to."""
+"""An import in a worker process does the same as one here, and ends within limits or when it is told to."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from typing import Any
 
 import pytest
 
-from app.child_figures import FIGURES
 from app.datasets.soccernet_v3_writer import write_soccernet_v3
 from app.errors import DamagedError, JobCancelled, TooLargeError
 from app.progress import TellProgress
 from app.review.datasets.dataset import list_datasets
-from app.review.importing import child
-from app.review.importing.child import Outcome, import_apart
 from app.review.importing.sources import Source, import_source
+from app.review.jobs import imports
+from app.review.jobs.imports import Outcome, import_in_worker
 from app.soccer.group import Group
 from app.store.store import Store
+from app.worker_process import COUNTS
 from tests.waiting import SECONDS
 
 
@@ -39,7 +39,7 @@ def apart(
     stop: Callable[[], None] = wanted,
 ) -> Outcome:
     source = Source("soccernet-v3", path, name="data")
-    return import_apart(
+    return import_in_worker(
         store, dataset, source, actor="ann", dry_run=dry_run, progress=progress, stop=stop
     )
 
@@ -54,13 +54,13 @@ def tree(tmp_path: Path, make_group: Callable[..., Group]) -> Path:
 
 @pytest.fixture
 def store(there: Store) -> Store:
-    """An installation of its own: the child opens it, and looks at its files first."""
+    """An installation of its own: the worker opens it, and looks at its files first."""
     return there
 
 
 def take_and_keep(*told: Any) -> None:
     """An import that has its turn to write, and never gives it back."""
-    told[-1].take_turn()
+    told[-1].__enter__()
     time.sleep(SECONDS)
 
 
@@ -84,7 +84,7 @@ def limit(monkeypatch: pytest.MonkeyPatch, store: Store, values: dict[str, int])
     monkeypatch.setattr(store, "settings", store.settings.model_copy(update=values))
 
 
-class TestImportApart:
+class TestImportInWorker:
     def test_does_and_says_what_an_import_here_does(self, store: Store, tree: Path) -> None:
         done: list[tuple[int, int | None, str]] = []
         outcome = apart(store, tree, progress=lambda *told: done.append(told))
@@ -170,16 +170,16 @@ class TestImportApart:
                 raise JobCancelled
 
         monkeypatch.setattr(store, "turn", Turn())
-        monkeypatch.setattr(child, "import_here", take_and_keep)
+        monkeypatch.setattr(imports, "import_here", take_and_keep)
         with pytest.raises(JobCancelled):
             apart(store, tree, stop=stop)
         with store.write():
             pass
 
-    def test_damage_that_the_child_meets_ends_changes_here(
+    def test_damage_that_the_worker_meets_ends_changes_here(
         self, there: Store, tree: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        monkeypatch.setattr(child, "import_here", meet_damage)
+        monkeypatch.setattr(imports, "import_here", meet_damage)
         with pytest.raises(DamagedError, match=r"^touchline\.db is damaged$"):
             apart(there, tree)
         with pytest.raises(DamagedError, match="nothing can be changed now"), there.write():
@@ -188,11 +188,11 @@ class TestImportApart:
     def test_one_that_breaks_down_is_counted(
         self, store: Store, tree: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        monkeypatch.setattr(child, "import_here", break_down)
-        before = FIGURES["imports"].ended["crash"]
+        monkeypatch.setattr(imports, "import_here", break_down)
+        before = COUNTS["imports"].ended["crash"]
         with pytest.raises(TooLargeError, match="made its process crash"):
             apart(store, tree)
-        assert FIGURES["imports"].ended["crash"] == before + 1
+        assert COUNTS["imports"].ended["crash"] == before + 1
 
     def test_what_needs_too_much_memory_is_a_sentence(
         self, store: Store, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

@@ -8,7 +8,7 @@ from pathlib import Path
 import pysqlite3.dbapi2 as sqlite
 import pytest
 
-from app.store.wal import read_header, read_log
+from app.store.recovery.wal import read_header, read_log
 
 COMMITS = 30
 

@@ -1,9 +1,9 @@
-"""The write-ahead log beside a database, read from its bytes, before SQLite opens either.
+"""Write-ahead log: the log beside a database, read from its bytes, before SQLite opens either.
 
 SQLite takes any log that lies beside a database for that database's own: a backup that was copied
 over ``touchline.db`` is mixed with the changes of the file that lay there before, page by page,
 and is malformed from then on. Nothing in the two files speaks against it. So every write of ours
-counts one up in the first page (``user_version``, see ``store.dialect.sqlite``), which also tells the
+counts one up in the first page (``user_version``, see ``dialect.sqlite``), which also tells the
 installation (``application_id``); and a log belongs to a database exactly when the log's first
 change is the one that follows on the database's last.
 
@@ -13,12 +13,13 @@ Source: "Database File Format", https://www.sqlite.org/fileformat2.html, section
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import IO
 
 import numpy as np
+from numpy.typing import NDArray
 
 MAGIC = b"SQLite format 3\0"
 _HEADER_BYTES = 100
@@ -27,8 +28,6 @@ _FRAME_HEADER = struct.Struct(">6I")
 _BIG_ENDIAN, _LITTLE_ENDIAN = 0x377F0683, 0x377F0682
 _NEWEST_LAYOUT = 4
 """Schema format number; SQLite refuses a larger one as if a statement were wrong."""
-_CHUNK = 8
-"""Bytes that one step of the checksum takes."""
 
 
 @dataclass(frozen=True)
@@ -108,13 +107,7 @@ def read_log(path: Path) -> WriteAheadLog:
     """The log of a path; an empty one where there is none, or nothing whole in it."""
     try:
         with path.open("rb") as file:
-            start = file.read(_LOG_HEADER.size)
-            if len(start) < _LOG_HEADER.size:
-                return WriteAheadLog()
-            magic, _version, page_bytes, _number, *_salts = _LOG_HEADER.unpack(start)
-            if magic not in (_BIG_ENDIAN, _LITTLE_ENDIAN) or not _is_page_size(page_bytes):
-                return WriteAheadLog()
-            return _read_frames(file, start, page_bytes)
+            return _read(file)
     except FileNotFoundError:
         return WriteAheadLog()
 
@@ -123,14 +116,30 @@ def _is_page_size(value: int) -> bool:
     return 512 <= value <= 65536 and value & (value - 1) == 0
 
 
-def _read_frames(file: Any, start: bytes, page_bytes: int) -> WriteAheadLog:
+def _read(file: IO[bytes]) -> WriteAheadLog:
     """Whole transactions, up to the first frame that SQLite would not believe."""
+    start = file.read(_LOG_HEADER.size)
+    if len(start) < _LOG_HEADER.size:
+        return WriteAheadLog()
+    magic, _version, page_bytes, _number, *salts, sum_1, sum_2 = _LOG_HEADER.unpack(start)
+    if magic not in (_BIG_ENDIAN, _LITTLE_ENDIAN) or not _is_page_size(page_bytes):
+        return WriteAheadLog()
+    order = ">u4" if magic == _BIG_ENDIAN else "<u4"
+    weights, frame_bytes = _fibonacci(page_bytes // 4 + 4), _FRAME_HEADER.size + page_bytes
+    sums = _checksum((0, 0), start[:24], order, weights)
+    # Of a log whose own sum is wrong no frame is believed.
+    is_whole = sums == (sum_1, sum_2)
     commits, headers = 0, []
     pending: DatabaseHeader | None = None
-    for number, pages, content in _frames(file, start, page_bytes):
-        if number == 1:
+    while is_whole and len(frame := file.read(frame_bytes)) == frame_bytes:
+        number, pages, *own_salts, sum_1, sum_2 = _FRAME_HEADER.unpack_from(frame)
+        content = frame[_FRAME_HEADER.size :]
+        sums = _checksum(sums, frame[:8] + content, order, weights)
+        is_whole = own_salts == salts and sums == (sum_1, sum_2)
+        if is_whole and number == 1:
             pending = DatabaseHeader.parse(content)
-        if pages:
+        # The last frame of a transaction says how many pages the database has after it.
+        if is_whole and pages:
             commits += 1
             if pending is not None:
                 headers.append(pending)
@@ -138,62 +147,29 @@ def _read_frames(file: Any, start: bytes, page_bytes: int) -> WriteAheadLog:
     return WriteAheadLog(commits, page_bytes, tuple(headers))
 
 
-def _frames(file: Any, start: bytes, page_bytes: int) -> Iterator[tuple[int, int, bytes]]:
-    """Page number, pages of the database after a commit (0 within one), and the page."""
-    magic, *_rest, salt_1, salt_2, sum_1, sum_2 = _LOG_HEADER.unpack(start)
-    order = ">u4" if magic == _BIG_ENDIAN else "<u4"
-    check = _Checksum(order, page_bytes)
-    if check.header(start[:24]) != (sum_1, sum_2):
-        return
-    while len(frame := file.read(_FRAME_HEADER.size + page_bytes)) == check.frame_bytes:
-        number, pages, *salts, sum_1, sum_2 = _FRAME_HEADER.unpack_from(frame)
-        content = frame[_FRAME_HEADER.size :]
-        if salts != [salt_1, salt_2] or check.frame(frame[:8] + content) != (sum_1, sum_2):
-            return
-        yield number, pages, content
+def _checksum(
+    sums: tuple[int, int], data: bytes, order: str, weights: NDArray[np.uint32]
+) -> tuple[int, int]:
+    """SQLite's running checksum of a log: for each pair (a, b) of words, s += a + t, then t += b + s.
 
+    So each sum is the two before it and one word, modulo 2^32, and each word counts in the last sum as
+    often as the Fibonacci number of its distance says. numpy's 32-bit words overflow just so.
 
-class _Checksum:
-    """SQLite's running checksum: for each pair (a, b) of words, s += a + t, then t += b + s.
-
-    That is a linear map, so that a whole frame is one product with weights made beforehand; all
-    modulo 2^32, which is how numpy's 32-bit words overflow.
+    Args:
+        sums: Of what came before.
+        data: The words, an even number of them.
+        order: Their type for numpy.
+        weights: At least two Fibonacci numbers more than there are words.
     """
-
-    def __init__(self, order: str, page_bytes: int):
-        self._order = order
-        self.frame_bytes = _FRAME_HEADER.size + page_bytes
-        self._state = (0, 0)
-        self._weights = _weights((8 + page_bytes) // _CHUNK)
-
-    def header(self, data: bytes) -> tuple[int, int]:
-        """After the 24 bytes of the log's own header."""
-        self._state = self._after(data, _weights(len(data) // _CHUNK))
-        return self._state
-
-    def frame(self, data: bytes) -> tuple[int, int]:
-        """After a frame: the first 8 bytes of its header, and its page."""
-        self._state = self._after(data, self._weights)
-        return self._state
-
-    def _after(self, data: bytes, weights: Any) -> tuple[int, int]:
-        words = np.frombuffer(data, self._order).astype(np.uint32).reshape(-1, 2)
-        first, second = words[:, 0], words[:, 0] + words[:, 1]
-        start = [np.uint32(value) for value in self._state]
-        sums = []
-        for row in weights:
-            total = np.sum(row[1:, 0] * first + row[1:, 1] * second, dtype=np.uint32)
-            with np.errstate(over="ignore"):
-                sums.append(int(row[0, 0] * start[0] + row[0, 1] * start[1] + total))
-        return sums[0], sums[1]
+    before = np.array([sums[0], (sums[1] - sums[0]) % 2**32], np.uint32)
+    words = np.concatenate([before, np.frombuffer(data, order).astype(np.uint32)])
+    return int(weights[1 - len(words) :] @ words[:-1]), int(weights[-len(words) :] @ words)
 
 
-def _weights(steps: int) -> Any:
-    """Powers of ((1, 1), (1, 2)) modulo 2^32 from ``steps`` down to 0, by row, (2, steps + 1, 2)."""
-    matrices = [(1, 0, 0, 1)]
-    for _ in range(steps):
-        a, b, c, d = matrices[-1]
-        matrices.append(
-            ((a + c) % 2**32, (b + d) % 2**32, (a + 2 * c) % 2**32, (b + 2 * d) % 2**32)
-        )
-    return np.array(matrices[::-1], np.uint32).reshape(-1, 2, 2).transpose(1, 0, 2)
+@cache
+def _fibonacci(count: int) -> NDArray[np.uint32]:
+    """..., 5, 3, 2, 1, 1 modulo 2^32, so many."""
+    numbers = [1, 1]
+    while len(numbers) < count:
+        numbers.append((numbers[-1] + numbers[-2]) % 2**32)
+    return np.array(numbers[::-1], np.uint32)

@@ -1,4 +1,4 @@
-"""Children of tests are kept where that hides nothing: one in the midst of a task ends as ever."""
+"""Workers of tests are kept where that hides nothing: one in the midst of a task ends as ever."""
 
 from __future__ import annotations
 
@@ -7,36 +7,36 @@ import time
 
 import pytest
 
-from app.child import Allowance
 from app.errors import JobCancelled
-from tests.kept_child import KeptChild
+from app.worker_process import WorkerLimits
+from tests.kept_worker import KeptWorker
 
-ALLOWED = Allowance(memory=1001 * 2**20, processor=30.0, silence=60.0)
-"""As no other test allows it: these children are of this file alone."""
+ALLOWED = WorkerLimits(memory=1001 * 2**20, processor=30.0, silence=60.0)
+"""As no other test allows it: these workers are of this file alone."""
 
 
 class TestKeptChild:
     def test_one_that_has_done_its_work_serves_the_next_of_its_kind(self) -> None:
-        first, second = KeptChild(ALLOWED), KeptChild(ALLOWED)
+        first, second = KeptWorker(ALLOWED), KeptWorker(ALLOWED)
         number = first.run(os.getpid)
         first.kill()
         first.close()
         assert second.run(os.getpid) == number
         second.close()
-        other = KeptChild(Allowance(1002 * 2**20, 30.0, 60.0))
+        other = KeptWorker(WorkerLimits(1002 * 2**20, 30.0, 60.0))
         assert other.run(os.getpid) != number
         other.close()
 
     def test_one_that_is_told_to_end_in_the_midst_is_not_kept(self) -> None:
-        child = KeptChild(ALLOWED)
-        number = child.run(os.getpid)
+        worker = KeptWorker(ALLOWED)
+        number = worker.run(os.getpid)
 
         def stop() -> None:
             raise JobCancelled
 
         with pytest.raises(JobCancelled):
-            child.run(time.sleep, 60, stop=stop)
+            worker.run(time.sleep, 60, stop=stop)
         with pytest.raises(ProcessLookupError):
             os.kill(number, 0)
-        assert child.run(os.getpid) != number
-        child.close()
+        assert worker.run(os.getpid) != number
+        worker.close()

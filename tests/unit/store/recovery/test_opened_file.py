@@ -8,7 +8,7 @@ import pytest
 from sqlalchemy import text
 
 from app.errors import DamagedError
-from app.store.first_look import log_file
+from app.store.recovery.preopen_check import log_file
 from app.store.store import Store
 from tests.databases import Databases
 from tests.unit.store.homes import INSERT, add, log_ids, names, say

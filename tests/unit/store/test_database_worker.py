@@ -1,4 +1,4 @@
-"""Work apart: it sees the database, takes its turn, tells, asks, and ends when it is told to."""
+"""Work in a worker process: it sees the database, takes its turn, tells, asks, and ends when it is told to."""
 
 from __future__ import annotations
 
@@ -13,17 +13,16 @@ from typing import Any
 import pytest
 import structlog
 
-from app.child import Child, ChildEnded
-from app.child_figures import FIGURES
 from app.errors import DamagedError, InputError, JobCancelled, NotFoundError
 from app.progress import TellProgress
 from app.review.datasets.dataset import list_datasets
 from app.soccer.policy import PAPER
-from app.store import child as module
-from app.store.child import Caller, patiently, work_apart
+from app.store import database_worker as module
 from app.store.clock import now
+from app.store.database_worker import Caller, run_in_worker, with_grace
 from app.store.datasets import insert_dataset_row
 from app.store.store import Store
+from app.worker_process import COUNTS, WorkerEnded, WorkerProcess
 from tests.waiting import SECONDS
 
 KIND = "exports"
@@ -45,7 +44,7 @@ def run(
     stop: Any = wanted,
     answer: Any = lambda question: None,
 ) -> Any:
-    return work_apart(store, KIND, work, *arguments, progress=progress, stop=stop, answer=answer)
+    return run_in_worker(store, KIND, work, *arguments, progress=progress, stop=stop, answer=answer)
 
 
 def name_process(store: Store, word: str, _caller: Caller) -> tuple[int, str, Path]:
@@ -82,7 +81,7 @@ def never_look_up(_store: Store, caller: Caller) -> None:
 
 
 def take_turn(_store: Store, mark: Path, caller: Caller) -> None:
-    caller.take_turn()
+    caller.__enter__()
     mark.write_text("taken")
     time.sleep(SECONDS)
 
@@ -107,7 +106,7 @@ def meet_damage(*_: object) -> None:
     raise DamagedError("touchline.db is damaged", hint="Restore it.")
 
 
-class TestWorkApart:
+class TestRunInWorker:
     def test_is_done_by_another_process_over_the_same_home(self, store: Store) -> None:
         number, word, home = run(store, name_process, "word")
         assert number != os.getpid()
@@ -131,7 +130,7 @@ class TestWorkApart:
         self, store: Store, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
     ) -> None:
         # One that was kept from another test writes to the stderr of then.
-        monkeypatch.setattr(module, "Child", Child)
+        monkeypatch.setattr(module, "WorkerProcess", WorkerProcess)
         with structlog.contextvars.bound_contextvars(job=31):
             run(store, log_a_word)
         printed = capfd.readouterr()
@@ -211,10 +210,10 @@ class TestWorkApart:
         assert list_datasets(store) == []
 
     def test_one_that_breaks_down_is_counted(self, store: Store) -> None:
-        before = FIGURES[KIND].ended["crash"]
-        with pytest.raises(ChildEnded, match="made its process crash"):
+        before = COUNTS[KIND].ended["crash"]
+        with pytest.raises(WorkerEnded, match="made its process crash"):
             run(store, break_down)
-        assert FIGURES[KIND].ended["crash"] == before + 1
+        assert COUNTS[KIND].ended["crash"] == before + 1
 
     def test_what_it_refuses_is_refused_here(self, store: Store) -> None:
         def progress(*_: object) -> None:
@@ -224,9 +223,9 @@ class TestWorkApart:
             run(store, count_slowly, store.settings.home / "mark", progress=progress)
 
 
-class TestPatiently:
+class TestWithGrace:
     def test_nothing_ends_what_is_wanted(self) -> None:
-        stop = patiently(wanted)
+        stop = with_grace(wanted)
         stop()
         stop()
 
@@ -236,10 +235,10 @@ class TestPatiently:
         def unwanted() -> None:
             raise JobCancelled
 
-        stop, clock = patiently(unwanted), [100.0]
+        stop, clock = with_grace(unwanted), [100.0]
         monkeypatch.setattr(module, "monotonic", lambda: clock[0])
         stop()
-        clock[0] += module.PATIENCE
+        clock[0] += module.GRACE_SECONDS
         stop()
         clock[0] += 0.1
         with pytest.raises(JobCancelled):
@@ -251,6 +250,6 @@ class TestPatiently:
         def unwanted() -> None:
             raise JobCancelled
 
-        monkeypatch.setattr(module, "PATIENCE", 0.3)
+        monkeypatch.setattr(module, "GRACE_SECONDS", 0.3)
         with pytest.raises(JobCancelled):
-            run(store, never_look_up, stop=patiently(unwanted))
+            run(store, never_look_up, stop=with_grace(unwanted))

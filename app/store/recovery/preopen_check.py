@@ -1,4 +1,4 @@
-"""A first look at a home's files, before SQLite opens the database and mends what it should not.
+"""Pre-open check: a home's files, before SQLite opens the database and repairs what it should not.
 
 What is refused here stays as it is: SQLite would take an empty file for a new database, and any log
 beside it for its own; and whoever closes a database last writes the log into it and deletes it, also
@@ -15,11 +15,11 @@ import pysqlite3.dbapi2
 
 from app.config import Settings
 from app.errors import DamagedError, StorageError
-from app.store.anchor import read_anchor, require_own_database
 from app.store.engine import make_engine, reported
 from app.store.home import ASIDE
 from app.store.keys import KEYS
-from app.store.wal import DatabaseHeader, WriteAheadLog, read_header, read_log
+from app.store.recovery.anchor import read_anchor, require_own_database
+from app.store.recovery.wal import DatabaseHeader, WriteAheadLog, read_header, read_log
 
 VERSION_TABLE = "alembic_version"
 """Every database of ours has it."""
@@ -119,8 +119,7 @@ def _require_ours(database: Path) -> None:
 def _require_new(settings: Settings) -> None:
     """Raise DamagedError where a home without a database has had one."""
     database = settings.database_file
-    signs = [sign for sign in signs_of_use(settings) if sign is not None]
-    if signs:
+    if signs := signs_of_use(settings):
         state = "is empty" if database.exists() else "is missing"
         raise DamagedError(
             f"{database} {state}, but this home has been used: {', '.join(signs)}",
@@ -129,23 +128,23 @@ def _require_new(settings: Settings) -> None:
         )
 
 
-def signs_of_use(settings: Settings) -> list[str | None]:
-    """What a home without a database holds that only a database explains; None: no such thing."""
+def signs_of_use(settings: Settings) -> list[str]:
+    """What a home without a database holds that only a database explains."""
     database = settings.database_file
     anchor = read_anchor(database)
     log = log_file(database)
     aside = next(settings.home.glob(f"{ASIDE}*/{database.name}"), None)
-    keys = [name for name in KEYS if (settings.home / name).exists()]
-    return [
+    signs = [
         None if anchor is None else f"home.json knows {anchor.entries:,} entries of its log",
         f"{log.name} holds changes" if _size(log) else None,
         _filled(settings.uploads, "*/upload.json"),
         _filled(settings.exports, "*.json"),
         _filled(settings.home / "backups", "*.zip"),
         *(_filled(settings.home / name, "*") for name in ("sample", "practice")),
-        *(f"{name} is there" for name in keys),
+        *(f"{name} is there" for name in KEYS if (settings.home / name).exists()),
         None if aside is None else f"{aside.parent.name}/ holds its database",
     ]
+    return [sign for sign in signs if sign is not None]
 
 
 def _filled(folder: Path, pattern: str) -> str | None:

@@ -1,4 +1,4 @@
-"""A child does what it is told, within its limits, and takes nobody with it."""
+"""A worker process does what it is told, within its limits, and takes nobody with it."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from multiprocessing import get_context, resource_tracker
 from multiprocessing.context import SpawnProcess
 from multiprocessing.resource_tracker import ResourceTracker
 from pathlib import Path
+from typing import get_args
 
 import pytest
 
-from app.child import Allowance, Child, ChildEnded, abandon
 from app.errors import (
     DatasetFormatError,
     JobCancelled,
@@ -27,16 +27,24 @@ from app.errors import (
     StaleRevisionError,
     StorageError,
 )
+from app.worker_process import (
+    EndReason,
+    WorkerCounts,
+    WorkerEnded,
+    WorkerLimits,
+    WorkerProcess,
+    abandon,
+)
 from tests.waiting import SECONDS
 
-pytestmark = pytest.mark.usefixtures("children_start_anew")
+pytestmark = pytest.mark.usefixtures("workers_start_anew")
 
 MEBI = 2**20
 ENDLESS = re.compile(r"(a+)+$"), "a" * 60 + "b"
 """A pattern that never comes to an end, and never lets another thread of its process run."""
 
 
-def child_pid() -> int:
+def worker_pid() -> int:
     return os.getpid()
 
 
@@ -90,8 +98,8 @@ def count(last: int, tell: Callable[[int], None]) -> str:
 
 
 @pytest.fixture(scope="module")
-def child() -> Iterator[Child]:
-    made = Child(Allowance(memory=300 * MEBI, processor=1.0, silence=60.0))
+def worker() -> Iterator[WorkerProcess]:
+    made = WorkerProcess(WorkerLimits(memory=300 * MEBI, processor=1.0, silence=60.0))
     yield made
     made.close()
 
@@ -112,89 +120,89 @@ def wait_for_end(pid: int) -> bool:
 
 
 class TestRun:
-    def test_works_in_another_process_that_stays_warm(self, child: Child) -> None:
-        first = child.run(child_pid)
+    def test_works_in_another_process_that_stays_warm(self, worker: WorkerProcess) -> None:
+        first = worker.run(worker_pid)
         assert first != os.getpid()
-        assert child.run(child_pid) == first
+        assert worker.run(worker_pid) == first
 
-    def test_words_are_heard_in_their_order(self, child: Child) -> None:
+    def test_words_are_heard_in_their_order(self, worker: WorkerProcess) -> None:
         heard: list[int] = []
-        assert child.run(count, 5, heard=heard.append) == "done"
+        assert worker.run(count, 5, on_message=heard.append) == "done"
         assert heard == [0, 1, 2, 3, 4]
 
-    def test_the_work_goes_on_when_its_word_was_heard(self, child: Child) -> None:
+    def test_the_work_goes_on_when_its_word_was_heard(self, worker: WorkerProcess) -> None:
         def hear(number: int) -> None:
             raise JobCancelled
 
-        pid = child.run(child_pid)
+        pid = worker.run(worker_pid)
         with pytest.raises(JobCancelled):
-            child.run(count, 5, heard=hear)
+            worker.run(count, 5, on_message=hear)
         assert wait_for_end(pid)
 
-    def test_a_refusal_travels_whole(self, child: Child) -> None:
+    def test_a_refusal_travels_whole(self, worker: WorkerProcess) -> None:
         with pytest.raises(DatasetFormatError) as caught:
-            child.run(refuse)
+            worker.run(refuse)
         assert str(caught.value) == "a.json, 7.png, x: is no number"
         assert (caught.value.record, caught.value.problem) == ("7.png", "is no number")
         with pytest.raises(StaleRevisionError) as stale:
-            child.run(find_it_changed)
+            worker.run(find_it_changed)
         assert (stale.value.base_etag, stale.value.current_etag) == ("a", "b")
 
-    def test_a_full_disk_stays_one(self, child: Child) -> None:
+    def test_a_full_disk_stays_one(self, worker: WorkerProcess) -> None:
         with pytest.raises(StorageError) as caught:
-            child.run(find_the_disk_full)
+            worker.run(find_the_disk_full)
         assert caught.value.hint == "Free some."
         assert isinstance(caught.value.__cause__, OSError)
         assert caught.value.__cause__.errno == errno.ENOSPC
 
-    def test_a_fault_says_where_it_is(self, child: Child) -> None:
+    def test_a_fault_says_where_it_is(self, worker: WorkerProcess) -> None:
         with pytest.raises(RuntimeError, match=r"in fail\n(.*\n)*KeyError: 'a fault of ours'"):
-            child.run(fail)
+            worker.run(fail)
 
-    def test_what_its_memory_does_not_hold_is_not_done(self, child: Child) -> None:
-        assert child.run(take, 100 * MEBI) == 100 * MEBI
-        with pytest.raises(ChildEnded, match="needs more than 300 MiB of memory") as caught:
-            child.run(take, 400 * MEBI)
+    def test_what_its_memory_does_not_hold_is_not_done(self, worker: WorkerProcess) -> None:
+        assert worker.run(take, 100 * MEBI) == 100 * MEBI
+        with pytest.raises(WorkerEnded, match="needs more than 300 MiB of memory") as caught:
+            worker.run(take, 400 * MEBI)
         assert caught.value.reason == "memory"
 
-    def test_a_runaway_ends_by_its_processor_time(self, child: Child) -> None:
-        before = child.run(child_pid)
-        with pytest.raises(ChildEnded, match="takes more than 1 seconds") as caught:
-            child.run(never_end)
+    def test_a_runaway_ends_by_its_processor_time(self, worker: WorkerProcess) -> None:
+        before = worker.run(worker_pid)
+        with pytest.raises(WorkerEnded, match="takes more than 1 seconds") as caught:
+            worker.run(never_end)
         assert caught.value.reason == "processor"
-        assert child.run(child_pid) != before
+        assert worker.run(worker_pid) != before
 
-    def test_each_task_has_its_own_processor_time(self, child: Child) -> None:
+    def test_each_task_has_its_own_processor_time(self, worker: WorkerProcess) -> None:
         for _ in range(3):
-            child.run(spend, 0.6)
+            worker.run(spend, 0.6)
 
     def test_what_waits_for_ever_ends_by_the_clock(self) -> None:
-        child = Child(Allowance(300 * MEBI, processor=10.0, silence=2.0))
-        pid = child.run(os.getpid)
-        with pytest.raises(ChildEnded, match="without a result") as caught:
-            child.run(time.sleep, 600.0)
+        worker = WorkerProcess(WorkerLimits(300 * MEBI, processor=10.0, silence=2.0))
+        pid = worker.run(os.getpid)
+        with pytest.raises(WorkerEnded, match="without a result") as caught:
+            worker.run(time.sleep, 600.0)
         assert caught.value.reason == "silence"
         assert wait_for_end(pid)
 
-    def test_a_crash_is_the_childs_alone(self, child: Child) -> None:
+    def test_a_crash_is_the_workers_alone(self, worker: WorkerProcess) -> None:
         for work, reason in ((crash, "crash"), (be_killed, "killed")):
-            with pytest.raises(ChildEnded) as caught:
-                child.run(work)
+            with pytest.raises(WorkerEnded) as caught:
+                worker.run(work)
             assert caught.value.reason == reason
-        assert child.run(child_pid) != os.getpid()
+        assert worker.run(worker_pid) != os.getpid()
 
     def test_a_crash_says_on_stderr_where_it_was(self, capfd: pytest.CaptureFixture[str]) -> None:
-        with pytest.raises(ChildEnded):
-            Child(Allowance(300 * MEBI, 10.0, 60.0)).run(crash)
+        with pytest.raises(WorkerEnded):
+            WorkerProcess(WorkerLimits(300 * MEBI, 10.0, 60.0)).run(crash)
         said = capfd.readouterr().err
         assert said.startswith("Fatal Python error: Aborted")
         assert "in crash" in said
 
-    def test_one_that_died_between_two_tasks_is_replaced(self, child: Child) -> None:
-        pid = child.run(child_pid)
+    def test_one_that_died_between_two_tasks_is_replaced(self, worker: WorkerProcess) -> None:
+        pid = worker.run(worker_pid)
         os.kill(pid, signal.SIGKILL)
         assert wait_for_end(pid)
-        assert child.run(child_pid) != pid
+        assert worker.run(worker_pid) != pid
 
     def test_one_that_cannot_be_started_is_tried_again_later(
         self, monkeypatch: pytest.MonkeyPatch
@@ -202,23 +210,23 @@ class TestRun:
         def refuse(_process: object) -> None:
             raise BlockingIOError(errno.EAGAIN, "Resource temporarily unavailable")
 
-        child = Child(Allowance(300 * MEBI, 10.0, 60.0))
+        worker = WorkerProcess(WorkerLimits(300 * MEBI, 10.0, 60.0))
         before = len(list(Path("/proc/self/fd").iterdir()))
         with monkeypatch.context() as patch:
             patch.setattr("multiprocessing.context.SpawnProcess.start", refuse)
             with pytest.raises(OverloadedError, match="no process could be started"):
-                child.run(child_pid)
+                worker.run(worker_pid)
         assert len(list(Path("/proc/self/fd").iterdir())) == before
-        child.kill()
-        assert child.run(child_pid) != os.getpid()
-        child.close()
+        worker.kill()
+        assert worker.run(worker_pid) != os.getpid()
+        worker.close()
 
     def test_one_that_dies_before_it_is_ready_says_nothing_of_its_task(
         self, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        monkeypatch.setattr("app.child._serve", be_killed_at_start)
+        monkeypatch.setattr("app.worker_process._serve", be_killed_at_start)
         with pytest.raises(OverloadedError, match="no process could be started"):
-            Child(Allowance(300 * MEBI, 10.0, 60.0)).run(child_pid)
+            WorkerProcess(WorkerLimits(300 * MEBI, 10.0, 60.0)).run(worker_pid)
 
     def test_one_that_hears_of_a_pressed_key_while_it_starts_works_all_the_same(
         self, monkeypatch: pytest.MonkeyPatch
@@ -231,30 +239,30 @@ class TestRun:
             os.kill(process.pid, signal.SIGINT)
 
         monkeypatch.setattr(SpawnProcess, "start", start_and_interrupt)
-        # As in a process that has no child yet: its tracker would be started with the first one.
+        # As in a process that has no worker yet: its tracker would be started with the first one.
         tracker = ResourceTracker()
         for name in ("ensure_running", "getfd"):
             monkeypatch.setattr(resource_tracker, name, getattr(tracker, name))
-        child = Child(Allowance(300 * MEBI, 10.0, 60.0))
+        worker = WorkerProcess(WorkerLimits(300 * MEBI, 10.0, 60.0))
         try:
-            assert child.run(child_pid) != os.getpid()
+            assert worker.run(worker_pid) != os.getpid()
         finally:
-            child.close()
+            worker.close()
             tracker._stop()
 
-    def test_one_that_is_told_to_end_did_not_crash(self, child: Child) -> None:
-        with pytest.raises(ChildEnded, match="its process was told to end") as ended:
-            child.run(be_told_to_end)
-        assert ended.value.reason == "told"
+    def test_one_that_is_told_to_end_did_not_crash(self, worker: WorkerProcess) -> None:
+        with pytest.raises(WorkerEnded, match="its process was told to end") as ended:
+            worker.run(be_told_to_end)
+        assert ended.value.reason == "terminated"
 
-    def test_what_is_not_wanted_any_more_is_killed(self, child: Child) -> None:
-        pid = child.run(child_pid)
+    def test_what_is_not_wanted_any_more_is_killed(self, worker: WorkerProcess) -> None:
+        pid = worker.run(worker_pid)
 
         def stop() -> None:
             raise JobCancelled
 
         with pytest.raises(JobCancelled):
-            child.run(never_end, stop=stop)
+            worker.run(never_end, stop=stop)
         assert wait_for_end(pid)
 
 
@@ -270,12 +278,12 @@ def spend(seconds: float) -> None:
 
 PARENT = """
 import sys
-from app.child import Allowance, Child
-from test_child import never_end, child_pid
+from app.worker_process import WorkerLimits, WorkerProcess
+from test_worker_process import never_end, worker_pid
 if __name__ == "__main__":
-    child = Child(Allowance(300 * 2**20, 60.0, 60.0))
-    print(child.run(child_pid), flush=True)
-    child.run(never_end)
+    worker = WorkerProcess(WorkerLimits(300 * 2**20, 60.0, 60.0))
+    print(worker.run(worker_pid), flush=True)
+    worker.run(never_end)
 """
 
 
@@ -325,3 +333,35 @@ class TestAbandon:
         finally:
             # Or this process could not end, either.
             tasks._reader.close()
+
+
+LITTLE = WorkerLimits(memory=2**20, processor=1.0, silence=1.0)
+
+
+@pytest.fixture
+def counts() -> WorkerCounts:
+    return WorkerCounts()
+
+
+class TestWorkerCounts:
+    def test_a_task_is_busy_until_it_is_done(self, counts: WorkerCounts) -> None:
+        with counts.working(), counts.working():
+            assert counts.busy == 2
+        assert counts.busy == 0
+        assert set(counts.ended.values()) == {0}
+
+    @pytest.mark.parametrize("reason", get_args(EndReason))
+    def test_a_worker_that_ends_is_counted_under_its_reason_alone(
+        self, counts: WorkerCounts, reason: EndReason
+    ) -> None:
+        for _ in range(2):
+            with pytest.raises(WorkerEnded), counts.working():
+                raise WorkerEnded(reason, LITTLE)
+        assert counts.ended == {**dict.fromkeys(get_args(EndReason), 0), reason: 2}
+        assert counts.busy == 0
+
+    def test_a_task_that_refuses_ended_no_worker(self, counts: WorkerCounts) -> None:
+        with pytest.raises(ValueError, match="a word"), counts.working():
+            raise ValueError("a word")
+        assert set(counts.ended.values()) == {0}
+        assert counts.busy == 0

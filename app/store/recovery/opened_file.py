@@ -9,7 +9,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from app.errors import DamagedError
-from app.store.first_look import log_file
+from app.store.recovery.preopen_check import log_file
 
 MOVED = (
     "Stop the server and put the file that was moved back into its place: with the -wal that lies there"

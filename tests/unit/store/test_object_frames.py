@@ -5,7 +5,7 @@ import stat
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-from app.store.object_cache import KEPT, LOOKS, ObjectCache
+from app.store.object_frames import KEPT, LOOKS, ObjectCache
 
 FRAME = bytes(1000)
 

@@ -14,8 +14,8 @@ from sqlalchemy import text
 
 from app.config import Settings
 from app.errors import DamagedError, StorageError
-from app.store.first_look import log_file
 from app.store.migrate import migrate
+from app.store.recovery.preopen_check import log_file
 from app.store.store import Store
 from tests.unit.store.homes import killed, say
 

@@ -11,11 +11,11 @@ from structlog.testing import capture_logs
 
 from app.config import Settings
 from app.errors import DamagedError
-from app.store import anchor
-from app.store.anchor import Anchor, anchor_file, make_anchor, read_anchor, renew_anchor
 from app.store.dialect.dialect import dialect_of
 from app.store.engine import make_engine
 from app.store.log import Entry, append
+from app.store.recovery import anchor
+from app.store.recovery.anchor import Anchor, anchor_file, make_anchor, read_anchor, renew_anchor
 from app.store.store import Store
 from tests.unit.store.homes import log_ids, say
 

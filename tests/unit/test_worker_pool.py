@@ -1,7 +1,8 @@
-"""A pool has a few children, and a bound on what waits for them."""
+"""A pool has a few workers, and a bound on what waits for them."""
 
 from __future__ import annotations
 
+import asyncio
 import os
 import time
 from collections.abc import Iterator
@@ -10,28 +11,27 @@ from pathlib import Path
 
 import pytest
 
-from app.child import Allowance, ChildEnded
-from app.child_figures import ChildFigures
-from app.child_pool import ChildPool, PoolTask
 from app.errors import ImageError, OverloadedError
+from app.worker_pool import PoolTask, WorkerPool
+from app.worker_process import WorkerCounts, WorkerEnded, WorkerLimits
 
-ALLOWANCE = Allowance(memory=1000 * 2**20, processor=60.0, silence=60.0)
-
-
-@pytest.fixture
-def figures() -> ChildFigures:
-    return ChildFigures()
+LIMITS = WorkerLimits(memory=1000 * 2**20, processor=60.0, silence=60.0)
 
 
 @pytest.fixture
-def pool(figures: ChildFigures) -> Iterator[ChildPool]:
-    made = ChildPool(ALLOWANCE, 1, 2, "pictures", figures)
+def counts() -> WorkerCounts:
+    return WorkerCounts()
+
+
+@pytest.fixture
+def pool(counts: WorkerCounts) -> Iterator[WorkerPool]:
+    made = WorkerPool(LIMITS, 1, 2, "pictures", counts)
     yield made
     made.close()
 
 
 class Gate:
-    """Holds a child until it is opened."""
+    """Holds a worker until it is opened."""
 
     def __init__(self, folder: Path):
         self.reached, self.open = folder / "reached", folder / "open"
@@ -54,19 +54,19 @@ def note(folder: Path, name: str) -> None:
     (folder / name).write_text("done")
 
 
-def submit_many(pool: ChildPool, folder: Path) -> list[PoolTask]:
+def submit_many(pool: WorkerPool, folder: Path) -> list[PoolTask]:
     return [pool.submit(note, folder, "late") for _ in range(20)]
 
 
 class TestSubmit:
-    def test_one_child_does_one_task_after_the_other(self, pool: ChildPool) -> None:
+    def test_one_worker_does_one_task_after_the_other(self, pool: WorkerPool) -> None:
         tasks = [pool.submit(os.getpid) for _ in range(3)]
         pids = {task.future.result(60) for task in tasks}
         assert len(pids) == 1
         assert pids != {os.getpid()}
 
     def test_more_than_may_wait_are_refused_and_later_taken(
-        self, pool: ChildPool, tmp_path: Path
+        self, pool: WorkerPool, tmp_path: Path
     ) -> None:
         gate = Gate(tmp_path)
         tasks = [pool.submit(pass_gate, gate, "a") for _ in range(3)]
@@ -77,7 +77,7 @@ class TestSubmit:
         assert [task.future.result(60) for task in (*tasks, patient)] == ["a", "a", "a", "c"]
         assert pool.submit(pass_gate, gate, "d").future.result(60) == "d"
 
-    def test_what_nobody_waits_for_is_not_begun(self, pool: ChildPool, tmp_path: Path) -> None:
+    def test_what_nobody_waits_for_is_not_begun(self, pool: WorkerPool, tmp_path: Path) -> None:
         gate = Gate(tmp_path)
         first = pool.submit(pass_gate, gate, "a")
         gate.wait_until_reached()
@@ -92,7 +92,9 @@ class TestSubmit:
             left.future.result(60)
         assert (tmp_path / "last").exists()
 
-    def test_what_nobody_waits_for_any_more_is_ended(self, pool: ChildPool, tmp_path: Path) -> None:
+    def test_what_nobody_waits_for_any_more_is_ended(
+        self, pool: WorkerPool, tmp_path: Path
+    ) -> None:
         task = pool.submit(pass_gate, Gate(tmp_path), "a")
         Gate(tmp_path).wait_until_reached()
         task.leave()
@@ -101,7 +103,7 @@ class TestSubmit:
         assert pool.submit(os.getpid).future.result(60) != os.getpid()
 
     def test_what_has_become_needless_until_its_turn_is_not_begun(
-        self, pool: ChildPool, tmp_path: Path
+        self, pool: WorkerPool, tmp_path: Path
     ) -> None:
         def begin() -> None:
             raise ImageError("tried before")
@@ -112,8 +114,8 @@ class TestSubmit:
         assert not (tmp_path / "late").exists()
         assert not pool.is_whole
 
-    def test_a_child_that_ends_is_explained_and_replaced(self, pool: ChildPool) -> None:
-        def explain(error: ChildEnded) -> Exception:
+    def test_a_worker_that_ends_is_explained_and_replaced(self, pool: WorkerPool) -> None:
+        def explain(error: WorkerEnded) -> Exception:
             return ImageError(f"7.png {error}")
 
         task = pool.submit(os.abort, explain=explain)
@@ -122,71 +124,90 @@ class TestSubmit:
         assert pool.submit(os.getpid).future.result(60) != os.getpid()
 
 
-class TestFigures:
+class TestResultUnless:
+    def test_is_the_result_while_somebody_waits(self, pool: WorkerPool) -> None:
+        async def here() -> bool:
+            return False
+
+        async def ask() -> int:
+            return await pool.submit(os.getpid).result_unless(here)
+
+        assert asyncio.run(ask()) != os.getpid()
+
+    def test_a_task_that_nobody_waits_for_is_given_up(self) -> None:
+        async def gone() -> bool:
+            return True
+
+        task = PoolTask(lambda error: error)
+        assert asyncio.run(task.result_unless(gone)) is None
+        assert task.future.cancelled()
+
+
+class TestCounts:
     def test_who_is_at_work_and_who_waits_is_counted(
-        self, pool: ChildPool, figures: ChildFigures, tmp_path: Path
+        self, pool: WorkerPool, counts: WorkerCounts, tmp_path: Path
     ) -> None:
         gate = Gate(tmp_path)
         tasks = [pool.submit(pass_gate, gate, "a") for _ in range(3)]
         with pytest.raises(OverloadedError):
             pool.submit(pass_gate, gate, "b")
         gate.wait_until_reached()
-        assert (figures.busy, figures.waiting) == (1, 2)
+        assert (counts.busy, counts.waiting) == (1, 2)
         for _ in range(2):
             tasks[1].leave()
-        assert (figures.busy, figures.waiting) == (1, 1)
+        assert (counts.busy, counts.waiting) == (1, 1)
         gate.open.touch()
         assert [tasks[number].future.result(60) for number in (0, 2)] == ["a", "a"]
-        assert (figures.busy, figures.waiting) == (0, 0)
+        assert (counts.busy, counts.waiting) == (0, 0)
 
-    def test_a_child_that_ends_is_counted_before_anybody_hears_of_it(
-        self, pool: ChildPool, figures: ChildFigures
+    def test_a_worker_that_ends_is_counted_before_anybody_hears_of_it(
+        self, pool: WorkerPool, counts: WorkerCounts
     ) -> None:
-        with pytest.raises(ChildEnded):
+        with pytest.raises(WorkerEnded):
             pool.submit(os.abort).future.result(60)
-        assert (figures.busy, figures.waiting, figures.ended["crash"]) == (0, 0, 1)
+        assert (counts.busy, counts.waiting, counts.ended["crash"]) == (0, 0, 1)
 
     def test_one_that_was_ended_because_nobody_waits_is_not(
-        self, pool: ChildPool, figures: ChildFigures, tmp_path: Path
+        self, pool: WorkerPool, counts: WorkerCounts, tmp_path: Path
     ) -> None:
         task = pool.submit(pass_gate, Gate(tmp_path), "a")
         Gate(tmp_path).wait_until_reached()
         task.leave()
         with pytest.raises(CancelledError):
             task.future.result(60)
-        assert (figures.busy, figures.waiting) == (0, 0)
-        assert set(figures.ended.values()) == {0}
+        assert (counts.busy, counts.waiting) == (0, 0)
+        assert set(counts.ended.values()) == {0}
 
 
 class TestClose:
-    def test_ends_what_runs_and_what_waits(self, pool: ChildPool, tmp_path: Path) -> None:
+    def test_ends_what_runs_and_what_waits(self, pool: WorkerPool, tmp_path: Path) -> None:
         running = pool.submit(pass_gate, Gate(tmp_path), "a")
         waiting = pool.submit(note, tmp_path, "b")
         Gate(tmp_path).wait_until_reached()
         pool.close()
         for task in (running, waiting):
-            with pytest.raises((ChildEnded, CancelledError)):
+            with pytest.raises((WorkerEnded, CancelledError)):
                 task.future.result(0)
 
     def test_what_comes_later_is_not_begun(
-        self, pool: ChildPool, figures: ChildFigures, tmp_path: Path
+        self, pool: WorkerPool, counts: WorkerCounts, tmp_path: Path
     ) -> None:
         pool.close()
         late = pool.submit(note, tmp_path, "late")
         with pytest.raises(CancelledError):
             late.future.result(0)
-        assert (pool.tasks, figures.waiting) == (0, 0)
+        assert (pool.tasks, counts.waiting) == (0, 0)
         assert not (tmp_path / "late").exists()
 
     def test_what_comes_at_the_same_moment_has_its_end_too(
-        self, figures: ChildFigures, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+        self, counts: WorkerCounts, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        monkeypatch.setattr("app.child_pool.PATIENCE", 0.0)
+        monkeypatch.setattr("app.worker_pool.ABANDONED_SECONDS", 0.0)
         for _ in range(5):
-            pool = ChildPool(ALLOWANCE, 1, 1000, "pictures", figures)
+            pool = WorkerPool(LIMITS, 1, 1000, "pictures", counts)
             with ThreadPoolExecutor(4) as threads:
                 begun = [threads.submit(submit_many, pool, tmp_path) for _ in range(3)]
                 pool.close()
             for task in (task for submitted in begun for task in submitted.result()):
                 assert task.future.done()
-            assert (pool.tasks, figures.waiting) == (0, 0)
+            assert (pool.tasks, counts.waiting) == (0, 0)
