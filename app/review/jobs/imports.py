@@ -10,7 +10,6 @@ from app.config import Settings
 from app.datasets.file_tree import Root
 from app.errors import InputError
 from app.progress import TellProgress
-from app.review.answers.keep import Keep, keep_nothing
 from app.review.datasets.dataset import get_dataset_head
 from app.review.datasets.naming import require_name
 from app.review.editing.paint import has_pictures
@@ -73,13 +72,7 @@ class ImportRequest:
 
 
 def request_import(
-    jobs: Jobs,
-    store: Store,
-    settings: Settings,
-    request: ImportRequest,
-    *,
-    actor: str,
-    keep: Keep[Job] = keep_nothing,
+    jobs: Jobs, store: Store, settings: Settings, request: ImportRequest, *, actor: str
 ) -> Job:
     """Import, soon; what can be refused is refused at once.
 
@@ -89,7 +82,6 @@ def request_import(
         settings: Where uploads lie, and which folders may be read.
         request: What to import.
         actor: Who imports.
-        keep: Keeps the answer with the job.
 
     Raises:
         InputError: Format, name or path cannot be used.
@@ -108,7 +100,6 @@ def request_import(
         dataset_id=None if row is None else int(row.id),
         actor=actor,
         request=request.values(),
-        keep=keep,
     )
 
 

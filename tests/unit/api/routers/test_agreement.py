@@ -15,7 +15,7 @@ DATASET = "/api/v1/datasets/broadcast"
 def annotated(api, group: int, person: str, moved: float) -> None:
     """The annotation of a person who moves a ball and accepts."""
     take = begin_take(api.app.state.services.store, group, person=person)
-    copy = api.get(f"/api/v1/groups/{take.copy_id}").json()
+    copy = api.get(f"/api/v1/groups/{take.group}").json()
     headers = {"If-Match": copy["etag"]}
     view = next(view for view in copy["views"] if view["balls"] and view["balls"][0]["box"])
     x, *rest = view["balls"][0]["box"]
