@@ -199,7 +199,8 @@ def _change(
         insert_solutions(session, solutions)
         refresh_queue(session, state.groups)
         saved = None if shown is None else read_state(session, shown)
-        session.respond(saved)
+        if saved is not None:
+            session.respond(saved)
     return replace(load_station(store, station_id), shown=saved)
 
 

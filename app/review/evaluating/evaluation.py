@@ -99,7 +99,7 @@ def get_evaluation(store: Store, evaluation_id: int) -> StoredEvaluation:
 
 
 def remove_evaluation(store: Store, evaluation_id: int, *, actor: str) -> None:
-    """Delete a run;
+    """Delete a run.
 
     Raises:
         NotFoundError: There is none.
