@@ -1,4 +1,4 @@
-"""The tables of background work: jobs, and the first answers to requests that may come twice."""
+"""The tables of background work: jobs, and the responses to requests that may come twice."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Idempotency-Key: the first answer again, whatever became of the state since."""
+"""Idempotency-Key: the first response again, whatever became of the state since."""
 
 from __future__ import annotations
 

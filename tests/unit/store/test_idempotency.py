@@ -1,4 +1,4 @@
-"""First answers: kept for a day, by key and actor."""
+"""Stored responses: for a day, by key and actor."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def find(store: Store, key: str, actor: str) -> StoredResponse | None:
         return find_response(session, key, actor)
 
 
-class TestKeepAnswer:
+class TestInsertResponse:
     def test_the_first_one_stays(self, store: Store) -> None:
         assert keep(store, "k", "ann", ANSWER)
         assert not keep(store, "k", "ann", StoredResponse("other", 200, {}, b""))
@@ -47,7 +47,7 @@ class TestKeepAnswer:
         assert find(store, "old", "ann") == other
 
 
-class TestForgetAnswers:
+class TestDeleteOldResponses:
     def test_only_old_ones_go(self, store: Store) -> None:
         keep(store, "old", "ann", ANSWER)
         age(store)
