@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
-from tests.unit.api.test_reply import stopped_after_a_commit
 
 from app.api.services import Services
 from app.review.editing.bulk_edits import MAX_ITEMS
@@ -13,6 +12,7 @@ from app.review.editing.point_limits import REQUEST_POINTS
 from app.store.log import read_log
 from tests.databases import content
 from tests.unit.api.group_requests import etag_of, send, take_handed_in
+from tests.unit.api.test_respond import stopped_after_a_commit
 
 API = "/api/v1"
 EDITS = f"{API}/datasets/broadcast/edits"
