@@ -50,7 +50,7 @@ if (isTeam) {
 	beginsAt((await askWhoIsThere())?.moment);
 	let begun = false;
 	effect(() => {
-		if (!me.value || begun) return;
+		if (!me.value || me.value.enrol || begun) return;
 		begun = true;
 		untracked(startWork);
 	});

@@ -173,11 +173,15 @@ def _sentence(request: Request, detail: dict[str, Any]) -> str:
         return sentence_about(request, detail["loc"])
     if detail["type"] in ("literal_error", "enum"):
         return f"must be {detail['ctx']['expected'].replace(chr(39), '')}"
-    text = _PLAIN.get(detail["type"]) or str(detail["msg"]).removeprefix("Value error, ")
+    plain = _PLAIN.get(detail["type"])
+    if plain is not None:
+        return plain.format_map(detail.get("ctx", {}))
+    text = str(detail["msg"]).removeprefix("Value error, ")
     return text[:1].lower() + text[1:]
 
 
 _OBJECT, _LIST = "must be an object", "must be a list"
+_WHOLE, _NUMBER = "must be a whole number", "must be a number"
 _PLAIN = {
     "dict_type": _OBJECT,
     "model_type": _OBJECT,
@@ -187,6 +191,23 @@ _PLAIN = {
     "tuple_type": _LIST,
     "none_required": "must be null",
     "bool_type": "must be true or false",
+    "bool_parsing": "must be true or false",
+    "string_type": "must be a text",
+    "string_too_short": "must have {min_length} characters or more",
+    "string_too_long": "must have {max_length} characters or less",
+    "too_short": "must have {min_length} items or more, and has {actual_length}",
+    "too_long": "must have {max_length} items or less, and has {actual_length}",
+    "int_type": _WHOLE,
+    "int_parsing": _WHOLE,
+    "int_from_float": _WHOLE,
+    "float_type": _NUMBER,
+    "float_parsing": _NUMBER,
+    "finite_number": "must be a finite number",
+    "greater_than": "must be more than {gt}",
+    "greater_than_equal": "must be {ge} or more",
+    "less_than": "must be less than {lt}",
+    "less_than_equal": "must be {le} or less",
+    "missing": "is missing",
     "string_pattern_mismatch": "has characters that are not allowed here, or lacks some",
 }
 """What is said instead of the framework's words, which are Python's."""

@@ -49,7 +49,7 @@ async def refuse_unknown_parameters(request: Request) -> None:
     for place, name, spelling in _numbers(route.path_format, route.endpoint):
         sent = request.path_params if place == "path" else request.query_params
         if name in sent and not spelling.fullmatch(str(sent[name])):
-            problems.append({"type": "int_parsing", "loc": (place, name), "msg": _NO_NUMBER})
+            problems.append({"type": "value_error", "loc": (place, name), "msg": _NO_NUMBER})
     if problems:
         raise RequestValidationError(problems)
 

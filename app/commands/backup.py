@@ -9,6 +9,7 @@ import typer
 
 from app.commands.options import Json, read_settings
 from app.commands.terminal import print_json, say
+from app.plural import plural
 
 commands = typer.Typer()
 
@@ -38,10 +39,12 @@ def backup(
         return
     size = out.stat().st_size / 1e6
     say(f"{out} ({size:,.1f} MB) is written and verified")
-    say(f"  {_contents(manifest.entries, manifest.rows)}, {len(manifest.files) - 1:,} files")
+    say(
+        f"  {_contents(manifest.entries, manifest.rows)}, {plural(len(manifest.files) - 1, 'file')}"
+    )
     if manifest.frames_elsewhere:
         say(
-            f"  {manifest.frames_elsewhere:,} files with frames are not in it; they stay as they are"
+            f"  {plural(manifest.frames_elsewhere, 'file')} with frames left out; they stay as they are"
         )
 
 
@@ -110,7 +113,7 @@ def restore(
         print_json(values)
         return
     say(f"{restored.home} is restored from {source}")
-    say(f"  {_contents(restored.entries, restored.rows)}, {restored.files:,} files")
+    say(f"  {_contents(restored.entries, restored.rows)}, {plural(restored.files, 'file')}")
     if restored.foreign_log:
         say("  the write-ahead log beside it was another database's, and is left out")
     if restored.aside is not None:
@@ -122,4 +125,4 @@ def restore(
 
 def _contents(entries: int, rows: dict[str, int]) -> str:
     groups, verdicts = rows.get("groups", 0), rows.get("verdict", 0)
-    return f"{entries:,} entries of the log, {groups:,} groups, {verdicts:,} verdicts"
+    return f"{plural(entries, 'entry', 'entries')} of the log, {plural(groups, 'group')}, {plural(verdicts, 'verdict')}"

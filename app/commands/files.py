@@ -68,6 +68,14 @@ def import_(
         str,
         typer.Option(metavar="NAME", help="COCO: the category that is the ball; default: by name."),
     ] = "",
+    group_by: Annotated[
+        str,
+        typer.Option(
+            metavar="folder|PATTERN",
+            help="frames: which pictures are one group, by folder or by a pattern of their names, "
+            "{instant}_{camera}.jpg; default: each is one.",
+        ),
+    ] = "",
     policy: Annotated[
         str | None,
         typer.Option(
@@ -102,6 +110,7 @@ def import_(
             "flipped": sorted(parse_cameras(flip)),
             "size": None if size is None else [size.width, size.height],
             **({"ball_category": ball_category} if ball_category else {}),
+            **({"grouping": group_by} if group_by else {}),
         }
         with connected(server) as client, show_progress("Importing") as progress:
             values, nothing = remote_files.import_values(
@@ -128,6 +137,7 @@ def import_(
         flipped=parse_cameras(flip),
         frames=None if frames is None else _root(settings, frames),
         ball_category=ball_category,
+        grouping=group_by,
     )
     source.check(policy=policy is not None)
     chosen = read_policy_option(policy or "paper")
@@ -161,8 +171,13 @@ def export(
     everything: Annotated[
         bool, typer.Option("--all", help="Every group, failed and rejected too.")
     ] = False,
-    boxes: Annotated[BoxKind, typer.Option(help="Which ball box is written.")] = "optimized",
-    images: Annotated[PicturesWritten, typer.Option(help="What happens to frames.")] = "none",
+    boxes: Annotated[
+        BoxKind,
+        typer.Option(help="coco, parquet, soccernet-v3d and yolo: which ball box is written."),
+    ] = "optimized",
+    images: Annotated[
+        PicturesWritten, typer.Option(help="What happens to frames; touchline holds none.")
+    ] = "none",
     views: Annotated[
         TrainingViews, typer.Option(help="coco and yolo: balls that no other view confirms, too?")
     ] = "valid",

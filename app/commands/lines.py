@@ -10,6 +10,7 @@ import typer
 
 from app.commands.options import Json, Size, Workers, read_settings
 from app.commands.terminal import complain, print_values, show_progress
+from app.plural import plural
 
 commands = typer.Typer()
 
@@ -84,7 +85,7 @@ def calibrate(
     if not result["calibrated"]:
         first = result["failed"][0]
         complain(
-            f"none of {result['frames']} frame{'' if result['frames'] == 1 else 's'} could be calibrated: {first['frame']}: {first['reason']}"
+            f"none of {plural(result['frames'], 'frame')} could be calibrated: {first['frame']}: {first['reason']}"
         )
         raise typer.Exit(1)
 

@@ -10,6 +10,7 @@ import typer
 from app.commands.opened import opened_to_solve
 from app.commands.options import Json, Size, Workers, acting
 from app.commands.terminal import print_json, print_values, say
+from app.plural import plural
 
 if TYPE_CHECKING:
     from app.review.editing.pictures import PictureState
@@ -84,7 +85,7 @@ def _of_dataset(
     for item in chosen:
         say(f"{item.match}: {_sentence(item)}")
     if wanted:
-        say(f"{changed} views changed; run touchline solve --dataset {dataset}")
+        say(f"{plural(changed, 'view')} changed; run touchline solve --dataset {dataset}")
 
 
 def _sentence(state: PictureState) -> str:

@@ -11,6 +11,7 @@ import typer
 from app.commands.opened import opened_store
 from app.commands.options import Dataset, Json, Workers, acting, read_settings
 from app.commands.terminal import complain, print_json, print_rows, print_values, say, show_progress
+from app.plural import plural
 
 commands = typer.Typer()
 
@@ -112,7 +113,9 @@ def detect(
     if json_:
         print_json(vars(found))
         return
-    say(f"{found.boxes} boxes in {found.frames} of {found.report['looked_at']} frames")
+    say(
+        f"{plural(found.boxes, 'box', 'boxes')} in {found.frames:,} of {plural(found.report['looked_at'], 'frame')}"
+    )
     _print_problems(found.report)
     say(
         f"They stay predictions; touchline accept --dataset {dataset} {found.name} takes them over."
@@ -122,8 +125,8 @@ def detect(
 def print_set(found: Mapping[str, Any]) -> None:
     """What was read into a set, and what could not be read."""
     say(
-        f"{found['source']}: {found['boxes']} boxes in {found['frames']} frames, "
-        f"{found['cameras']} cameras, {found['unknown']} unknown frames "
+        f"{found['source']}: {plural(found['boxes'], 'box', 'boxes')} in {plural(found['frames'], 'frame')}, "
+        f"{plural(found['cameras'], 'camera')}, {plural(found['unknown'], 'unknown frame')} "
         f"(predictions {found['name']})"
     )
     report = found["report"]

@@ -12,6 +12,7 @@ import typer
 from app.commands.opened import opened_store
 from app.commands.options import Json, Workers, parse_size, read_settings
 from app.commands.terminal import print_json, print_values, say, show_progress
+from app.plural import plural
 from app.soccer.choices import ProposalOutcome
 
 commands = typer.Typer()
@@ -92,7 +93,7 @@ def _propose_for_views(
                 return
             for item in items:
                 counts = ", ".join(f"{item[name]} {name}" for name in get_args(ProposalOutcome))
-                said = f"{item['looked']} of {item['views']} view{'' if item['views'] == 1 else 's'} looked at: {counts}"
+                said = f"{item['looked']} of {plural(item['views'], 'view')} looked at: {counts}"
                 name = f"{item['match']}: " if item["match"] else ""
                 say(f"{name}{said}, {item['accepted']} accepted")
             return

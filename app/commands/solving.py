@@ -19,6 +19,7 @@ from app.commands.terminal import (
     say,
     show_progress,
 )
+from app.plural import plural
 
 if TYPE_CHECKING:
     from app.soccer.policy import Policy
@@ -62,7 +63,7 @@ def solve(
             report = solve_fully(store, dataset, executor, progress, interrupted)
             left = left_undone(store, dataset) if interrupted() else None
             if left is not None:
-                complain(f"stopped; {report.solved} groups are kept, {left}")
+                complain(f"stopped; {plural(report.solved, 'group is', 'groups are')} kept, {left}")
                 raise typer.Exit(INTERRUPTED)
         count_yield(store, dataset, report, progress)
     _print_solved(vars(report), report.sentence, json_=json_)

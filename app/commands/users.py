@@ -13,14 +13,14 @@ from app.commands.terminal import print_json, print_values, say
 
 if TYPE_CHECKING:
     from app.review.people.access_tokens import AccessToken
-    from app.review.people.invitations import Post
-    from app.review.people.links import Link
+    from app.review.people.invitations import Invitation, Post
     from app.review.people.people import Person
     from app.review.people.roles import Role
 
 commands = typer.Typer(help="Who may log in to the server of a team.", no_args_is_help=True)
 
 Name = Annotated[str, typer.Argument(help="Name of the person.")]
+Email = Annotated[str | None, typer.Option(metavar="ADDRESS", help="Send the link there by mail.")]
 Dataset = Annotated[str, typer.Argument(help="Name or id of the dataset.")]
 
 
@@ -40,9 +40,7 @@ def add(
     role: Annotated[
         str, typer.Option(help="none, viewer, annotator, reviewer, lead or admin.")
     ] = "reviewer",
-    email: Annotated[
-        str | None, typer.Option(metavar="ADDRESS", help="Send the link there by mail.")
-    ] = None,
+    email: Email = None,
     json_: Json = False,
 ) -> None:
     """Make an account, and print or mail the link with which its person chooses a password."""
@@ -51,8 +49,7 @@ def add(
     wanted, post = _role(role), _post()
     with opened_store() as store:
         _, row = invite_one(store, name, wanted, email, post, actor=acting())
-    values = {key: value for key, value in vars(row).items() if key not in ("row", "state")}
-    print_values({key: value for key, value in values.items() if value not in (None, False)}, json_)
+    _print_link(row, json_)
 
 
 @commands.command("invite-many")
@@ -170,18 +167,21 @@ def reset(
     second_factor: Annotated[
         bool, typer.Option("--second-factor", help="Take away their second factor, too.")
     ] = False,
+    email: Email = None,
     json_: Json = False,
 ) -> None:
-    """Print a link with which somebody chooses another password; it logs them out when it is used."""
-    from app.review.people.people import find_person, renew_link
+    """Print or mail a link with which somebody chooses another password; using it logs them out."""
+    from app.review.people.invitations import renew_one
+    from app.review.people.people import find_person
     from app.review.people.second_factor import SecondFactors
 
+    post = _post()
     with opened_store() as store:
         found = find_person(store, name)
         if second_factor:
             SecondFactors(store).clear(found.id, actor=acting())
-        person, link = renew_link(store, found.id, actor=acting())
-    _print_link(person, link, json_)
+        _, row = renew_one(store, found.id, email, post, actor=acting())
+    _print_link(row, json_)
 
 
 @commands.command()
@@ -279,8 +279,6 @@ def _values(person: Person) -> dict[str, Any]:
     return values | linked | ({"datasets": datasets} if datasets else {})
 
 
-def _print_link(person: Person, link: Link, json_: bool) -> None:
-    settings = read_settings()
-    base = settings.url or f"http://{settings.host}:{settings.port}"
-    values = {"name": person.name, "role": str(person.role)}
-    print_values({**values, "link": link.address(base), "expires": link.expires}, json_)
+def _print_link(row: Invitation, json_: bool) -> None:
+    values = {key: value for key, value in vars(row).items() if key not in ("row", "state")}
+    print_values({key: value for key, value in values.items() if value not in (None, False)}, json_)

@@ -10,6 +10,7 @@ from typing import Any
 from app.datasets.ball_names import is_ball, same_name
 from app.datasets.record_ids import IdIndex, id_text
 from app.datasets.report import Report
+from app.plural import plural
 
 _SHOWN = 12
 """Categories that a sentence names."""
@@ -88,7 +89,7 @@ class Categories:
         taken = [category for category in self._all if category.ball]
         if self.balls:
             names = " and ".join(item.shown for item in taken if self._found[item.id])
-            count = f"{self.balls:,} annotation{'' if self.balls == 1 else 's'}"
+            count = plural(self.balls, "annotation")
             why = "" if self.listed else "; the file lists no categories"
             self._report.remark(f"{self._path}: category {names} is the ball ({count}){why}")
             return

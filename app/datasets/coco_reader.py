@@ -31,6 +31,7 @@ from app.datasets.view_groups import PlacedView, ViewGroups
 from app.datasets.view_state import StateReader
 from app.errors import DatasetFormatError, UnsafePathError
 from app.geometry.camera import Camera
+from app.plural import plural
 from app.soccer.annotation import BallAnnotation, Extras
 from app.soccer.frames import Box
 from app.soccer.group import Group, View
@@ -184,8 +185,7 @@ class _File:
         count = len(self._joined.of_image[index])
         if not count:
             return error
-        annotations = "annotation" if count == 1 else "annotations"
-        problem = f"{error.problem}; left out with {count} {annotations}"
+        problem = f"{error.problem}; left out with {plural(count, 'annotation')}"
         return DatasetFormatError(error.path, error.record, error.field, problem)
 
     def _ours(self, image: StateReader, index: int) -> PlacedView:

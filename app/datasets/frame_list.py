@@ -21,6 +21,7 @@ from app.datasets.safe_path import check_name
 from app.errors import DatasetFormatError, InputError, NotFoundError
 from app.object_store.address import is_address, seal
 from app.object_store.path import StoredPath, find_path, target_path
+from app.plural import plural
 from app.soccer.group import Group, View
 from app.soccer.media import Media
 
@@ -114,7 +115,7 @@ class FrameList:
             views = tuple(self._with_frame(group.key, view) for view in group.views)
             yield replace(group, views=views)
         if unused:
-            count = "1 entry names" if len(unused) == 1 else f"{len(unused):,} entries name"
+            count = plural(len(unused), "entry names", "entries name")
             names = ", ".join(f"{group}/{view}" for group, view in list(unused)[:5])
             more = ", ..." if len(unused) > 5 else ""
             problem = f"{count} no view of what was read: {names}{more}"

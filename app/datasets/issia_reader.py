@@ -19,6 +19,7 @@ from app.datasets.sn_calibration_reader import line_files_of, read_line_files
 from app.datasets.trees import opened_tree
 from app.datasets.viper_reader import ViperTrack, is_viper, read_viper
 from app.geometry.camera import Camera
+from app.plural import plural
 from app.soccer.annotation import BallAnnotation, Extras
 from app.soccer.frames import Box, ImageSize
 from app.soccer.group import Group, Station, View
@@ -256,8 +257,7 @@ def _cameras(
             shown,
             f"source {number} ({track.source})",
             None,
-            f"is left out with {balls} ball{'' if balls == 1 else 's'} and "
-            f"{persons} person{'' if persons == 1 else 's'}: no name "
+            f"is left out with {plural(balls, 'ball')} and {plural(persons, 'person')}: no name "
             "of a camera in it tells it from the first source",
         )
 

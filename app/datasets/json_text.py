@@ -13,6 +13,7 @@ import numpy as np
 
 from app.datasets.report import Report
 from app.errors import DatasetFormatError
+from app.plural import plural
 
 NanRule = Literal["refuse", "keep"]
 MAX_BYTES = 256 * 1024 * 1024
@@ -54,8 +55,8 @@ def read_json(
         nan: Without a report: whether NaN, Infinity and numbers that are too large refuse the text, or
             are kept, for a reader that refuses them field by field (``fields.number``).
         max_bytes: Longest text that is looked at.
-        report: Takes one problem for each NaN, Infinity and number that is too large, which are
-            null in the value.
+        report: Takes a remark for each NaN, Infinity and number that is too large, which are null
+            in the value: what is left out for want of it, the reader of its field says.
 
     Raises:
         DatasetFormatError: Not JSON, too long, nested too deeply, or (without ``report``) with a
@@ -180,8 +181,8 @@ def _literal_without_infinite(text: str, path: str, record: str | None, report: 
     missing = _Missing()
     value = ast.literal_eval(missing.visit(ast.parse(text, mode="eval")))
     if missing.count:
-        numbers = "1 number is" if missing.count == 1 else f"{missing.count:,} numbers are"
-        report.note(path, record, None, f"{numbers} not finite (nan, inf); read as missing")
+        numbers = plural(missing.count, "number is", "numbers are")
+        _remark(report, path, record, None, f"{numbers} not finite (nan, inf)")
     return value
 
 
@@ -218,13 +219,19 @@ def _null_infinite(value: Any, path: str, report: Report) -> Any:
         what = (
             "is NaN, which is not a number" if math.isnan(number) else "is too large for a number"
         )
-        report.note(path, *_spelt(place), f"{what}; read as missing")
+        _remark(report, path, *_spelt(place), what)
     if len(found) > MAX_NAMED:
         fields = Counter(str(place[-1]) for place, _ in found[MAX_NAMED:] if place)
         shown = ", ".join(f"{name} ({count:,})" for name, count in fields.most_common(5))
         problem = f"{len(found) - MAX_NAMED:,} more numbers are not finite: {shown}"
-        report.note(path, None, None, f"{problem}; read as missing")
+        _remark(report, path, None, None, problem)
     return value
+
+
+def _remark(report: Report, path: str, record: str | None, field: str | None, what: str) -> None:
+    """Say what a file holds. Where it is of no use without that number, its reader leaves it out."""
+    problem = DatasetFormatError(path, record, field, f"{what}; read as missing")
+    report.remark(problem.message)
 
 
 def _cleared(

@@ -20,6 +20,7 @@ from app.datasets.sn_calibration import LARGEST_UNIT, LineFile, split_and_size
 from app.datasets.soccernet_v3 import SPLITS
 from app.datasets.trees import opened_tree
 from app.errors import DatasetFormatError, UnknownMarkingError
+from app.plural import plural
 from app.soccer.annotation import Extras, Lines, make_lines
 from app.soccer.frames import ImagePoint, ImageSize
 from app.soccer.group import Group, Station, View
@@ -303,7 +304,7 @@ def read_sn_calibration(
             unused.pop(file.place, None)
             yield _group(file, infos.get(file.place, {}), calibration)
         if unused:
-            count = "1 image" if len(unused) == 1 else f"{len(unused):,} images"
+            count = plural(len(unused), "image")
             shown = ", ".join(list(unused)[:5]) + (", ..." if len(unused) > 5 else "")
             report.remark(f"{count} of match_info.json without a file of lines: {shown}")
 

@@ -23,6 +23,7 @@ from app.datasets.soccernet_v3 import (
 )
 from app.datasets.trees import opened_tree
 from app.errors import DatasetFormatError, UnsafePathError
+from app.plural import plural
 from app.soccer.group import Group, Station, View
 
 
@@ -237,8 +238,7 @@ class _Match:
         """One sentence a match; labels without any frames are a legitimate dataset."""
         if self.missing and self.frames.some:
             shown = ", ".join(self.missing[:5]) + (", ..." if len(self.missing) > 5 else "")
-            count = len(self.missing)
-            images = "1 image has" if count == 1 else f"{count} images have"
+            images = plural(len(self.missing), "image has", "images have")
             self.note(None, None, f"{images} no frame: {shown}")
 
 

@@ -22,6 +22,7 @@ from app.datasets.soccernet_v3d import LABELS, TABLE
 from app.datasets.soccernet_v3d_table import SnTable, TableRow, read_snv3d_table
 from app.datasets.trees import opened_tree
 from app.errors import DatasetFormatError
+from app.plural import plural
 from app.soccer.group import Group, Station, View
 
 COMPUTED = (
@@ -67,7 +68,7 @@ def read_soccernet_v3d(
                 yield reader.labelled(group, tree.shown(folder + LABELS))
         yield from reader.tabled(tree, names, limits)
         if unused := table.unused():
-            count = "1 action" if len(unused) == 1 else f"{len(unused):,} actions"
+            count = plural(len(unused), "action")
             shown = ", ".join(unused[:5]) + (", ..." if len(unused) > 5 else "")
             report.remark(f"{count} of the split lists did not come: {shown}")
 

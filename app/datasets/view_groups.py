@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 from app.datasets.report import Report
 from app.datasets.view_state import GroupHead
+from app.plural import plural
 from app.soccer.group import Group, Station, View
 
 
@@ -53,7 +54,7 @@ class ViewGroups:
             if items[0].head.views > len(items)
         ]
         if lacking:
-            count = "1 group has" if len(lacking) == 1 else f"{len(lacking):,} groups have"
+            count = plural(len(lacking), "group has", "groups have")
             shown = ", ".join(lacking[:5]) + (", ..." if len(lacking) > 5 else "")
             self._report.remark(f"{count} fewer views than when it was written: {shown}")
         for key in list(self._waiting):

@@ -21,6 +21,7 @@ from app.datasets.file_tree import DEFAULT_LIMITS, FileTree, Limits
 from app.datasets.report import Report
 from app.errors import DatasetFormatError
 from app.finite import quoted
+from app.plural import plural
 from app.soccer.frames import Box, ImagePoint, ImageSize
 
 MAX_SPAN = 10_000
@@ -178,7 +179,7 @@ class _Reader:
     def finish(self) -> list[ViperTrack]:
         """The tracks; reports what was not read, a line for each kind of object and shape."""
         for (name, what), count in self._left_out.items():
-            entries = "1 entry is" if count == 1 else f"{count:,} entries are"
+            entries = plural(count, "entry is", "entries are")
             self._report.note(self._shown, f"object {name}", what, f"{entries} left out: {_SHAPES}")
 
         for track in self.tracks:

@@ -14,6 +14,7 @@ from app.datasets.export_record import ExportRecord, chosen_box
 from app.datasets.frame_names import flat_frame, likely_suffix, split_folder
 from app.datasets.view_files import PutText, put_on_disk
 from app.datasets.yolo_lists import ImageLists
+from app.plural import plural
 from app.soccer.frames import Box, ImageSize
 from app.soccer.group import View
 
@@ -122,7 +123,7 @@ def label_line(box: Box, size: ImageSize) -> str | None:
 def _write_data(root: Path, lists: ImageLists, counts: dict[str, int]) -> None:
     missing = counts["images_missing"]
     sentence = (
-        f"{missing} images are not in this export: put each frame where {TABLE} names it."
+        f"{plural(missing, 'image is', 'images are')} not in this export: put each where {TABLE} names it."
         if missing
         else "All images are in this export."
     )

@@ -13,6 +13,7 @@ from app.evaluation.figure import Axis, Figure, Panel, Series
 from app.evaluation.frame import JudgedFrame
 from app.evaluation.result import FrameResult
 from app.evaluation.table import Cell, Column, FrameRange, Row, Table
+from app.plural import plural
 
 
 @dataclass(frozen=True)
@@ -87,7 +88,7 @@ def error_figure(frames: Sequence[FrameResult], bins: Bins) -> Figure:
         Axis("Error of the place", "m", 0.0),
         (_points(kept, bins.field), middle),
     )
-    note = f"{len(kept)} frames with a detection of IoU > 0, oracle cameras."
+    note = f"{plural(len(kept), 'frame')} with a detection of IoU > 0, oracle cameras."
     return Figure(bins.figure, bins.title, (panel,), note)
 
 

@@ -12,6 +12,7 @@ from app.evaluation.figure import Axis, Figure, Mark, Panel, Series
 from app.evaluation.frame import Frame
 from app.evaluation.table import Cell, Column, FrameRange, Row, Table
 from app.geometry.camera import Camera
+from app.plural import plural
 from app.progress import TellProgress
 from app.soccer.solution import GAMMAS_PERCENT
 from app.solving.score import SHARE_ABOVE, FrameScore, score, score_frame
@@ -70,7 +71,7 @@ def cameras_table(
     count = len(rows[0][2]) if rows else 0
     unseen = sum(frame not in judged for frame in (rows[0][2] if rows else ()))
     note = (
-        f"{count} frames with annotated lines; JaC, share and challenge score count a frame "
+        f"{plural(count, 'frame')} with annotated lines; JaC, share and challenge score count a frame "
         f"without a camera as 0. The challenge score takes the better of the labels as given and "
         f"turned by 180 degrees; JaC does not."
     )

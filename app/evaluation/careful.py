@@ -10,6 +10,7 @@ from app.evaluation.figure import Axis, Figure, Panel, Series
 from app.evaluation.frame import Detection, Frame
 from app.evaluation.overlap import iou, size_error_percent
 from app.evaluation.table import Column, FrameRange, Row, Table
+from app.plural import plural
 from app.soccer.frames import Box
 
 COLUMNS = (
@@ -78,7 +79,7 @@ def boxes_figure(
         for frame, box in _compared(frames, careful)
         if frame.id in distances
     )
-    note = f"{len(compared)} frames; a point opens its frame."
+    note = f"{plural(len(compared), 'frame')}; a point opens its frame."
     measures = (
         ("Overlap with the reference box", Axis("IoU", low=0.0, high=1.0), iou),
         ("Size against the reference box", Axis("Size error", "%", low=0.0), size_error_percent),

@@ -20,6 +20,7 @@ from app.evaluation.figure import Axis, Figure, Panel, Series
 from app.evaluation.frame import JudgedFrame
 from app.evaluation.table import Cell, Column, FrameRange, Row, Table
 from app.geometry.arrays import FloatArray
+from app.plural import plural
 
 MAX_PLACES = 400
 """Points of one drawn curve; a curve of ten thousand detections looks the same."""
@@ -55,8 +56,8 @@ def detection_summary(judged: Sequence[JudgedFrame], resamples: Resamples) -> Ta
         cell(recall, *resamples.statistic(lambda w: _recall(hits, w[place]))),
     )
     note = (
-        f"{len(judged)} frames: {balls} with a ball, {len(judged) - balls} without; "
-        f"{len(hits.scores)} detections."
+        f"{plural(len(judged), 'frame')}: {balls} with a ball, {len(judged) - balls} without; "
+        f"{plural(len(hits.scores), 'detection')}."
     )
     row = Row("all", "All frames", cells, FrameRange("detections"))
     return Table("detection", "Detection", COLUMNS, (row,), note)

@@ -11,6 +11,7 @@ from app.evaluation.bootstrap import Resamples
 from app.evaluation.figure import Axis, Figure, Mark, Panel, Series
 from app.evaluation.result import FrameResult
 from app.evaluation.table import Cell, Column, FrameRange, Row, Table
+from app.plural import plural
 
 NEAR_M = 2.0
 """The paper's threshold of P_2m."""
@@ -56,7 +57,7 @@ def localization_table(
         rows.append(_overlapping(balls, name, label, error, percent, resamples))
         rows.append(_everywhere(balls, name, label, any_error, resamples))
     note = (
-        f"{len(balls)} frames with a 3D ball. MAE and median are over the frames whose detection "
+        f"{plural(len(balls), 'frame')} with a 3D ball. MAE and median are over the frames whose detection "
         f"has a place; IoU > 0 rows leave out frames without an overlapping detection."
     )
     return Table("localization", "3D from one view", COLUMNS, tuple(rows), note)

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 
 PITCH_SIZE = "pitch_size"
 """The one finding that is of a match; it stands at the first group of it."""
+PICTURE_GEOMETRY = "picture_geometry"
+"""Lines that fit a stretched or cropped picture, or a picture of another shape than declared."""
 FINDING_KINDS = (
     "wrong_label",
     "sides_swapped",
@@ -15,7 +17,7 @@ FINDING_KINDS = (
     "under_constrained",
     "paint_disagrees",
     "no_paint",
-    "picture_geometry",
+    PICTURE_GEOMETRY,
     "camera_size",
     "view_disagrees",
     "views_contradict",

@@ -72,8 +72,8 @@ class PaintReading:
 
     Attributes:
         frame: Digest of the picture's bytes; empty where there are none.
-        sought_for: Key of the calibration of the clicks that it was sought with: of other clicks
-            it says nothing.
+        sought_for: Key of the camera of the clicks that it was sought from (``sought_key``): of
+            other clicks it says nothing.
         evidence: Places of paint, pixels of the annotated size.
         reason: Why it is not solved with, ``no_paint``, ``paint_disagrees`` or ``no_frame``; None
             where it is.

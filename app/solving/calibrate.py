@@ -13,6 +13,7 @@ from app.errors import DegenerateGeometryError
 from app.geometry.arrays import FloatArray, row_by_row
 from app.geometry.camera import Camera
 from app.geometry.resection import LOG_FOCAL, PARAMETERS, X, Z
+from app.plural import plural
 from app.soccer.annotation import Lines
 from app.soccer.frames import ImagePoint, ImageSize
 from app.soccer.group import Group, SharedPosition, Station, View
@@ -56,6 +57,9 @@ NONE_KNOWN: Mapping[str, Calibration] = MappingProxyType({})
 DRAWN_DIGITS = 3
 """Decimals of a pixel that are kept of places and lengths; distances keep every bit."""
 
+START_VERSION = "8"
+"""Raised by one whenever the same clicks give another camera: from there paint is sought."""
+
 MAX_POSITION_SIGMA_M = 5.0
 MAX_FOCAL_SIGMA = 0.10
 """Above these the position (metres) or focal length (share) counts as not observable."""
@@ -77,7 +81,7 @@ def calibrate(
     if measurements < MIN_MEASUREMENTS:
         count = len(observations.markings)
         reason = (
-            f"{count} {'marking gives' if count == 1 else 'markings give'} {measurements} "
+            f"{plural(count, 'marking gives', 'markings give')} {measurements} "
             f"independent measurements, a camera needs {MIN_MEASUREMENTS}"
         )
         return Calibration("lines", None, reason=reason)
@@ -296,7 +300,7 @@ def calibrate_view(
     key = clicks_key(group, view, policy)
     clicked = known.get(key) or calibrate_clicks(group, view, policy)
     reading = wanted_paint(group, view, policy)
-    if reading is None or reading.sought_for != key:
+    if reading is None or reading.sought_for != sought_key(group, view, policy):
         return clicked
     return calibrate_paint(clicked, reading, view.station, group.pitch, policy)
 
@@ -315,7 +319,7 @@ def view_keys(group: Group, view: View, policy: CalibrationPolicy) -> tuple[str,
     """The same, and after it the key of the clicks that it starts from where it is another."""
     key = clicks_key(group, view, policy)
     reading = wanted_paint(group, view, policy)
-    if reading is None or reading.sought_for != key:
+    if reading is None or reading.sought_for != sought_key(group, view, policy):
         return (key,)
     painted = digest_of(f"{key} {reading.digest}".encode())
     return painted, key
@@ -324,6 +328,15 @@ def view_keys(group: Group, view: View, policy: CalibrationPolicy) -> tuple[str,
 def clicks_key(group: Group, view: View, policy: CalibrationPolicy) -> str:
     """``calibration_key`` of what ``calibrate_clicks`` makes."""
     return calibration_key(view.station, group.pitch, policy, _shared(group, view, policy))
+
+
+def sought_key(group: Group, view: View, policy: CalibrationPolicy) -> str:
+    """Digest of what the camera depends on from which the paint of a view's picture is sought.
+
+    How that camera is measured has no part in it: what counts as missing moves no camera.
+    """
+    shared = _shared(group, view, policy)
+    return _key(_camera_parts(START_VERSION, view.station, group.pitch, policy, shared))
 
 
 def wanted_paint(group: Group, view: View, policy: CalibrationPolicy) -> PaintReading | None:
@@ -395,26 +408,39 @@ def calibration_key(
     shared: SharedPosition | None = None,
 ) -> str:
     """Digest of all that ``calibrate_station`` reads: the same key, the same calibration."""
+    parts = _camera_parts(SOLVER_VERSION, station, pitch, policy, shared)
+    if station.not_visible:
+        parts.append(repr(("not visible", station.not_visible)))
+    if policy.shortest_marking_px:
+        parts.append(repr(("shortest", policy.shortest_marking_px)))
+    return _key(parts)
+
+
+def _camera_parts(
+    version: str,
+    station: Station,
+    pitch: Pitch,
+    policy: CalibrationPolicy,
+    shared: SharedPosition | None,
+) -> list[str]:
+    """All that the camera of a station depends on; ``version`` is that of the code."""
     # Plain tuples are spelt out in half the time.
     lines = [(marking, [*map(tuple, points)]) for marking, points in sorted(station.lines.items())]
-    parts = [*map(repr, (SOLVER_VERSION, station.size, pitch)), policy.spelling, repr(lines)]
-    counted = [repr(("not visible", station.not_visible))] if station.not_visible else []
-    if policy.shortest_marking_px:
-        counted.append(repr(("shortest", policy.shortest_marking_px)))
+    parts = [*map(repr, (version, station.size, pitch)), policy.spelling, repr(lines)]
     if station.given is not None and station.calibration == "given":
         parts.append(repr(station.given.parameters.tolist()))
         if station.given.is_wide:
             parts.append(repr(station.given.lens))
         if station.given_covariance is not None:
             parts.append(repr(station.given_covariance))
-        return _key(parts + counted)
+        return parts
     if station.picture is not None:
         parts.append(repr(station.picture))
     elif shared is not None:
         parts.append(repr(shared))
     if (policy.line_sigma_px, policy.line_share) != (None, None):
         parts.append(repr(("line noise", policy.line_sigma_px, policy.line_share)))
-    return _key(parts + counted)
+    return parts
 
 
 def _key(parts: list[str]) -> str:

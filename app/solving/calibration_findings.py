@@ -11,6 +11,7 @@ from app.soccer.finding import Finding, Fix
 from app.soccer.frames import ImageSize, height_above_grass
 from app.soccer.solution import Calibration
 from app.solving.calibrate import MAX_POSITION_SIGMA_M
+from app.solving.numbers import metres, pixels
 from app.solving.picture_findings import BELIEVED, MIN_SHIFT, MIN_STRETCH
 
 MAX_CAMERA_HEIGHT_M = 100.0
@@ -105,7 +106,7 @@ def _bad_points(
     for marking, (index, worst) in sorted(slips.items(), key=lambda slip: -slip[1][1]):
         yield Finding(
             "bad_point",
-            f"Point {index + 1} of “{marking}” lies {worst:.1f} px off the line on which its other "
+            f"Point {index + 1} of “{marking}” lies {pixels(worst)} off the line on which its other "
             "points lie. Delete it, or move it onto the paint.",
             view,
             marking,
@@ -129,7 +130,7 @@ def _not_annotated(
         if length > shortest:
             yield Finding(
                 "visible_not_annotated",
-                f"“{fit.marking}” should be visible over {length:.0f} px and is not drawn. "
+                f"“{fit.marking}” should be visible over {pixels(length)} and is not drawn. "
                 "Draw it if you see it, or mark it as not visible under Lines.",
                 view,
                 fit.marking,
@@ -221,12 +222,12 @@ def _implausible_camera(calibration: Calibration, view: str | None) -> Iterator[
     wrong = [
         (number, threshold, words)
         for number, threshold, is_wrong, words in (
-            (height, 0.0, height <= 0, f"stands {-height:.1f} m below the grass"),
+            (height, 0.0, height <= 0, f"stands {metres(-height)} below the grass"),
             (
                 height,
                 MAX_CAMERA_HEIGHT_M,
                 height > MAX_CAMERA_HEIGHT_M,
-                f"hangs {height:.0f} m above the grass",
+                f"hangs {metres(height)} above the grass",
             ),
             (
                 distance,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 
+from app.plural import plural
 from app.soccer.finding import UNUSABLE_SIGMA_M, Finding, Fix
 from app.soccer.group import Group, View, view_letter
 from app.soccer.pitch import Pitch
@@ -13,6 +14,7 @@ from app.solving.calibration_findings import calibration_findings
 from app.solving.chi_square import LOW_P_VALUE
 from app.solving.contradiction import SPEEDS, TYPICAL_SPEED, Contradiction
 from app.solving.gates import chance
+from app.solving.numbers import degrees, metres, pixels
 from app.solving.paint_findings import paint_findings
 from app.solving.plausible import implausible
 from app.solving.sides import Swap, find_swaps
@@ -125,7 +127,7 @@ def _sides_swapped(swap: Swap) -> Finding:
     else:
         sentence = (
             "The lines are labelled from the other end of the pitch: with left and right swapped "
-            f"this view agrees with the rest about the ball, within {swap.turned_error_px:.1f} px."
+            f"this view agrees with the rest about the ball, within {pixels(swap.turned_error_px)}."
         )
     return Finding(
         "sides_swapped",
@@ -176,8 +178,8 @@ def view_disagrees(view: str, best: Pair, letters: Mapping[str, str], tau_px: fl
     here, there = best.errors_px if best.a == view else best.errors_px[::-1]
     return Finding(
         "view_disagrees",
-        f"This view does not see the ball where another view sees it: at best {here:.1f} px apart "
-        f"here and {there:.1f} px in {letters[other]}, {tau_px:.1f} px are allowed. Correct its "
+        f"This view does not see the ball where another view sees it: at best {pixels(here)} apart "
+        f"here and {pixels(there)} in {letters[other]}, {pixels(tau_px)} are allowed. Correct its "
         "ball, or leave the view out.",
         view,
         number=apart_px,
@@ -197,7 +199,7 @@ def misses_ball(view: str, error_px: float, tau_px: float) -> Finding:
     """What is said of a view that counts and that the 3D ball misses by so many pixels."""
     return Finding(
         "view_disagrees",
-        f"The 3D ball is {error_px:.1f} px from the ball of this view, {tau_px:.1f} px are "
+        f"The 3D ball is {pixels(error_px)} from the ball of this view, {pixels(tau_px)} are "
         "allowed, although each pair that counts fits: the pairs contradict each other. Correct "
         "the ball of a view, or leave a view out.",
         view,
@@ -232,7 +234,7 @@ def _not_synchronous(pairs: Sequence[Pair], policy: Policy, group: Group) -> Ite
     best = closest(judged)
     sizes = [view.size.diagonal for view in group.views if view.key in (best.a, best.b)]
     error_px, tau_px = max(best.errors_px), policy.tau_px(max(sizes))
-    apart = f"{best.errors_px[0]:.1f} and {best.errors_px[1]:.1f} px apart"
+    apart = f"{pixels(best.errors_px[0])} and {pixels(best.errors_px[1])} apart"
     sentence = (
         f"The two views do not see the ball in the same place ({apart})"
         if len(group.views) == 2
@@ -258,15 +260,14 @@ def _views_contradict(item: Contradiction, group: Group, ball: Ball3D | None) ->
     """Views that pass tau and are still farther apart than their uncertainty lets them be."""
     found = item.chi_square
     one = "The two views do" if len(found.views) == 2 else "The views do"
-    degrees = "degree" if found.freedom == 1 else "degrees"
     sentences = [
         f"{one} not show one ball: consistent views have residuals as large as these "
-        f"(χ² {found.value:,.1f}, {found.freedom} {degrees} of freedom) in only "
+        f"(χ² {found.value:,.1f}, {plural(found.freedom, 'degree')} of freedom) in only "
         f"{chance(found.p_value)}."
     ]
     if ball is not None and item.widening > 1:
         sentences.append(
-            f"Sigma is widened {item.widening:.1f} times for it, to {ball.sigma_m:.2f} m."
+            f"Sigma is widened {item.widening:.1f} times for it, to {metres(ball.sigma_m)}."
         )
     if not item.is_known:
         sentences.append(
@@ -325,8 +326,8 @@ def _low_parallax(ball: Ball3D, policy: Policy) -> Iterator[Finding]:
     if ball.parallax_degrees < policy.low_parallax_degrees:
         yield Finding(
             "low_parallax",
-            f"The rays meet at {ball.parallax_degrees:.1f}° only, so the distance of the ball is "
-            f"uncertain: about ± {ball.sigma_m:.1f} m. A view from another side would settle it.",
+            f"The rays meet at {degrees(ball.parallax_degrees)} only, so the distance of the ball is "
+            f"uncertain: about ± {metres(ball.sigma_m)}. A view from another side would settle it.",
             number=ball.parallax_degrees,
             threshold=policy.low_parallax_degrees,
         )
@@ -339,14 +340,14 @@ def _high_uncertainty(ball: Ball3D, contradicted: Contradiction | None) -> Itera
     why = "although the views agree" if contradicted is None else "as the views contradict it"
     limit, sentence = (
         HIGH_SIGMA_M,
-        f"The position of the ball is uncertain, about ± {ball.sigma_m:.2f} m, {why}. Decide "
+        f"The position of the ball is uncertain, about ± {metres(ball.sigma_m)}, {why}. Decide "
         "whether that is good enough.",
     )
     if ball.sigma_m > UNUSABLE_SIGMA_M:
         limit, sentence = (
             UNUSABLE_SIGMA_M,
-            f"The ball is known to ± {ball.sigma_m:.1f} m only, {why}; its rays meet at "
-            f"{ball.parallax_degrees:.1f}°. Beyond ± {UNUSABLE_SIGMA_M:.0f} m a ball is of no use.",
+            f"The ball is known to ± {metres(ball.sigma_m)} only, {why}; its rays meet at "
+            f"{degrees(ball.parallax_degrees)}. Beyond ± {UNUSABLE_SIGMA_M:.0f} m a ball is of no use.",
         )
     yield Finding("high_uncertainty", sentence, number=ball.sigma_m, threshold=limit)
 
@@ -356,8 +357,8 @@ def _known_to(ball: Ball3D) -> str:
     if not ball.sigma_m > UNUSABLE_SIGMA_M:
         return ""
     return (
-        f", known to ± {ball.sigma_m:.1f} m only, with rays that meet at "
-        f"{ball.parallax_degrees:.1f}°"
+        f", known to ± {metres(ball.sigma_m)} only, with rays that meet at "
+        f"{degrees(ball.parallax_degrees)}"
     )
 
 

@@ -9,10 +9,12 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import floor, isnan, log10
 
+from app.plural import plural
 from app.soccer.policy import Policy
 from app.soccer.solution import GATES, Ball3D, Calibration, ChiSquare, Gate, Pair, margin_of
 from app.solving.chi_square import LOW_P_VALUE
 from app.solving.judgement import MIN_VIEWS, Judgement
+from app.solving.numbers import degrees, metres, percent, pixels
 
 UNLIKELY_P_VALUE = 0.05
 """Below: consistent views have residuals as large as these in fewer than one of twenty groups."""
@@ -110,6 +112,8 @@ def _calibratable(group: _Group) -> Gate:
     count = len(views) - len(fallen)
     blamed = "calibratable" in group.failed
     sentence = f"in {count} of {len(views)} views"
+    if guessed := [view for view in views if _is_guess(view.calibration)]:
+        sentence += f", {_letters(guessed)} uncertain"
     if blamed:
         sentence = f"{fallen[0].letter} has no camera: {fallen[0].calibration.reason}"
     return _gate(
@@ -120,6 +124,11 @@ def _calibratable(group: _Group) -> Gate:
         sentence,
         view=fallen[0].key if blamed else None,
     )
+
+
+def _is_guess(calibration: Calibration) -> bool:
+    """Whether the lines leave open a part of the camera that was found."""
+    return calibration.camera is not None and bool(calibration.unobservable)
 
 
 def _jac(group: _Group, policy: Policy) -> Gate:
@@ -199,7 +208,7 @@ def _ball(group: _Group) -> Gate:
     without = [view for view in group.left if not view.has_ball]
     count = len(group.left) - len(without)
     passed = "ball" not in group.failed
-    sentence = f"in {count} {'view' if count == 1 else 'views'}"
+    sentence = f"in {plural(count, 'view')}"
     for why in dict.fromkeys(view.no_ball for view in without):
         alike = _letters([view for view in without if view.no_ball == why])
         sentence += f", {why.format(alike)}"
@@ -266,7 +275,7 @@ def reprojection(
     if not judged:
         return _unjudged("reprojection", None)
     (_, error, tau), best = min(judged, key=lambda item: (not item[1].valid, item[0][0]))
-    sentence = f"{_name(best, letters)} {error:.1f} px, {_percent(error / tau, tau_percent)}"
+    sentence = f"{_name(best, letters)} {pixels(error)}, {_percent(error / tau, tau_percent)}"
     if len(judged) > 1:
         sentence += " (best pair)"
     margin = margin_of(error, tau, at_most=True)
@@ -286,7 +295,8 @@ def _percent(share: float, limit: float) -> str:
         >>> _percent(0.14, 1.0), _percent(1.0002, 1.0)
         ('0.14 %', '1.0002 %')
     """
-    return f"{_beside(share * limit, limit)} %"
+    value = share * limit
+    return f"{_beside(value, limit) if round(value, 2) == round(limit, 2) else percent(value)} %"
 
 
 def _shares(
@@ -309,7 +319,7 @@ def _parallax(group: _Group, ball: Ball3D | None, policy: Policy) -> Gate:
     if ball is None:
         return _unjudged("parallax", threshold, active=active)
     value, passed = ball.parallax_degrees, "parallax" not in group.failed
-    return _gate("parallax", passed, value, threshold, f"{value:.1f}°", active=active)
+    return _gate("parallax", passed, value, threshold, degrees(value), active=active)
 
 
 def _sigma(group: _Group, ball: Ball3D | None, policy: Policy) -> Gate:
@@ -318,7 +328,7 @@ def _sigma(group: _Group, ball: Ball3D | None, policy: Policy) -> Gate:
         return _unjudged("sigma", threshold, active=active)
     value, passed = ball.sigma_m, "sigma" not in group.failed
     margin = margin_of(value, threshold, at_most=True)
-    return Gate("sigma", passed, value, threshold, margin, f"{value:.2f} m", active=active)
+    return Gate("sigma", passed, value, threshold, margin, metres(value), active=active)
 
 
 def _chi_square(group: _Group, found: ChiSquare | None, policy: Policy) -> Gate:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from app.soccer.frames import height_above_grass
 from app.soccer.pitch import Pitch
 from app.soccer.policy import Policy
+from app.solving.numbers import metres
 
 LOW_BALL_M = 2.0
 """Up to this height beside the pitch a ball counts as one that lies there."""
@@ -34,13 +35,13 @@ def implausible(
     outside = max(abs(x) - pitch.length / 2, abs(y) - pitch.width / 2)
     reach = policy.outside_pitch_m * (1 - height / policy.max_height_m)
     if LOW_BALL_M < height <= policy.max_height_m and reach < outside <= policy.outside_pitch_m:
-        words = f"is {outside:.0f} m outside the pitch at a height of {height:.0f} m"
+        words = f"is {outside:.0f} m outside the pitch at a height of {metres(height)}"
         return [(outside, reach, words)]
     return [
         (number, limit, words)
         for number, limit, words in (
-            (z, policy.below_grass_m, f"lies {z:.1f} m below the grass"),
-            (height, policy.max_height_m, f"flies {height:.0f} m above the grass"),
+            (z, policy.below_grass_m, f"lies {metres(z)} below the grass"),
+            (height, policy.max_height_m, f"flies {metres(height)} above the grass"),
             (outside, policy.outside_pitch_m, f"is {outside:.0f} m outside the pitch"),
         )
         if number > limit

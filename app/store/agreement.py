@@ -16,7 +16,7 @@ from app.store.takes import INDEPENDENT
 
 AGREED, OPEN, DECIDED = "agreed", "open", "decided"
 """States of an agreement."""
-_ROWS = select(*AgreementModel.__table__.columns, QueueModel.number).join(
+_ROWS = select(*AgreementModel.__table__.columns, QueueModel.number, QueueModel.status).join(
     QueueModel, QueueModel.group_id == AgreementModel.group_id
 )
 
@@ -24,7 +24,7 @@ _ROWS = select(*AgreementModel.__table__.columns, QueueModel.number).join(
 def agreements_of(
     session: Session, dataset_id: int, *, batch_id: int | None = None, state: str | None = None
 ) -> Sequence[Any]:
-    """What the groups of a dataset came to, each with its ``number``; the worst first.
+    """What the groups of a dataset came to, each with its ``number`` and ``status``; the worst first.
 
     Args:
         session: The database.

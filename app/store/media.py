@@ -20,6 +20,7 @@ from app.config import Settings
 from app.durable import replace_file
 from app.errors import ImageError, NotFoundError, StorageError, TooLargeError
 from app.object_store.address import unseal
+from app.plural import plural
 from app.soccer.media import Media
 from app.store.archives import Archives
 from app.store.image_header import JPEG, SIDEWAYS, ImageHeader, check_scans, check_size, read_header
@@ -378,7 +379,9 @@ def _video_frame(media: Media, settings: Settings) -> Any:
     path, number = Path(media.path), media.frame or 0
     times = video_times(media, settings)
     if not 0 <= number < len(times):
-        raise NotFoundError(f"{path.name} has no frame {number}; it has {len(times):,} frames")
+        raise NotFoundError(
+            f"{path.name} has no frame {number}; it has {plural(len(times), 'frame')}"
+        )
     picture = frame_at(path, number, times)
     if picture is None:
         raise NotFoundError(f"frame {number} of {path.name} cannot be decoded")

@@ -8,8 +8,8 @@ from typing import Any
 
 from sqlalchemy import delete, insert, select, text
 
-from app.soccer.finding import PITCH_SIZE
 from app.store.dialect.statements import DeferReferences
+from app.store.findings import SEEN
 from app.store.groups import StoredGroup, read_groups
 from app.store.session import Session
 from app.store.stations import StoredStation, stored_station
@@ -66,9 +66,9 @@ def all_spare(session: Session) -> Iterator[Any]:
 
 
 def all_noticed(session: Session) -> Iterator[Any]:
-    """The row of everything that imports noticed; what was computed is not among it."""
+    """The row of everything that imports noticed; what was computed or seen of pictures is not among it."""
     statement = select(*ImportFindingModel.__table__.columns)
-    return iter(session.execute(statement.where(ImportFindingModel.kind != PITCH_SIZE)))
+    return iter(session.execute(statement.where(ImportFindingModel.kind.not_in(SEEN))))
 
 
 def rewrite(

@@ -12,6 +12,7 @@ from app.store.clock import now
 from app.store.group_rows import next_id
 from app.store.session import Session
 from app.store.tables.groups import GroupModel
+from app.store.tables.queue import QueueModel
 from app.store.tables.takes import CopyDatasetModel, TakeModel
 from app.store.tables.work import BatchGroupModel
 
@@ -145,7 +146,8 @@ def takes_in(
 
 
 def names_of(session: Session, copy_ids: Sequence[int]) -> Sequence[Any]:
-    """``id``, ``key``, ``label``, ``of_id`` and ``same`` (whether it has the original's key) of copies."""
+    """``id``, ``key``, ``label``, ``of_id`` and ``same`` (whether it has the original's key) of copies, and
+    ``number``, ``of_key`` and ``of_label`` of the original."""
     original = aliased(GroupModel)
     statement = (
         select(
@@ -154,10 +156,14 @@ def names_of(session: Session, copy_ids: Sequence[int]) -> Sequence[Any]:
             GroupModel.label,
             CopyDatasetModel.of_id,
             (original.key == GroupModel.key).label("same"),
+            original.key.label("of_key"),
+            original.label.label("of_label"),
+            QueueModel.number,
         )
         .join(CopyDatasetModel, CopyDatasetModel.dataset_id == GroupModel.dataset_id)
         .join(TakeModel, TakeModel.copy_id == GroupModel.id)
         .join(original, original.id == TakeModel.group_id)
+        .join(QueueModel, QueueModel.group_id == original.id)
     )
     return session.execute(statement.where(GroupModel.id.in_(copy_ids))).all()
 

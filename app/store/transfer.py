@@ -20,6 +20,7 @@ from sqlalchemy import Connection, Engine, Table, func, insert, inspect, select,
 
 from app.config import Settings
 from app.errors import DamagedError, InputError
+from app.plural import plural
 from app.store.anchor import anchor_of
 from app.store.dialect.dialect import Dialect, dialect_of
 from app.store.engine import WRITE, make_engine, reported
@@ -104,7 +105,7 @@ def transfer(
 
 
 def _unkeepable(found: Sequence[NullCharacter]) -> InputError:
-    count = "1 text holds" if len(found) == 1 else f"{len(found):,} texts hold"
+    count = plural(len(found), "text holds", "texts hold")
     return InputError(
         f"{count} U+0000, which no database takes any more: {named(found)}",
         hint="Run touchline transfer with --replace-null: it writes U+FFFD in its place.",

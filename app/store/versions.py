@@ -144,7 +144,17 @@ def candidate_rows(session: Session, dataset_id: int) -> Sequence[Any]:
         .group_by(VerdictModel.group_id)
         .subquery()
     )
-    names = ("group_id", "key", "match", "split", "status", "stale", "passes", "gate")
+    names = (
+        "group_id",
+        "key",
+        "match",
+        "split",
+        "view_keys",
+        "status",
+        "stale",
+        "passes",
+        "gate",
+    )
     statement = (
         select(
             *(getattr(QueueModel, name) for name in names),

@@ -18,8 +18,23 @@ from app.store.tables.groups import GroupModel, StationModel, ViewModel
 from app.store.tables.queue import QueueModel
 
 
+class _Framed:
+    """A row with the place of a frame."""
+
+    media_path: str | None
+    media_member: str | None
+    media_frame: int | None
+
+    @property
+    def media(self) -> Media | None:
+        """Its frame, where it has one."""
+        if self.media_path is None:
+            return None
+        return Media(self.media_path, self.media_member, self.media_frame)
+
+
 @dataclass(frozen=True)
-class StoredView:
+class StoredView(_Framed):
     """A view with its annotated size in pixels, its frame, and its balls as they are stored.
 
     Attributes:
@@ -41,13 +56,6 @@ class StoredView:
     media_member: str | None
     media_frame: int | None
     said: str
-
-    @property
-    def media(self) -> Media | None:
-        """Its frame, where it has one."""
-        if self.media_path is None:
-            return None
-        return Media(self.media_path, self.media_member, self.media_frame)
 
     @property
     def balls(self) -> list[BallAnnotation]:
@@ -85,7 +93,7 @@ def dataset_views(
 
 
 @dataclass(frozen=True)
-class NamedView:
+class NamedView(_Framed):
     """What names the files of a view in an export."""
 
     group_id: int
@@ -101,13 +109,6 @@ class NamedView:
     media_path: str | None
     media_member: str | None
     media_frame: int | None
-
-    @property
-    def media(self) -> Media | None:
-        """Its frame, where it has one."""
-        if self.media_path is None:
-            return None
-        return Media(self.media_path, self.media_member, self.media_frame)
 
 
 def named_views(session: Session, group_ids: Sequence[int]) -> list[NamedView]:

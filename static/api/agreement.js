@@ -46,6 +46,7 @@ export function getComparison(group, other, signal) {
  * @property {number} number
  * @property {number | null} batch
  * @property {'agreed' | 'open' | 'decided'} state
+ * @property {'unreviewed' | 'accepted' | 'rejected' | 'deferred'} status the verdict on the group itself
  * @property {string[]} people
  * @property {(string | null)[]} verdicts
  * @property {number} worst how many times its limit the worst disagreement was

@@ -21,7 +21,7 @@ import { queryText, request } from './client.js';
  * @property {string | null} error
  */
 
-/** In which formats a dataset, or a version of it, can be exported. @param {number} dataset @param {{version?: number}} options @param {AbortSignal} [signal] @returns {Promise<{items: {format: string, possible: boolean, reason: string | null, hint: string | null}[]}>} */
+/** In which formats a dataset, or a version of it, can be exported. @param {number} dataset @param {{version?: number}} options @param {AbortSignal} [signal] @returns {Promise<{items: {format: string, possible: boolean, reason: string | null, hint: string | null, options: string[]}[]}>} */
 export function getFormats(dataset, options, signal) {
 	return request(`/datasets/${dataset}/export-formats${queryText(options)}`, { signal });
 }

@@ -35,6 +35,11 @@ export function postUpload(file, progress, signal) {
 	return upload(`/uploads${queryText({ name: file.name })}`, file, progress, signal);
 }
 
+/** How much room uploads have, and how much of it one's own take. @param {AbortSignal} [signal] @returns {Promise<{max_bytes: number, days: number, used_bytes: number, quota_bytes: number | null}>} */
+export function getUploadRoom(signal) {
+	return request(`/uploads${queryText({ limit: '1' })}`, { signal });
+}
+
 /** The folders that the operator allowed, or what lies in one. @param {string} path "": the allowed ones @param {AbortSignal} [signal] @returns {Promise<FolderJson>} */
 export function getFolders(path, signal) {
 	return request(`/imports/folders${queryText({ path })}`, { signal });

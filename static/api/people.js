@@ -76,8 +76,8 @@ export const postInvitations = (people, dryRun) => request(`/users/invitations${
 /** @param {number} id @param {{role?: Role, disabled?: boolean}} body @returns {Promise<UserJson>} */
 export const patchUser = (id, body) => request(`/users/${id}`, { method: 'PATCH', body });
 
-/** @param {number} id @returns {Promise<UserWithLink>} */
-export const postUserLink = (id) => request(`/users/${id}/link`, { method: 'POST' });
+/** @param {number} id @param {string} [email] where the link goes by mail @returns {Promise<UserWithLink>} */
+export const postUserLink = (id, email = '') => request(`/users/${id}/link`, { method: 'POST', ...(email ? { body: { email } } : {}) });
 
 /** Show what was done before there were accounts as somebody's; once. @param {number} id @returns {Promise<unknown>} */
 export const postAdoption = (id) => request(`/users/${id}/adoption`, { method: 'POST' });

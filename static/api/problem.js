@@ -38,6 +38,7 @@ function detailOf(status, body) {
 export function sentenceOf(error) {
 	if (!(error instanceof Error)) return String(error);
 	const hint = error instanceof ApiError ? error.hint : null;
-	const text = error.message.replace(/[^.?!]$/, '$&.');
+	// A field is named as it stands in the form, and not as its place in the request.
+	const text = error.message.replace(/^\/(\w+): /, '$1: ').replace(/[^.?!]$/, '$&.');
 	return (text.charAt(0).toUpperCase() + text.slice(1)) + (hint ? ` ${hint}` : '');
 }

@@ -5,7 +5,7 @@ import { request } from './client.js';
 
 /** @import {GroupDocument} from './types.js' */
 
-/** @typedef {{id: number, batch: number | null, group: number, dataset: number, of: number | null, title: string, person: string, place: number, begun: string, handed_in: string | null, verdict: string | null, settled: string | null, handed_back: HandedBackJson | null}} TakeJson */
+/** @typedef {{id: number, batch: number | null, group: number, dataset: number, of: number | null, number: number | null, title: string, person: string, place: number, begun: string, handed_in: string | null, verdict: string | null, settled: string | null, handed_back: HandedBackJson | null}} TakeJson */
 /** @typedef {{group: number, title: string, by: string, at: string, reason: string}} HandedBackJson */
 /** @typedef {{count: number, median: number | null, low: number | null, high: number | null}} MiddleJson */
 /** @typedef {{line_px: number | null, lines_missing: number, ball_px: number | null, balls_missing: number, ball_m: number | null}} ErrorJson */

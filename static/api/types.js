@@ -332,6 +332,7 @@
  * @property {number} unreviewed
  * @property {PolicyJson} policy
  * @property {string} created
+ * @property {boolean} hides_groups whether groups are hidden from whoever asks, who annotates independently
  */
 
 /** @typedef {{edges: number[], open_high: boolean, log: boolean, counts: number[], unknown: number}} Histogram */

@@ -17,6 +17,8 @@ import { idempotencyKey, queryText, request } from './client.js';
  * @property {boolean} dry_run
  */
 
+/** @typedef {{groups: number, splits: {[name: string]: number}, left_out: {[why: string]: number}, unsolved: number}} FreezePlan */
+
 /**
  * @typedef {object} VersionJson
  * @property {number} id
@@ -53,7 +55,7 @@ export function getVersions(dataset, signal) {
 	return request(`/datasets/${dataset}/versions`, { signal });
 }
 
-/** What freezing would take in; saves nothing. @param {number} dataset @param {FreezeRequest} body @param {AbortSignal} [signal] @returns {Promise<any>} */
+/** What freezing would take in; saves nothing. @param {number} dataset @param {FreezeRequest} body @param {AbortSignal} [signal] @returns {Promise<FreezePlan>} */
 export function previewFreeze(dataset, body, signal) {
 	return request(`/datasets/${dataset}/versions`, { method: 'POST', body: { ...body, dry_run: true }, signal });
 }

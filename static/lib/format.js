@@ -32,6 +32,22 @@ export function pixels(value) {
 	return fixed(value, size >= 99.95 ? 0 : 1);
 }
 
+/** Pixels with their unit: "7.3 px". @param {number | null | undefined} value */
+export function pixelText(value) {
+	const text = pixels(value);
+	return text === NONE ? text : `${text} px`;
+}
+
+/** An angle: "44.5°". @param {number | null | undefined} value */
+export function degrees(value) {
+	return fixed(value, 1, '°');
+}
+
+/** A place or a length on the pitch: "−34.76 m". @param {number | null | undefined} value */
+export function metres(value) {
+	return fixed(value, 2, ' m');
+}
+
 /** Per cent in four characters: 0.06, 14.3, 113. @param {number | null | undefined} value */
 export function percent(value) {
 	const size = Math.abs(value ?? 0);

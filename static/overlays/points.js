@@ -4,7 +4,7 @@
 import { gradeOfResidual } from '../geometry/residual.js';
 import { toScreen } from '../geometry/viewport.js';
 import { colours } from '../lib/colours.js';
-import { fixed } from '../lib/format.js';
+import { pixelText } from '../lib/format.js';
 import { label, shareOf, strokeLine, UPPER_BORDER } from './pen.js';
 
 /** @import {ImagePoint} from '../geometry/camera.js' */
@@ -75,7 +75,7 @@ export function drawSelectedPoint(context, { picture, viewport, selected }) {
 	context.lineWidth = 2;
 	context.strokeStyle = colours.value.selected;
 	context.stroke();
-	const number = residual.distance === null ? '' : ` · ${fixed(residual.distance, 1, ' px')}`;
+	const number = residual.distance === null ? '' : ` · ${pixelText(residual.distance)}`;
 	const text = `${selected.marking} · point ${selected.index + 1}${number}`;
 	const above = y - 18 > UPPER_BORDER;
 	label(context, text, { x: x + 16, y: above ? y - 18 : y + 18 }, colours.value.point);

@@ -1,8 +1,8 @@
 // @ts-check
 /** What can be imported, and what each format does not say itself. */
 
-/** @typedef {{name: string, label: string, hint: string, kind: 'size' | 'calibration' | 'offset' | 'cameras' | 'text'}} FormatOption */
-/** @typedef {{name: string, label: string, note: string, options: FormatOption[], lines?: boolean}} ImportFormat   `lines`: static cameras, whose lines are files of their own */
+/** @typedef {{name: string, label: string, hint: string, kind: 'size' | 'calibration' | 'offset' | 'cameras' | 'grouping' | 'text'}} FormatOption */
+/** @typedef {{name: string, label: string, note: string, options: FormatOption[], lines?: boolean, keepsPolicy?: boolean}} ImportFormat   `lines`: static cameras, whose lines are files of their own; `keepsPolicy`: no policy is chosen for it */
 
 /** @type {FormatOption} */
 const CALIBRATION = { name: 'calibration', label: 'Where a view has a given camera and lines', hint: 'which of them is used', kind: 'calibration' };
@@ -15,6 +15,9 @@ const OFFSET = { name: 'frame_offset', label: 'Frame offset', hint: 'number in t
 /** @type {FormatOption} */
 const FLIPPED = { name: 'flipped', label: 'Mirrored cameras', hint: 'numbers, for example 2,6', kind: 'cameras' };
 
+/** @type {FormatOption} */
+const GROUPING = { name: 'grouping', label: 'Which pictures are one group', hint: 'a pattern of their names, with {instant} and {camera}', kind: 'grouping' };
+
 /** @type {ImportFormat[]} */
 export const IMPORT_FORMATS = [
 	{ name: 'soccernet-v3', label: 'SoccerNet-v3', note: 'a folder or zip with Labels-v3.json', options: [] },
@@ -22,11 +25,12 @@ export const IMPORT_FORMATS = [
 	{ name: 'issia', label: 'ISSIA', note: 'XGTF ground truth of the static cameras', options: [CALIBRATION, SIZE, OFFSET, FLIPPED], lines: true },
 	{ name: 'issia-3d', label: 'ISSIA-3D', note: 'ISSIA-3D.csv and issia_calibration.json', options: [CALIBRATION, SIZE, FLIPPED], lines: true },
 	{ name: 'sn-calibration', label: 'sn-calibration', note: 'a JSON of lines for each frame', options: [CALIBRATION, SIZE] },
-	{ name: 'cameras', label: 'Cameras', note: 'cameras for known frames', options: [{ ...SIZE, hint: 'for which the cameras were made, for example 960x540; empty: that of each view' }] },
+	{ name: 'cameras', label: 'Cameras', note: 'cameras for known frames', options: [{ ...SIZE, hint: 'for which the cameras were made, for example 960x540; empty: that of each view' }], keepsPolicy: true },
 	{ name: 'gamestate', label: 'sn-gamestate', note: 'Labels-GameState.json', options: [CALIBRATION] },
 	{ name: 'coco', label: 'COCO', note: 'as Touchline, CVAT, Label Studio, Roboflow or FiftyOne export it', options: [CALIBRATION, CATEGORY] },
 	{ name: 'parquet', label: 'Parquet', note: 'as Touchline exports it', options: [] },
-	{ name: 'frames', label: 'Pictures', note: 'without annotations: each becomes a group, cameras are proposed', options: [] },
+	{ name: 'frames', label: 'Pictures', note: 'without annotations: they become groups, cameras are proposed', options: [GROUPING] },
+	{ name: 'touchline', label: 'Touchline', note: 'edits and verdicts of another installation', options: [], keepsPolicy: true },
 ];
 
 /**

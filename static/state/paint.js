@@ -6,7 +6,7 @@ import { computed, effect, signal } from '@preact/signals';
 import { proposeLines, readPaint } from '../api/paint.js';
 import { ApiError } from '../api/problem.js';
 import { linesOntoPaint, ontoPaint, reachOf } from '../geometry/paint.js';
-import { fixed, plural } from '../lib/format.js';
+import { pixelText, plural } from '../lib/format.js';
 import { latest } from '../lib/latest.js';
 import { page } from '../lib/router.js';
 import { changed, changes, lines, shownSolution, staging, stageLines, view } from './calibration.js';
@@ -107,7 +107,7 @@ function stage({ lines: next, moved, left }, only) {
 	}
 	stageLines(next, only ? `${only} onto the paint` : 'Points onto the paint');
 	const median = [...moved].sort((a, b) => a - b)[moved.length >> 1];
-	announce(`${plural(moved.length, 'point')} moved onto the paint, median move ${fixed(median, 1)} px${stayed}.`);
+	announce(`${plural(moved.length, 'point')} moved onto the paint, median move ${pixelText(median)}${stayed}.`);
 }
 
 /** Where a point that is dragged lies on the paint of its marking; where there is none, where it is. */

@@ -99,6 +99,10 @@ export async function openQueue(dataset, q) {
 		if (abort.aborted) return;
 		if (!(error instanceof ApiError)) throw error;
 		queue.value = { ...EMPTY, dataset: dataset.name, q, error, loaded: true };
+		// Counts of the query before say nothing of one that cannot be read.
+		summary.value = null;
+		statusCounts.value = null;
+		countedFor = '';
 	} finally {
 		if (!abort.aborted) opening = false;
 	}

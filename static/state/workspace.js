@@ -93,6 +93,21 @@ export function focusView(letter) {
 	if (maximised.value) maximised.value = letter;
 }
 
+/** @typedef {{view: string | null, marking?: string | null, index?: number | null, ball?: boolean}} Place   a view by its key, or a marking, a point of it or the ball there */
+
+/**
+ * Lead to the view and the line that a sentence speaks of.
+ *
+ * @param {import('../api/types.js').GroupDocument} group @param {Place} place
+ */
+export function pointTo(group, { view: key, marking, index, ball }) {
+	const view = group.views.find((one) => one.key === key);
+	if (!view) return;
+	focusView(view.letter);
+	if (ball) selected.value = { kind: 'ball', view: view.key };
+	else if (marking && view.lines[marking]) selected.value = { kind: 'point', view: view.key, marking, index: index ?? 0 };
+}
+
 /** @param {string} letter */
 export function toggleMaximised(letter) {
 	focused.value = letter;

@@ -4,7 +4,7 @@
 import { html } from 'htm/preact';
 
 import { ballCenter } from '../geometry/preview.js';
-import { fixed, pixels } from '../lib/format.js';
+import { pixelText } from '../lib/format.js';
 import { conflict, keepMine, mergeBoth, takeTheirs } from '../state/conflict.js';
 import { leftOutText } from '../state/reasons.js';
 
@@ -35,11 +35,11 @@ function includedWords(value) {
 function ballWords(ball, base) {
 	const center = ball && ballCenter(ball);
 	if (!ball || !center) return ball?.out_of_view ? 'out of view' : 'no ball';
-	const size = ball.box ? `Ø ${fixed((ball.box[2] + ball.box[3]) / 2, 1)} px` : 'point';
+	const size = ball.box ? `Ø ${pixelText((ball.box[2] + ball.box[3]) / 2)}` : 'point';
 	const from = base && base !== ball ? ballCenter(base) : null;
 	const moved = from ? Math.hypot(center.x - from.x, center.y - from.y) : 0;
 	const hidden = ball.occluded ? ', occluded' : '';
-	return `${size}${moved > 0.005 ? `, moved ${pixels(moved)} px` : ''}${hidden}`;
+	return `${size}${moved > 0.005 ? `, moved ${pixelText(moved)}` : ''}${hidden}`;
 }
 
 /** @param {PointJson[] | null} points @param {PointJson[] | null} base */
@@ -48,7 +48,7 @@ function lineWords(points, base) {
 	const count = `${points.length} ${points.length === 1 ? 'point' : 'points'}`;
 	if (!base || base === points || base.length !== points.length) return count;
 	const moved = Math.max(...points.map((point, i) => Math.hypot(point.x - base[i].x, point.y - base[i].y)));
-	return moved > 0.005 ? `${count}, moved ${pixels(moved)} px` : count;
+	return moved > 0.005 ? `${count}, moved ${pixelText(moved)}` : count;
 }
 
 /** @param {{field: Field}} props */

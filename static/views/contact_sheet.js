@@ -10,7 +10,7 @@ import { gradeOfSize } from '../geometry/residual.js';
 import { centeredOn } from '../geometry/viewport.js';
 import { Canvas } from '../lib/canvas.js';
 import { colours } from '../lib/colours.js';
-import { fixed, pixels } from '../lib/format.js';
+import { fixed, pixelText } from '../lib/format.js';
 import { useSize } from '../lib/hooks.js';
 import { drawBall } from '../overlays/ball.js';
 import { drawExpected } from '../overlays/expected_ball.js';
@@ -56,9 +56,9 @@ function windowOf({ view, solved, ball: fit, predictions }, policy) {
 
 /** The diameter that the 3D ball asks for, or the annotated one. @param {ViewPicture} picture */
 function sizeText({ view, ball, predictions }) {
-	if (ball?.optimized_diameter_px) return `Ø ${pixels(ball.optimized_diameter_px)} px`;
+	if (ball?.optimized_diameter_px) return `Ø ${pixelText(ball.optimized_diameter_px)}`;
 	const box = ballOf(view)?.box;
-	return box ? `box ${pixels((box[2] + box[3]) / 2)} px` : predictions?.marks.some(({ sure }) => sure) ? 'predicted' : '';
+	return box ? `box ${pixelText((box[2] + box[3]) / 2)}` : predictions?.marks.some(({ sure }) => sure) ? 'predicted' : '';
 }
 
 /** A crop is not more than this much longer one way than the other. */

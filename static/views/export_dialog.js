@@ -16,7 +16,7 @@ import { JobProgress } from './job_progress.js';
 /** @import {DatasetJson, ExportJson} from '../api/types.js' */
 /** @import {VersionJson} from '../api/versions.js' */
 
-/** @typedef {{items: {format: string, reason: string | null}[]}} Formats */
+/** @typedef {{items: {format: string, reason: string | null, options: string[]}[]}} Formats */
 
 /**
  * The formats: one that has no place for the groups says why and cannot be chosen.
@@ -40,14 +40,14 @@ function FormatChoice({ answers, chosen, choose }) {
 	`;
 }
 
-/** @param {{legend: string, name: string, options: {name: string, label: string, note: string}[], onChoose?: (name: string) => void}} props */
-function Choice({ legend, name, options, onChoose = () => {} }) {
+/** @param {{legend: string, name: string, options: {name: string, label: string, note: string}[], why?: string, onChoose?: (name: string) => void}} props `why` nothing can be chosen */
+function Choice({ legend, name, options, why = '', onChoose = () => {} }) {
 	return html`
-		<fieldset class="choice">
+		<fieldset class="choice" title=${why || undefined}>
 			<legend>${legend}</legend>
 			${options.map((option, i) => html`
-				<label key=${option.name}>
-					<input type="radio" name=${name} value=${option.name} defaultChecked=${i === 0} onChange=${() => onChoose(option.name)} />
+				<label key=${option.name} data-disabled=${why !== ''}>
+					<input type="radio" name=${name} value=${option.name} defaultChecked=${i === 0} disabled=${why !== ''} onChange=${() => onChoose(option.name)} />
 					<span>${option.label}<small>${option.note}</small></span>
 				</label>`)}
 		</fieldset>
@@ -100,6 +100,11 @@ export function ExportDialog({ one, version = null, onClose }) {
 	/** @param {string} name */
 	const isPossible = (name) => !reasons.some(({ format, reason }) => format === name && reason);
 	const chosen = isPossible(wanted) ? wanted : FORMATS.find(({ name }) => isPossible(name))?.name ?? wanted;
+	const used = reasons.find(({ format }) => format === chosen)?.options;
+	/** Why the chosen format has no use for an option; empty: it has. @param {string} option @param {string} sentence */
+	const unused = (option, sentence) => (used && !used.includes(option) ? sentence : '');
+	const noFrames = unused('images', 'This format holds no frames');
+	const noViews = unused('views', 'COCO and YOLO alone leave balls out');
 	const none = !version && !all && one.accepted === 0 && chosen !== 'touchline' ? 'Nobody has accepted a group yet' : '';
 	const why = state.busy ? 'Under way' : isPossible(chosen) ? none : reasons.find(({ format }) => format === chosen)?.reason ?? '';
 	/** @param {FormData} form */
@@ -111,7 +116,7 @@ export function ExportDialog({ one, version = null, onClose }) {
 				dataset: one.name,
 				format: chosen,
 				all: form.get('groups') === 'all',
-				boxes: String(form.get('boxes')),
+				boxes: String(form.get('boxes') ?? BOXES[0].name),
 				images: form.get('images') ? 'copy' : 'none',
 				views: form.get('views') ? 'all' : 'valid',
 				version: version?.name ?? null,
@@ -137,9 +142,9 @@ export function ExportDialog({ one, version = null, onClose }) {
 					<div class="export__column">
 						${version ? html`<p class="note">${plural(version.counts.groups, 'group')} as frozen: always the same bytes.</p>`
 							: html`<${Choice} legend="Groups" name="groups" options=${groupChoices(one)} onChoose=${(/** @type {string} */ name) => setAll(name === 'all')} />`}
-						<${Choice} legend="Ball boxes" name="boxes" options=${BOXES} />
-						<label class="form__check"><input type="checkbox" name="images" />Copy the frames into the zip</label>
-						<label class="form__check"><input type="checkbox" name="views" />COCO and YOLO: include balls that no other view confirms</label>
+						<${Choice} legend="Ball boxes" name="boxes" options=${BOXES} why=${unused('boxes', 'This format holds no box to choose')} />
+						<label class="form__check" data-disabled=${noFrames !== ''} title=${noFrames || undefined}><input type="checkbox" name="images" disabled=${noFrames !== ''} />Copy the frames into the zip</label>
+						<label class="form__check" data-disabled=${noViews !== ''} title=${noViews || undefined}><input type="checkbox" name="views" disabled=${noViews !== ''} />COCO and YOLO: include balls that no other view confirms</label>
 					</div>
 				</div>
 				${state.job ? html`<${JobProgress} job=${state.job} />` : null}

@@ -7,7 +7,7 @@ import { findingTitle } from '../state/advice.js';
 import { dismiss } from '../state/dismissals.js';
 import { mends, toldFinding } from '../state/mends.js';
 import { openFindings } from '../state/open_findings.js';
-import { focusView } from '../state/workspace.js';
+import { pointTo } from '../state/workspace.js';
 import { Letter } from './letter.js';
 import { pageAddress } from './dataset_menu.js';
 import { When } from './when.js';
@@ -25,7 +25,7 @@ function Finding({ group, finding }) {
 	return html`
 		<li class="finding" data-kind=${finding.kind} data-dismissed=${Boolean(checked)}>
 			<p>
-				${view ? html`<button class="row-button" type="button" aria-label=${`Focus view ${view.letter}`} onClick=${() => focusView(view.letter)}><${Letter} letter=${view.letter} /></button>` : null}
+				${view ? html`<button class="row-button" type="button" aria-label=${`Focus view ${view.letter}`} onClick=${() => pointTo(group, { ...finding, index: finding.fix?.index ?? null })}><${Letter} letter=${view.letter} /></button>` : null}
 				${checked ? html`<s><strong>${title}${sure}.</strong> ${finding.sentence}</s>` : html`<strong>${title}${sure}.</strong> ${finding.sentence}`}
 			</p>
 			${checked ? html`<p class="finding__checked">Checked, fine${checked.by === 'local' ? '' : `: ${checked.by}`}, <${When} at=${checked.at} />${checked.note ? ` · “${checked.note}”` : ''}</p>` : null}

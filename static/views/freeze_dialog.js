@@ -7,14 +7,14 @@ import { useState } from 'preact/hooks';
 import { sentenceOf } from '../api/problem.js';
 import { postVersion, previewFreeze } from '../api/versions.js';
 import { withValue } from '../lib/field.js';
-import { count, words } from '../lib/format.js';
+import { count, sharePercent, words } from '../lib/format.js';
 import { useResource } from '../lib/resource.js';
 import { follow } from '../state/jobs.js';
 import { FormDialog } from './dialog.js';
 import { JobProgress } from './job_progress.js';
 
 /** @import {JobJson} from '../api/jobs.js' */
-/** @import {FreezeRequest, SplitRequest} from '../api/versions.js' */
+/** @import {FreezePlan, FreezeRequest, SplitRequest} from '../api/versions.js' */
 /** @import {DatasetJson} from '../api/types.js' */
 
 /** The first of v1, v2, ... that is free. @param {string[]} taken */
@@ -61,12 +61,19 @@ function blank(kind) {
 	return kind === 'camera' ? { kind, test_cameras: ['cam1', 'cam2'] } : { kind };
 }
 
-/** @param {{plan: {groups: number, left_out: {[why: string]: number}, unsolved: number}}} props */
-function Plan({ plan }) {
+/** How many groups each split has, and their share: "train 44 (73 %)". @param {{[name: string]: number}} splits */
+export function splitTexts(splits) {
+	const all = Object.values(splits).reduce((a, b) => a + b, 0);
+	return Object.entries(splits).map(([name, n]) => `${name === 'none' ? 'no split' : name} ${count(n)} (${sharePercent(n / all)})`);
+}
+
+/** @param {{plan: FreezePlan, split: SplitRequest}} props */
+function Plan({ plan, split }) {
 	const left = Object.entries(plan.left_out);
 	return html`
 		<div class="bulk__outcome" role="status">
-			<p><strong>${count(plan.groups)}</strong> ${plan.groups === 1 ? 'group is' : 'groups are'} included.</p>
+			<p><strong>${count(plan.groups)}</strong> ${plan.groups === 1 ? 'group is' : 'groups are'} included${plan.groups ? html`: ${splitTexts(plan.splits).join(', ')}` : ''}.</p>
+			${split.kind === 'match' && plan.groups ? html`<p class="note">A match is in one split with all its groups, so the share of groups is near that of matches, not equal to it.</p>` : null}
 			${plan.unsolved ? html`<p data-grade="warn">${count(plan.unsolved)} ${plan.unsolved === 1 ? 'is' : 'are'} not solved yet.</p>` : null}
 			${left.length ? html`<ul>${left.map(([why, n]) => html`<li key=${why}>${count(n)} ${n === 1 ? 'stays' : 'stay'} out: ${words(why).replace(': ', ', ')}</li>`)}</ul>` : null}
 		</div>
@@ -125,7 +132,7 @@ export function FreezeDialog({ one, taken, onClose, onFrozen }) {
 			buttons=${html`<button class="button button--primary" type="submit" aria-disabled=${why !== ''} title=${why}>${busy ? 'Freezing…' : done ? 'Done' : 'Freeze'}</button>`}
 		>
 			<${FreezeFields} ask=${ask} change=${(/** @type {Partial<FreezeRequest>} */ values) => setAsk({ ...ask, ...values })} />
-			${plan.value && !done ? html`<${Plan} plan=${plan.value} />` : null}
+			${plan.value && !done ? html`<${Plan} plan=${plan.value} split=${ask.split} />` : null}
 			${job ? html`<${JobProgress} job=${job} />` : null}
 			${problem ? html`<p class="form__error" role="alert">${problem}</p>` : null}
 		<//>

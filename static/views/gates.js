@@ -5,9 +5,10 @@ import { html } from 'htm/preact';
 
 import { ballOf } from '../geometry/preview.js';
 import { mends } from '../state/mends.js';
-import { focusView, gatesOpen, selected } from '../state/workspace.js';
+import { gatesOpen, pointTo } from '../state/workspace.js';
 import { gateLabel, gateMargin } from './gate_names.js';
 import { carryOut } from './mend_actions.js';
+import { uncertainViews } from './view_state.js';
 
 /** @import {GateJson, GroupDocument, SolutionJson} from '../api/types.js' */
 /** @import {Mend} from '../state/mends.js' */
@@ -30,29 +31,21 @@ function follows(group, gate, before) {
 	return counted.length >= 2;
 }
 
-/** @param {GroupDocument} group @param {GateJson} gate @param {GateJson[]} before the gates above it */
-function stateOf(group, gate, before) {
+/** @param {GroupDocument} group @param {GateJson} gate @param {GateJson[]} before the gates above it @param {boolean} uncertain whether lines leave a camera open */
+function stateOf(group, gate, before, uncertain) {
 	if (!gate.active) return { state: 'off', glyph: '·', word: 'not required' };
 	if (gate.value === null) return { state: 'off', glyph: '·', word: 'not judged' };
+	if (gate.passed && gate.name === 'calibratable' && uncertain) return { state: 'doubt', glyph: '!', word: 'passed, with a camera that is uncertain' };
 	if (gate.passed) return { state: 'passed', glyph: '✓', word: 'passed' };
 	if (follows(group, gate, before)) return { state: 'follows', glyph: '↳', word: 'fails because of the gate above' };
 	return { state: 'failed', glyph: '✗', word: 'failed' };
-}
-
-/** Show what a mend speaks about. @param {GroupDocument} group @param {Mend} mend */
-function show(group, { view: key, marking, index, guide }) {
-	const view = group.views.find((one) => one.key === key);
-	if (!view) return;
-	focusView(view.letter);
-	if (guide?.looks) selected.value = { kind: 'ball', view: view.key };
-	else if (marking && view.lines[marking]) selected.value = { kind: 'point', view: view.key, marking, index: index ?? 0 };
 }
 
 /** @param {{group: GroupDocument, remedy: Mend}} props */
 function RemedyRow({ group, remedy }) {
 	return html`
 		<li class="remedy" data-passes=${remedy.passes}>
-			<button class="remedy__sentence" type="button" title="Show what this is about" onClick=${() => show(group, remedy)}>${remedy.sentence}</button>
+			<button class="remedy__sentence" type="button" title="Show what this is about" onClick=${() => pointTo(group, { ...remedy, ball: Boolean(remedy.guide?.looks) })}>${remedy.sentence}</button>
 			<button data-needs="annotate" class="button button--fix" type="button" onClick=${() => carryOut(remedy)}>${remedy.label}</button>
 		</li>
 	`;
@@ -72,6 +65,7 @@ function Remedies({ group }) {
 
 /** @param {{group: GroupDocument, solution: SolutionJson}} props */
 export function Gates({ group, solution }) {
+	const uncertain = uncertainViews(group, solution).length > 0;
 	return html`
 		<section class="card" aria-label="Gates">
 			<h2>Gates · policy ${group.policy.name}
@@ -79,11 +73,11 @@ export function Gates({ group, solution }) {
 			</h2>
 			<ol class="gates" data-open=${gatesOpen.value}>
 				${solution.gates.map((gate, i) => {
-					const { state, glyph, word } = stateOf(group, gate, solution.gates.slice(0, i));
+					const { state, glyph, word } = stateOf(group, gate, solution.gates.slice(0, i), uncertain);
 					const margin = gateMargin(gate);
 					return html`
 						<li key=${gate.name} data-state=${state} data-gate=${gate.name}>
-							<span aria-hidden="true" title=${state === 'follows' ? word : undefined}>${glyph}</span>
+							<span aria-hidden="true" title=${state === 'follows' || state === 'doubt' ? word : undefined}>${glyph}</span>
 							<span class="gates__name term" tabindex="0" data-term=${`gate:${gate.name}`}>${gateLabel(gate, group.policy)}<span class="hidden-text">, ${word}:</span></span>
 							<span class="gates__value" title=${margin}>${unbroken(gate.sentence)}</span>
 							${gatesOpen.value && margin ? html`<span class="gates__margin">${margin}</span>` : null}

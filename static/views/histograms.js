@@ -7,7 +7,7 @@ import { useState } from 'preact/hooks';
 import { withValue } from '../lib/field.js';
 import { plural } from '../lib/format.js';
 import { rangeOf, withField } from '../state/query.js';
-import { summary } from '../state/queue.js';
+import { queue, summary } from '../state/queue.js';
 import { BinAxis, endsOf, noneOf, short } from './bin_axis.js';
 
 /** @import {Histogram} from '../api/types.js' */
@@ -119,9 +119,11 @@ function OneHistogram({ column, data, q, onQuery }) {
 /** @param {{q: string, painted: boolean, onQuery: (q: string) => void}} props `painted`: cameras are found from paint */
 export function Histograms({ q, painted, onQuery }) {
 	const histograms = summary.value?.histograms ?? {};
+	const failed = queue.value.error !== null;
 	return html`
 		${COLUMNS.filter(({ name }) => painted || name !== 'agreement').map((column) => {
 			const data = histograms[column.name];
+			if (!data && failed) return html`<section key=${column.name} class="card histogram" aria-label=${column.label} data-known="false"><h2>${column.label}</h2><p class="histogram__none">Not counted: the query fails.</p></section>`;
 			return data
 				? html`<${OneHistogram} key=${column.name} column=${column} data=${data} q=${q} onQuery=${onQuery} />`
 				: html`<section key=${column.name} class="card histogram" aria-busy="true"><h2>${column.label}</h2><svg></svg><p class="bin-axis">–</p></section>`;

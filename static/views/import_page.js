@@ -30,9 +30,32 @@ const POLICIES = [
 	{ name: 'strict', label: 'strict: as paper, with rays 5° apart and σ below 0.5 m' },
 ];
 
+/** Which pictures are one group; nothing is said where each is one. @param {{option: FormatOption, change: (value: any) => void}} props */
+function GroupingField({ option, change }) {
+	const [how, setHow] = useState('');
+	const [pattern, setPattern] = useState('{instant}_{camera}.jpg');
+	/** @param {string} next @param {string} names */
+	function tell(next, names) {
+		setHow(next);
+		setPattern(names);
+		change(next === 'pattern' ? names : next || undefined);
+	}
+	return html`
+		<div class="form__row">
+			<label for="option-grouping">${option.label}</label>
+			<select class="field" id="option-grouping" onChange=${withValue((next) => tell(next, pattern))}>
+				<option value="">each picture is a group</option><option value="folder">those of a folder are one group</option><option value="pattern">by their names</option>
+			</select>
+			${how === 'pattern' ? html`<input class="field" id="option-pattern" aria-label="Pattern of the names" autocomplete="off" maxlength="200" value=${pattern} onInput=${withValue((names) => tell(how, names))} />` : null}
+			<small>${how === 'pattern' ? option.hint : 'A group is one instant, seen by one camera or more. The dry run says what they become.'}</small>
+		</div>
+	`;
+}
+
 /** @param {{option: FormatOption, change: (value: any) => void}} props */
 function OptionField({ option, change }) {
 	const id = `option-${option.name}`;
+	if (option.kind === 'grouping') return html`<${GroupingField} option=${option} change=${change} />`;
 	if (option.kind === 'calibration') {
 		return html`
 			<div class="form__row">
@@ -138,7 +161,7 @@ export function ImportPage() {
 	function start(dry_run) {
 		if (why || !source) return;
 		const asked = Object.entries(options).filter(([key, value]) => value !== undefined && (chosen.options.some((option) => option.name === key) || (key === 'lines' && chosen.lines)));
-		run({ dataset: name, format, source, options: Object.fromEntries(asked), dry_run, ...(policy && !kept ? { policy } : {}) });
+		run({ dataset: name, format, source, options: Object.fromEntries(asked), dry_run, ...(policy && !kept && !chosen.keepsPolicy ? { policy } : {}) });
 	}
 	/** @param {SubmitEvent} event */
 	function submit(event) {
@@ -162,7 +185,7 @@ export function ImportPage() {
 						${chosen.options.map((option) => html`<${OptionField} key=${option.name} option=${option} change=${(/** @type {any} */ value) => setOptions({ ...options, [option.name]: value })} />`)}
 						${chosen.lines ? html`
 							<${LinesField} source=${source} change=${(/** @type {ImportSource | undefined} */ lines) => setOptions({ ...options, lines })} />` : null}
-						<${PolicyField} kept=${kept} change=${setPolicy} />
+						${chosen.keepsPolicy ? null : html`<${PolicyField} kept=${kept} change=${setPolicy} />`}
 						<p class="buttons">
 							<button data-needs="lead" data-of="" class="button button--primary" type="submit" aria-disabled=${why !== ''} title=${why}>Dry run</button>
 							<button data-needs="lead" data-of="" class="button" type="button" aria-disabled=${why !== ''} title=${why} onClick=${() => start(false)}>Import</button>

@@ -50,8 +50,9 @@ function WithoutPicture({ report, dry, dataset }) {
 /** @param {{report: Report, dry: boolean, dataset: string}} props */
 export function ImportReport({ report, dry, dataset }) {
 	const { outcome } = report;
+	const groups = report.new + report.changed + report.unchanged;
 	const numbers = [
-		['read', report.read], ['new', report.new], ['changed', report.changed], ['unchanged', report.unchanged], ['findings', report.findings],
+		['groups', groups], ['new', report.new], ['changed', report.changed], ['unchanged', report.unchanged], ['findings', report.findings],
 		['left out', report.skipped.length + (report.more_skipped ?? 0)], ['without picture', report.without_picture],
 	];
 	const counts = Object.entries(report.counts ?? {});
@@ -60,6 +61,7 @@ export function ImportReport({ report, dry, dataset }) {
 		<section class="import__report" aria-label=${dry ? 'What would happen' : 'What happened'}>
 			<h3 data-grade=${grade}>${heading(outcome, dry)}</h3>
 			<dl class="number-list">${numbers.map(([name, n]) => html`<div key=${name}><dt>${name}</dt><dd>${count(Number(n ?? 0))}</dd></div>`)}</dl>
+			<p class="note">${plural(report.read, 'record')} in the files</p>
 			${counts.length ? html`<p class="note">${counts.map(([name, n]) => counted(n, name)).join(' · ')}</p>` : null}
 			<${WithoutPicture} report=${report} dry=${dry} dataset=${dataset} />
 			${report.paint_job ? html`

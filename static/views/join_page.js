@@ -11,8 +11,7 @@ import { withValue } from '../lib/field.js';
 import { navigate } from '../lib/router.js';
 import { ways } from '../state/me.js';
 import { FormError } from './form_error.js';
-import { useSessionForm } from './login.js';
-import { MaintenanceBar } from './maintenance_bar.js';
+import { EntryPage, useSessionForm } from './login.js';
 import { SignOnButton } from './sign_on_button.js';
 
 /** @typedef {{name: string | null, joined: boolean}} Meant */
@@ -63,22 +62,17 @@ export function JoinPage() {
 	const [meant, setMeant] = useState(/** @type {Meant | null} */ (null));
 	const [error, setError] = useState(/** @type {ApiError | null} */ (null));
 	useEffect(() => {
-		document.title = 'Choose a password · Touchline';
 		history.replaceState(null, '', '/join');
-		lookAtLink(token || '-').then(setMeant, (problem) => {
+		// What no link ends with is answered like one that is not good any more.
+		lookAtLink(/^[\w-]{1,200}$/.test(token) ? token : '-').then(setMeant, (problem) => {
 			if (!(problem instanceof ApiError)) throw problem;
 			setError(problem);
 		});
 	}, []);
 	return html`
-		<main class="login">
-			<section class="card" aria-labelledby="join-title">
-				<${MaintenanceBar} />
-				<p class="login__brand">Touchline</p>
-				<h1 id="join-title">${meant ? titleOf(meant) : 'Choose a password'}</h1>
-				${meant ? html`<${Ways} meant=${meant} token=${token} />` : null}
-				${error ? html`<${FormError} error=${error} /><p><a class="button" href="/groups">Log in</a></p>` : null}
-			</section>
-		</main>
+		<${EntryPage} title="Choose a password" heading=${meant ? titleOf(meant) : 'Choose a password'}>
+			${meant ? html`<${Ways} meant=${meant} token=${token} />` : null}
+			${error ? html`<${FormError} error=${error} /><p><a class="button" href="/groups">Log in</a></p>` : null}
+		<//>
 	`;
 }

@@ -7,7 +7,7 @@ import { useCallback } from 'preact/hooks';
 import { plainMarking } from '../geometry/marking_words.js';
 import { Canvas } from '../lib/canvas.js';
 import { colours } from '../lib/colours.js';
-import { fixed, pixels, shortMarking } from '../lib/format.js';
+import { pixelText, shortMarking } from '../lib/format.js';
 import { useSize } from '../lib/hooks.js';
 import { drawStrip } from '../overlays/line_strip.js';
 import { useFrames, usePixels } from '../state/frames.js';
@@ -62,7 +62,7 @@ function Strip({ row, width, pixels: data }) {
 				${marking.polyline.length > 1
 					? html`<${Canvas} class="line-row__strip" width=${width} height=${STRIP} draw=${draw} name="" />`
 					: html`<span class="line-row__none">outside this view</span>`}
-				<span class="line-row__value" data-grade=${marking.grade}>${marking.largest === null ? fixed(null, 1) : `${pixels(marking.largest)} px`}</span>
+				<span class="line-row__value" data-grade=${marking.grade}>${pixelText(marking.largest)}</span>
 			</button>
 		</li>
 	`;
@@ -79,7 +79,7 @@ export function LineList({ pictures }) {
 	const rest = rows[fitting];
 	return html`
 		<section class="card strip-card" data-card="lines" aria-label="Lines, worst first">
-			<h2>Lines, ±12 px${rest ? html`<span class="card__aside">${rows.length - fitting} more ${rows.length - fitting === 1 ? 'line' : 'lines'}, ${rows.length - fitting === 1 ? '' : 'all '}≤ ${pixels(rest.marking.largest)} px</span>` : null}</h2>
+			<h2>Lines, ±12 px${rest ? html`<span class="card__aside">${rows.length - fitting} more ${rows.length - fitting === 1 ? 'line' : 'lines'}, ${rows.length - fitting === 1 ? '' : 'all '}≤ ${pixelText(rest.marking.largest)}</span>` : null}</h2>
 			<ul class="line-list" ref=${ref} data-narrow=${narrow}>
 				${rows.length ? null : html`<li class="empty-note">No lines are annotated in this group.</li>`}
 				${size.width < 100 ? null : shown.map((row) => html`

@@ -69,8 +69,10 @@ function PasskeyButton() {
 /** Every way in that there is here. @param {{name?: string}} props */
 function LoginForm({ name = '' }) {
 	const { password, sign_on: provider } = ways.value;
+	// A longer address is not kept for whoever comes back from the provider.
+	const to = () => (location.href.length < 2000 ? location.pathname + location.search : location.pathname.slice(0, 1000));
 	return html`
-		${provider ? html`<${SignOnButton} primary=${!password} begin=${() => beginSignOn({ to: location.pathname + location.search })}>Log in with ${provider}<//>` : null}
+		${provider ? html`<${SignOnButton} primary=${!password} begin=${() => beginSignOn({ to: to() })}>Log in with ${provider}<//>` : null}
 		${provider && password ? html`<p class="login__or">or</p>` : null}
 		${password ? html`<${PasswordForm} name=${name} /><${PasskeyButton} />` : null}
 	`;
@@ -100,25 +102,40 @@ function PasswordForm({ name }) {
 	`;
 }
 
-export function LoginPage() {
-	const main = useRef(/** @type {HTMLElement | null} */ (null));
+/**
+ * A page before somebody is let in, with the notice of maintenance. `wide`: it has cards of its own.
+ *
+ * @param {{title: string, heading: unknown, wide?: boolean, children?: any}} props
+ */
+export function EntryPage({ title, heading, wide = false, children }) {
+	useEffect(() => { document.title = `${title} · Touchline`; }, [title]);
 	useEffect(() => {
-		document.title = 'Log in · Touchline';
-		/** @type {HTMLElement | null | undefined} */ (main.current?.querySelector('input') ?? main.current?.querySelector('button'))?.focus();
 		// Before anybody has logged in no stream tells of another notice of maintenance.
 		const timer = setInterval(askWhoIsThere, ASK_AGAIN);
 		return () => clearInterval(timer);
 	}, []);
 	return html`
-		<main class="login" ref=${main}>
-			<section class="card" aria-labelledby="login-title">
+		<main class="login">
+			<section class=${wide ? 'factor__page' : 'card'} aria-labelledby="entry-title">
 				<${MaintenanceBar} />
-				<p class="login__brand">Touchline</p>
-				<h1 id="login-title">Log in</h1>
-				<${LoginForm} />
-				<p class="note">${ways.value.password ? 'No account, or no password?' : 'No account here?'} An admin of this server can send you a link.</p>
+				${wide ? null : html`<p class="login__brand">Touchline</p>`}
+				<h1 id="entry-title">${heading}</h1>
+				${children}
 			</section>
 		</main>
+	`;
+}
+
+export function LoginPage() {
+	const form = useRef(/** @type {HTMLElement | null} */ (null));
+	useEffect(() => {
+		/** @type {HTMLElement | null | undefined} */ (form.current?.querySelector('input') ?? form.current?.querySelector('button'))?.focus();
+	}, []);
+	return html`
+		<${EntryPage} title="Log in" heading="Log in">
+			<div ref=${form}><${LoginForm} /></div>
+			<p class="note">${ways.value.password ? 'No account, or no password?' : 'No account here?'} An admin of this server can send you a link.</p>
+		<//>
 	`;
 }
 
@@ -133,6 +150,7 @@ export function LoginAgain() {
 	return html`
 		<dialog class="dialog" ref=${dialog} aria-labelledby="login-again" onCancel=${(/** @type {Event} */ event) => event.preventDefault()}>
 			<header class="dialog__header"><h2 id="login-again">Your session has ended</h2></header>
+			<${MaintenanceBar} />
 			<p>Log in to continue here. ${waiting ? `${plural(waiting, 'change')} of yours ${waiting === 1 ? 'waits' : 'wait'} and will be saved then.` : 'Nothing is lost.'}</p>
 			<${LoginForm} name=${me.value?.name ?? ''} />
 		</dialog>

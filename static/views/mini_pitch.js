@@ -8,10 +8,11 @@ import { ballName, ballTold } from '../geometry/estimator.js';
 import { pathFromAbove, pitchMarkings } from '../geometry/pitch.js';
 import { ballCenter, ballOf } from '../geometry/preview.js';
 import { clipSegment, spreadApart, within as inBox } from '../geometry/spread.js';
-import { fixed } from '../lib/format.js';
+import { degrees, metres } from '../lib/format.js';
 import { useSize } from '../lib/hooks.js';
 import { groupDocument, isPreview } from '../state/group.js';
 import { cycleEstimator, estimator } from '../state/workspace.js';
+import { uncertainViews } from './view_state.js';
 
 /** @import {GroupDocument, SolutionJson, ViewJson} from '../api/types.js' */
 /** @import {Camera, PitchPoint} from '../geometry/camera.js' */
@@ -109,6 +110,7 @@ function Drawing({ group, solution }) {
 	// One unit of the drawing is a metre; marks keep their size on screen.
 	const pixel = Math.max(frame.width / Math.max(1, size.width), frame.height / Math.max(1, size.height));
 	const ball = solution.ball?.point;
+	const guessed = new Set(uncertainViews(group, solution).filter(({ guess }) => guess.includes('position')).map(({ view }) => view.letter));
 	const [l, w] = [group.pitch.length, group.pitch.width];
 	const rim = (MARK + 1) * pixel;
 	const room = {
@@ -137,7 +139,8 @@ function Drawing({ group, solution }) {
 				${cameras.map(({ letter }, i) => {
 					const { x, y } = marks[i];
 					return html`
-						<g class="mini-pitch__camera" data-letter=${letter}>
+						<g class="mini-pitch__camera" data-letter=${letter} data-uncertain=${guessed.has(letter)}>
+							${guessed.has(letter) ? html`<title>The lines of ${letter} do not determine where its camera stands</title>` : null}
 							<circle cx=${x} cy=${y} r=${MARK * pixel} />
 							<text x=${x} y=${y} dy=${3.6 * pixel} font-size=${10 * pixel}>${letter}</text>
 						</g>`;
@@ -155,11 +158,11 @@ function Numbers({ solution }) {
 	const [x, y] = ball.point;
 	return html`
 		<dl class="mini-pitch__numbers">
-			<div><dt>x</dt><dd data-number="x">${fixed(x, 2, ' m')}</dd></div>
-			<div><dt>y</dt><dd data-number="y">${fixed(y, 2, ' m')}</dd></div>
-			<div><dt>height</dt><dd data-number="height">${fixed(ball.height_m, 2, ' m')}</dd></div>
-			<div><dt>σ</dt><dd data-number="sigma">${fixed(ball.sigma_m, 2, ' m')}</dd></div>
-			<div><dt title="Parallax: angle between the rays">β</dt><dd data-number="parallax">${fixed(ball.parallax_degrees, 1, '°')}</dd></div>
+			<div><dt>x</dt><dd data-number="x">${metres(x)}</dd></div>
+			<div><dt>y</dt><dd data-number="y">${metres(y)}</dd></div>
+			<div><dt>height</dt><dd data-number="height">${metres(ball.height_m)}</dd></div>
+			<div><dt>σ</dt><dd data-number="sigma">${metres(ball.sigma_m)}</dd></div>
+			<div><dt title="Parallax: angle between the rays">β</dt><dd data-number="parallax">${degrees(ball.parallax_degrees)}</dd></div>
 		</dl>
 	`;
 }

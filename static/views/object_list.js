@@ -5,7 +5,7 @@ import { html } from 'htm/preact';
 import { useLayoutEffect, useRef } from 'preact/hooks';
 
 import { ballOf } from '../geometry/preview.js';
-import { fixed, pixels, scoreText } from '../lib/format.js';
+import { pixelText, scoreText } from '../lib/format.js';
 import { objectsOf, sameObject } from '../state/tab_order.js';
 import { boxes, editing, selected } from '../state/workspace.js';
 
@@ -19,7 +19,7 @@ import { boxes, editing, selected } from '../state/workspace.js';
 function wordsFor(picture, object) {
 	if (object.kind === 'ball') {
 		const ball = ballOf(picture.view);
-		const size = ball?.box ? `Ø ${fixed((ball.box[2] + ball.box[3]) / 2, 2)} px` : '';
+		const size = ball?.box ? `Ø ${pixelText((ball.box[2] + ball.box[3]) / 2)}` : '';
 		return { name: 'Ball', point: ball?.predicted_by ? 'was predicted' : '', number: size, title: picture.predictions?.origin ?? undefined };
 	}
 	if (object.kind === 'prediction') {
@@ -28,7 +28,7 @@ function wordsFor(picture, object) {
 	}
 	const found = picture.markings.find(({ marking }) => marking === object.marking);
 	const distance = found?.points[object.index]?.distance ?? null;
-	const number = distance === null ? '' : `${pixels(distance)} px`;
+	const number = distance === null ? '' : pixelText(distance);
 	return { name: object.marking, point: `point ${object.index + 1}`, number };
 }
 

@@ -4,7 +4,7 @@
 import { html } from 'htm/preact';
 
 import { diagonal } from '../geometry/preview.js';
-import { fixed, pixels, words } from '../lib/format.js';
+import { degrees, fixed, pixels, words } from '../lib/format.js';
 import { Letter } from './letter.js';
 import { Term } from './term.js';
 
@@ -48,7 +48,7 @@ export function PairTable({ group, solution }) {
 					${solution.pairs.map((pair) => html`
 						<tr key=${`${pair.a} ${pair.b}`} data-valid=${pair.valid}>
 							<th scope="row"><span class="pair-letters"><${Letter} letter=${letter(pair.a)} /><${Letter} letter=${letter(pair.b)} /></span></th>
-							<td>${fixed(pair.parallax_degrees, 1, '°')}</td>
+							<td>${degrees(pair.parallax_degrees)}</td>
 							<td>${fixed(pair.baseline_m, 1)}</td>
 							<td data-number="pair-errors">${pixels(pair.errors_px[0])} · ${pixels(pair.errors_px[1])}</td>
 							<td class="pair-state" data-grade=${pair.valid ? 'ok' : 'bad'} title=${pair.valid ? 'valid' : whyNot(group, pair)}>

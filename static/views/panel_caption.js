@@ -4,13 +4,16 @@
 import { html } from 'htm/preact';
 
 import { GLYPHS } from '../geometry/residual.js';
-import { pixels } from '../lib/format.js';
+import { pixelText } from '../lib/format.js';
 import { overlaysHidden } from '../state/workspace.js';
 import { otherShape } from './frame.js';
 import { errorOf, gradeOfView, jacOf } from './view_state.js';
 import { Letter } from './letter.js';
 
 /** @import {ViewPicture} from '../overlays/scene.js' */
+
+/** What an error is measured from, where there is little room. */
+const SHORT = { ball: '', pair: ' (best pair)', others: ' (from others)' };
 
 /** @param {{picture: ViewPicture, frame?: ImageBitmap | null}} props */
 export function PanelCaption({ picture, frame }) {
@@ -29,7 +32,7 @@ export function PanelCaption({ picture, frame }) {
 			<span class="caption__state" data-grade=${grade}>
 				<span aria-hidden="true">${GLYPHS[grade]}</span> ${sentence}
 				${jac !== null ? html`<span data-number="jac">${sentence ? ' · ' : ''}JaC ${jac.toFixed(2)}</span>` : null}
-				${error.px === null ? null : html`<span data-number="error"> · ball ${pixels(error.px)} px</span>`}
+				${error.px === null ? null : html`<span data-number="error"> · ball ${pixelText(error.px)}${SHORT[error.from]}</span>`}
 			</span>
 			${shape ? html`<span class="caption__state" data-grade="warn" title=${shape}>! other shape</span>` : null}
 		</figcaption>

@@ -53,7 +53,7 @@ function LinkCard({ made, close }) {
 	if (made.link === null) {
 		return html`
 			<section class="card" role="status" aria-labelledby="people-link">
-				<h2 id="people-link">${made.user.name} is invited</h2>
+				<h2 id="people-link">${made.user.joined ? `${made.user.name} has a link for a new password` : `${made.user.name} is invited`}</h2>
 				<p>The link was sent by mail. Did it not arrive? <em>New link</em> below makes another one.</p>
 				<p class="buttons"><button class="button" type="button" onClick=${close}>Done</button></p>
 			</section>
@@ -65,6 +65,25 @@ function LinkCard({ made, close }) {
 			${made.problem ? html`<p class="form__error">It was not sent by mail: ${made.problem}.</p>` : null}
 			<p>It sets their password, works once, until ${new Date(made.expires).toLocaleString('en-GB', { day: 'numeric', month: 'short', hour: '2-digit', minute: '2-digit' })}, and is not shown again.</p>
 			<${CopyField} label="Link" text=${made.link} close=${close} />
+		</section>
+	`;
+}
+
+/** Where another link for somebody goes, on a server that sends mail. @param {{of: UserJson, renew: (email: string) => Promise<boolean>, error: ApiError | null, close: () => void}} props */
+function NewLinkCard({ of, renew, error, close }) {
+	const field = useRef(/** @type {HTMLInputElement | null} */ (null));
+	useEffect(() => field.current?.focus(), []);
+	const send = withForm(async (said) => {
+		if (await renew(String(said.get('email')))) close();
+	});
+	return html`
+		<section class="card" aria-labelledby="people-new-link">
+			<h2 id="people-new-link">New link for ${of.name}</h2>
+			<form class="form" onSubmit=${send}>
+				<div class="form__row"><label for="people-link-email">E-mail (optional)</label><input class="field" id="people-link-email" name="email" type="email" maxlength="254" autocomplete="off" ref=${field} /><small>The link is sent there; left empty, it is shown here. The address is not stored.</small></div>
+				<${FormError} error=${error} />
+				<p class="buttons"><button class="button button--primary" type="submit">Make a new link</button><button class="button" type="button" onClick=${close}>Cancel</button></p>
+			</form>
 		</section>
 	`;
 }
@@ -157,6 +176,7 @@ function usePeople() {
 	const found = useResource(() => getUsers(), []);
 	const [made, setMade] = useState(/** @type {UserWithLink | null} */ (null));
 	const [shown, setShown] = useState(/** @type {UserJson | null} */ (null));
+	const [linked, setLinked] = useState(/** @type {UserJson | null} */ (null));
 	const { error, attempt } = useAttempt();
 	/** @template T @param {Promise<T>} doing @param {(done: T) => void} [then] */
 	async function act(doing, then) {
@@ -164,7 +184,7 @@ function usePeople() {
 		found.reload();
 		return done;
 	}
-	return { found, made, shown, error, act, setMade, setShown };
+	return { found, made, shown, linked, error, act, setMade, setShown, setLinked };
 }
 
 /** What people are in one dataset, in place of what they are in all of them. */
@@ -207,24 +227,28 @@ function LocalWork({ people, adoptedBy, give }) {
 }
 
 export function PeoplePage() {
-	const { found, made, shown, error, act, setMade, setShown } = usePeople();
+	const { found, made, shown, linked, error, act, setMade, setShown, setLinked } = usePeople();
 	const people = found.value?.items;
+	const mail = found.value?.mail ?? false;
+	/** @param {UserJson} one @param {string} [email] */
+	const renew = (one, email) => act(postUserLink(one.id, email), setMade);
 	return html`
 		<${PageFrame} current="people" title="People" where=${html`<strong>People</strong>`}>
 			${found.error ? html`<${Trouble} title="The people cannot be shown" error=${found.error} retry=${found.reload} />` : null}
 			${!people && !found.error ? html`<${Loading} what="people" />` : null}
 			${made ? html`<${LinkCard} key=${made.link} made=${made} close=${() => setMade(null)} />` : null}
+			${linked ? html`<${NewLinkCard} key=${linked.id} of=${linked} error=${error} renew=${(/** @type {string} */ email) => renew(linked, email)} close=${() => setLinked(null)} />` : null}
 			${shown ? html`<${TokensCard} of=${shown} act=${act} close=${() => setShown(null)} />` : null}
 			${people ? html`
-				<${InviteCard} error=${error} mail=${found.value?.mail ?? false} invite=${(/** @type {string} */ name, /** @type {Role} */ role, /** @type {string} */ email) => act(postUser(name, role, email), setMade)} />
-				<${InviteManyCard} mail=${found.value?.mail ?? false} invited=${found.reload} />
+				<${InviteCard} error=${error} mail=${mail} invite=${(/** @type {string} */ name, /** @type {Role} */ role, /** @type {string} */ email) => act(postUser(name, role, email), setMade)} />
+				<${InviteManyCard} mail=${mail} invited=${found.reload} />
 				<section class="card card--flush" aria-labelledby="people-all">
 					<h2 id="people-all">Everybody</h2>
 					<div class="table__scroll"><table class="table">
 						<thead><tr><th>Name</th><th>In all datasets</th><th>State</th><th>Seen</th><td></td></tr></thead>
 						<tbody>${people.map((one) => html`
 							<${PersonRow}
-								key=${one.id} one=${one} tokens=${() => setShown(one)} factor=${() => act(deleteSecondFactorOf(one.id))} unlink=${() => act(deleteIdentityOf(one.id))} link=${() => act(postUserLink(one.id), setMade)}
+								key=${one.id} one=${one} tokens=${() => setShown(one)} factor=${() => act(deleteSecondFactorOf(one.id))} unlink=${() => act(deleteIdentityOf(one.id))} link=${() => (mail ? setLinked(one) : renew(one))}
 								change=${(/** @type {{role?: Role, disabled?: boolean}} */ wanted) => act(patchUser(one.id, wanted))}
 							/>`)}
 						</tbody>

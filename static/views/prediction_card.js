@@ -4,7 +4,7 @@
 import { html } from 'htm/preact';
 
 import { withValue } from '../lib/field.js';
-import { pixels, plural, scoreText } from '../lib/format.js';
+import { pixelText, plural, scoreText } from '../lib/format.js';
 import { acceptEdits, distanceTo, EVERY_SET, surest } from '../state/prediction_marks.js';
 import { acceptAll, acceptMark, leastScore, predicted, shownSet } from '../state/predictions.js';
 import { focusView, selected } from '../state/workspace.js';
@@ -43,7 +43,7 @@ function Choice({ predicted: { sets, set } }) {
 function Offered({ view, mark, sets }) {
 	const away = distanceTo(view, mark);
 	const there = view.balls.length > 0;
-	const what = away === null ? '' : ` · ${pixels(away)} px off`;
+	const what = away === null ? '' : ` · ${pixelText(away)} off`;
 	return html`
 		<span class="predictions__what" title=${`${mark.name}, ${mark.scored ? 'score ' : ''}${scoreText(mark)}`}>
 			${sets > 1 ? `${mark.name} ` : ''}${scoreText(mark)}${what}

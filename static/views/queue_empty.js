@@ -11,6 +11,9 @@ import { wordsOf } from '../state/query.js';
 import { queue } from '../state/queue.js';
 import { NoDatasets, mayImport } from './no_datasets.js';
 
+/** What is told to people from whom groups are hidden: that it is so and why, neither which nor how many. */
+export const HIDDEN_WHY = 'While you annotate a batch of this dataset independently, some of its groups are hidden from you. Lists and counts are without them until the batch is closed.';
+
 /** The query with the word that cannot be read marked. @param {{q: string, pointer: string | null}} props */
 function Marked({ q, pointer }) {
 	const place = /^\/q\/(\d+)$/.exec(pointer ?? '');
@@ -54,10 +57,19 @@ export function QueueEmpty({ q }) {
 			</section>
 		`;
 	}
+	if (dataset.value.hides_groups && !q) {
+		return html`
+			<section class="card empty">
+				<h2>No group is shown to you</h2>
+				<p>${HIDDEN_WHY}</p>
+				<p><a class="button button--primary" href="/work">My work</a></p>
+			</section>
+		`;
+	}
 	return html`
 		<section class="card empty">
 			<h2>${q ? 'No group matches this query' : 'This dataset has no groups'}</h2>
-			${q ? html`<p>Remove a filter, or show all groups.</p><p><a class="button" href=${queueAddress(name, '')}>Show all groups</a></p>`
+			${q ? html`<p>Remove a filter, or show all groups.${dataset.value.hides_groups ? ` ${HIDDEN_WHY}` : ''}</p><p><a class="button" href=${queueAddress(name, '')}>Show all groups</a></p>`
 				: html`<p>Nothing was imported into it yet.</p>${mayImport(name) ? html`<p><a class="button button--primary" href=${`/import?dataset=${encodeURIComponent(name)}`}>Import</a></p>` : html`<p>A lead of this dataset can import files.</p>`}`}
 		</section>
 	`;

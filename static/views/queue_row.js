@@ -3,7 +3,7 @@
 
 import { html } from 'htm/preact';
 
-import { fixed, marginText, pixels, words } from '../lib/format.js';
+import { degrees, fixed, marginText, pixels, words } from '../lib/format.js';
 import { navigate } from '../lib/router.js';
 import { reviewAddress } from '../state/navigation.js';
 import { activeRow } from '../state/queue.js';
@@ -22,6 +22,8 @@ const GLYPHS = /** @type {Record<string, string>} */ ({
 function statusOf(row) {
 	if (row.stale) return { status: 'stale', text: `${row.status}, stale` };
 	if (row.status === 'unreviewed' && row.findings.length > 0) return { status: 'flagged', text: 'flagged' };
+	// Annotations that agree settle what is drawn; the verdict is still somebody's.
+	if (row.status === 'unreviewed' && row.came_to === 'agreed') return { status: 'unreviewed', text: 'agreed, no verdict' };
 	return { status: row.status, text: row.status };
 }
 
@@ -47,7 +49,8 @@ const CAME_TO = { agreed: 'agree', open: 'differ', decided: 'differed' };
 function OwnAnnotations({ row }) {
 	if (!row.takes) return null;
 	const text = row.came_to ? `${row.takes} ${CAME_TO[row.came_to]}` : row.takes === 1 ? '1 annotation' : `${row.takes} annotations`;
-	const title = `${row.takes === 1 ? 'One person has' : `${row.takes} people have`} submitted an independent annotation${row.came_to === 'open' ? '; they differ and need a decision' : ''}`;
+	const open = row.came_to === 'agreed' && row.status === 'unreviewed' ? '; they agree and the first one is used, but nobody has accepted or rejected the group' : '';
+	const title = `${row.takes === 1 ? 'One person has' : `${row.takes} people have`} submitted an independent annotation${row.came_to === 'open' ? '; they differ and need a decision' : open}`;
 	if (row.came_to !== 'open') return html`<span class="own-annotations" title=${title}>${text}</span>`;
 	return html`<a class="own-annotations" data-state="open" href=${`/adjudicate/${row.id}`} tabindex="-1" title=${title}>${text}</a>`;
 }
@@ -96,7 +99,7 @@ function Cells({ row, index, q, painted, active, ticked }) {
 		${painted ? html`<div role="gridcell" class="queue-cell" data-numeric="true" data-number="agreement">${fixed(row.agreement, 2)}</div>` : null}
 		<div role="gridcell" class="queue-cell" data-numeric="true">${pixels(row.error_px)}</div>
 		<div role="gridcell" class="queue-cell" data-numeric="true">${fixed(row.sigma_m, 2)}</div>
-		<div role="gridcell" class="queue-cell" data-numeric="true">${fixed(row.parallax_degrees, 0, '°')}</div>
+		<div role="gridcell" class="queue-cell" data-numeric="true">${degrees(row.parallax_degrees)}</div>
 		<div role="gridcell" class="queue-cell" data-numeric="true">${fixed(row.size_ratio, 2)}</div>
 		<div role="gridcell" class="queue-cell" data-numeric="true">${row.views}</div>
 		<div role="gridcell" class="queue-cell" data-narrow="true">${row.split || '–'}</div>

@@ -14,6 +14,7 @@ import { queue, statusCounts } from '../state/queue.js';
 import { clearTicks, countOf, queryOf, ticks } from '../state/queue_ticks.js';
 import { whyNot } from '../state/rights.js';
 import { BulkDialog } from './bulk_dialog.js';
+import { HIDDEN_WHY } from './queue_empty.js';
 import { Reviewers } from './reviewers.js';
 import { SavedViews } from './saved_views.js';
 import { BatchDialog } from './work/batch_dialog.js';
@@ -134,6 +135,7 @@ export function QueueTools({ dataset, q, onQuery }) {
 				${reason ? 'Decide…' : ticked > 0 ? `Decide ${count(ticked)} ticked…` : `Decide all ${count(total)}…`}
 			</button>
 			<${ValueOfReview} q=${q} />
+			${dataset.hides_groups && !error && total > 0 ? html`<p class="queue-tools__order" data-hidden-groups>${HIDDEN_WHY}</p>` : null}
 			${giving ? html`
 				<${BatchDialog}
 					dataset=${dataset} q=${q} total=${total} onClose=${() => setGiving(false)}

@@ -10,6 +10,7 @@ import { finishSignOn } from '../api/sign_on.js';
 import { navigate, place } from '../lib/router.js';
 import { me, welcome } from '../state/me.js';
 import { FormError } from './form_error.js';
+import { EntryPage } from './login.js';
 import { OneField } from './second_factor.js';
 
 /** @import {SignOnAnswer} from '../api/sign_on.js' */
@@ -23,13 +24,20 @@ const SAYS = /** @type {{[error: string]: {detail: string, hint: string}}} */ ({
 });
 const OTHERWISE = { detail: 'the provider refused the request of this server', hint: 'The operator of this server has to check its settings.' };
 
+/** Of what the address may say, characters: this server's own part, and the provider's. */
+const LONGEST_STATE = 200;
+const LONGEST = 4096;
+const STRANGE = { detail: 'this is no address to which the provider sends anybody', hint: 'Log in again.' };
+
 /** What the address says, which it then forgets. @returns {SignOnAnswer | ApiError | null} */
 function readAddress() {
 	const { search } = place.peek();
 	const [state, code, iss, error] = ['state', 'code', 'iss', 'error'].map((name) => search.get(name));
 	history.replaceState(null, '', '/login');
 	if (error) return new ApiError(400, SAYS[error] ?? OTHERWISE);
-	return state && code ? { state, code, ...(iss ? { iss } : {}) } : null;
+	if (!state || !code) return null;
+	if (state.length > LONGEST_STATE || code.length > LONGEST) return new ApiError(400, STRANGE);
+	return { state, code, ...(iss ? { iss } : {}) };
 }
 
 /** Ask the server, once, and again with the code of a second factor. */
@@ -63,17 +71,14 @@ function useReturn() {
 export function SignOnPage() {
 	const { error, asked, again } = useReturn();
 	const main = useRef(/** @type {HTMLElement | null} */ (null));
-	useEffect(() => { document.title = 'Log in · Touchline'; }, []);
 	useEffect(() => { /** @type {HTMLElement | null | undefined} */ (main.current?.querySelector('input, a.button'))?.focus(); }, [asked, error]);
 	return html`
-		<main class="login" ref=${main}>
-			<section class="card" aria-labelledby="sign-on-title">
-				<p class="login__brand">Touchline</p>
-				<h1 id="sign-on-title">${asked ? 'One more step' : error ? 'You are not logged in' : 'Logging in…'}</h1>
+		<${EntryPage} title="Log in" heading=${asked ? 'One more step' : error ? 'You are not logged in' : 'Logging in…'}>
+			<div ref=${main}>
 				${asked ? html`<${OneField} id="sign-on-factor" label="Code of your second factor" button="Log in" name="factor" complete="one-time-code" error=${error} send=${again} />` : null}
 				${error && !asked ? html`<${FormError} error=${error} /><p><a class="button button--primary" href=${me.value ? '/account' : '/groups'}>${me.value ? 'Back to your account' : 'Back to the login'}</a></p>` : null}
 				${!error ? html`<p role="status">Checking your login with the provider.</p>` : null}
-			</section>
-		</main>
+			</div>
+		<//>
 	`;
 }

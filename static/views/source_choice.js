@@ -4,7 +4,7 @@
 import { html } from 'htm/preact';
 import { useEffect, useRef, useState } from 'preact/hooks';
 
-import { getFolders, postUpload } from '../api/imports.js';
+import { getFolders, getUploadRoom, postUpload } from '../api/imports.js';
 import { sentenceOf } from '../api/problem.js';
 import { areVideos, chosenFiles, droppedFiles } from '../lib/local_files.js';
 import { plural } from '../lib/format.js';
@@ -123,6 +123,17 @@ export function UploadField({ id, label, accept, hint = '', onUploaded }) {
 	`;
 }
 
+/** How much of their room one's uploads take. @param {{sent: unknown}} props `sent`: another one asks again */
+function UploadRoom({ sent }) {
+	const room = useResource((signal) => getUploadRoom(signal), [sent]).value;
+	if (!room) return null;
+	const { used_bytes: used, quota_bytes: quota, days, max_bytes: most } = room;
+	return html`
+		${quota === null ? null : html`<div class="meter" role="meter" aria-label="Room of your uploads" aria-valuemin="0" aria-valuemax=${quota} aria-valuenow=${used} aria-valuetext=${`${sizeText(used)} of ${sizeText(quota)}`}><span style=${{ width: `${Math.min(100, (100 * used) / quota)}%` }}></span></div>`}
+		<small>${quota === null ? `Your uploads take ${sizeText(used)}` : `Your uploads take ${sizeText(used)} of ${sizeText(quota)}`}; a file may have ${sizeText(most)}. What no dataset uses is deleted after ${plural(days, 'day')}.</small>
+	`;
+}
+
 /** Any number of files or a folder, chosen here or dropped. @param {{dropped: Promise<PathFile[]> | null, over: boolean, onUploaded: (sent: UploadJson | null) => void}} props */
 function DropField({ dropped, over, onUploaded }) {
 	const { state, send } = useUpload(onUploaded);
@@ -135,6 +146,7 @@ function DropField({ dropped, over, onUploaded }) {
 			<input class="field" id="import-folder" type="file" webkitdirectory onChange=${(/** @type {Event} */ event) => send(filesOf(event))} />
 			<small>Or drop files, pictures or a folder anywhere on this page.</small>
 			<${UploadState} state=${state} />
+			<${UploadRoom} sent=${state.done} />
 		</div>
 	`;
 }

@@ -8,11 +8,13 @@ import { dismissTold } from '../state/dismissals.js';
 import { mend, toldFinding } from '../state/mends.js';
 import { REASONS } from '../state/reasons.js';
 import { isBlind } from '../state/verdicts.js';
+import { pointTo } from '../state/workspace.js';
 import { PitchLink } from './findings.js';
 import { headline } from './verdict_text.js';
 import { MendBox } from './mend_box.js';
 
 /** @import {GroupDocument, SolutionJson, VerdictJson} from '../api/types.js' */
+/** @import {Remark} from './verdict_text.js' */
 
 /** @param {VerdictJson} verdict */
 function verdictText({ state, reason, note, by }) {
@@ -23,9 +25,21 @@ function verdictText({ state, reason, note, by }) {
 	return [state === 'unreviewed' ? 'Note' : capital(state), why, said, who].filter(Boolean).join(' · ');
 }
 
+/** Leads to the lines of the view that a remark is about, and to the worst point of its marking. @param {{group: GroupDocument, solution: SolutionJson | null, remark: Remark}} props */
+function RemarkLink({ group, solution, remark: { view, letter, marking } }) {
+	function lead() {
+		const fit = solution?.views.find((one) => one.view === view)?.calibration.markings.find((one) => one.marking === marking);
+		const far = fit?.distances_px ?? [];
+		pointTo(group, { view, marking, index: Math.max(0, far.indexOf(Math.max(...far))) });
+		// The card of the view is there with the next frame.
+		requestAnimationFrame(() => document.querySelector(`[aria-label="Lines of view ${letter}"]`)?.scrollIntoView({ block: 'nearest' }));
+	}
+	return html`<button class="link-button" type="button" title=${`Show its lines: view ${letter}`} onClick=${lead}>${marking ? `“${marking}” of ${letter}` : `View ${letter}`}</button>`;
+}
+
 /** @param {{group: GroupDocument, solution: SolutionJson | null, live: boolean}} props */
 export function VerdictCard({ group, solution, live }) {
-	const { tone, over, title, text } = headline(group, solution, mend.value);
+	const { tone, over, title, text, remarks = [] } = headline(group, solution, mend.value);
 	const sure = toldFinding.value?.confidence ?? null;
 	const { verdict } = group;
 	return html`
@@ -33,6 +47,7 @@ export function VerdictCard({ group, solution, live }) {
 			<p class="verdict-card__over">${over}</p>
 			<h1>${title}</h1>
 			<p class="verdict-card__text">${text}${sure === null ? '' : html` <span class="verdict-card__sure">${Math.round(sure * 100)} % sure.</span>`}</p>
+			${remarks.map((remark) => html`<p class="verdict-card__text" data-remark=${remark.letter}><${RemarkLink} group=${group} solution=${solution} remark=${remark} />${' '}${remark.text}</p>`)}
 			${solution?.findings.some(({ kind, sentence }) => kind === 'pitch_size' && sentence === text) ? html`<${PitchLink} dataset=${group.dataset.name} />` : null}
 			<${MendBox} group=${group} solution=${solution} />
 			${toldFinding.value ? html`<p class="verdict-card__checked"><button class="button button--small" type="button" data-needs="review" title="This finding was checked and is fine; Ctrl Z opens it again" onClick=${dismissTold}>Checked, fine <kbd>⇧S</kbd></button></p>` : null}

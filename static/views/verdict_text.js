@@ -2,18 +2,19 @@
 /** What a group comes to, in one sentence: it passes, or what is wrong with it. */
 
 import { ballOf, diagonal } from '../geometry/preview.js';
-import { capital, pixels, words } from '../lib/format.js';
+import { capital, pixelText, words } from '../lib/format.js';
 import { ballError } from '../overlays/scene.js';
 import { findingTitle, saysApart } from '../state/advice.js';
 import { toldFinding } from '../state/mends.js';
 import { openFindings } from '../state/open_findings.js';
 import { GATE_TITLES, gateLabel } from './gate_names.js';
-import { gradeOfView } from './view_state.js';
+import { gradeOfView, uncertainViews } from './view_state.js';
 
 /** @import {GroupDocument, SolutionJson, ViewJson} from '../api/types.js' */
 /** @import {Mend} from '../state/mends.js' */
 
-/** @typedef {{tone: 'ok' | 'warn' | 'bad' | 'unseen', over: string, title: string, text: string}} Headline */
+/** @typedef {{view: string, letter: string, marking: string | null, text: string}} Remark   about a view, or a marking of it */
+/** @typedef {{tone: 'ok' | 'warn' | 'bad' | 'unseen', over: string, title: string, text: string, remarks?: Remark[]}} Headline */
 
 /** Below: consistent views have errors as large as these in fewer than one of twenty groups. */
 const UNLIKELY_P_VALUE = 0.05;
@@ -31,6 +32,12 @@ function asked(group, solution, name) {
  * @returns {Headline}
  */
 export function headline(group, solution, offered) {
+	const found = sentences(group, solution, offered);
+	return solution ? { ...found, remarks: [...uncertain(group, solution), ...(found.remarks ?? [])] } : found;
+}
+
+/** @param {GroupDocument} group @param {SolutionJson | null} solution @param {Mend | null} offered @returns {Headline} */
+function sentences(group, solution, offered) {
 	if (!solution && offered?.title) return { tone: 'unseen', over: 'Not solved', title: offered.title, text: offered.sentence };
 	if (!solution) {
 		return { tone: 'unseen', over: 'Not solved', title: 'No numbers yet', text: 'Solve the dataset, or edit this group: each edit solves it.' };
@@ -59,7 +66,7 @@ export function headline(group, solution, offered) {
 	if (told) return { tone: 'warn', over: 'Passes, worth a look', title: told.title ?? '', text: told.sentence };
 	return {
 		tone: isUnlikely(solution) ? 'warn' : 'ok', over: 'Passes every gate', title: agreement(all === 2 ? 'Both views' : `All ${all} views`, solution),
-		text: [spread(solution), unused(group, solution)].filter(Boolean).join(' '),
+		text: spread(solution), remarks: unused(group, solution),
 	};
 }
 
@@ -107,24 +114,31 @@ function whyUnused(group, solution, view) {
 	const px = ballError(view.key, solution);
 	const tau = (group.policy.tau_percent / 100) * diagonal(view);
 	const { sentence, grade } = gradeOfView({ view, solved, ball: solved?.ball ?? null, apart: px, tau });
-	return grade === 'bad' && (px ?? 0) > tau && !solved?.failed ? `error ${pixels(px)} px, at most ${pixels(tau)} px` : sentence;
+	return grade === 'bad' && (px ?? 0) > tau && !solved?.failed ? `error ${pixelText(px)}, at most ${pixelText(tau)}` : sentence;
 }
 
 /** @param {SolutionJson} solution */
 function spread(solution) {
 	const errors = solution.views.flatMap(({ ball }) => (ball?.error_px === null || !ball ? [] : [ball.error_px]));
 	if (!errors.length) return '';
-	// Rounded up: nothing lies within 0.0 px.
-	const most = Math.max(0.1, Math.ceil(10 * Math.max(...errors)) / 10).toFixed(1);
-	return isUnlikely(solution) ? `The largest error of the ball is ${most} px.` : `Every view sees the ball in the same place, within ${most} px.`;
+	// Nothing lies within 0.0 px.
+	const most = pixelText(Math.max(0.1, ...errors));
+	return isUnlikely(solution) ? `The largest error of the ball is ${most}.` : `Every view sees the ball in the same place, within ${most}.`;
 }
 
-/** Drawn lines that the cameras do without, red in the pictures though nothing fails. @param {GroupDocument} group @param {SolutionJson} solution */
+/** Drawn lines that the cameras do without, red in the pictures though nothing fails. @param {GroupDocument} group @param {SolutionJson} solution @returns {Remark[]} */
 function unused(group, solution) {
-	const sentences = group.views.flatMap((view) => {
+	return group.views.flatMap((view) => {
 		const markings = solution.views.find((one) => one.view === view.key)?.calibration.markings ?? [];
-		const names = markings.filter(({ marking, used, outcome }) => view.lines[marking] && (!used || outcome !== 'tp')).map(({ marking }) => `“${marking}”`);
-		return names.length ? [`${names.join(' and ')} of ${view.letter} ${names.length > 1 ? 'do' : 'does'} not fit (does not block; see Lines).`] : [];
+		return markings.filter(({ marking, used, outcome }) => view.lines[marking] && (!used || outcome !== 'tp'))
+			.map(({ marking }) => ({ view: view.key, letter: view.letter, marking, text: 'does not fit; it does not block.' }));
 	});
-	return sentences.join(' ');
+}
+
+/** Cameras that the lines do not determine, unless the card speaks about them anyway. @param {GroupDocument} group @param {SolutionJson} solution @returns {Remark[]} */
+function uncertain(group, solution) {
+	const told = toldFinding.value;
+	return uncertainViews(group, solution)
+		.filter(({ view }) => !(told?.kind === 'under_constrained' && told.view === view.key))
+		.map(({ view, guess }) => ({ view: view.key, letter: view.letter, marking: null, text: `has an uncertain camera: its lines do not determine the ${guess}.` }));
 }

@@ -43,8 +43,8 @@ function Parts({ diff, dataset }) {
 		<p>${words(diff.lines[0] ?? '')}</p>
 		<ul class="diff__lines">${diff.lines.slice(1).map((/** @type {string} */ line) => html`<li key=${line}>${words(line)}</li>`)}</ul>
 		<p class="note">${plural(counts.unchanged, 'group')} ${counts.unchanged === 1 ? 'is' : 'are'} the same in both.</p>
-		<${Part} title="Added" items=${diff.added} all=${counts.added} dataset=${dataset} tell=${(/** @type {any} */ item) => words(item.why)} />
-		<${Part} title="Dropped" items=${diff.dropped} all=${counts.dropped} dataset=${dataset} tell=${(/** @type {any} */ item) => words(item.why)} />
+		<${Part} title="Added" items=${diff.added} all=${counts.added} dataset=${dataset} tell=${(/** @type {any} */ item) => `before: ${words(item.why)}`} />
+		<${Part} title="Dropped" items=${diff.dropped} all=${counts.dropped} dataset=${dataset} tell=${(/** @type {any} */ item) => `now: ${words(item.why)}`} />
 		<${Part} title="Balls that moved" items=${diff.moved} all=${counts.moved} dataset=${dataset} tell=${(/** @type {any} */ item) => fixed(item.metres, 3, ' m')} />
 		<${Part} title="Changed" items=${diff.changed} all=${counts.changed} dataset=${dataset} tell=${(/** @type {any} */ item) => item.what.map(words).join(', ')} />
 	`;

@@ -6,12 +6,12 @@ import { useState } from 'preact/hooks';
 
 import { sentenceOf } from '../api/problem.js';
 import { getVersions, manifestAddress, verifyVersion } from '../api/versions.js';
-import { count, plural } from '../lib/format.js';
+import { count, plural, sharePercent } from '../lib/format.js';
 import { useResource } from '../lib/resource.js';
 import { follow } from '../state/jobs.js';
 import { datasetPage } from './dataset_frame.js';
 import { ExportDialog } from './export_dialog.js';
-import { FreezeDialog } from './freeze_dialog.js';
+import { FreezeDialog, splitTexts } from './freeze_dialog.js';
 import { Loading, Trouble } from './page_frame.js';
 import { VerifyReport } from './verify_report.js';
 import { VersionDiff } from './version_diff.js';
@@ -23,7 +23,7 @@ import { When } from './when.js';
 
 /** @param {any} split @returns {string} */
 function splitText(split) {
-	if (split?.kind === 'match') return `by match, seed ${split.seed}, ${Math.round(100 * split.test_share)} % test`;
+	if (split?.kind === 'match') return `by match, seed ${split.seed}, ${sharePercent(split.test_share)} of the matches test`;
 	if (split?.kind === 'camera') return `by camera, ${split.test_cameras.join(' ')} test`;
 	return 'as given';
 }
@@ -31,7 +31,7 @@ function splitText(split) {
 /** @param {{version: VersionJson}} props */
 function Facts({ version }) {
 	const { counts } = version;
-	const splits = Object.entries(counts.splits ?? {}).map(([name, part]) => `${name} ${count(/** @type {any} */ (part).groups)}`);
+	const splits = splitTexts(Object.fromEntries(Object.entries(counts.splits ?? {}).map(([name, part]) => [name, /** @type {any} */ (part).groups])));
 	return html`
 		<dl class="facts">
 			<dt>Hash</dt><dd class="mono">${version.hash}</dd>

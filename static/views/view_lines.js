@@ -9,6 +9,7 @@ import { submit } from '../state/group.js';
 import { influence } from '../state/insight.js';
 import { focused, selected } from '../state/workspace.js';
 import { Letter } from './letter.js';
+import { Term } from './term.js';
 import { jacOf } from './view_state.js';
 
 /** @import {GroupDocument} from '../api/types.js' */
@@ -27,7 +28,7 @@ const FULL = 2;
  */
 function leftOut(one) {
 	if (!one) return { text: '', better: false };
-	if (!one.jac_without) return { text: 'none', better: false };
+	if (!one.jac_without) return { text: 'needed', better: false };
 	const better = one.jac_without['0.5'] >= one.jac['0.5'] && one.jac['0.5'] < 1;
 	return { text: one.largest_px_without === null ? '–' : pixels(one.largest_px_without), better };
 }
@@ -89,7 +90,7 @@ export function ViewLines({ group, pictures }) {
 	return html`
 		<section class="card" aria-label=${`Lines of view ${picture.view.letter}`}>
 			<h2><${Letter} letter=${picture.view.letter} /> Lines${jac === null ? '' : ` · JaC ${jac.toFixed(2)}`}
-				<span class="card__aside">error${known.length ? ' · error if unused' : ''}</span></h2>
+				<span class="card__aside"><${Term} word="column:line_error">px<//>${known.length ? html` · <${Term} word="column:line_without">px without it<//>` : null}</span></h2>
 			${drawn.length ? html`
 				<ul class="view-lines" data-influence=${known.length > 0}>
 					${drawn.map((marking) => html`

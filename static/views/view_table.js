@@ -10,7 +10,7 @@ import { leftOutText } from '../state/reasons.js';
 import { focused, focusView, paintWhiskers } from '../state/workspace.js';
 import { Letter } from './letter.js';
 import { Term } from './term.js';
-import { errorOf, gradesOf, jacOf, paintOf } from './view_state.js';
+import { errorOf, gradesOf, jacOf, paintOf, unusedErrors } from './view_state.js';
 
 /** @import {GroupDocument} from '../api/types.js' */
 /** @import {ViewPicture} from '../overlays/scene.js' */
@@ -75,6 +75,7 @@ function ViewRow({ group, picture }) {
 	const { view, solved, ball } = picture;
 	const grades = gradesOf(picture, group.policy);
 	const error = errorOf(picture);
+	const unused = unusedErrors(picture);
 	return html`
 		<tr data-row=${view.letter} data-focused=${focused.value === view.letter}>
 			<th scope="row">
@@ -99,6 +100,10 @@ function ViewRow({ group, picture }) {
 		${view.proposed?.length ? html`
 			<tr class="numbers__aside" data-proposed=${view.letter}>
 				<td colspan="7">lines: ${view.proposed.length} of ${Object.keys(view.lines).length} accepted as <${Term} word="proposal">proposed<//></td>
+			</tr>` : null}
+		${unused ? html`
+			<tr class="numbers__aside" data-unused=${view.letter}>
+				<td colspan="7">ball of ${view.letter}, not used: ${unused}</td>
 			</tr>` : null}
 		${view.left_out ? html`
 			<tr class="numbers__aside" data-why=${view.left_out.reason}>

@@ -30,7 +30,8 @@ Environment variables; `touchline serve` and every command read them. How they a
 POLICY = """
 ## Of a dataset: the policy
 Thresholds are those of the policy that a dataset is judged by: `touchline policy show`, the page *Policy*, or `PUT /datasets/{id}/policy`
-([api.md](api.md)). Empty: not asked for. *paper* is what the paper says; *strict* asks for more where it says so.
+([api.md](api.md)). Empty: not asked for. *paper* is what the paper says; *strict* asks for more where it says so;
+*touchline* is *paper* with `calibration.source` `paint` and `calibration.shortest_marking_px` 5.
 """.strip()
 
 

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 
 from playwright.sync_api import Page, expect
 
 from app.config import Settings
+from app.review.agreement.weigh import after_hand_in
+from app.review.takes.take import begin_take, hand_in
 from app.store.store import Store
 from tests.e2e.screen import passing, until, withdraw_verdict
 from tests.e2e.team import annotate
@@ -53,3 +56,34 @@ def test_one_of_two_is_taken_by_keyboard(home: Path, open_page: Callable[..., Pa
     expect(page.get_by_text("They apply to annotations submitted from now on")).to_be_visible()
     assert page.request.get(agreement).json()["limits"] == {**before, "ball_px": 4.5}
     assert page.request.put(f"{agreement}/limits", data=before).ok
+
+
+def test_two_who_agree_without_a_verdict_are_told_alike_by_queue_and_agreement(
+    home: Path, open_page: Callable[..., Page]
+) -> None:
+    page = open_page("/groups")
+    group = passing(page, 2)
+    store = Store.open(Settings(home=home))
+    try:
+        for person in ("kim", "lou"):
+            take = begin_take(store, group, person=person)
+            hand_in(store, take.id, actor=person)
+            came_to = after_hand_in(store, take.group)
+        assert came_to == "agreed"
+    finally:
+        store.close()
+    page.goto(f"/groups?q=id:{group}")
+    row = page.locator(".queue-row:not(.queue-row--head)")
+    expect(row.locator(".pill").last).to_contain_text("agreed, no verdict")
+    page.goto("/datasets/sample/agreement")
+    groups = page.get_by_role("region", name="Groups, the worst first", exact=True)
+    expect(groups.get_by_role("row").filter(has_text="kim")).to_contain_text("agreed, no verdict")
+    takes = page.get_by_role("region", name="Independent annotations").get_by_role("row")
+    found = page.request.get(f"/api/v1/groups?dataset=sample&q=id:{group}").json()
+    number = found["items"][0]["number"]
+    for person in ("kim", "lou"):
+        one = takes.filter(has_text=person)
+        expect(one).to_contain_text("done")
+        expect(one.get_by_role("link")).to_have_text(re.compile(rf"^{number} · "))
+    page.get_by_role("link", name="1 without a verdict").click()
+    expect(page.locator(".queue-row a").first).to_have_text(str(number))

@@ -7,7 +7,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Page, expect
+from playwright.sync_api import Page, Route, expect
 
 from app.review.people.people import find_person
 from app.review.people.roles import Role
@@ -213,6 +213,30 @@ class TestPeople:
         press("Copy")(page)
         expect(page.get_by_role("button", name="Copied")).to_be_visible()
         assert page.evaluate("() => window.copied") == link
+
+    def test_where_mail_is_set_up_another_link_asks_for_an_address(
+        self, open_page: OpenPage, crew: Crew
+    ) -> None:
+        page = open_as(open_page, crew.log_in("ada"), "/account")
+
+        def with_mail(route: Route) -> None:
+            answer = route.fetch()
+            route.fulfill(response=answer, json={**answer.json(), "mail": True})
+
+        page.route("**/api/v1/users", with_mail)
+        page.goto(f"{crew.address}/people")
+        press("New link for carl")(page)
+        card = page.locator("section[aria-labelledby=people-new-link]")
+        expect(card.get_by_label("E-mail (optional)")).to_be_focused()
+        card.get_by_label("E-mail (optional)").fill("carl@example.org")
+        with page.expect_response(lambda answer: answer.url.endswith("/link")) as told:
+            page.keyboard.press("Enter")
+        assert told.value.request.post_data_json == {"email": "carl@example.org"}
+        expect(card).to_be_hidden()
+        expect(
+            page.get_by_text("It was not sent by mail: this server sends no mail")
+        ).to_be_visible()
+        expect(page.get_by_label("Link", exact=True)).to_have_value(told.value.json()["link"])
 
 
 TOKENS = "section[aria-labelledby=account-tokens]"

@@ -111,6 +111,11 @@ class TestExports:
         expect(dialog).to_contain_text(f"Accepted groups · {counts['accepted']}")
         expect(dialog).to_contain_text(f"All groups · {counts['groups']}")
         expect(dialog.get_by_role("button", name="Export", exact=True)).to_be_enabled()
+        # What a format does not use cannot be chosen, and is not sent.
+        dialog.get_by_role("radio", name="Game state").check()
+        expect(dialog.get_by_role("radio", name="Exact outlines")).to_be_disabled()
+        expect(dialog.get_by_label("COCO and YOLO: include balls")).to_be_disabled()
+        expect(dialog.get_by_label("Copy the frames into the zip")).to_be_enabled()
         page.keyboard.press("Escape")
         items = read(page, "/exports")["items"]
         assert len(items) == len(EXPORTS)

@@ -117,6 +117,32 @@ class TestPictures:
             "stills/second half/2.jpg",
         ]
 
+    def test_that_are_dropped_become_one_group_and_the_room_of_uploads_is_said(
+        self, stills: Path, open_page: OpenPage
+    ) -> None:
+        page = open_page("/import")
+        page.get_by_label("Dataset", exact=True).fill("stills")
+        drop(page, stills / "1.png", stills / "second half" / "2.jpg")
+        expect(page.get_by_text("2 files, ")).to_contain_text("are uploaded")
+        expect(page.get_by_text("Your uploads take ")).to_be_visible()
+        page.get_by_label("Which pictures are one group").select_option("by their names")
+        page.get_by_label("Pattern of the names").fill("{instant}-{camera}")
+        page.get_by_role("button", name="Dry run").click()
+        report = page.get_by_role("region", name="What would happen")
+        expect(report).to_contain_text("2 pictures do not fit {instant}-{camera}")
+        page.get_by_label("Which pictures are one group").select_option("folder")
+        page.get_by_role("button", name="Dry run").click()
+        expect(report).to_contain_text("Grouped by folder: 2 pictures in 1 group")
+        # One count has one meaning: groups here and in the sentence of the job.
+        expect(page.get_by_text("1 group read")).to_be_visible()
+        expect(report.locator("dl > div").first).to_have_text("groups1")
+        expect(report).to_contain_text("2 records in the files")
+        assert serious_in_both(page) == []
+        page.get_by_role("button", name="Import", exact=True).click()
+        expect(page.get_by_role("region", name="What happened")).to_be_visible()
+        groups = page.request.get("/api/v1/groups?dataset=stills").json()["items"]
+        assert [(group["key"], group["views"]) for group in groups] == [("pictures", 2)]
+
     def test_of_a_video_are_asked_for(self, open_page: OpenPage, tmp_path: Path) -> None:
         (video := tmp_path / "match.mp4").write_bytes(b"any bytes")
         page = open_page("/import")

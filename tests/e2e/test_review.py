@@ -90,13 +90,32 @@ class TestQueue:
         first = page.locator(".queue-row:not(.queue-row--head)").first
         expect(first.locator("a")).to_have_text("5")
 
-    def test_a_query_that_cannot_be_read_says_why(self, open_page: OpenPage, console: Any) -> None:
+    def test_a_query_that_cannot_be_read_says_why_and_keeps_no_number_of_the_one_before(
+        self, open_page: OpenPage, console: Any
+    ) -> None:
         console.expect("400")
         console.expect("422")
-        page = open_page("/groups?q=nonsense%3A1")
+        page = open_page("/groups?q=number<=5")
+        expect(page.locator(".facet__count").first).to_have_text(re.compile(r"\d"))
+        page.locator(".field--query").fill("nonsense:1")
         expect(page.locator(".empty h2")).to_have_text("The query cannot be read")
+        expect(page.locator(".facet__count").first).to_be_empty()
+        expect(page.locator(".histogram rect")).to_have_count(0)
+        expect(page.locator(".histogram").first).to_contain_text("Not counted: the query fails")
         page.get_by_text("Show all groups").click()
         expect(page.locator(".save")).to_contain_text("14 of 14 match")
+        expect(page.locator(".histogram rect").first).to_be_visible()
+
+    def test_an_angle_is_the_same_number_in_the_queue_and_in_the_group(
+        self, open_page: OpenPage
+    ) -> None:
+        page = open_page("/groups")
+        expect(page.locator(".queue-row a").first).to_have_text("1")
+        row = rows(page)[0]
+        shown = f"{row['parallax_degrees']:.1f}°"
+        expect(page.locator(".queue-row [data-numeric]").get_by_text(shown)).to_be_visible()
+        page.locator(".queue-row a").first.click()
+        expect(page.locator(".mini-pitch [data-number=parallax]")).to_have_text(shown)
 
     def test_nothing_found_offers_a_way_back(self, open_page: OpenPage) -> None:
         page = open_page("/groups?q=number%3E9000")
@@ -110,6 +129,70 @@ class TestQueue:
         page.mouse.move(box["x"] + 0.99 * box["width"], box["y"] + 20, steps=4)
         page.mouse.up()
         expect(page.locator(".field--query")).to_have_value("jac>=0.8 jac<=1")
+
+
+class TestSayingOneThing:
+    def test_an_error_says_what_it_is_measured_from_before_and_after_a_view_is_left_out(
+        self, open_page: OpenPage
+    ) -> None:
+        page = open_page("/review/12")
+        screen = Screen(page)
+        screen.ready()
+        told = page.locator('[data-unused="D"]')
+        expect(told).to_have_text(
+            re.compile(
+                r"not used: \S+ px in its best pair.*; \S+ px from the 3D ball of the others"
+            )
+        )
+        far = (told.inner_text().split("; ")[-1]).removesuffix(" of the others")
+        box = page.get_by_label("Include view D")
+        box.uncheck()
+        screen.saved()
+        expect(told).to_have_text(f"ball of D, not used: {far} of the others")
+        expect(page.locator('[data-view="D"] .caption [data-number="error"]')).to_have_text(
+            re.compile(r"ball \S+ px \(from others\)")
+        )
+        undo_edit(page, 12)
+
+    def test_a_camera_that_its_lines_do_not_determine_looks_uncertain_and_says_why(
+        self, open_page: OpenPage
+    ) -> None:
+        page = open_page("/review/4")
+        Screen(page).ready()
+        state = page.locator('[data-view="B"] .caption__state').first
+        expect(state).to_have_attribute("data-grade", "warn")
+        expect(state).to_contain_text("camera uncertain")
+        gate = page.locator('[data-gate="calibratable"]')
+        expect(gate).to_have_attribute("data-state", "doubt")
+        expect(gate).to_contain_text("in 4 of 4 views, B uncertain")
+        uncertain = page.locator('.mini-pitch__camera[data-uncertain="true"]')
+        expect(uncertain).to_have_attribute("data-letter", "B")
+        expect(page.locator('[data-remark="B"]')).to_contain_text(
+            "uncertain camera: its lines do not determine the position"
+        )
+
+    def test_a_line_that_does_not_fit_leads_to_its_view_and_its_worst_point(
+        self, open_page: OpenPage
+    ) -> None:
+        page = open_page("/review/11")
+        screen = Screen(page)
+        screen.ready()
+        page.keyboard.press("Shift+s")
+        link = page.get_by_role("button", name="“Side line bottom” of B")
+        link.click()
+        expect(page.locator('[data-row="B"]')).to_have_attribute("data-focused", "true")
+        lines = page.get_by_role("region", name="Lines of view B")
+        expect(lines).to_be_in_viewport()
+        fits = screen.document()["solution"]["views"][1]["calibration"]["markings"]
+        far = next(fit["distances_px"] for fit in fits if fit["marking"] == "Side line bottom")
+        page.keyboard.press("i")
+        chosen = page.locator(".object-list [aria-pressed=true]")
+        expect(chosen).to_contain_text(f"Side line bottompoint {far.index(max(far)) + 1}")
+        page.keyboard.press("Escape")
+        screen.saved()
+        page.keyboard.press("Control+z")
+        expect(link).to_have_count(0)
+        screen.saved()
 
 
 class TestPaint:

@@ -12,8 +12,10 @@ import pyotp
 from playwright.sync_api import Page, expect
 
 from app.review.editing.submit import load
+from app.review.people.maintenance import clear_banner, set_banner
 from app.review.people.people import find_person, invite
 from app.review.people.roles import Role
+from app.review.people.second_factor import SecondFactors
 from app.review.verdicts.verdict import set_verdict
 from app.store.logins import delete_logins
 from app.store.store import Store
@@ -178,6 +180,64 @@ class TestSessions:
         expect(again).to_be_hidden()
         until(page, lambda: verdict(page)["state"] == "deferred")
         assert verdict(page)["by"] == "rita"
+
+    def test_every_page_before_somebody_is_let_in_has_the_notice_of_maintenance(
+        self, open_page: OpenPage, team: str, team_home: Path, console: Any
+    ) -> None:
+        console.expect(REFUSED)
+        console.expect("the server responded with a status of 404")
+        join(team_home, "nora", Role.ADMIN)
+        _, invited = in_store(
+            team_home, lambda store: invite(store, "nils", Role.VIEWER, actor="local")
+        )
+        in_store(team_home, lambda store: set_banner(store, "Back at noon", actor="local"))
+        page = open_page("/groups", address=team)
+        for path, heading in {
+            "/groups": "Log in",
+            "/login?error=access_denied&state=x": "You are not logged in",
+            f"/join#{invited.token}": "Welcome, nils",
+            "/join#used-up": "Choose a password",
+        }.items():
+            page.goto("about:blank")
+            page.goto(f"{team}{path}")
+            expect(page.get_by_role("heading", name=heading)).to_be_visible()
+            expect(page.get_by_text("Back at noon")).to_be_visible()
+        page.goto(f"{team}/account")
+        log_in(page, "nora")
+        expect(page.get_by_role("heading", name="Sessions")).to_be_visible()
+        in_store(team_home, lambda store: SecondFactors(store).require(True, actor="local"))
+        try:
+            page.reload()
+            expect(page.get_by_role("heading", name="requires a second factor")).to_be_visible()
+            expect(page.get_by_text("Back at noon")).to_be_visible()
+        finally:
+            in_store(team_home, lambda store: SecondFactors(store).require(False, actor="local"))
+        page.reload()
+        expect(page.get_by_role("heading", name="Sessions")).to_be_visible()
+        in_store(team_home, lambda store: end_sessions(store, "nora"))
+        again = page.get_by_role("dialog", name="Your session has ended")
+        page.evaluate("() => dispatchEvent(new Event('focus'))")
+        expect(again).to_be_visible()
+        expect(again.get_by_text("Back at noon")).to_be_visible()
+        in_store(team_home, lambda store: clear_banner(store, actor="local"))
+
+    def test_addresses_that_nobody_made_are_answered_in_plain_words(
+        self, open_page: OpenPage, team: str, console: Any
+    ) -> None:
+        console.expect(REFUSED)
+        console.expect("the server responded with a status of 404")
+        page = open_page("/groups", address=team)
+        for path, sentence in {
+            f"/join#{'x' * 300}": "This link is not good any more",
+            "/join#what%20is%20this?": "This link is not good any more",
+            f"/login?state={'x' * 300}&code=x": "This is no address to which the provider sends",
+            f"/login?state=x&code={'x' * 5000}": "This is no address to which the provider sends",
+            "/login?state=x&code=x": "That took too long, was answered before",
+            "/login?error=KeyError": "The provider refused the request of this server",
+        }.items():
+            page.goto("about:blank")
+            page.goto(f"{team}{path}")
+            expect(page.get_by_role("alert")).to_contain_text(sentence)
 
     def test_what_others_said_while_the_page_did_not_listen_yet_is_shown(
         self, open_page: OpenPage, team: str, team_home: Path, console: Any

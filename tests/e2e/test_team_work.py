@@ -183,7 +183,15 @@ class TestWork:
         for name, keys in (("uma", ["s"]), ("ulf", ["x", "1"])):
             page = open_page("/work", address=team)
             log_in(page, name)
+            expect(page.locator("[data-hidden-groups]")).to_contain_text("hidden from you")
             copies[name] = judge_alone(page, "Twice", keys, unseen=copies)
+        page.goto("/groups")
+        expect(page.locator("[data-hidden-groups]")).to_contain_text(
+            "some of its groups are hidden"
+        )
+        lotte.goto("/groups")
+        expect(lotte.locator(".queue-row a").first).to_be_visible()
+        expect(lotte.locator("[data-hidden-groups]")).to_have_count(0)
         assert len({9, *copies.values()}) == 3
 
         waiting = "/api/v1/datasets/sample/adjudications"

@@ -1,7 +1,7 @@
 import assert from 'node:assert/strict';
 import { describe, it } from 'node:test';
 
-import { counted, marginText, sharePercent } from '../../static/lib/format.js';
+import { counted, degrees, marginText, metres, pixelText, sharePercent } from '../../static/lib/format.js';
 import { gateMargin } from '../../static/views/gate_names.js';
 import { headline } from '../../static/views/verdict_text.js';
 
@@ -26,10 +26,10 @@ function passing({ used = 3, p = 0.72, said = 'normal (p = 0.72)', error = 0.04,
 }
 
 describe('headline', () => {
-	it('says that the views agree where their consistency is normal, and rounds their error up', () => {
+	it('says that the views agree where their consistency is normal, and rounds their error as every other number', () => {
 		const { tone, title, text } = passing();
 		assert.deepEqual([tone, title, text], ['ok', 'All 3 views agree', 'Every view sees the ball in the same place, within 0.1 px.']);
-		assert.match(passing({ error: 1.21 }).text, /within 1\.3 px/);
+		assert.match(passing({ error: 1.21 }).text, /within 1\.2 px/);
 	});
 
 	it('never says agree beside a consistency that is unlikely', () => {
@@ -39,12 +39,37 @@ describe('headline', () => {
 		assert.equal(passing({ ...said, used: 2 }).title, '2 of 3 views are used; their agreement is unlikely (p = 0.012)');
 	});
 
+	it('leads to the view and the line that it speaks of', () => {
+		const markings = [{ marking: 'Side line left', used: true, outcome: 'fp', distances_px: [1, 127] }];
+		const { text, remarks } = passing({
+			last: { lines: { 'Side line left': [] } }, solved: { calibration: { camera: {}, source: 'lines', jac: null, markings } },
+		});
+		assert.equal(text, 'Every view sees the ball in the same place, within 0.1 px.');
+		assert.deepEqual(remarks, [{ view: 'c', letter: 'C', marking: 'Side line left', text: 'does not fit; it does not block.' }]);
+	});
+
+	it('says that a camera is uncertain, and why, whatever else there is to say', () => {
+		const solved = { calibration: { camera: {}, source: 'lines', jac: null, markings: [], unobservable: ['position'] } };
+		const remarks = [{ view: 'c', letter: 'C', marking: null, text: 'has an uncertain camera: its lines do not determine the position.' }];
+		assert.deepEqual(passing({ solved }).remarks, remarks);
+		assert.deepEqual(passing({ used: 2, solved }).remarks, remarks);
+		assert.deepEqual(passing({ used: 2, solved, last: { included: false } }).remarks, []);
+	});
+
 	it('says why a view is not used', () => {
 		const why = (more) => passing({ used: 2, ...more }).text;
 		assert.equal(why({ last: { balls: [{ ...ball, inferred: true }] } }), 'Not used: C (ball placed, not counted).');
 		assert.equal(why({ solved: { failed: 'jac' } }), 'Not used: C (lines do not fit).');
 		assert.equal(why({ solved: { ball: { error_px: 61 } } }), 'Not used: C (error 61.0 px, at most 14.7 px).');
 		assert.equal(why({}), 'Not used: C (no matching view).');
+	});
+});
+
+describe('numbers with their unit', () => {
+	it('have one rounding each', () => {
+		assert.deepEqual([44.46, null].map(degrees), ['44.5°', '–']);
+		assert.deepEqual([-34.761, 0.067, undefined].map(metres), ['−34.76 m', '0.07 m', '–']);
+		assert.deepEqual([7.26, 126.8, null].map(pixelText), ['7.3 px', '127 px', '–']);
 	});
 });
 

@@ -4,7 +4,7 @@ import { describe, it } from 'node:test';
 import { picturesOf } from '../../static/overlays/scene.js';
 import { gradeOfSize } from '../../static/geometry/residual.js';
 import { whyNot } from '../../static/views/pair_table.js';
-import { errorOf, gradeOfView, paintOf } from '../../static/views/view_state.js';
+import { errorOf, gradeOfView, paintOf, uncertainViews, unusedErrors } from '../../static/views/view_state.js';
 
 const box = { box: [10, 10, 8, 8], point: null, out_of_view: false, occluded: false };
 
@@ -41,6 +41,33 @@ describe('paintOf', () => {
 	});
 });
 
+describe('uncertainViews', () => {
+	const { view, solved } = picture({ solved: { calibration: { camera: {}, unobservable: ['position', 'focal length'] } } });
+
+	it('are those whose camera their lines leave open, unless they are left out', () => {
+		assert.deepEqual(uncertainViews({ views: [view] }, { views: [solved] }), [{ view, guess: 'position and focal length' }]);
+		assert.deepEqual(uncertainViews({ views: [{ ...view, included: false }] }, { views: [solved] }), []);
+		assert.deepEqual(uncertainViews({ views: [view] }, { views: [picture().solved] }), []);
+	});
+});
+
+describe('errors of a view that is not used', () => {
+	const unused = (more) => picture({ error: 223, solved: { included: false }, ...more });
+
+	it('say what they are measured from, before and after the view is left out', () => {
+		assert.equal(unusedErrors(unused({ apart: 31.8 })), '31.8 px in its best pair; 223 px from the 3D ball of the others');
+		assert.equal(unusedErrors(unused({ apart: 9 })), '9.0 px in its best pair, which does not count; 223 px from the 3D ball of the others');
+		assert.equal(unusedErrors(unused({ view: { included: false } })), '223 px from the 3D ball of the others');
+		assert.equal(errorOf(unused({ apart: 31.8 })).from, 'pair');
+		assert.equal(errorOf(unused()).from, 'others');
+	});
+
+	it('are none of a view that is used', () => {
+		assert.equal(unusedErrors(picture({ error: 2 })), '');
+		assert.equal(errorOf(picture({ error: 2 })).from, 'ball');
+	});
+});
+
 describe('gradeOfView', () => {
 	it('does not call a given camera well whose ball no other view confirms', () => {
 		assert.equal(gradeOfView(picture({ solved: { included: false } })).grade, 'bad');
@@ -51,6 +78,12 @@ describe('gradeOfView', () => {
 	it('puts no red cross before a view whose own numbers are good', () => {
 		const blameless = picture({ apart: 0.4, error: 0.4, solved: { included: false } });
 		assert.deepEqual(gradeOfView(blameless), { grade: 'warn', sentence: 'no matching view' });
+	});
+
+	it('never calls a camera well that its lines do not determine', () => {
+		const open = { calibration: { camera: {}, source: 'lines', unobservable: ['position'] } };
+		assert.deepEqual(gradeOfView(picture({ error: 2, solved: open })), { grade: 'warn', sentence: 'camera uncertain' });
+		assert.deepEqual(gradeOfView(picture({ error: 2, solved: open, view: { balls: [] } })), { grade: 'warn', sentence: 'camera uncertain, no ball' });
 	});
 
 	it('says that a ball was placed and does not count', () => {

@@ -274,6 +274,8 @@ class TestGold:
             assert count(ask(person, "GET", target).json()) == OTHERS, target
             every = ORDINARY + GOLDEN + OTHERS
             assert count(ask("lea", "GET", target).json()) == every, target
+        told = {name: ask(name, "GET", "/datasets/demo").json() for name in (person, "lea")}
+        assert [told[name]["hides_groups"] for name in (person, "lea")] == [True, False]
         name = {"name": "of all", "q": ""}
         assert ask("lea", "POST", "/datasets/demo/saved-views", name).json()["groups"] == every
         (view,) = ask(person, "GET", "/datasets/demo/saved-views").json()["items"]
@@ -391,6 +393,7 @@ class TestReviewers:
         closed = ask("lea", "PATCH", f"/batches/{batch}", {"state": "closed"})
         assert closed.status_code == 200
         assert ask("anna", "GET", f"/groups/{groups[0]}").status_code == 200
+        assert ask("anna", "GET", "/datasets/demo").json()["hides_groups"] is False
 
 
 class TestTelling:

@@ -69,6 +69,21 @@ class TestInviteUser:
         assert told["problem"] == "this server sends no mail: hand over the link yourself"
         assert "/join#" in told["link"]
 
+    def test_another_link_goes_by_mail_as_the_first_did(self, team: Team, box: MailBox) -> None:
+        user = asked(team, f"{API}/users", {"name": "again", "role": "viewer"}, 201)["user"]
+        target = f"{API}/users/{user['id']}/link"
+        told = asked(team, target, {"email": "again@example.org"}, 200)
+        assert (told["link"], told["mailed"], told["problem"]) == (None, True, None)
+        (letter,) = box.letters
+        token = letter.get_content().partition("/join#")[2].split()[0]
+        meant = asked(team, f"{API}/links/look", {"token": token}, 200)
+        assert meant == {"name": "again", "joined": False}
+        told = asked(team, target, {"email": "nobody@example.org"}, 200)
+        assert (told["mailed"], "/join#" in told["link"]) == (False, True)
+        assert told["problem"].startswith("the mail server refuses the letter")
+        told = asked(team, target, {}, 200)
+        assert (told["mailed"], told["problem"], "/join#" in told["link"]) == (False, None, True)
+
     @pytest.mark.parametrize(
         "email", ["x", "a@example.org\r\nBcc: eve@example.org", "a@example.org,b@example.org"]
     )

@@ -30,6 +30,7 @@ from app.api.stored_file import stored_file
 from app.errors import ConflictError, NotFoundError
 from app.review.datasets.dataset import dataset_id
 from app.review.exporting.export import possible_formats
+from app.review.exporting.formats import used_options
 from app.review.jobs.exports import KIND, request_export
 from app.review.jobs.records import Job
 from app.review.people.deeds import record_deed
@@ -64,7 +65,12 @@ def list_formats(
     found = dataset_id(store, dataset)
     answers = possible_formats(store, found, version)
     return FormatList(
-        items=[FormatDocument(**vars(one), possible=one.reason is None) for one in answers]
+        items=[
+            FormatDocument(
+                **vars(one), possible=one.reason is None, options=used_options(one.format)
+            )
+            for one in answers
+        ]
     )
 
 

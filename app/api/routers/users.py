@@ -13,6 +13,7 @@ from app.api.schemas.people import (
     InvitationDocument,
     InvitationList,
     InvitationReport,
+    NewLink,
     NewUser,
     UserDocument,
     UserEdit,
@@ -21,8 +22,14 @@ from app.api.schemas.people import (
 )
 from app.api.team import AppTeam, Team
 from app.review.people import people
-from app.review.people.invitations import Post, Wanted, invite_many, invite_one
-from app.review.people.links import Link
+from app.review.people.invitations import (
+    Invitation,
+    Post,
+    Wanted,
+    invite_many,
+    invite_one,
+    renew_one,
+)
 from app.review.people.local_deeds import adopt, adopted_by
 from app.review.people.people import Person
 from app.store.store import Store
@@ -30,9 +37,14 @@ from app.store.store import Store
 router = APIRouter(prefix="/users", tags=["users"])
 
 
-def _with_link(team: Team, request: Request, person: Person, link: Link) -> UserWithLink:
-    user = UserDocument.model_validate(person)
-    return UserWithLink(user=user, link=link.address(team.base(request)), expires=link.expires)
+def _with_link(person: Person, row: Invitation) -> UserWithLink:
+    return UserWithLink(
+        user=UserDocument.model_validate(person),
+        link=row.link,
+        expires=row.expires,
+        mailed=row.mailed,
+        problem=row.problem,
+    )
 
 
 @router.get("", operation_id="listUsers", responses=responses(401, 409))
@@ -63,13 +75,7 @@ def invite_user(
     """
     post = _post(team, request)
     person, row = invite_one(store, new.name, new.role, new.email, post, actor=me.actor)
-    return UserWithLink(
-        user=UserDocument.model_validate(person),
-        link=row.link,
-        expires=row.expires,
-        mailed=row.mailed,
-        problem=row.problem,
-    )
+    return _with_link(person, row)
 
 
 @router.post(
@@ -125,15 +131,23 @@ def change_user(user: Id, change: UserEdit, store: AppStore, _team: AppTeam, me:
 @router.post(
     "/{user}/link",
     operation_id="renewUserLink",
-    responses=responses(401, 404, 409),
+    responses=responses(401, 404, 409, 413, 415),
 )
-def renew_link(user: Id, request: Request, store: AppStore, team: AppTeam, me: Me) -> UserWithLink:
+def renew_link(
+    user: Id,
+    request: Request,
+    store: AppStore,
+    team: AppTeam,
+    me: Me,
+    new: NewLink | None = None,
+) -> UserWithLink:
     """A new link with which somebody sets their password; earlier links are no longer valid.
 
-    Nobody makes one for themselves, and no token makes any.
+    Nobody makes one for themselves, and no token makes any. With an `email` it goes by mail, as that
+    of `POST /users` does.
     """
-    person, link = people.renew_link(store, user, actor=me.actor)
-    return _with_link(team, request, person, link)
+    email = None if new is None else new.email
+    return _with_link(*renew_one(store, user, email, _post(team, request), actor=me.actor))
 
 
 @router.post(

@@ -15,6 +15,7 @@ from app.finite import MAX_ID
 from app.review.agreement.adjudicate import Case, OpenCase
 from app.review.agreement.compare import AnnotationPair, Comparison
 from app.review.agreement.summary import GroupAgreement, PeopleAgreement
+from app.soccer.choices import VerdictState
 
 Side = Literal["a", "b"]
 BallState = Literal["seen", "occluded", "out_of_view", "none", "several"]
@@ -175,6 +176,9 @@ class GroupAgreementDocument(Document, shows=GroupAgreement):
     """What one group came to."""
 
     state: Literal["agreed", "open", "decided"]
+    status: VerdictState = Field(
+        description="The verdict on the group itself: annotations that agree without one leave it unreviewed."
+    )
     worst: float = Field(description="How many times its limit the worst disagreement was.")
     spreads: SpreadsDocument
     outcome: Literal["take", "start"] | None
@@ -185,7 +189,9 @@ class GroupAgreementDocument(Document, shows=GroupAgreement):
 class AgreementDocument(Document):
     """How far the people of a dataset agree."""
 
-    agreed: int = Field(description="Groups that settled themselves.")
+    agreed: int = Field(
+        description="Groups whose annotations agree, so that the first one was taken over."
+    )
     open: int = Field(description="Groups that wait for a decision.")
     decided: int
     limits: LimitsDocument

@@ -17,6 +17,10 @@ class DatasetDocument(Document, shows=Dataset):
 
     policy: PolicyDocument
     created: datetime
+    hides_groups: bool = Field(
+        description="Whether groups are hidden from whoever asks until the batch in which they annotate "
+        "independently is closed; no count has them."
+    )
 
 
 class DatasetList(ListDocument[DatasetDocument]):

@@ -32,9 +32,13 @@ class ExportRequest(BaseModel):
         description="Id, name or hash of a frozen version: its groups as they were, always the "
         "same bytes.",
     )
-    boxes: BoxKind = Field(default="optimized", description="Which ball box is written.")
+    boxes: BoxKind = Field(
+        default="optimized",
+        description="Which ball box is written: coco, parquet, soccernet-v3d and yolo.",
+    )
     images: PicturesSent = Field(
-        default="none", description="Whether frames are copied into the zip."
+        default="none",
+        description="Whether frames are copied into the zip; touchline holds none.",
     )
     views: TrainingViews = Field(
         default="valid",
@@ -55,6 +59,9 @@ class FormatDocument(Document):
     possible: bool = Field(description="Whether it holds what the dataset has.")
     reason: str | None = Field(description="Why it cannot; null: it can.")
     hint: str | None = Field(description="What to do instead, where there is anything.")
+    options: list[str] = Field(
+        description="Which of `boxes`, `images` and `views` it uses; a request with another is refused."
+    )
 
 
 class FormatList(ListDocument[FormatDocument]):

@@ -62,6 +62,11 @@ class ImportOptions(BaseModel):
         description="COCO: name or id of the category that is the ball; empty: by names such as "
         "ball, sports_ball and soccer-ball.",
     )
+    grouping: Annotated[str, Field(max_length=200)] = Field(
+        default="",
+        description="frames: which pictures are one group: `folder`, or a pattern of their names such "
+        "as `{instant}_{camera}.jpg`; empty: each picture is a group.",
+    )
     lines: ImportPlace | None = Field(
         default=None, description="ISSIA: line files of the static cameras."
     )

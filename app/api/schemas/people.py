@@ -212,6 +212,19 @@ class NewUser(BaseModel):
     )
 
 
+class NewLink(BaseModel):
+    """Where another link for somebody goes."""
+
+    model_config = ConfigDict(
+        extra="forbid", json_schema_extra={"examples": [{"email": "anna@example.org"}]}
+    )
+
+    email: Annotated[str, Field(max_length=320)] | None = Field(
+        default=None,
+        description="Where the link goes by mail, if the server sends mail. It is not stored.",
+    )
+
+
 class InvitedPerson(BaseModel):
     """A row of a list of people to invite; what is wrong with it, the report says."""
 

@@ -59,11 +59,18 @@ class TakeDocument(Document, shows=TakeView):
     group: int = Field(description="The copy: a group like any other.")
     dataset: int = Field(description="Of the groups that this is a copy of one of.")
     of: int | None = Field(description="The group that it is a copy of, where that may be known.")
-    title: str = Field(description="What people call the group.")
+    number: int | None = Field(
+        description="Number of that group in its dataset, where that may be known."
+    )
+    title: str = Field(
+        description="What people call the group; where it may not be known, the copy."
+    )
     place: int = Field(description="Which one of this person in this batch, from 1.")
     begun: datetime
     handed_in: datetime | None
-    settled: datetime | None = Field(description="When something was decided about it.")
+    settled: datetime | None = Field(
+        description="When something was decided about it; null: not yet, or its person is not told."
+    )
     handed_back: HandedBackDocument | None = Field(
         description="Why its person has it back; null: they have not."
     )

@@ -92,6 +92,9 @@ class FreezePlanDocument(Document):
     """What a freeze would do."""
 
     groups: int
+    splits: dict[str, int] = Field(
+        description="How many of the groups would be in each split; `none`: in no split, or in two."
+    )
     left_out: dict[str, int] = Field(description="Why the other groups do not enter.")
     unsolved: int = Field(description="How many of the groups that enter have to be solved first.")
 

@@ -9,6 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field, StrictBool, model_validator
 
 from app.api.schemas.document import ListDocument
 from app.api.schemas.group import image_address
+from app.plural import plural
 from app.soccer.choices import CalibrationChoice
 from app.soccer.picture import ASPECTS, MAX_SHIFT, OPEN, PictureGeometry
 from app.soccer.reasons import MAX_NOTE, Reason
@@ -123,5 +124,4 @@ class NeighbourList(ListDocument[Neighbour]):
 
 def frames_away(offset: int) -> str:
     """``1 frame later``, ``3 frames before``."""
-    frames = "1 frame" if abs(offset) == 1 else f"{abs(offset)} frames"
-    return f"{frames} {'later' if offset > 0 else 'before'}"
+    return f"{plural(abs(offset), 'frame')} {'later' if offset > 0 else 'before'}"

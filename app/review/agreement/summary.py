@@ -49,6 +49,7 @@ class GroupAgreement:
 
     Attributes:
         worst: How many times its limit the worst disagreement was.
+        status: The verdict on the group itself: annotations that agree without one leave it unreviewed.
         taken: Whose annotation was taken over; None: nobody's yet.
     """
 
@@ -56,6 +57,7 @@ class GroupAgreement:
     number: int
     batch: int | None
     state: str
+    status: str
     people: tuple[str, ...]
     verdicts: tuple[str | None, ...]
     worst: float
@@ -136,7 +138,17 @@ def agreement_of(store: Store, dataset: str | int, batch: int | None = None) -> 
 def agreement_csv(found: Agreement) -> str:
     """A row for each group, the worst first; text that would be a formula is none."""
     names = [f"{name}_{end}" for name in MEASURES for end in ("median", "tail")]
-    head = ("number", "group", "batch", "state", "people", "verdicts", "disagreements", "worst")
+    head = (
+        "number",
+        "group",
+        "batch",
+        "state",
+        "status",
+        "people",
+        "verdicts",
+        "disagreements",
+        "worst",
+    )
     tail = ("outcome", "taken", "decided", "decided_by")
     lines = [csv_line((*head, *names, *tail))]
     for one in found.groups:
@@ -146,7 +158,7 @@ def agreement_csv(found: Agreement) -> str:
             for value in (one.spreads[name].median, one.spreads[name].tail)
         ]
         values = (
-            *(one.number, one.group, one.batch, one.state),
+            *(one.number, one.group, one.batch, one.state, one.status),
             *("; ".join(one.people), "; ".join(said or "none" for said in one.verdicts)),
             *(one.disagreements, one.worst),
             *numbers,
@@ -189,6 +201,7 @@ def _group(one: _Read) -> GroupAgreement:
         row.number,
         row.batch_id or None,
         row.state,
+        row.status,
         tuple(one.verdicts),
         tuple(one.verdicts.values()),
         row.worst,

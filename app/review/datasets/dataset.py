@@ -27,6 +27,7 @@ from app.store.datasets import (
 from app.store.listing import count_states
 from app.store.log import Entry, append
 from app.store.queue import refresh_queue
+from app.store.reader import is_blind
 from app.store.session import Session
 from app.store.sight import COPIES, EVERYTHING, Sight
 from app.store.store import Store
@@ -34,7 +35,11 @@ from app.store.store import Store
 
 @dataclass(frozen=True)
 class Dataset:
-    """A dataset and how far it is; the four states add up to ``groups``."""
+    """A dataset and how far it is; the four states add up to ``groups``.
+
+    ``hides_groups``: whether groups of it are hidden from whoever asks, who annotates blind; which, and
+    how many, they are not told.
+    """
 
     id: int
     name: str
@@ -46,6 +51,7 @@ class Dataset:
     unreviewed: int
     policy: Policy
     created: str
+    hides_groups: bool
 
 
 @dataclass(frozen=True)
@@ -186,4 +192,5 @@ def _dataset(row: Any, counts: Counter[str]) -> Dataset:
         rejected=counts["rejected"],
         deferred=counts["deferred"],
         unreviewed=counts["unreviewed"],
+        hides_groups=is_blind(row.id),
     )

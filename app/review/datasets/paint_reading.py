@@ -34,7 +34,7 @@ class PaintTask:
     Attributes:
         group: Its group, the other views left out.
         policy: Its clicks are calibrated by.
-        sought_for: Key of that calibration.
+        sought_for: Key of the camera of that calibration.
         clicked: The calibration, where it is known.
         old: What was read before.
     """

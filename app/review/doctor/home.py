@@ -12,6 +12,7 @@ import pysqlite3.dbapi2
 from app.config import Settings
 from app.errors import ConflictError, InputError, StorageError
 from app.mail import read_mail_server
+from app.plural import plural
 from app.review.doctor.check import Check
 from app.review.doctor.stores import examine_stores
 from app.review.people.identities import linked_admins
@@ -113,8 +114,8 @@ def _linked_admins(store: Store) -> Check | None:
 def _permissions(settings: Settings) -> Check:
     found = open_to_others(settings)
     if found:
-        sentence = f"other users can read {len(found):,} files and folders: {found[0]}"
-        more = "" if len(found) == 1 else " and others"
+        sentence = f"other users can read {plural(len(found), 'file or folder', 'files and folders')}: {found[0]}"
+        more = " and others" if found[1:] else ""
         mend = f"Start touchline serve, or run chmod -R go= {settings.home}"
         return Check("permissions", False, sentence + more, mend)
     return Check("permissions", True, "the home is its owner's alone")
@@ -162,7 +163,7 @@ def _clock(session: Session) -> Check:
     count, latest = entries_after(session, text_of(now + timedelta(minutes=5)))
     if count == 0:
         return Check("clock", True, "not behind the log")
-    sentence = f"{count:,} entries of the log are later than the clock, which says {text_of(now)}; the latest is of {latest}"
+    sentence = f"{plural(count, 'entry of the log is', 'entries of the log are')} later than the clock, which says {text_of(now)}; the latest is of {latest}"
     last = last_time(session)
     if last is not None and datetime.fromisoformat(last) > now + timedelta(minutes=5):
         return Check("clock", False, sentence, "Set the clock of this machine.")

@@ -19,7 +19,7 @@ from app.soccer.group import Group
 from app.soccer.paint_evidence import PaintReading
 from app.soccer.policy import CalibrationPolicy
 from app.soccer.solution import Calibration
-from app.solving.calibrate import clicks_key, wanted_paint
+from app.solving.calibrate import clicks_key, sought_key, wanted_paint
 from app.store.frames import Frames
 
 SECONDS = 5.0
@@ -94,8 +94,8 @@ def _stale(
         reading = wanted_paint(group, view, policy)
         if reading is None and (view.media is None or not view.takes_paint):
             continue
-        key = clicks_key(group, view, policy)
-        clicked = known.get(key)
+        key = sought_key(group, view, policy)
+        clicked = known.get(clicks_key(group, view, policy))
         # Clicks that were seen to make no camera say nowhere where to look.
         is_lost = clicked is not None and clicked.camera is None
         if (reading is None or reading.sought_for != key) and not is_lost:

@@ -29,7 +29,7 @@ from app.review.editing.known import known_calibrations
 from app.review.editing.picture_task import PictureTask
 from app.soccer.paint_evidence import NO_FRAME, NO_PAINT, PAINT_DISAGREES, PaintReading
 from app.soccer.policy import CalibrationPolicy
-from app.solving.calibrate import clicks_key
+from app.solving.calibrate import clicks_key, sought_key
 from app.store.clock import now
 from app.store.datasets import group_ids
 from app.store.frames import VideoIndexer
@@ -297,9 +297,10 @@ def _group_tasks(
     group = stored.group
     for view in group.views:
         if view.takes_paint:
-            key = clicks_key(group, view, policy)
+            clicked = known.get(clicks_key(group, view, policy))
             alone = replace(group, views=(view,), paint={})
-            yield PaintTask(alone, policy, key, known.get(key), group.paint.get(view.key))
+            key, old = sought_key(group, view, policy), group.paint.get(view.key)
+            yield PaintTask(alone, policy, key, clicked, old)
 
 
 def _readings(

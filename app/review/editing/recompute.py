@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, field
 
+from app.plural import plural
 from app.progress import TellProgress
 from app.review.datasets.dataset import (
     DatasetHead,
@@ -50,12 +51,19 @@ other processes a chunk is what Ctrl+C has to wait for."""
 
 @dataclass
 class SolveReport:
-    """What was done; ``failed`` are groups whose solving itself broke, with the reason."""
+    """What was done; ``failed`` are groups whose solving itself broke, with the reason.
+
+    Attributes:
+        estimated: Matches whose pitch was estimated.
+        proposed: Matches of the dataset for which another pitch is proposed, then.
+    """
 
     total: int = 0
     solved: int = 0
     passed: int = 0
     failed: list[tuple[str, str]] = field(default_factory=list)
+    estimated: int = 0
+    proposed: int = 0
 
     @property
     def sentence(self) -> str:
@@ -71,7 +79,7 @@ def outcome_sentence(solved: int, passed: int, errors: int) -> str:
         '52 pass, 8 do not; 1 error'
     """
     rest = solved - passed
-    return f"{passed} pass, {rest} do not; {errors} error{'' if errors == 1 else 's'}"
+    return f"{passed} pass, {rest} do not; {plural(errors, 'error')}"
 
 
 @dataclass(frozen=True)

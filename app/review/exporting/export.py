@@ -27,6 +27,7 @@ from app.review.datasets.licence import licence_of
 from app.review.exporting.formats import (
     CONTENT,
     FORMATS,
+    USERS,
     WriteOptions,
     box_settings,
     export_names,
@@ -92,14 +93,25 @@ class FormatAnswer:
 class _Options:
     format: str
     everything: bool
-    boxes: str
-    images: str
-    views: str
+    boxes: str = "optimized"
+    images: str = "none"
+    views: str = "valid"
 
     @property
     def every_view(self) -> bool:
         """Whether training data hold every view."""
         return self.everything or self.views == "all"
+
+    def require_used(self) -> None:
+        """Raises InputError where an option is given that the format does not use."""
+        usual = _Options(self.format, self.everything)
+        for name, formats in USERS.items():
+            if self.format not in formats and getattr(self, name) != getattr(usual, name):
+                raise InputError(
+                    f"{self.format} does not use --{name}",
+                    hint=f"Leave it out. It is for {', '.join(sorted(formats))}.",
+                    pointer=f"/{name}",
+                )
 
     def check(self, out: Root) -> None:
         for name, value, choices in (
@@ -113,6 +125,7 @@ class _Options:
                     f'"{value}" is not possible for {name}; choose one of {", ".join(choices)}',
                     pointer=f"/{name}",
                 )
+        self.require_used()
         if self.images == "link" and isinstance(out, StoredPath):
             raise InputError("a store cannot hold links; copy the images")
         if self.images == "link" and out.suffix.lower() == ".zip":
@@ -147,9 +160,8 @@ def export(
             not at all.
         everything: Every group, whatever its verdict.
         boxes: ``optimized``, ``annotated`` or ``exact``: which ball box Labels-v3D.json, COCO,
-            YOLO and Parquet hold. Other formats have no place for a chosen box, and their
-            manifests name none.
-        images: ``none``, ``copy`` or ``link`` (folders only).
+            YOLO and Parquet hold. Other formats have no place for a chosen box.
+        images: ``none``, ``copy`` or ``link`` (folders only); ``touchline`` holds none.
         views: ``valid`` or ``all``: whether COCO and YOLO, from which detectors learn, hold the
             views that annotate a ball and are in no valid pair. ``everything`` says all.
         version: Name, id or hash of a frozen version to export instead of the dataset as it is:
@@ -159,7 +171,7 @@ def export(
         beside: After which its half written files are called, see ``output_anywhere``.
 
     Raises:
-        InputError: Nothing to export, or the groups do not fit the format.
+        InputError: Nothing to export, the format does not use an option, or the groups do not fit it.
         StorageError: The disk refuses.
     """
     options = _Options(format, everything, boxes, images, views)
@@ -215,10 +227,11 @@ def require_possible(
 
     Raises:
         NotFoundError: There is no such dataset or version.
-        InputError: Nothing to export, none of the images that are wanted is there, or the groups
-            do not fit the format; then the hint names the formats that they fit.
+        InputError: Nothing to export, none of the images that are wanted is there, the format does
+            not use an option, or the groups do not fit it; then the hint names those that they fit.
     """
     asked = _Options(format, everything, boxes, images, views)
+    asked.require_used()
     try:
         _try(store, dataset, asked, version)
     except _NoRoomError as error:

@@ -27,6 +27,7 @@ from app.datasets.soccernet_v3d_writer import write_soccernet_v3d
 from app.datasets.view_files import PutText
 from app.datasets.yolo_writer import write_yolo
 from app.errors import InputError
+from app.plural import plural
 from app.soccer.group import Group
 
 FORMATS: tuple[str, ...] = get_args(ExportFormat)
@@ -38,8 +39,6 @@ CONTENT = {
     "yolo": ("labels", "view that a detector may learn from"),
 }
 """What a format consists of: the name of its count, and the word for one."""
-TRAINING = ("coco", "yolo")
-"""Formats from which detectors learn: no ball that other views do not confirm, unless asked."""
 WITHOUT_LENSES = ("soccernet-v3d", "issia", "issia-3d", "sn-calibration")
 """Formats whose cameras are SoccerNet's: they have no place for a wide lens."""
 LAYOUTS: Mapping[str, FrameName] = {
@@ -58,8 +57,14 @@ CLAIMS: Mapping[str, Claims] = {
 """The names that a format makes of a view, unless that of its frame alone."""
 PRESCRIBED = ("soccernet-v3", "soccernet-v3d", "yolo")
 """Formats that prescribe the names, or whose names hold that of the group: no view has another."""
-WITH_BOXES = ("soccernet-v3d", "coco", "yolo", "parquet")
-"""Formats that hold the ball box that was chosen; all others have no place for it."""
+
+USERS: Mapping[str, tuple[str, ...]] = {
+    "boxes": ("soccernet-v3d", "coco", "yolo", "parquet"),
+    "images": tuple(name for name in FORMATS if name != "touchline"),
+    "views": ("coco", "yolo"),
+}
+"""Which formats use an option; any other would ignore it, so it is refused there. Detectors learn from
+those that use ``views``: they hold no ball that other views do not confirm, unless asked."""
 
 
 @dataclass(frozen=True)
@@ -167,6 +172,11 @@ def _with_plain_lenses(
         yield record
 
 
+def used_options(format: str) -> list[str]:  # noqa: A002
+    """The options that a format uses, of ``USERS``."""
+    return [name for name in USERS if format in USERS[name]]
+
+
 def frame_layout(format: str) -> FrameName:  # noqa: A002
     """Where a format looks for the frames of its views."""
     return LAYOUTS.get(format, match_frame)
@@ -182,7 +192,7 @@ def export_names(format: str, outlines: Iterable[Outline]) -> ExportNames:  # no
 
 def box_settings(format: str, boxes: str) -> dict[str, str]:  # noqa: A002
     """Which kind of ball box the files hold, for a format that has a choice."""
-    if format not in WITH_BOXES:
+    if "boxes" not in used_options(format):
         return {}
     # optimized_d is defined around the centre of the annotated box.
     own = {"ball_bbox": "annotated"} if format == "soccernet-v3d" else {}
@@ -191,7 +201,7 @@ def box_settings(format: str, boxes: str) -> dict[str, str]:  # noqa: A002
 
 def view_settings(format: str, every_view: bool) -> dict[str, str]:  # noqa: A002
     """Which views a detector learns from, for a format that leaves some out."""
-    return {"views": "all" if every_view else "valid"} if format in TRAINING else {}
+    return {"views": "all" if every_view else "valid"} if "views" in used_options(format) else {}
 
 
 def lacking(format: str, counts: Mapping[str, int]) -> str | None:  # noqa: A002
@@ -202,7 +212,7 @@ def lacking(format: str, counts: Mapping[str, int]) -> str | None:  # noqa: A002
     missing = counts.get("images_missing", 0)
     if format != "yolo" or not missing:
         return None
-    images = "1 image is" if missing == 1 else f"{missing:,} images are"
+    images = plural(missing, "image is", "images are")
     return f"{images} not in this export; frames.csv names their places"
 
 

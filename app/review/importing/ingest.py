@@ -11,6 +11,7 @@ from pathlib import Path
 from app.datasets.report import Report
 from app.errors import ConflictError
 from app.object_store.address import is_address
+from app.plural import plural
 from app.progress import TellProgress
 from app.review.datasets.dataset import insert_dataset
 from app.review.datasets.paint_reading import outdated_where_people_moved
@@ -51,7 +52,7 @@ class IngestReport:
 
     Attributes:
         changed: Groups, and static cameras that many groups share.
-        findings: Edits that a changed source met.
+        findings: Edits that a changed source met, and pictures of another shape than declared.
         without_picture: Groups of which no view has a picture.
         missing: Groups that this source brought before and does not bring any more; they stay.
         problems: What to tell about single groups, or about the missing ones.
@@ -168,7 +169,7 @@ def _note_missing(
         }
     report.missing = len(missing)
     if report.missing:
-        groups = "1 group" if report.missing == 1 else f"{report.missing} groups"
+        groups = plural(report.missing, "group")
         report.problems.append(f"{groups} of an earlier import did not come again; all stay")
     return missing
 

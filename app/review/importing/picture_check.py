@@ -15,8 +15,12 @@ from app.progress import TellProgress
 from app.soccer.frames import ImageSize
 from app.soccer.group import Group, View
 from app.soccer.media import Media
+from app.store.datasets import find_dataset
+from app.store.findings import replace_shape_findings
 from app.store.image_header import SIDEWAYS, ImageHeader
 from app.store.media import picture_header, video_length, video_times
+from app.store.queue import refresh_queue
+from app.store.store import Store
 
 OUTSIDE = 0.02
 """Of a side; annotators of public datasets clicked up to 1 % beyond the border of a picture."""
@@ -24,6 +28,11 @@ NAMED = 5
 """Places of a kind that are named; the others are counted."""
 
 
+_SHAPE = "The picture has another shape than its annotations"
+_MEND = (
+    "What is drawn on it lies in the wrong place. Import it with the right size or picture, or leave "
+    "the view out."
+)
 LONGEST = 20_000
 """Frames that a video promises, up to which it is indexed by an import; beyond, when it is looked at."""
 
@@ -59,6 +68,10 @@ class PictureCheck:
     shapes: list[str] = field(default_factory=list)
     outside: list[str] = field(default_factory=list)
     beyond: list[str] = field(default_factory=list)
+    found: list[tuple[str, str, str]] = field(default_factory=list)
+    """Of ``shapes``: key of the group, key of the view, and the sentence of the finding."""
+    groups: set[str] = field(default_factory=set)
+    """Keys of the groups that were compared."""
     _stations: set[str] = field(default_factory=set)
     """Static cameras whose lines were looked at: every group brings them again."""
     _videos: dict[str, _Video] = field(default_factory=dict)
@@ -67,6 +80,7 @@ class PictureCheck:
     def watch(self, groups: Iterable[Group]) -> Iterator[Group]:
         """The groups, each compared as it passes."""
         for group in groups:
+            self.groups.add(group.key)
             for view in group.views:
                 self._compare(group, view)
             self._passed += 1
@@ -93,6 +107,16 @@ class PictureCheck:
             )
         return found
 
+    def note(self, store: Store, dataset: str) -> int:
+        """Put findings at the views whose picture has another shape; such a group passes its gates, and
+        nobody shall take it for a sound one. Returns how many there are."""
+        with store.write() as session:
+            row = find_dataset(session, dataset)
+            if row is not None:
+                ids = replace_shape_findings(session, int(row.id), self.groups, self.found)
+                refresh_queue(session, ids)
+        return len(self.found)
+
     def _compare(self, group: Group, view: View) -> None:
         place = f"group {group.key}, view {view.key}"
         header = None if view.media is None else self._header(place, view.media)
@@ -102,6 +126,7 @@ class PictureCheck:
             difference = _difference(view.size, header)
             if difference:
                 self.shapes.append(f"{place}{_file(view.media)}: {difference}")
+                self.found.append((group.key, view.key, f"{_SHAPE} ({difference}). {_MEND}"))
         if places := list(self._outside(view)):
             more = f" and {len(places) - 1} more" if len(places) > 1 else ""
             self.outside.append(

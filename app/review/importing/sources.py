@@ -14,7 +14,7 @@ from app.datasets.coco_reader import read_coco
 from app.datasets.file_tree import Limits, Root
 from app.datasets.format_names import ImportFormat
 from app.datasets.frame_list import read_frame_list
-from app.datasets.frames_reader import read_frames
+from app.datasets.frames_reader import check_grouping, read_frames
 from app.datasets.gamestate_reader import read_gamestate
 from app.datasets.guess_format import guess_format, holds_videos_alone
 from app.datasets.issia_3d_reader import open_issia_3d
@@ -27,6 +27,7 @@ from app.datasets.sn_calibration_reader import read_sn_calibration
 from app.datasets.soccernet_v3_reader import read_soccernet_v3
 from app.datasets.soccernet_v3d_reader import read_soccernet_v3d
 from app.errors import DatasetFormatError, InputError
+from app.plural import plural
 from app.progress import TellProgress
 from app.review.importing.cameras import ingest_cameras
 from app.review.importing.ingest import IngestReport, ingest
@@ -49,6 +50,7 @@ USERS: Mapping[str, tuple[str, ...]] = {
     "frame_offset": ("issia",),
     "flipped": STATIC,
     "ball_category": ("coco",),
+    "grouping": ("frames",),
     "frames": _OF_GROUPS,
     "policy": _OF_GROUPS,
 }
@@ -56,6 +58,7 @@ USERS: Mapping[str, tuple[str, ...]] = {
 _TYPED = {
     "ball_category": "--ball-category",
     "frame_offset": "--frame-offset",
+    "grouping": "--group-by",
     "flipped": "--flip",
 }
 
@@ -90,7 +93,7 @@ class BallTally:
             f'"{name[:40]}" ({count:,})' for name, count in self.classes.most_common(12)
         )
         boxes = f"; its boxes are of {most}" if most else ""
-        groups = "the 1 group" if self.groups == 1 else f"any of {self.groups:,} groups"
+        groups = f"{'the' if self.groups == 1 else 'any of'} {plural(self.groups, 'group')}"
         return f"no ball was read from {groups}{boxes}"
 
 
@@ -120,6 +123,7 @@ class Source:
             the labels.
         name: What people call it; the log keeps it. Empty: the path.
         ball_category: COCO: name or id of the category that is the ball; empty: by its name.
+        grouping: Pictures: which are one group (``frames_reader``); empty: each is one.
     """
 
     format: str
@@ -132,6 +136,7 @@ class Source:
     frames: Root | None = None
     name: str = ""
     ball_category: str = ""
+    grouping: str = ""
 
     def check(self, *, policy: bool = False) -> None:
         """Refuse an option that the format does not use.
@@ -140,8 +145,9 @@ class Source:
             policy: Whether a policy was named for the dataset.
 
         Raises:
-            InputError: Naming the option, and the formats that use it.
+            InputError: Naming the option, and the formats that use it; or the grouping is none.
         """
+        check_grouping(self.grouping)
         usual = Source(self.format, self.path)
         given = {
             name
@@ -337,6 +343,10 @@ def import_source(
         told=report,
     )
     result.problems += check.remarks()
+    if dry_run or not result.new + result.changed + result.unchanged:
+        result.findings += len(check.found)
+    else:
+        result.findings += check.note(store, dataset)
     if folder is not None and not dry_run:
         ingest_spare(store, dataset, _spare(folder), source=source.label, actor=actor)
     if source.format not in BALLS_ELSEWHERE and (sentence := tally.without_ball()):
@@ -370,7 +380,8 @@ def _groups(source: Source, settings: Settings, report: Report, limits: Limits) 
         case "parquet":
             return read_parquet(path, report, limits=limits)
         case "frames":
-            return read_frames(path, partial(_size_of_picture, settings), report, limits)
+            size_of = partial(_size_of_picture, settings)
+            return read_frames(path, size_of, report, limits, source.grouping)
         case _:
             size = source.size or DEFAULT_SIZE
             return read_sn_calibration(path, size, report, calibration=calibration, limits=limits)

@@ -20,13 +20,28 @@ def ending(kind: str, result: Json) -> str | None:
 
 
 def _solved(result: Json) -> str:
+    pitches = _estimated(result)
     if not result["solved"] and not result["failed"]:
-        return "Nothing was left to solve."
+        return pitches or "Nothing was left to solve."
     passed, rest = result["passed"], result["solved"] - result["passed"]
     return (
         f"{plural(result['solved'], 'group')} solved: {passed:,} pass, {rest:,} do not; "
-        f"{plural(result['failed'], 'error')}."
+        f"{plural(result['failed'], 'error')}." + (f" {pitches}" if pitches else "")
     )
+
+
+def _estimated(result: Json) -> str:
+    """What solving found of pitches, "" where it estimated none; results of older servers say nothing."""
+    if not result.get("estimated"):
+        return ""
+    matches = plural(result["estimated"], "match", "matches")
+    proposed = plural(result["proposed"], "match", "matches")
+    found = (
+        f"another size is proposed for {proposed}"
+        if result["proposed"]
+        else "no other size is proposed"
+    )
+    return f"The pitch of {matches} was estimated: {found}."
 
 
 def _imported(result: Json) -> str:

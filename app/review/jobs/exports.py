@@ -10,6 +10,7 @@ from app.datasets.store_output import require_absent
 from app.errors import InputError, NotFoundError
 from app.object_store.address import SCHEME
 from app.object_store.path import StoredPath, target_path
+from app.plural import plural
 from app.review.datasets.dataset import get_dataset_head
 from app.review.exporting.child import export_asked
 from app.review.exporting.export import require_possible
@@ -108,7 +109,7 @@ def export_work(
                 answer=lambda frame: frames.read(*frame),
             )
         # It is done, also where somebody cancels it now.
-        progress.place = report.groups, report.groups, f"{report.groups:,} groups written"
+        progress.place = report.groups, report.groups, f"{plural(report.groups, 'group')} written"
         entry = folder.keep(name, request, report)
         return {
             "export": entry.id,

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from concurrent.futures import Executor
 
+from app.plural import plural
 from app.progress import TellProgress
 from app.review.datasets.dataset import get_dataset_head
 from app.review.editing.pitches import estimate_pitches, stale_matches
@@ -33,8 +34,14 @@ def solve_fully(
     report = solve_dataset(store, dataset, executor, progress, stop)
     total = report.total
     if not stop():
-        # It stays at the groups that are solved, and can be ended all the same.
-        estimate_pitches(store, dataset, executor, lambda *_: progress(total, total), stop)
+
+        def estimated(done: int, _total: int | None = None, _said: str = "") -> None:
+            report.estimated = done
+            # It stays at the groups that are solved, and can be ended all the same.
+            progress(total, total)
+
+        found = estimate_pitches(store, dataset, executor, estimated, stop)
+        report.proposed = len(found.proposals)
     return report
 
 
@@ -43,7 +50,7 @@ def left_undone(store: Store, dataset: str | int) -> str | None:
     groups, matches = len(stale_groups(store, dataset)), len(stale_matches(store, dataset))
     if groups:
         return f"{groups} are left to do"
-    many = "1 match" if matches == 1 else f"{matches} matches"
+    many = plural(matches, "match", "matches")
     return f"the pitch of {many} is left to estimate" if matches else None
 
 

@@ -9,6 +9,7 @@ from typing import Any
 from app.config import Settings
 from app.datasets.file_tree import Root
 from app.errors import InputError
+from app.plural import plural
 from app.progress import TellProgress
 from app.review.datasets.dataset import get_dataset_head
 from app.review.datasets.naming import require_name
@@ -44,7 +45,7 @@ class ImportRequest:
         lines: The same for ISSIA's line files, or None.
         frames: The same for a list of frames, or None.
         options: ``calibration``, ``frame_offset``, ``flipped``, ``size`` ([width, height]),
-            ``ball_category``.
+            ``ball_category``, ``grouping``.
         policy: Name of a shipped one for a dataset that is made; None: as its pictures suggest.
     """
 
@@ -169,7 +170,7 @@ def _following(
 def _step(progress: JobProgress, sentence: str) -> TellProgress:
     def step(done: int, _total: int | None = None, said: str = "") -> None:
         more = f" {said}" if said else ""
-        progress(done, None, f"{sentence}{more} {done:,} groups so far.")
+        progress(done, None, f"{sentence}{more} {plural(done, 'group')} so far.")
 
     return step
 
@@ -226,6 +227,7 @@ def source_of(settings: Settings, request: ImportRequest) -> Source:
         flipped=frozenset(options.get("flipped", ())),
         name=name,
         ball_category=options.get("ball_category", ""),
+        grouping=options.get("grouping", ""),
     )
     source.check(policy=request.policy is not None)
     return source

@@ -194,4 +194,6 @@ def _report(report: SolveReport) -> Json:
         "passed": report.passed,
         "failed": len(report.failed),
         "failures": named,
+        "estimated": report.estimated,
+        "proposed": report.proposed,
     }

@@ -8,6 +8,7 @@ from enum import StrEnum
 from typing import Any
 
 from app.errors import NotFoundError
+from app.plural import plural
 from app.review.people.roles import Sight
 from app.store.audit import AuditQuery as AuditQuery
 from app.store.audit import AuditRow, audit_rows
@@ -238,7 +239,7 @@ def _verdict(_row: AuditRow, body: Mapping[str, Any]) -> str:
 def _bulk(row: AuditRow, body: Mapping[str, Any]) -> str:
     verb = "undid verdicts on" if row.kind.endswith("undo") else f"{body.get('state', 'changed')}"
     count = body.get("changed", body.get("groups"))
-    return f"{verb} {count if isinstance(count, int) else 'many'} groups at once"
+    return f"{verb} {plural(count, 'group') if isinstance(count, int) else 'many groups'} at once"
 
 
 def _comment(_row: AuditRow, body: Mapping[str, Any]) -> str:
@@ -303,8 +304,7 @@ def _own(row: AuditRow, body: Mapping[str, Any]) -> str | None:
     if row.kind == "work" and did in _BATCH_DEEDS and "name" in body:
         return f"{_BATCH_DEEDS[did]} the batch “{body['name']}”"
     if row.kind == "gold" and "groups" in body:
-        count = len(body["groups"])
-        return f"marked {count} group{'' if count == 1 else 's'} of a {body['source']} as gold"
+        return f"marked {plural(len(body['groups']), 'group')} of a {body['source']} as gold"
     if row.kind == "guideline" and "number" in body:
         return f"wrote version {body['number']} of the guidelines"
     return said.get((row.kind, str(did)))

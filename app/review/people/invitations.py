@@ -14,7 +14,7 @@ from app.finite import quoted
 from app.mail import Letter, MailServer, checked_address
 from app.review.people.links import Link
 from app.review.people.names import checked_name, require_no_token
-from app.review.people.people import Person, insert_invited, invite
+from app.review.people.people import Person, insert_invited, invite, renew_link
 from app.review.people.roles import Role
 from app.store.people import person_by_name
 from app.store.store import Store
@@ -45,7 +45,8 @@ class Invitation:
     """What became of one row of a list.
 
     Attributes:
-        state: ``invited``; ``possible``, on a dry run; or ``refused``.
+        state: ``invited``; ``reset``, who has a way in already; ``possible``, on a dry run; or
+            ``refused``.
         link: Address of the link, for whoever invites to hand over; None: there is none, or it went
             by mail.
         expires: Until when it is good.
@@ -116,6 +117,24 @@ def invite_one(
     address = checked_address(email, pointer="/email") if email else None
     person, link = invite(store, name, role, actor=actor)
     row = Invitation(1, person.name, person.role, "invited", expires=link.expires)
+    return person, post.hand_over([(row, link, address)], actor)[0]
+
+
+def renew_one(
+    store: Store, person_id: int, email: str | None, post: Post, *, actor: str
+) -> tuple[Person, Invitation]:
+    """Make another link for somebody, and hand it over as an invitation is.
+
+    Raises:
+        NotFoundError: There is nobody of that id.
+        ForbiddenError: It is oneself, or a token asks.
+        InputError: The address cannot be one.
+        ConflictError: They are disabled.
+    """
+    address = checked_address(email, pointer="/email") if email else None
+    person, link = renew_link(store, person_id, actor=actor)
+    state = "reset" if person.joined else "invited"
+    row = Invitation(1, person.name, person.role, state, expires=link.expires)
     return person, post.hand_over([(row, link, address)], actor)[0]
 
 
@@ -232,11 +251,16 @@ def _refused(one: Wanted, problem: str) -> Invitation:
 def _letter(url: str, row: Invitation, link: Link, address: str, by: str) -> Letter:
     host = urlsplit(url).hostname
     until = f"{datetime.fromisoformat(link.expires):%d %B %Y, %H:%M} UTC"
+    if row.state == "reset":
+        subject = f"A new password for Touchline at {host}"
+        why = f"{by} sends you a link to set a new password for Touchline at {url}."
+    else:
+        subject = f"Your account on Touchline at {host}"
+        why = f"{by} invites you to Touchline at {url} as {row.role}."
     return Letter(
         address,
-        f"Your account on Touchline at {host}",
-        f"Hello {row.name},\n\n{by} invites you to Touchline at {url} as {row.role}.\n\n"
-        f"Choose your password here:\n\n{link.address(url)}\n\n"
+        subject,
+        f"Hello {row.name},\n\n{why}\n\nChoose your password here:\n\n{link.address(url)}\n\n"
         f"The link works once, until {until}.\n"
         "If you did not expect this mail, you need not do anything.\n",
     )

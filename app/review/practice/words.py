@@ -51,7 +51,7 @@ WORDS = {
         question="One click of an annotator went astray. Find it.",
         hint="Follow the error lines: they lead from the line to each annotated point, and one is "
         "much longer than the others.",
-        fault="In view {view} a point of “{marking}” lies {amount:.0f} px beside its line.",
+        fault="In view {view} a point of “{marking}” lies beside its line.",
         best="Press Enter to do what the card offers, Shift Enter for another way (or drag the "
         "point onto the paint). Then press A.",
     ),
@@ -83,8 +83,7 @@ WORDS = {
         question="Everything fits, and still the group cannot be used. Where do the cameras stand?",
         hint="Look at the small pitch below: how far are the cameras from each other? Two views "
         "from one place say nothing about depth.",
-        fault="Both cameras stand at one place: view {view} is only {amount:.1f} m beside the "
-        "main camera.",
+        fault="Both cameras stand at nearly one place: view {view} is beside the main camera.",
         best="No edit can fix that. Press X, then Enter for “Duplicate view”.",
     ),
 }

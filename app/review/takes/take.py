@@ -69,8 +69,9 @@ class TakeView:
     Attributes:
         group: The copy.
         dataset: Of what it is a copy.
-        of: The original; None where its person is not told.
-        title: What people call the group.
+        of, number: The original, and its number in its dataset; None where its person is not told.
+        title: What people call the group; where its person is not told, what they call the copy.
+        settled: When something was decided about it; None: not yet, or its person is not told.
         handed_back: Why its person has it back; None: they have not, or handed it in again.
     """
 
@@ -79,6 +80,7 @@ class TakeView:
     group: int
     dataset: int
     of: int | None
+    number: int | None
     title: str
     person: str
     place: int
@@ -251,26 +253,39 @@ def _shown(session: Session, takes: Sequence[Take]) -> list[TakeView]:
     blind = frozenset[int]() if reader is None else frozenset().union(*reader.batches.values())
     waiting = [one.copy_id for one in takes if one.handed_in is None and one.settled is None]
     back = read_handed_back(session, waiting)
+
+    def is_told(one: Take) -> bool:
+        """Whether it may be known of what it is a copy, and what became of it: its person is told neither
+        while they work blind, nor ever of a copy without a name, which may be of a gold group."""
+        if one.batch_id in blind:
+            return False
+        own = reader is None or reader.person == one.person
+        return bool(heads[one.copy_id].same) or not own
+
     return [
         TakeView(
             id=one.id,
             batch=one.batch_id,
             group=one.copy_id,
             dataset=heads[one.copy_id].of_id,
-            # A copy that says not what it is of has another key.
-            of=one.group_id if heads[one.copy_id].same and one.batch_id not in blind else None,
-            title=heads[one.copy_id].label or heads[one.copy_id].key,
+            of=one.group_id if told else None,
+            number=heads[one.copy_id].number if told else None,
+            title=_title(heads[one.copy_id], told),
             person=one.person,
             place=one.place,
             begun=one.begun,
             handed_in=one.handed_in,
             verdict=one.verdict,
             # Of a gold group nothing is ever decided.
-            settled=None if one.batch_id in blind else one.settled,
+            settled=one.settled if told else None,
             handed_back=back.get(one.copy_id),
         )
-        for one in takes
+        for one, told in ((one, is_told(one)) for one in takes)
     ]
+
+
+def _title(head: Any, told: bool) -> str:
+    return str((head.of_label or head.of_key) if told else (head.label or head.key))
 
 
 def read_take(session: Session, take_id: int) -> Take:

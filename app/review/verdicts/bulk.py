@@ -13,6 +13,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from app.errors import ConflictError
+from app.plural import plural
 from app.review.idempotency import read_progress, save_progress
 from app.review.queue.fields import asks_blind
 from app.review.queue.query import MAX_LISTED_LENGTH, parse_query
@@ -208,7 +209,7 @@ def _left(rows: Sequence[Any], begun: Mapping[str, Any]) -> list[Any]:
 def _require_expected(found: SortedOut, expected: int | None) -> None:
     if expected is not None and expected != len(found.change):
         raise ConflictError(
-            f"{len(found.change)} groups would change, not {expected}",
+            f"{plural(len(found.change), 'group')} would change, not {expected}",
             hint="Look at what would happen once more (dry_run=true).",
         )
 

@@ -18,12 +18,13 @@ from app.store.store import Store
 from app.store.stored_json import Json, parse
 from app.store.versions import said_rows
 
-NEW, GONE = "not in the dataset before", "no longer in the dataset"
+NEW, GONE = "not in the dataset", "no longer in the dataset"
 
 
 @dataclass(frozen=True)
 class Passage:
-    """A group that came into the newer version, or that left it; ``why`` it was or is not in."""
+    """A group that came into the newer version, or that left it; ``why`` it was not in the older one, or is
+    not in the newer one."""
 
     group: str
     why: str
@@ -139,16 +140,16 @@ def read_changelog(session: Session, version: Version) -> list[str]:
 def changelog_lines(diff: VersionDiff) -> list[str]:
     """A diff in sentences."""
     lines = [f"Since {diff.older.name}:"]
-    for items, verb in ((diff.added, "added"), (diff.dropped, "dropped")):
+    for items, verb, when in ((diff.added, "added", "before"), (diff.dropped, "dropped", "now")):
         if items:
-            lines.append(f"{_groups(len(items))} {verb} ({_whys(items)}).")
+            lines.append(f"{_groups(len(items))} {verb} ({when}: {_whys(items)}).")
     for what, count in sorted(Counter(w for item in diff.changed for w in item.what).items()):
         lines.append(f"{_groups(count)} with {_CHANGES[what]}.")
     if diff.moved:
         metres = [item.metres for item in diff.moved]
         lines.append(
-            f"{plural(len(metres), 'ball')} moved, by {median(metres):.3g} m in the median and "
-            f"{metres[0]:.3g} m at most."
+            f"{plural(len(metres), 'ball')} moved, by {median(metres):.3f} m in the median and "
+            f"{metres[0]:.3f} m at most."
         )
     lines += [
         f"{item.name}: {_word(item.before)} before, {_word(item.after)} now."

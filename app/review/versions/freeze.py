@@ -6,6 +6,7 @@ version's own row come last, in one. Killed anywhere and started again it ends i
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -89,9 +90,10 @@ class FreezeRequest:
 
 @dataclass(frozen=True)
 class FreezePlan:
-    """What a freeze would do: how many groups enter, and why the others do not."""
+    """What a freeze would do: how many groups enter, in which split, and why the others do not."""
 
     groups: int
+    splits: Mapping[str, int]
     left_out: Mapping[str, int]
     unsolved: int
 
@@ -115,9 +117,14 @@ def plan_freeze(
     if strict:
         require_solved(candidates, found.name)
         _require_some(found, candidates, request.groups)
-    Splitter.of(request.split, {item.match for item in candidates})
+    splitter = Splitter.of(request.split, {item.match for item in candidates})
+    members = [item for item in candidates if item.why is None]
+    sides = Counter(
+        splitter.group(item.match, item.split, item.views) or NO_SPLIT for item in members
+    )
     return FreezePlan(
-        groups=sum(item.why is None for item in candidates),
+        groups=len(members),
+        splits=dict(sorted(sides.items())),
         left_out=_reasons(candidates),
         unsolved=sum(item.unsolved for item in candidates),
     )

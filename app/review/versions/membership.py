@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any, get_args
 
 from app.errors import ConflictError
+from app.plural import plural
 from app.soccer.choices import VersionRule
 from app.store.session import Session
 from app.store.stored_json import Json
@@ -23,6 +24,8 @@ class Candidate:
     """A group that may enter a version.
 
     Attributes:
+        split: As its dataset gives it.
+        views: Keys of its views.
         why: Why it does not; None: it does.
         verdict: State, reason, note and override; None where nobody decided.
         unsolved: It might enter, and nobody knows while it has no solution.
@@ -32,6 +35,7 @@ class Candidate:
     key: str
     match: str
     split: str
+    views: tuple[str, ...]
     why: str | None
     verdict: Json
     unsolved: bool
@@ -59,7 +63,7 @@ def require_solved(candidates: Sequence[Candidate], dataset: str) -> None:
     """Raise ConflictError where groups that might enter have no solution of this solver."""
     count = sum(item.unsolved for item in candidates)
     if count:
-        groups = "1 group waits" if count == 1 else f"{count} groups wait"
+        groups = plural(count, "group waits", "groups wait")
         raise ConflictError(
             f"{groups} to be solved and might enter the version",
             hint=f'The server solves them when it starts; touchline solve --dataset "{dataset}" '
@@ -74,6 +78,7 @@ def _candidate(row: Any, rule: str) -> Candidate:
         key=row.key,
         match=row.match,
         split=row.split,
+        views=tuple(row.view_keys.strip(",").split(",")),
         why=why,
         verdict=_verdict(row),
         unsolved=why == UNSOLVED,

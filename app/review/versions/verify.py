@@ -11,6 +11,7 @@ from itertools import islice
 from typing import Any
 
 from app.errors import DamagedError, JobCancelled, ReviewError, StorageError
+from app.plural import plural
 from app.progress import TellProgress
 from app.review.datasets.fan_out import fan_out
 from app.review.versions.hash import version_hash
@@ -95,14 +96,15 @@ class VerifyReport:
     def sentence(self) -> str:
         """The outcome in one sentence."""
         if self.ok:
-            return f"All {self.groups} groups and the hash came out as they were frozen."
+            groups = f"All {self.groups:,} groups" if self.groups != 1 else "The group"
+            return f"{groups} and the hash came out as they were frozen."
         why = ""
         if self.solver_version != self.solver_version_now:
             why = (
                 f"; the version was computed by solver {self.solver_version}, "
                 f"this is solver {self.solver_version_now}"
             )
-        return f"{self.groups - self.equal} of {self.groups} groups came out differently{why}."
+        return f"{self.groups - self.equal:,} of {plural(self.groups, 'group')} came out differently{why}."
 
     def add(self, found: Sequence[VersionDifference]) -> None:
         """Count differences, and keep the first."""

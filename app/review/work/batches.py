@@ -10,6 +10,7 @@ from enum import StrEnum
 from typing import Any
 
 from app.errors import ConflictError, InputError, NotFoundError
+from app.plural import plural
 from app.review.datasets.dataset import dataset_id
 from app.review.datasets.naming import checked_title
 from app.review.people.bell import RingKind, tell
@@ -409,7 +410,7 @@ def _tell(session: Session, batch: Batch, people: Iterable[str], actor: str) -> 
     by = person_of(actor)
     due = "" if batch.due is None else f", due {batch.due}"
     # Who is told how many groups it has counts how many gold ones are mixed in.
-    groups = "groups" if batch.gold_every is not None else f"{batch.groups} groups"
+    groups = "groups" if batch.gold_every is not None else plural(batch.groups, "group")
     said = f"{by} assigned you work: {batch.name}, {groups} of {batch.dataset}{due}"
     for name in dict.fromkeys(people):
         tell(

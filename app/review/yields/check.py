@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from app.config import Settings
+from app.plural import plural
 from app.review.doctor.check import Check
 from app.review.yields.arrays_file import map_arrays
 from app.review.yields.cache import ARRAYS
@@ -15,11 +16,11 @@ def examine_yields(settings: Settings) -> Check:
     files = [path for ending in ARRAYS for path in sorted(settings.yields.glob(f"*/*{ending}"))]
     damaged = [path for path in files if not _is_sound(path)]
     if damaged:
-        more = "" if len(damaged) == 1 else f" and {len(damaged) - 1:,} others"
+        more = "" if len(damaged) == 1 else f" and {plural(len(damaged) - 1, 'other')}"
         sentence = f"{damaged[0].relative_to(settings.home)}{more} cannot be read as written"
         mend = f"Stop the server and delete {settings.yields}: yields are counted anew."
         return Check("yields", False, sentence, mend)
-    count = "1 file" if len(files) == 1 else f"{len(files):,} files"
+    count = plural(len(files), "file")
     return Check("yields", True, f"{count} in the cache, each as it was written")
 
 

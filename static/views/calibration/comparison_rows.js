@@ -2,7 +2,7 @@
 /** Before and after: what the staged lines change, number by number. */
 
 import { gradeBelow, gradeOfJac } from '../../geometry/residual.js';
-import { fixed, pixels, sharePercent } from '../../lib/format.js';
+import { degrees, fixed, metres, pixelText, sharePercent } from '../../lib/format.js';
 import { ballError } from '../../overlays/scene.js';
 
 /** @import {GroupDocument, SolutionJson, ViewSolutionJson} from '../../api/types.js' */
@@ -40,18 +40,18 @@ const MEASURES = [
 		say: to(2), better: 1, step: 0.005,
 	})),
 	{ name: 'median', label: 'Median point', read: (_, solved) => solved?.calibration.error_px, say: to(2, ' px'), better: -1, step: 0.005 },
-	{ name: 'worst', label: 'Worst point', read: (_, solved) => worstLine(solved), say: to(1, ' px'), better: -1, step: 0.05 },
+	{ name: 'worst', label: 'Worst point', read: (_, solved) => worstLine(solved), say: pixelText, better: -1, step: 0.05 },
 	{ name: 'supported', label: 'Markings with paint', read: (_, solved) => solved?.calibration.paint?.supported, say: share, better: 1, step: 0.005, rare: true },
 	{ name: 'explained', label: 'Paint with a marking', read: (_, solved) => solved?.calibration.paint?.explained, say: share, better: 1, step: 0.005, rare: true },
-	{ name: 'ball', label: 'Ball here', read: (solution, solved) => (solved ? ballError(solved.view, solution) : null), say: (value) => (value === null || value === undefined ? pixels(value) : `${pixels(value)} px`), better: -1, step: 0.05 },
+	{ name: 'ball', label: 'Ball here', read: (solution, solved) => (solved ? ballError(solved.view, solution) : null), say: pixelText, better: -1, step: 0.05 },
 	{ name: 'ratio', label: 'Ball Ø ratio', read: (_, solved) => solved?.ball?.size_ratio, say: to(2, '×'), better: 0, step: 0.005 },
 	{ name: 'gates', label: 'Gates passed', read: (solution) => solution?.gates.filter(({ active, passed }) => active && passed).length, say: to(0), better: 1, step: 0.5 },
 	{ name: 'views', label: 'Views used', read: (solution) => solution?.ball?.views.length ?? 0, say: to(0), better: 1, step: 0.5 },
-	{ name: 'x', label: 'Ball x', read: (solution) => solution?.ball?.point[0], say: to(2, ' m'), better: 0, step: 0.005 },
-	{ name: 'y', label: 'Ball y', read: (solution) => solution?.ball?.point[1], say: to(2, ' m'), better: 0, step: 0.005 },
-	{ name: 'height', label: 'Ball height', read: (solution) => solution?.ball?.height_m, say: to(2, ' m'), better: 0, step: 0.005 },
-	{ name: 'sigma', label: 'σ', read: (solution) => solution?.ball?.sigma_m, say: to(3, ' m'), better: -1, step: 0.0005 },
-	{ name: 'parallax', label: 'Parallax', read: (solution) => solution?.ball?.parallax_degrees, say: to(1, '°'), better: 0, step: 0.05 },
+	{ name: 'x', label: 'Ball x', read: (solution) => solution?.ball?.point[0], say: metres, better: 0, step: 0.005 },
+	{ name: 'y', label: 'Ball y', read: (solution) => solution?.ball?.point[1], say: metres, better: 0, step: 0.005 },
+	{ name: 'height', label: 'Ball height', read: (solution) => solution?.ball?.height_m, say: metres, better: 0, step: 0.005 },
+	{ name: 'sigma', label: 'σ', read: (solution) => solution?.ball?.sigma_m, say: metres, better: -1, step: 0.005 },
+	{ name: 'parallax', label: 'Parallax', read: (solution) => solution?.ball?.parallax_degrees, say: degrees, better: 0, step: 0.05 },
 ];
 
 /**

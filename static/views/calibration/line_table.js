@@ -5,7 +5,7 @@ import { html } from 'htm/preact';
 
 import { diagonal } from '../../geometry/preview.js';
 import { GLYPHS } from '../../geometry/residual.js';
-import { fixed, pixels, shortMarking } from '../../lib/format.js';
+import { fixed, pixelText, pixels, shortMarking } from '../../lib/format.js';
 import { changed, choice, hovered } from '../../state/calibration.js';
 import { Undrawn } from '../view_lines.js';
 import { pickMarking } from './actions.js';
@@ -40,7 +40,7 @@ function influenceOf(influence) {
 	const gained = after - before;
 	const text = Math.abs(gained) < WORTH ? '±0' : `${gained > 0 ? '+' : '−'}${Math.abs(gained).toFixed(2)}`;
 	const far = influence.largest_px_without;
-	const own = far === null ? '' : `; it is then ${pixels(far)} px off`;
+	const own = far === null ? '' : `; it is then ${pixelText(far)} off`;
 	const title = `Without it: JaC 0.5 % ${before.toFixed(2)} → ${after.toFixed(2)}${own}`;
 	return { text, grade: gained > WORTH ? 'warn' : 'unseen', title };
 }
@@ -84,7 +84,7 @@ export function LineTable({ picture, influences }) {
 							<th scope="col" title="Annotated points">n</th>
 							<th scope="col" title="Worst point; ticks at 0.5 and 1 %, the end is 2 % of the diagonal">to 2 %</th>
 							<th scope="col" title="Worst point, pixels">px</th>
-							${known ? html`<th scope="col" title=${`Change of JaC 0.5 % when the camera is found without this line${changed.value ? '; for the saved lines' : ''}`}>without</th>` : null}
+							${known ? html`<th scope="col" title=${`Change of JaC 0.5 % when the camera is found without this line${changed.value ? '; for the saved lines' : ''}`}>JaC without</th>` : null}
 						</tr>
 					</thead>
 					<tbody>

@@ -7,7 +7,7 @@ import { useCallback, useState } from 'preact/hooks';
 import { getStation } from '../../api/calibration.js';
 import { ApiError, sentenceOf } from '../../api/problem.js';
 import { deleteRig, postRig } from '../../api/rig.js';
-import { capital, count, fixed, plural } from '../../lib/format.js';
+import { capital, count, fixed, metres, pixelText, pixels, plural } from '../../lib/format.js';
 import { useResource } from '../../lib/resource.js';
 import { follow, isOver } from '../../state/jobs.js';
 import { announce } from '../../state/notice.js';
@@ -25,7 +25,7 @@ const CHOICES = /** @type {{name: Accepted, label: string, note: string}[]} */ (
 
 /** @param {number | null} before @param {number | null} after */
 function change(before, after) {
-	return before === null || after === null ? '–' : `${fixed(before, 1)} → ${fixed(after, 1, ' px')}`;
+	return before === null || after === null ? '–' : `${pixels(before)} → ${pixelText(after)}`;
 }
 
 /** @param {{proposal: RigProposal}} props */
@@ -37,8 +37,8 @@ function Proposal({ proposal }) {
 				<tbody>${proposal.cameras.map((camera) => html`
 					<tr key=${camera.key} data-camera=${camera.key}>
 						<th scope="row">${camera.key}</th>
-						<td data-numeric="true">${fixed(camera.moved_m, 2, ' m')} <small>±${fixed(camera.position_sigma_m, 2)}</small></td>
-						<td data-numeric="true">${fixed(camera.picture_px, 1, ' px')}</td>
+						<td data-numeric="true">${metres(camera.moved_m)} <small>±${fixed(camera.position_sigma_m, 2)}</small></td>
+						<td data-numeric="true">${pixelText(camera.picture_px)}</td>
 						<td data-numeric="true">${change(camera.lines_before_px, camera.lines_after_px)}</td>
 					</tr>`)}</tbody>
 			</table>
@@ -53,7 +53,7 @@ function Proposal({ proposal }) {
 					</tr>`)}</tbody>
 			</table>
 		</div>
-		<p>${plural(proposal.frames, 'instant')} ${proposal.frames === 1 ? 'was' : 'were'} used, ${count(proposal.gross)} left out, because their cameras do not show one ball. Balls move by ${fixed(proposal.ball_moved_m, 2, ' m')} in the median. The cameras are ${proposal.anchor}. ${capital(proposal.time)}.</p>
+		<p>${plural(proposal.frames, 'instant')} ${proposal.frames === 1 ? 'was' : 'were'} used, ${count(proposal.gross)} left out, because their cameras do not show one ball. Balls move by ${metres(proposal.ball_moved_m)} in the median. The cameras are ${proposal.anchor}. ${capital(proposal.time)}.</p>
 		${proposal.left_alone.length ? html`<p data-grade="warn">Too few common balls: ${proposal.left_alone.join(', ')}</p>` : null}
 	`;
 }

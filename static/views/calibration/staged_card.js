@@ -3,7 +3,7 @@
 
 import { html } from 'htm/preact';
 
-import { fixed, pixels } from '../../lib/format.js';
+import { fixed, pixelText } from '../../lib/format.js';
 import { asking, isWaiting, proposeFromPaint, snapToPaint } from '../../state/paint.js';
 import { changed, changes, choice, discardStaged, lines, mode, redo, staging, undo } from '../../state/calibration.js';
 import { deleteChosen, deleteMarking, insertPoint, save, swapAllSides, toggleDrawing, toggleRelabelling } from './actions.js';
@@ -32,7 +32,7 @@ function Points({ picture }) {
 				<li key=${i}>
 					<button type="button" aria-pressed=${chosen.index === i} onClick=${() => { choice.value = { marking: chosen.marking, index: i }; }}>
 						<span>${i + 1}</span><span>${fixed(x, 1)}</span><span>${fixed(y, 1)}</span>
-						<span>${fit?.points[i]?.distance === undefined ? '' : `${pixels(fit.points[i].distance)} px`}</span>
+						<span>${fit?.points[i]?.distance === undefined ? '' : pixelText(fit.points[i].distance)}</span>
 					</button>
 				</li>`)}
 		</ol>

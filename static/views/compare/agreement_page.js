@@ -12,7 +12,7 @@ import { withValue } from '../../lib/field.js';
 import { fixed, plural, words } from '../../lib/format.js';
 import { useResource } from '../../lib/resource.js';
 import { pageDataset } from '../../lib/router.js';
-import { reviewAddress } from '../../state/navigation.js';
+import { queueAddress, reviewAddress } from '../../state/navigation.js';
 import { whyNot } from '../../state/rights.js';
 import { Loading, PageFrame, Trouble } from '../page_frame.js';
 import { When } from '../when.js';
@@ -71,12 +71,18 @@ function PeopleRow({ one, name }) {
 	`;
 }
 
+/** Whether the annotations of a group agree, and nobody has judged it. @param {GroupAgreementJson} one */
+function isUnjudged({ state, status }) {
+	return state === 'agreed' && status === 'unreviewed';
+}
+
 /** @param {{found: AgreementJson, dataset: string, batch: number | null}} props */
 function PeopleCard({ found, dataset, batch }) {
+	const unjudged = found.groups.filter(isUnjudged).length;
 	return html`
 		<section class="card card--flush" aria-labelledby="agreement-people">
 			<h2 id="agreement-people">Agreement<span class="card__aside">median · 95th percentile, of JaC the 5th</span></h2>
-			<p class="agreement__text">Settled automatically, because all agree: ${found.agreed}; decided: ${found.decided}; waiting for a decision: ${found.open}. Krippendorff’s α of the verdicts: ${coefficient(found.alpha)}.</p>
+			<p class="agreement__text">All agree, so that the first annotation is used: ${found.agreed}${unjudged ? html` (<a class="link" href=${queueAddress(dataset, 'annotations:agreed status:unreviewed')}>${unjudged} without a verdict</a>)` : null}; decided: ${found.decided}; waiting for a decision: ${found.open}. Krippendorff’s α of the verdicts: ${coefficient(found.alpha)}.</p>
 			<div class="table__scroll" tabindex="0" role="region" aria-label="Agreement by pair of people">
 				<table class="table">
 					<thead><tr><th>people</th><th data-numeric="true">groups</th><th data-numeric="true">κ of verdicts</th><th data-numeric="true">lines, px</th><th data-numeric="true">ball, px</th><th data-numeric="true">3D ball, m</th><th data-numeric="true">JaC</th><th data-numeric="true">cameras, m</th></tr></thead>
@@ -116,7 +122,7 @@ function LimitsCard({ limits, dataset, saved }) {
 	return html`
 		<section class="card" aria-labelledby="agreement-limits">
 			<h2 id="agreement-limits">Limits</h2>
-			<p>Annotations agree when they have the same verdict and differ by no more than this. A group whose annotations agree is settled automatically: the first one submitted is used.</p>
+			<p>Annotations agree when they have the same verdict and differ by no more than this. The first annotation of a group whose annotations agree is used automatically, with the verdict that they gave. Where they gave none, the group waits for a verdict in the queue.</p>
 			<form class="agreement__limits" onSubmit=${save}>
 				${LIMITS.map(({ name, label, step }) => html`
 					<label key=${name}><span>${label}</span><input class="field"
@@ -137,7 +143,7 @@ function GroupRow({ one }) {
 	return html`
 		<tr>
 			<th scope="row"><a href=${link}>${one.number}</a></th><td>${said}</td>
-			<td>${one.state}${one.taken ? html`<small>${one.taken}’s${one.state === 'decided' ? `, by ${one.decided_by}` : ''}${one.outcome === 'start' ? ', continued from' : ''}</small>` : null}</td>
+			<td>${one.state}${isUnjudged(one) ? ', no verdict' : ''}${one.taken ? html`<small>${one.taken}’s${one.state === 'decided' ? `, by ${one.decided_by}` : ''}${one.outcome === 'start' ? ', continued from' : ''}</small>` : null}</td>
 			<td data-numeric="true">${one.disagreements}</td><td data-numeric="true">${spread(one.spreads.line_px, 1)}</td>
 			<td data-numeric="true">${spread(one.spreads.ball_px, 1)}</td><td data-numeric="true">${fixed(one.spreads.ball_m.median, 2)}</td><td data-numeric="true">${spread(one.spreads.jac, 2)}</td>
 		</tr>
@@ -162,7 +168,7 @@ function GroupsCard({ found }) {
 
 /** @param {TakeJson} one */
 function stateOf({ handed_in: handed, settled, handed_back: back }) {
-	if (settled) return html`over <small><${When} at=${settled} /></small>`;
+	if (settled) return html`<span title="It is used in its group, or another one is">done</span> <small><${When} at=${settled} /></small>`;
 	if (handed) return html`<strong>submitted</strong> <small><${When} at=${handed} /></small>`;
 	return back ? html`returned by ${back.by}${back.reason ? html`<small>“${back.reason}”</small>` : null}` : 'in progress';
 }
@@ -184,7 +190,7 @@ function TakesCard({ dataset, batch }) {
 				<table class="table">
 					<thead><tr><th>group</th><th>person</th><th>verdict</th><th>state</th></tr></thead>
 					<tbody>${sorted.slice(0, MOST_ROWS).map((one) => html`
-						<tr key=${one.id}><th scope="row"><a href=${reviewAddress(one.group)}>${one.title}</a></th><td>${one.person}</td><td>${words(one.verdict ?? '–')}</td><td>${stateOf(one)}</td></tr>`)}</tbody>
+						<tr key=${one.id}><th scope="row"><a href=${reviewAddress(one.group)}>${one.number === null ? one.title : `${one.number} · ${one.title}`}</a></th><td>${one.person}</td><td>${words(one.verdict ?? '–')}</td><td>${stateOf(one)}</td></tr>`)}</tbody>
 				</table>
 			</div>
 			${items.length > MOST_ROWS ? html`<p class="agreement__text">The first ${MOST_ROWS} of ${items.length}; choose a batch to see its own.</p>` : null}

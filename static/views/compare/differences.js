@@ -3,7 +3,7 @@
 
 import { html } from 'htm/preact';
 
-import { capital, fixed, pixels, words } from '../../lib/format.js';
+import { capital, fixed, metres, pixelText, pixels, words } from '../../lib/format.js';
 import { numbers, pair, pointed, pointOut } from '../../state/compare.js';
 import { Letter } from '../letter.js';
 
@@ -64,12 +64,12 @@ export function NumberCard({ names, limits, letter }) {
 					<${BallRows} view=${view} names=${names} limits=${limits} />
 					<${Row} label=${`JaC, camera of ${names[0]} on lines of ${names[1]}`} value=${fixed(view.jac[0], 2)} grade=${gradeOf(view.jac[0], limits.jac, true)} />
 					<${Row} label=${`JaC, camera of ${names[1]} on lines of ${names[0]}`} value=${fixed(view.jac[1], 2)} grade=${gradeOf(view.jac[1], limits.jac, true)} />
-					<${Row} label="cameras apart" value=${fixed(view.position_m, 2, ' m')} />
-					<${Row} label=${`3D balls apart${explained}`} value=${fixed(ball?.distance_m ?? null, 2, ' m')} grade=${gradeOf(ball?.distance_m ?? null, limits.ball_m)} />
-					${ball?.sigmas_m.some((one) => one !== null) ? html`<${Row} label="their σ" value=${ball.sigmas_m.map((one) => fixed(one, 2, ' m')).join(' and ')} />` : null}
+					<${Row} label="cameras apart" value=${metres(view.position_m)} />
+					<${Row} label=${`3D balls apart${explained}`} value=${metres(ball?.distance_m ?? null)} grade=${gradeOf(ball?.distance_m ?? null, limits.ball_m)} />
+					${ball?.sigmas_m.some((one) => one !== null) ? html`<${Row} label="their σ" value=${ball.sigmas_m.map((one) => metres(one)).join(' and ')} />` : null}
 					${view.lines.map((line) => html`<${Row}
 						key=${line.marking} label=${line.marking}
-						value=${line.only ? `only annotation ${names[line.only === 'a' ? 0 : 1]}` : `${pixels(line.mean_px)} px, at most ${pixels(line.largest_px)}`}
+						value=${line.only ? `only annotation ${names[line.only === 'a' ? 0 : 1]}` : `${pixelText(line.mean_px)}, at most ${pixels(line.largest_px)}`}
 						grade=${line.only ? 'warn' : gradeOf(line.largest_px, limits.line_px)} />`)}
 				</tbody></table>
 			</div>
@@ -83,7 +83,7 @@ function BallRows({ view: { ball }, names, limits }) {
 	const said = same ? words(ball.a) : `${names[0]} ${words(ball.a)}, ${names[1]} ${words(ball.b)}`;
 	return html`
 		<${Row} label="ball" value=${said} grade=${same ? 'ok' : 'warn'} />
-		<${Row} label="ball centres apart" value=${`${pixels(ball.center_px)} px`} grade=${gradeOf(ball.center_px, limits.ball_px)} />
-		<${Row} label="ball diameters" value=${`${ball.diameter_px !== null && ball.diameter_px > 0 ? '+' : ''}${fixed(ball.diameter_px, 1, ' px')}`} grade=${gradeOf(ball.diameter_px === null ? null : Math.abs(ball.diameter_px), limits.diameter_px)} />
+		<${Row} label="ball centres apart" value=${pixelText(ball.center_px)} grade=${gradeOf(ball.center_px, limits.ball_px)} />
+		<${Row} label="ball diameters" value=${`${ball.diameter_px !== null && ball.diameter_px > 0 ? '+' : ''}${pixelText(ball.diameter_px)}`} grade=${gradeOf(ball.diameter_px === null ? null : Math.abs(ball.diameter_px), limits.diameter_px)} />
 	`;
 }

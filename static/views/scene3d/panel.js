@@ -6,7 +6,7 @@ import { useEffect, useMemo, useRef, useState } from 'preact/hooks';
 
 import { spreadApart } from '../../geometry/spread.js';
 import { colours } from '../../lib/colours.js';
-import { fixed } from '../../lib/format.js';
+import { metres } from '../../lib/format.js';
 import { useKeys, useSize } from '../../lib/hooks.js';
 import { useFrames } from '../../state/frames.js';
 import { goToPreset, lookThrough, standpoint, toggleScene } from '../../state/scene3d.js';
@@ -108,7 +108,7 @@ function Stage({ scene, images }) {
 					<svg class="scene3d__leaders" aria-hidden="true">${scene.stands.map(({ letter }) => html`<path key=${letter} data-leader=${letter} />`)}</svg>
 					${scene.stands.map(({ letter, label }) => html`
 						<button key=${letter} class="scene3d__camera letter" type="button" data-letter=${letter} data-label=${letter} title=${`Look through ${label}`} aria-label=${`Look through camera ${letter}`} onClick=${() => lookThrough(letter)}>${letter}</button>`)}
-					${scene.ball || scene.best ? html`<span class="scene3d__height" data-label="ball">${fixed((scene.best ?? scene.ball)?.height, 2, ' m')}</span>` : null}
+					${scene.ball || scene.best ? html`<span class="scene3d__height" data-label="ball">${metres((scene.best ?? scene.ball)?.height)}</span>` : null}
 				</div>`}
 		</div>
 	`;

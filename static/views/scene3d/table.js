@@ -3,7 +3,7 @@
 
 import { html } from 'htm/preact';
 
-import { fixed } from '../../lib/format.js';
+import { fixed, metres } from '../../lib/format.js';
 import { Letter } from '../letter.js';
 
 /** @import {PlacedBall, SceneValues, Stand} from './values.js' */
@@ -21,14 +21,14 @@ function Row({ name, what, point, rest }) {
 /** @param {Stand} stand @param {SceneValues} scene */
 function standText({ camera, used }, { best, ball }) {
 	const point = (best ?? ball)?.point;
-	const away = point ? `${fixed(Math.hypot(...camera.C.map((value, i) => value - point[i])), 1)} m from the ball` : '';
+	const away = point ? `${metres(Math.hypot(...camera.C.map((value, i) => value - point[i])))} from the ball` : '';
 	return [used ? '' : 'not used', away].filter(Boolean).join(', ');
 }
 
 /** @param {PlacedBall} ball */
 function ballText({ sigma, ellipsoid }) {
 	const size = ellipsoid ? `2σ ${ellipsoid.radii.map((radius) => fixed(radius, 2)).join(' × ')} m` : '';
-	return [sigma === null ? '' : `σ ${fixed(sigma, 2)} m`, size].filter(Boolean).join(', ');
+	return [sigma === null ? '' : `σ ${metres(sigma)}`, size].filter(Boolean).join(', ');
 }
 
 /** @param {{scene: SceneValues}} props */

@@ -7,7 +7,7 @@ import { useCallback, useEffect, useRef, useState } from 'preact/hooks';
 import { diagonal } from '../../geometry/preview.js';
 import { Canvas } from '../../lib/canvas.js';
 import { colours } from '../../lib/colours.js';
-import { count, fixed, pixels } from '../../lib/format.js';
+import { count, metres, pixelText } from '../../lib/format.js';
 import { useSize } from '../../lib/hooks.js';
 import { groupDocument } from '../../state/group.js';
 import {
@@ -37,8 +37,8 @@ function words(all, index) {
 	const state = passes === null ? 'not solved' : passes ? 'passes' : `fails ${(all.gate[index] ?? '').replaceAll('_', ' ')}`;
 	const error = all.error_px[index];
 	const point = all.point[index];
-	const place = point ? `, ${fixed(-point[2], 1)} m high` : '';
-	return `Frame ${frame}: ${error === null ? 'no error' : `${pixels(error)} px`}, ${state}${place}${verdict}`;
+	const place = point ? `, ${metres(-point[2])} high` : '';
+	return `Frame ${frame}: ${error === null ? 'no error' : pixelText(error)}, ${state}${place}${verdict}`;
 }
 
 const STEPS = /** @type {Record<string, number>} */ ({
@@ -134,7 +134,7 @@ export function Timeline() {
 				<button class="button" type="button" onClick=${goToWorst}>Worst <kbd>J</kbd></button>
 				<button class="button" type="button" aria-label="Zoom in" title="Zoom in (wheel)" onClick=${() => zoomSpan(0.5)}>+</button>
 				<button class="button" type="button" aria-label="Zoom out" title="Zoom out (wheel)" onClick=${() => zoomSpan(2)}>−</button>
-				<span class="timeline__key"><span aria-hidden="true">- -</span> limit ${pixels(limit)} px</span>
+				<span class="timeline__key"><span aria-hidden="true">- -</span> limit ${pixelText(limit)}</span>
 			</div>
 			${all && all.id.length > 0 ? html`<${Curve} all=${all} limit=${limit} />` : html`<p class="empty-note" role="status">${trouble.value || 'Loading the frames…'}</p>`}
 		</section>

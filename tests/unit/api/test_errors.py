@@ -16,6 +16,7 @@ from app.api.errors import (
     status_of,
 )
 from app.api.schemas.annotation import LinesEdit
+from app.api.schemas.people import NewSession
 from app.errors import (
     ConflictError,
     DatasetFormatError,
@@ -95,6 +96,9 @@ def client(plain_app: FastAPI, client_of):
         view: Annotated[int, Path(ge=1)], edit: LinesEdit, limit: Annotated[int, Query(le=5)] = 1
     ) -> None: ...
 
+    @plain_app.post("/session")
+    def log_in(said: NewSession) -> None: ...
+
     install_handlers(plain_app)
     return client_of(plain_app)
 
@@ -157,7 +161,20 @@ class TestValidationErrors:
     def test_the_pointer_leads_to_the_field(self, client) -> None:
         problem = self.problem(client, {"lines": {"Middle line": [{"x": 1.0}]}})
         assert problem["pointer"] == "/lines/Middle line/0/y"
-        assert problem["detail"].startswith("/lines/Middle line/0/y: field required")
+        assert problem["detail"].startswith("/lines/Middle line/0/y: is missing")
+
+    @pytest.mark.parametrize(
+        ("password", "sentence"),
+        [
+            ("x" * 201, "/password: must have 200 characters or less"),
+            ("", "/password: must have 1 characters or more"),
+            (7, "/password: must be a text"),
+        ],
+        ids=["long", "empty", "number"],
+    )
+    def test_a_login_is_refused_in_plain_words(self, client, password, sentence) -> None:
+        answer = client.post("/session", json={"name": "anna", "password": password})
+        assert (answer.status_code, answer.json()["detail"]) == (422, sentence)
 
     def test_an_unknown_marking_is_named(self, client) -> None:
         problem = self.problem(client, {"lines": {"Midfield/line": None}})

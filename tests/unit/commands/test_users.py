@@ -88,11 +88,12 @@ class TestUsers:
                 "SMTP_FROM": "box@example.org",
             }.items():
                 monkeypatch.setenv(f"TOUCHLINE_{name}", value)
-            done = run("users", "add", "anna", "--email", "anna@example.org", "--json")
-        told = json.loads(done.stdout)
-        assert told["mailed"] is True
-        assert "link" not in told
-        assert [to for _, to in box.envelopes] == ["anna@example.org"]
+            for command in ("add", "reset"):
+                done = run("users", command, "anna", "--email", "anna@example.org", "--json")
+                told = json.loads(done.stdout)
+                assert told["mailed"] is True
+                assert "link" not in told
+        assert [to for _, to in box.envelopes] == 2 * ["anna@example.org"]
 
     def test_many_are_invited_from_a_file(self, tmp_path: Path, store: Store) -> None:
         file = tmp_path / "people.csv"

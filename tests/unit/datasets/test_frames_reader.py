@@ -7,8 +7,9 @@ import pytest
 from PIL import Image
 
 from app.config import Settings
-from app.datasets.frames_reader import read_frames
+from app.datasets.frames_reader import check_grouping, read_frames
 from app.datasets.report import Report
+from app.errors import InputError
 from app.soccer.frames import ImageSize
 from app.soccer.group import Group
 from app.soccer.media import Media
@@ -21,8 +22,12 @@ def size_of(data: bytes, name: str) -> ImageSize:
     return ImageSize(header.width, header.height)
 
 
-def read(root: Path, report: Report) -> list[Group]:
-    return list(read_frames(root, size_of, report))
+def read(root: Path, report: Report, grouping: str = "") -> list[Group]:
+    return list(read_frames(root, size_of, report, grouping=grouping))
+
+
+def keys(groups: list[Group]) -> dict[str, list[str]]:
+    return {group.key: [view.key for view in group.views] for group in groups}
 
 
 @pytest.fixture
@@ -87,3 +92,53 @@ class TestReadFrames:
         Image.new("RGB", (128, 72)).save(tmp_path / "a.jpg", icc_profile=bytes(200_000))
         (group,) = read(tmp_path, report)
         assert group.views[0].size == ImageSize(128, 72)
+
+
+class TestGrouping:
+    @pytest.fixture
+    def instants(self, tmp_path: Path) -> Path:
+        root = tmp_path / "instants"
+        for name in ("1_main.jpg", "1_goal.JPG", "2_main.jpg", "poster.png", "late/1_main.jpg"):
+            (root / name).parent.mkdir(parents=True, exist_ok=True)
+            Image.new("RGB", (128, 72)).save(root / name)
+        return root
+
+    def test_pictures_of_a_folder_are_one_group(self, instants: Path, report: Report) -> None:
+        assert keys(read(instants, report, "folder")) == {
+            "pictures": ["1_goal.JPG", "1_main.jpg", "2_main.jpg", "poster.png"],
+            "late": ["1_main.jpg"],
+        }
+        assert report.remarks == [
+            "Grouped by folder: 5 pictures in 2 groups; for example pictures: 1_goal.JPG, "
+            "1_main.jpg, 2_main.jpg, poster.png."
+        ]
+
+    def test_a_pattern_groups_by_the_instant_within_a_folder(
+        self, instants: Path, report: Report
+    ) -> None:
+        groups = read(instants, report, "{instant}_{camera}.jpg")
+        assert keys(groups) == {
+            "1": ["1_goal.JPG", "1_main.jpg"],
+            "2": ["2_main.jpg"],
+            "late/1": ["1_main.jpg"],
+            "poster.png": ["poster.png"],
+        }
+        assert len({view.station.key for group in groups for view in group.views}) == 5
+        assert report.remarks[1:] == [
+            "1 picture does not fit {instant}_{camera}.jpg: each is a group of its own."
+        ]
+
+    @pytest.mark.parametrize(
+        "grouping",
+        ["folders", "{instant}.jpg", "{instant}_{camera}_{camera}", "{a}{instant}{camera}"],
+    )
+    def test_what_is_no_pattern_is_refused(self, grouping: str) -> None:
+        with pytest.raises(InputError, match=r"with \{instant\} and \{camera\}"):
+            check_grouping(grouping)
+
+    def test_letters_of_patterns_mean_themselves(self) -> None:
+        pattern = check_grouping("cam({camera}) {instant}.png")
+        assert pattern is not None
+        found = pattern.fullmatch("cam(a.b) 00:17.png")
+        assert found is not None
+        assert (found["instant"], found["camera"]) == ("00:17", "a.b")

@@ -44,8 +44,8 @@ class TestReadSoccernetV3:
         file.write_text(text[:line] + bad + text[text.index(",", line) :])
         assert len(_read(root, report)) == 2
         # The number with its place in the file, and the line that it costs.
-        number, line = report.problems
-        assert "read as missing" in number.problem
+        (number,), (line,) = report.remarks, report.problems
+        assert "read as missing" in number
         assert (line.record, line.field) == ("7.png", "lines[0].points")
 
     @pytest.mark.parametrize("depth", [0, 1, 2, 3])

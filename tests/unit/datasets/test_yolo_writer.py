@@ -74,7 +74,7 @@ class TestWriteYolo:
     ) -> None:
         record = solved(soccer_group())
         write_yolo(tmp_path, [replace(record, frames={"7.png": "images/train/x_7.png"})])
-        assert "1 images are not in this export" in (tmp_path / "data.yaml").read_text()
+        assert "1 image is not in this export" in (tmp_path / "data.yaml").read_text()
         with (tmp_path / "frames.csv").open(newline="") as file:
             first, second = csv.DictReader(file)
         assert (first["image"], first["present"]) == ("images/train/x_7.png", "True")

@@ -167,7 +167,7 @@ class TestNotSynchronous:
         assert (item.kind, item.number) == ("not_synchronous", 50.0)
         assert item.threshold == pytest.approx(TAU)
         assert item.sentence.startswith(
-            "The two views do not see the ball in the same place (30.0 and 50.0 px"
+            "The two views do not see the ball in the same place (30.0 px and 50.0 px"
         )
 
     def test_rays_that_meet_behind_a_camera_are_not_told_as_pixels_that_are_allowed(self) -> None:
@@ -258,21 +258,21 @@ class TestOfTheBall:
         (item,) = found(made("ab"), ball=replace(GOOD, sigma_m=sigma))
         assert (item.number, item.is_unusable_ball) == (sigma, unusable)
         assert item.threshold == (2.0 if unusable else 0.25)
-        assert (f"known to ± {sigma:.1f} m only" in item.sentence) == unusable
+        assert (f"known to ± {sigma:.2f} m only" in item.sentence) == unusable
 
     def test_an_implausible_place_of_which_nothing_is_known_says_so(self) -> None:
         ball = replace(GOOD, point=(0.0, 42.0, -14.0), sigma_m=64.6, parallax_degrees=0.2)
         item = found(made("ab"), ball=ball)[0]
         assert (item.kind, item.number, item.threshold) == ("implausible_ball", 8.0, 6.5)
         assert (
-            "is 8 m outside the pitch at a height of 14 m, known to ± 64.6 m only, with rays that "
+            "is 8 m outside the pitch at a height of 14.00 m, known to ± 64.60 m only, with rays that "
             "meet at 0.2°"
         ) in item.sentence
 
     def test_an_implausible_ball_has_the_number_of_what_is_wrong_first(self) -> None:
         (item,) = found(made("ab"), ball=replace(GOOD, point=(70.0, 2.0, 0.75)))
         assert (item.kind, item.number, item.threshold) == ("implausible_ball", 0.75, 0.5)
-        assert "lies 0.8 m below the grass and is 18 m outside the pitch" in item.sentence
+        assert "lies 0.75 m below the grass and is 18 m outside the pitch" in item.sentence
 
 
 class TestSidesSwapped:

@@ -103,6 +103,11 @@ class TestCalibratable:
         found = gates([seen("A"), seen("B", **NO_CAMERA), seen("C")])["calibratable"]
         assert found == Gate("calibratable", True, 2.0, 2, 0.0, "in 2 of 3 views")
 
+    def test_says_which_cameras_the_lines_do_not_determine(self):
+        guess = replace(MEASURED, unobservable=("position",))
+        found = gates([seen("A"), seen("B", calibration=guess)])["calibratable"]
+        assert (found.passed, found.sentence) == (True, "in 2 of 2 views, B uncertain")
+
     def test_a_group_of_one_view_needs_one_camera(self):
         assert gates([seen("A")])["calibratable"].threshold == 1
 

@@ -11,13 +11,15 @@ import pytest
 from app.geometry.camera import Camera
 from app.geometry.polyline import clip_polyline
 from app.geometry.rotation import rotation_from_pan_tilt_roll
+from app.soccer.annotation import make_lines
 from app.soccer.finding import Fix
+from app.soccer.frames import ImagePoint, ImageSize
 from app.soccer.group import Group, Station, View
 from app.soccer.paint_evidence import PaintEvidence, PaintPoint, PaintReading
 from app.soccer.picture import OPEN
 from app.soccer.pitch import MARKINGS, Pitch
 from app.soccer.policy import PAPER, TOUCHLINE
-from app.solving.calibrate import calibrate_view, view_key
+from app.solving.calibrate import calibrate_view, sought_key, view_key
 from app.solving.solve import solve
 from tests.balls import box_around
 from tests.cameras import SIZE
@@ -60,7 +62,7 @@ def clicked() -> Group:
 def read(group: Group, **changes) -> Group:
     """The group, the paint of whose first picture was read."""
     view = group.views[0]
-    key = view_key(group, view, CLICKS)
+    key = sought_key(group, view, CLICKS)
     reading = PaintReading("f" * 32, key, painted(MAIN), None, 0.9, 0.8)
     return replace(group, paint={view.key: replace(reading, **changes)})
 
@@ -134,6 +136,35 @@ class TestKey:
         view = clicked().views[0]
         assert view_key(clicked(), view, TOLD) == view_key(clicked(), view, CLICKS)
 
+    def test_what_counts_as_missing_leaves_paint_as_it_was_read(self):
+        """It changes how a camera is measured, and no camera."""
+        group = read(clicked())
+        view = group.views[0]
+        hidden = replace(view, station=replace(view.station, not_visible=("Circle left",)))
+        hiding = group.with_view(hidden)
+        for shortest in (0.0, 5.0, 9.0):
+            policy = replace(TOLD, shortest_marking_px=shortest)
+            found, other = first(group, policy), first(hiding, policy)
+            assert found.source == other.source == "paint"
+            assert found.camera == other.camera == first(group).camera
+        keys = {
+            view_key(group, view, replace(TOLD, shortest_marking_px=shortest))
+            for shortest in (0.0, 5.0)
+        }
+        assert len(keys) == 2
+
+    def test_paint_that_was_read_before_stays_known(self):
+        """Stored readings name the key that all of a calibration had before."""
+        lines = {"Middle line": [ImagePoint(480.0, 100.5), ImagePoint(490.25, 500.0)]}
+        station = Station("a", ImageSize(960, 540), lines=make_lines(lines))
+        group = Group("g", (View("a", station, ()),))
+        assert sought_key(group, group.views[0], TOLD) == "5e1cff3d68f54b070aa1f12d1f685e29"
+
+    def test_the_camera_of_the_clicks_is_what_its_version_says(self):
+        """A change here asks for another ``START_VERSION``."""
+        camera = first(clicked(), CLICKS).camera
+        assert camera.position == pytest.approx([2.85597, 62.14639, -16.02059], abs=1e-3)
+
     def test_each_reading_has_a_key_of_its_own(self):
         groups = (clicked(), read(clicked()), read(clicked(), supported=0.5))
         assert len({view_key(group, group.views[0], TOLD) for group in groups}) == 3
@@ -172,7 +203,8 @@ class TestFindings:
     def test_a_picture_that_is_not_there_or_was_never_read_is_no_fault_of_the_group(self):
         assert kinds(read(clicked())) == {}
         assert kinds(clicked()) == {}
-        assert solve(clicked(), TOUCHLINE).findings == solve(clicked(), PAPER).findings
+        lines = replace(TOUCHLINE, calibration=PAPER.calibration)
+        assert solve(clicked(), TOUCHLINE).findings == solve(clicked(), lines).findings
 
     def test_lines_that_changed_since_ask_for_another_reading(self):
         group = read(clicked(), sought_for="another")

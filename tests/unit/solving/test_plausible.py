@@ -25,13 +25,13 @@ class TestImplausible:
     def test_the_higher_a_ball_the_less_far_outside_it_may_be(self, outside, height, reach) -> None:
         ((number, limit, words),) = implausible((52.5 + outside, 0.0, -height), PITCH, PAPER)
         assert (number, limit) == (pytest.approx(outside), pytest.approx(reach))
-        assert words == f"is {outside:.0f} m outside the pitch at a height of {height:.0f} m"
+        assert words == f"is {outside:.0f} m outside the pitch at a height of {height:.2f} m"
 
     def test_each_end_alone_has_its_own_words(self) -> None:
         found = implausible((0.0, 62.0, 10.2), PITCH, PAPER)
         assert [words for _, _, words in found] == [
-            "lies 10.2 m below the grass",
+            "lies 10.20 m below the grass",
             "is 28 m outside the pitch",
         ]
         ((number, limit, words),) = implausible((0.0, 0.0, -41.0), PITCH, PAPER)
-        assert (number, limit, words) == (41.0, 40.0, "flies 41 m above the grass")
+        assert (number, limit, words) == (41.0, 40.0, "flies 41.00 m above the grass")

@@ -59,6 +59,21 @@ class TestAdjudication:
         assert any(spread["median"] != spread["tail"] for spread in spreads.values())
         assert api.get(f"{DATASET}/agreement", params={"of_batch": 7}).json()["groups"] == []
 
+    def test_two_who_agree_without_a_verdict_leave_the_group_unreviewed_and_every_list_says_so(
+        self, api
+    ) -> None:
+        group = api.get("/api/v1/groups", params={"dataset": "broadcast"}).json()["items"][0]["id"]
+        for person in ("ann", "ben"):
+            take = begin_take(api.app.state.services.store, group, person=person)
+            assert api.post(f"/api/v1/groups/{take.group}/hand-in").is_success
+        (one,) = api.get(f"{DATASET}/agreement").json()["groups"]
+        assert (one["state"], one["status"]) == ("agreed", "unreviewed")
+        found = api.get(
+            "/api/v1/groups",
+            params={"dataset": "broadcast", "q": "annotations:agreed status:unreviewed"},
+        ).json()["items"]
+        assert [row["id"] for row in found] == [group]
+
     def test_limits_are_changed_and_wrong_ones_refused(self, api) -> None:
         limits = api.get(f"{DATASET}/agreement").json()["limits"]
         changed = {**limits, "line_px": 8.0}

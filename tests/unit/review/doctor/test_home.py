@@ -157,7 +157,7 @@ class TestExamineSurroundings:
             session.execute(text("UPDATE log SET at = '2999-01-01T00:00:00+00:00' WHERE id = 1"))
         found = around(store)["clock"]
         assert found.ok
-        assert found.sentence.startswith("1 entries of the log are later than the clock")
+        assert found.sentence.startswith("1 entry of the log is later than the clock")
         assert found.sentence.endswith("the newest is not: the clock was set right since")
 
     def test_what_nothing_uses_is_counted(self, there: Store) -> None:

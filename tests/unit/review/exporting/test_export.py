@@ -16,6 +16,7 @@ from app.review.editing.edit import SetBall
 from app.review.editing.recompute import solve_dataset
 from app.review.editing.submit import load, submit
 from app.review.exporting.export import FORMATS, export, possible_formats, require_possible
+from app.review.exporting.formats import used_options
 from app.review.importing.ingest import ensure_dataset
 from app.review.policies.policy import change_policy
 from app.review.verdicts.verdict import set_verdict
@@ -196,15 +197,49 @@ class TestExport:
         assert len(cells) == 1
 
     @pytest.mark.parametrize("form", ["soccernet-v3", "cameras", "sn-calibration"])
-    def test_formats_without_a_chosen_box_claim_none_and_stay_the_same(
+    def test_formats_without_a_chosen_box_claim_none(
         self, store, three, tmp_path, form: str
     ) -> None:
-        for kind in ("annotated", "exact"):
-            out = tmp_path / f"{kind}.zip"
-            export(store, "demo", form, out, everything=True, boxes=kind)
-        assert (tmp_path / "annotated.zip").read_bytes() == (tmp_path / "exact.zip").read_bytes()
-        manifest = json.loads(files(tmp_path / "exact.zip")["manifest.json"])
+        export(store, "demo", form, tmp_path / "out.zip", everything=True)
+        manifest = json.loads(files(tmp_path / "out.zip")["manifest.json"])
         assert "boxes" not in manifest["settings"]
+
+    @pytest.mark.parametrize(
+        ("form", "asked", "formats"),
+        [
+            ("issia", {"boxes": "exact"}, "coco, parquet, soccernet-v3d, yolo"),
+            ("parquet", {"views": "all"}, "coco, yolo"),
+            ("touchline", {"images": "copy"}, "cameras, coco, gamestate, issia"),
+        ],
+    )
+    def test_an_option_that_the_format_does_not_use_is_refused(
+        self, store, three, tmp_path, form: str, asked: dict[str, str], formats: str
+    ) -> None:
+        (name,) = asked
+        for run in (
+            lambda: export(store, "demo", form, tmp_path / "out", everything=True, **asked),
+            lambda: require_possible(store, "demo", form, everything=True, **asked),
+        ):
+            with pytest.raises(InputError, match=f"{form} does not use --{name}") as refused:
+                run()
+            assert refused.value.pointer == f"/{name}"
+            assert f"It is for {formats}" in str(refused.value.hint)
+        assert not (tmp_path / "out").exists()
+
+    def test_every_format_uses_the_options_that_it_says(self) -> None:
+        assert {name: used_options(name) for name in FORMATS} == {
+            "soccernet-v3d": ["boxes", "images"],
+            "soccernet-v3": ["images"],
+            "issia-3d": ["images"],
+            "issia": ["images"],
+            "cameras": ["images"],
+            "coco": ["boxes", "images", "views"],
+            "yolo": ["boxes", "images", "views"],
+            "parquet": ["boxes", "images"],
+            "gamestate": ["images"],
+            "sn-calibration": ["images"],
+            "touchline": [],
+        }
 
     def test_the_manifest_has_the_licence_of_every_source_once(
         self, store, fill, make_group, make_static, tmp_path

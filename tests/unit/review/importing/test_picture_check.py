@@ -9,6 +9,7 @@ import cv2
 import numpy as np
 import pytest
 from PIL import Image
+from sqlalchemy import select
 
 from app.config import Settings
 from app.datasets.report import Report
@@ -20,7 +21,9 @@ from app.soccer.frames import ImagePoint, ImageSize
 from app.soccer.group import Group, Station, View
 from app.soccer.media import Media
 from app.store import video_index
+from app.store.queue import import_findings
 from app.store.store import Store
+from app.store.tables.queue import QueueModel
 from tests.videos import write_video
 
 SIZE = ImageSize(128, 72)
@@ -196,3 +199,30 @@ class TestImport:
         imported = import_source(store, "demo", Source("coco", tmp_path), store.settings)
         (remark,) = imported.values()["remarks"]
         assert "72 x 128 declared, the picture is 128 x 72" in remark
+
+    def test_its_group_has_a_finding_until_the_size_is_right(
+        self, store: Store, tmp_path: Path
+    ) -> None:
+        """Else a group whose gates pass would look as sound as any other."""
+        write(tmp_path / "7.jpg", 128, 72)
+        source = Source("coco", tmp_path)
+
+        def brought(width: int, height: int, dry_run: bool = False) -> tuple[int, list[str]]:
+            image = {"id": 1, "width": width, "height": height, "file_name": "7.jpg"}
+            value = {"images": [image], "annotations": [], "categories": []}
+            (tmp_path / "instances_default.json").write_text(json.dumps(value))
+            found = import_source(store, "demo", source, store.settings, dry_run=dry_run)
+            with store.read() as session:
+                noticed = import_findings(session, [1])[1]
+                (row,) = session.execute(select(QueueModel.findings)).all()
+            assert bool(row.findings.strip(",")) == bool(noticed)
+            return found.values()["findings"], [f"{one.kind} {one.sentence}" for one in noticed]
+
+        assert brought(128, 72) == (0, [])
+        assert brought(72, 128, dry_run=True) == (1, [])
+        for _ in range(2):
+            count, (told,) = brought(72, 128)
+            assert count == 1
+            assert told.startswith("picture_geometry The picture has another shape")
+            assert "72 x 128 declared, the picture is 128 x 72, the same on its side" in told
+        assert brought(128, 72) == (0, [])

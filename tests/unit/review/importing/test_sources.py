@@ -439,7 +439,7 @@ class TestCheck:
     def test_the_browser_offers_the_options_that_a_format_uses(self) -> None:
         text = Path("static/state/import_formats.js").read_text(encoding="utf-8")
         names = {"CALIBRATION": "calibration", "SIZE": "size", "OFFSET": "frame_offset"}
-        names |= {"FLIPPED": "flipped", "CATEGORY": "ball_category"}
+        names |= {"FLIPPED": "flipped", "CATEGORY": "ball_category", "GROUPING": "grouping"}
         offered = re.findall(
             r"name: '([a-z0-9-]+)', label: .*?, options: \[(.*?)\]( , lines|, lines)?", text
         )

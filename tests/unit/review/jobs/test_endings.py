@@ -17,6 +17,17 @@ RESULTS = [
     ("solve", SOLVED, "60 groups solved: 52 pass, 8 do not; 0 errors."),
     ("solve", {**SOLVED, "solved": 0, "passed": 0}, "Nothing was left to solve."),
     (
+        "solve",
+        {**SOLVED, "solved": 0, "passed": 0, "estimated": 4, "proposed": 1},
+        "The pitch of 4 matches was estimated: another size is proposed for 1 match.",
+    ),
+    (
+        "solve",
+        {**SOLVED, "estimated": 1, "proposed": 0},
+        "60 groups solved: 52 pass, 8 do not; 0 errors. The pitch of 1 match was estimated: no "
+        "other size is proposed.",
+    ),
+    (
         "import",
         {**IMPORTED, "dry_run": False},
         "3 groups read: 2 new, 1 changed, 0 unchanged; 1 record left out.",

@@ -44,9 +44,14 @@ class TestRequestSolve:
             "passed": 1,
             "failed": 0,
             "failures": [],
+            "estimated": 1,
+            "proposed": 0,
         }
         assert (done.done, done.total) == (2, 2)
-        assert done.sentence == "2 groups solved: 1 pass, 1 do not; 0 errors."
+        assert done.sentence == (
+            "2 groups solved: 1 pass, 1 do not; 0 errors. The pitch of 1 match was estimated: no other "
+            "size is proposed."
+        )
         assert stale_groups(store, "demo") == []
 
     @pytest.mark.parametrize(("worth", "made"), [(2, 1), (3, 0)])

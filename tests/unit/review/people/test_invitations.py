@@ -10,6 +10,7 @@ import pytest
 from app.config import Settings
 from app.errors import ForbiddenError, InputError
 from app.mail import MailServer, read_mail_server
+from app.review.people import links
 from app.review.people.invitations import (
     NO_MAIL,
     NO_URL,
@@ -18,6 +19,7 @@ from app.review.people.invitations import (
     invite_many,
     invite_one,
     read_list,
+    renew_one,
 )
 from app.review.people.links import look
 from app.review.people.people import list_people
@@ -135,6 +137,23 @@ class TestPost:
             post = Post(mail_server(store.settings.home, box), None, "http://evil.example")
             (row,) = invite_many(store, ROWS[:1], post, actor="local", dry_run=False)
         assert (row.mailed, row.problem, box.letters) == (False, NO_URL, [])
+
+    def test_another_link_says_what_it_is_for(self, store: Store) -> None:
+        with serving(MailBox()) as box:
+            post = Post(mail_server(store.settings.home, box), URL, URL)
+            person, first = invite_one(store, "anna", Role.LEAD, None, post, actor="berta")
+            address = "anna@example.org"
+            renew_one(store, person.id, address, post, actor="berta")
+            again, row = renew_one(store, person.id, None, post, actor="berta")
+            links.use(store, token_of(row.link or ""), "three plain words")
+            _, reset = renew_one(store, person.id, address, post, actor="berta")
+        assert (first.state, row.state, reset.state) == ("invited", "invited", "reset")
+        assert reset.mailed and not again.joined
+        invited, other = box.letters
+        assert invited["Subject"] == "Your account on Touchline at touchline.example.org"
+        assert other["Subject"] == "A new password for Touchline at touchline.example.org"
+        assert "invites you" not in other.get_content()
+        assert look(store, token_of(other.get_content())).joined
 
     def test_addresses_stand_in_no_table(self, store: Store) -> None:
         with serving(MailBox()) as box:

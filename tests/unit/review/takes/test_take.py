@@ -36,8 +36,9 @@ from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import Box, ImagePoint
 from app.soccer.policy import STRICT
 from app.store.log import newest_entry, verify_chain
+from app.store.reader import READER, Reader
 from app.store.sight import COPIES, Sight
-from app.store.takes import GOLD
+from app.store.takes import GOLD, INDEPENDENT
 from tests.unit.review.takes.begun import begin_for_batch, begin_take
 
 BALL = BallAnnotation(box=Box(500.0, 300.0, 14.0, 14.0))
@@ -158,6 +159,31 @@ class TestBeginTake:
         hand_in(store, take.id, actor="ann")
         adopted = adopt_take(store, take.id, actor="lea")
         assert adopted.group.views[0].balls == (BALL,)
+
+    @pytest.mark.parametrize("kind", [INDEPENDENT, GOLD])
+    def test_its_person_is_told_nothing_of_what_became_of_a_nameless_copy_also_later(
+        self, store, state, kind
+    ) -> None:
+        take = begin_for_batch(store, state.id, "ann", batch_id=3, nameless=True, kind=kind)
+        hand_in(store, take.id, actor="ann")
+        if kind == INDEPENDENT:
+            adopt_take(store, take.id, actor="lea")
+        own, leads = (told_to(store, state, take, name) for name in ("ann", "lea"))
+        # The batch is closed: nothing is hidden blind any more.
+        assert (own.of, own.number, own.title, own.settled) == (None, None, "Group 1", None)
+        assert (leads.of, leads.number, leads.title) == (state.id, 1, state.group.label)
+        assert (leads.settled is None) == (kind == GOLD)
+
+
+def told_to(store, state, take, name):
+    """A take as somebody sees it who works in no open batch."""
+    token = READER.set(Reader(name, {}, lambda _dataset: True))
+    try:
+        (view,) = list_takes(store, state.dataset_id, lambda _dataset: True, person=name)
+    finally:
+        READER.reset(token)
+    assert view.id == take.id
+    return view
 
 
 class TestStart:

@@ -53,7 +53,7 @@ class TestDiffVersions:
     def test_groups_come_and_go_for_a_reason(self, store, two) -> None:
         diff = diff_versions(store, two[0].id, two[1].id)
         added = {item.group.rpartition("/")[2]: item.why for item in diff.added}
-        assert added == {"9.png": "unreviewed", "10.png": "not in the dataset before"}
+        assert added == {"9.png": "unreviewed", "10.png": "not in the dataset"}
         (dropped,) = diff.dropped
         assert dropped.why == "rejected: sides_confused"
 
@@ -157,7 +157,7 @@ class TestOfWhateverPasses:
         assert metres[0] > 2 * metres[1]
         lines = changelog(store, second.id)
         assert "1 group with another verdict." in lines
-        assert any(line.endswith(f"{max(metres):.3g} m at most.") for line in lines)
+        assert any(line.endswith(f"{max(metres):.3f} m at most.") for line in lines)
 
 
 class TestChangelog:
@@ -167,8 +167,8 @@ class TestChangelog:
     def test_the_next_one_says_what_changed(self, store, two) -> None:
         lines = changelog(store, two[1].id)
         assert lines[0] == "Since v1:"
-        assert "2 groups added (1 not in the dataset before, 1 unreviewed)." in lines
-        assert "1 group dropped (1 rejected: sides_confused)." in lines
+        assert "2 groups added (before: 1 not in the dataset, 1 unreviewed)." in lines
+        assert "1 group dropped (now: 1 rejected: sides_confused)." in lines
         assert any(line.startswith("1 ball moved, by 0.0") for line in lines)
         assert lines[-1].startswith("split: ")
 

@@ -298,6 +298,22 @@ class TestPlanFreeze:
         assert plan.left_out == {"rejected: bad_calibration": 1, "unreviewed": 2}
         assert content(store) == before
 
+    @pytest.mark.parametrize(
+        "split", [Split(), Split("match", seed=3, test_share=0.2), Split("camera")], ids=str
+    )
+    def test_it_foretells_how_many_groups_each_split_has(
+        self, store, fill, make_group, split
+    ) -> None:
+        fill(*(replace(make_group(at), match=f"league/2020/{at % 3}") for at in range(7)))
+        if split.kind == "camera":
+            split = replace(split, test_cameras=("1.png", "2.png"))
+        request = FreezeRequest("v1", split=split, groups="passing")
+        plan = plan_freeze(store, "demo", request)
+        version = freeze(store, "demo", request, actor="ann")
+        counts = {side: of["groups"] for side, of in version.counts["splits"].items()}
+        assert plan.splits == {side: n for side, n in counts.items() if n}
+        assert sum(plan.splits.values()) == plan.groups > 0
+
     def test_a_strict_plan_refuses_what_freezing_refuses(self, store, fill, make_group) -> None:
         fill(make_group(7))
         with pytest.raises(InputError):
