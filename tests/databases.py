@@ -19,7 +19,7 @@ from app.store.engine import WRITE, make_engine
 from app.store.session import Session
 from app.store.store import Store
 from app.store.tables import Base
-from app.store.tables.jobs import AnswerModel
+from app.store.tables.jobs import StoredResponseModel
 from tests.cluster import ADVICE, Cluster, find_programs, running_cluster
 from tests.on_postgresql import shared_cluster
 
@@ -275,6 +275,8 @@ def opened_databases(kind: str, folder: Path) -> Iterator[Databases]:
 
 def content(store: Store) -> dict[str, list[str]]:
     """Every row of the database but for the answers to requests."""
-    tables = [table for table in Base.metadata.sorted_tables if table is not AnswerModel.__table__]
+    tables = [
+        table for table in Base.metadata.sorted_tables if table is not StoredResponseModel.__table__
+    ]
     with store.read() as session:
         return {table.name: sorted(map(repr, session.execute(select(table)))) for table in tables}

@@ -187,7 +187,7 @@ def _add_middleware(app: FastAPI, settings: Settings, site: Site, team: Team | N
     """The first one added is the innermost."""
     doors = Doors(app.state.services.store.sharing.is_shared, settings.solves_apart)
     app.add_middleware(Lanes, doors=doors)
-    # Outside of the lanes: a repetition that waits for the first answer takes nobody's place.
+    # Outside of the lanes: a repetition that waits for the first response takes nobody's place.
     app.add_middleware(Idempotency, actor=LOCAL_USER)
     if team is not None:
         # Inside of what makes HEAD a GET, outside of whatever could answer.

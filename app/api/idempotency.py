@@ -1,8 +1,8 @@
-"""Idempotency-Key: a request that is sent again gets the answer that it got the first time.
+"""Idempotency-Key: a request that is sent again gets the response that it got the first time.
 
-A route keeps its answer in the transaction of its work (``api.reply``), so that wherever the server
-is stopped a repetition finds either both or neither. The answers of other routes are kept here,
-once they are sent.
+A route stores its response in the transaction of its work (``api.respond``), so that wherever the
+server is stopped a repetition finds either both or neither. The responses of other routes are
+stored here, once they are sent.
 """
 
 from __future__ import annotations
@@ -21,14 +21,22 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from app.api.deps import ACTOR_HEADER
 from app.api.errors import RETRY_SECONDS, status_of
 from app.api.problem import make_problem, problem_response
-from app.api.reply import ASKED, KEPT_HEADERS, KeyedRequest
+from app.api.respond import KEYED_REQUEST, STORED_HEADERS
 from app.api.security.access import actor_of
 from app.api.security.bodies import BYTES, VALUE
 from app.api.security.concealment import HIDDEN, SENT
 from app.api.security.origin import SAFE_METHODS
 from app.canonical import canonical
 from app.errors import BusyError, OverloadedError, ReviewError, StorageError
-from app.review.answers.answers import Answer, claim, end_claim, find_first, keep_first
+from app.review.idempotency import (
+    IdempotencyKey,
+    KeyedRequest,
+    StoredResponse,
+    claim,
+    end_claim,
+    find_stored,
+    store_sent,
+)
 from app.store.store import Store
 
 log = structlog.get_logger("touchline.api")
@@ -36,9 +44,9 @@ log = structlog.get_logger("touchline.api")
 HEADER = "Idempotency-Key"
 KEY = re.compile(r"[\x21-\x7e]{1,200}")
 REPLAYED = "Idempotency-Replayed"
-"""Says that an answer is not a new one."""
+"""Says that a response is not a new one."""
 MAX_ANSWER_BYTES = 8 * 1024 * 1024
-"""Larger answers are not kept; no route that changes something gives one."""
+"""Larger responses are not stored; no route that changes something gives one."""
 PATIENCE = 60.0
 """Seconds that a repetition waits for the first one to be answered."""
 AGAIN_SECONDS = 0.02
@@ -46,13 +54,13 @@ AGAIN_SECONDS = 0.02
 UNKEPT = re.compile(
     r"/api/v\d+/(?:session|sessions|links|tokens|users|datasets/[^/]+/webhooks)(?:/|$)"
 )
-"""Answers that hold a secret are shown once, and kept nowhere."""
+"""Responses that hold a secret are shown once, and stored nowhere."""
 THREADS = 4
-"""So many answers are looked up at a time, and as many are kept."""
+"""So many responses are looked up at a time, and as many are stored."""
 
 
 class Idempotency:
-    """Answers a repetition with the first answer, and the same key with another request with 422.
+    """Answers a repetition with the first response, and the same key with another request with 422.
 
     Args:
         app: What answers for the first time.
@@ -62,7 +70,7 @@ class Idempotency:
     def __init__(self, app: ASGIApp, actor: str):
         self.app, self._actor = app, actor
         self._under_way: dict[tuple[str, str], asyncio.Event] = {}
-        self._finding, self._keeping = CapacityLimiter(THREADS), CapacityLimiter(THREADS)
+        self._finding, self._storing = CapacityLimiter(THREADS), CapacityLimiter(THREADS)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """One request."""
@@ -113,7 +121,7 @@ class Idempotency:
             await self._answer(actor, key, request, send)
         finally:
             with CancelScope(shield=True):
-                await run_sync(end_claim, request.store, key, actor, limiter=self._keeping)
+                await run_sync(end_claim, request.store, key, actor, limiter=self._storing)
 
     async def _claim(self, store: Store, key: str, actor: str) -> bool:
         """Whether it could be had before patience was at its end."""
@@ -135,15 +143,15 @@ class Idempotency:
         else:
             await self._carry_out(actor, key, request, send)
 
-    async def _find(self, request: _Request, key: str, actor: str) -> Answer | None:
-        """What is kept under a key; in a thread only where there is something to wait for.
+    async def _find(self, request: _Request, key: str, actor: str) -> StoredResponse | None:
+        """What is stored under a key; in a thread only where there is something to wait for.
 
         Nothing for who has lost sight, meanwhile, of what it is about.
         """
         try:
-            found = find_first(request.store, key, actor, at_once=True)
+            found = find_stored(request.store, key, actor, at_once=True)
         except BusyError:
-            found = await run_sync(find_first, request.store, key, actor, limiter=self._finding)
+            found = await run_sync(find_stored, request.store, key, actor, limiter=self._finding)
         hidden = None if found is None else request.scope.get(HIDDEN)
         if hidden is not None and await run_sync(hidden, limiter=self._finding):
             return None
@@ -152,20 +160,20 @@ class Idempotency:
     async def _carry_out(self, actor: str, key: str, request: _Request, send: Send) -> None:
         if request.streamed:
             # What is asked for is known once its bytes have passed.
-            asked = None
+            keyed = None
         else:
             await request.read()
-            asked = KeyedRequest(key, actor, request.digest())
-            request.scope[ASKED] = asked
+            keyed = KeyedRequest(IdempotencyKey(key, actor, request.digest()))
+            request.scope[KEYED_REQUEST] = keyed
         recorded = _Recorded(send)
         await self.app(request.scope, request.receive, recorded.send)
-        if recorded.is_kept and not (asked and asked.kept):
+        if recorded.is_whole and not (keyed and keyed.stored):
             try:
-                answer = recorded.answer(request.digest())
-                await run_sync(keep_first, request.store, key, actor, answer, limiter=self._keeping)
+                sent = recorded.stored_form(request.digest())
+                await run_sync(store_sent, request.store, key, actor, sent, limiter=self._storing)
             except StorageError as error:
                 # It is sent already; a repetition is answered with the state as it is then.
-                log.warning("an answer could not be kept", error=str(error))
+                log.warning("a response could not be stored", error=str(error))
 
 
 def _still() -> OverloadedError:
@@ -177,7 +185,7 @@ async def _refuse(error: ReviewError, scope: Scope, receive: Receive, send: Send
     await problem_response(problem, {"Retry-After": RETRY_SECONDS})(scope, receive, send)
 
 
-async def _again(known: Answer, request: _Request, send: Send) -> None:
+async def _again(known: StoredResponse, request: _Request, send: Send) -> None:
     if not await request.asks_for(known):
         problem = make_problem(
             422, f"this {HEADER} was used for another request", hint="Send a new key with it."
@@ -212,7 +220,7 @@ class _Request:
 
     @property
     def store(self) -> Store:
-        """Where the application keeps its answers."""
+        """Where the application stores its responses."""
         store: Store = self.scope["app"].state.services.store
         return store
 
@@ -221,8 +229,8 @@ class _Request:
         while not self._ended:
             await self._next()
 
-    async def asks_for(self, known: Answer) -> bool:
-        """Whether it is the request that an answer was given to."""
+    async def asks_for(self, known: StoredResponse) -> bool:
+        """Whether it is the request that a response was given to."""
         await self.read()
         return self.digest() == known.request_digest
 
@@ -265,7 +273,7 @@ class _Request:
 
 
 class _Recorded:
-    """Passes an answer on and remembers it."""
+    """Passes a response on and remembers it."""
 
     def __init__(self, send: Send):
         self._send = send
@@ -274,12 +282,12 @@ class _Recorded:
         self._ended = False
 
     @property
-    def is_kept(self) -> bool:
+    def is_whole(self) -> bool:
         """Whether it is a whole success; what was refused may be tried again."""
         return self._ended and 200 <= self._status < 300 and len(self._body) <= MAX_ANSWER_BYTES
 
     async def send(self, message: Message) -> None:
-        """The next message of the answer."""
+        """The next message of the response."""
         if message["type"] == "http.response.start":
             self._status, self._headers = message["status"], Headers(raw=message["headers"])
         elif message["type"] == "http.response.body":
@@ -288,7 +296,7 @@ class _Recorded:
             self._ended = not message.get("more_body", False)
         await self._send(message)
 
-    def answer(self, digest: str) -> Answer:
-        """What is kept."""
-        headers = {name: self._headers[name] for name in KEPT_HEADERS if name in self._headers}
-        return Answer(digest, self._status, headers, bytes(self._body))
+    def stored_form(self, digest: str) -> StoredResponse:
+        """What is stored."""
+        headers = {name: self._headers[name] for name in STORED_HEADERS if name in self._headers}
+        return StoredResponse(digest, self._status, headers, bytes(self._body))

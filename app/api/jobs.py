@@ -7,7 +7,7 @@ from typing import Any
 from fastapi import Response
 
 from app.api.problem import Responses, responses
-from app.api.reply import document
+from app.api.respond import document
 from app.api.schemas.job import JobDocument
 from app.review.jobs.records import Job
 

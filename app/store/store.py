@@ -184,6 +184,7 @@ class Store:
             # is written.
             session.begin()
             yield session
+            session.store_response()
             if not lasting and session.log_end is not None:
                 raise RuntimeError("entries of the log must be on the disk")
             self._require_anchored(session)

@@ -71,7 +71,7 @@ def verdict(page: Page, group: int = 1) -> Any:
 
 def annotate(store: Store, group: int, person: str, moved: float) -> str | None:
     """Hand in what a person made of a group; its ball moved by so many pixels."""
-    copy = begin_take(store, group, person=person).copy_id
+    copy = begin_take(store, group, person=person).group
     state = load(store, copy)
     view = next(view for view in state.group.views if view.ball and view.ball.box)
     if moved and view.ball and view.ball.box:

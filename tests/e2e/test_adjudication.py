@@ -68,7 +68,7 @@ def test_two_who_agree_without_a_verdict_are_told_alike_by_queue_and_agreement(
         for person in ("kim", "lou"):
             take = begin_take(store, group, person=person)
             hand_in(store, take.id, actor=person)
-            came_to = after_hand_in(store, take.copy_id)
+            came_to = after_hand_in(store, take.group)
         assert came_to == "agreed"
     finally:
         store.close()

@@ -43,8 +43,8 @@ class Clock(when.datetime):
     @classmethod
     def now(cls, tz=None):
         return when.datetime.fromtimestamp(time.time(), tz)
-import app.store.answers, app.store.clock
-app.store.clock.datetime = app.store.answers.datetime = Clock
+import app.store.idempotency, app.store.clock
+app.store.clock.datetime = app.store.idempotency.datetime = Clock
 """
 """Gives a server a clock that is as many seconds aside as a file says.
 

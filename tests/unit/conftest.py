@@ -49,7 +49,7 @@ ON_BOTH = frozenset(
         "review/verdicts/test_verdict.py",
         "review/versions/test_check.py",
         "review/versions/test_freeze.py",
-        "store/test_answers.py",
+        "store/test_idempotency.py",
         "store/test_conditions.py",
         "store/test_listing.py",
         "store/test_log.py",
@@ -61,7 +61,7 @@ ON_BOTH = frozenset(
 """Files whose tests always run on SQLite and on PostgreSQL: what the engines do differently, what finds
 damage, and one way each of edits, verdicts, versions and answers through the store."""
 WHEN_ALL = ON_BOTH | {
-    "review/answers/test_answers.py",
+    "review/test_idempotency.py",
     "review/datasets/test_delete.py",
     "review/importing/test_ingest.py",
     "review/queue/test_listing.py",

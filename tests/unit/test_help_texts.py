@@ -58,7 +58,7 @@ PLAIN_WORDS = """
     exports facets facts fan faults fields figure figures files finite first fixes fixture
     folder folders follow form format formats found frozen gathered gestures glossary grass grid guess guide header
     headers heads health heat help histograms history hit home hooks idempotency identity if image images
-    import imports in info init insight items jaccard json judged keep key keys known konva last latest lazy
+    import imports in info init insight items jaccard json judged key keys known konva last latest lazy
     least leftovers legend lens lesson lessons letter licence list listing live locks look loupe
     kernels profile trace
     main map markdown marks match matches matrix membership menu merge metrics migrate mini missing
@@ -66,7 +66,7 @@ PLAIN_WORDS = """
     observability onnx open openapi opened options order origin orphans output overlap page pages
     paint palette parquet parse patch pen pins pitch pitches pixel place places plain plural png pointer
     policies pool popover pose position preopen preview problem process progress projection props query rail reader reasons receiving
-    recompute record remedies removal render reply report requests resect resource restore result
+    recompute record remedies removal render report requests resect resource respond restore result
     revert reviewers rotation router row rows run runs sample save scale scene scene3d scenes score
     scoreboard sending server service session sets shadows sheet singular site smallest solve
     solving source sources sphere spill spread squares stacks stage staging standpoints starts

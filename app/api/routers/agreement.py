@@ -9,7 +9,7 @@ from fastapi import APIRouter, Query, Response
 from app.api.deps import Actor, AppServices, AppStore, DatasetPath, Id
 from app.api.paging import paged
 from app.api.problem import responses
-from app.api.reply import AskedUnder, Reply, document, nothing
+from app.api.respond import as_document, document, no_content, responds
 from app.api.routers.groups import ETAG, group_answer
 from app.api.schemas.agreement import (
     AgreementDocument,
@@ -27,6 +27,7 @@ from app.finite import MAX_ID
 from app.review.agreement import adjudicate, limits
 from app.review.agreement.compare import compare_groups
 from app.review.agreement.summary import agreement_csv, agreement_of
+from app.review.editing.state import GroupState
 from app.review.takes.take import TakeView
 
 router = APIRouter(tags=["agreement"])
@@ -85,15 +86,13 @@ def get_agreement_file(dataset: DatasetPath, store: AppStore, of_batch: OfBatch 
     response_model=LimitsDocument,
     responses=responses(404, 413, 415),
 )
+@responds(as_document(LimitsDocument.model_validate))
 def put_limits(
-    dataset: DatasetPath, edit: LimitsEdit, store: AppStore, actor: Actor, asked: AskedUnder
-) -> Response:
+    dataset: DatasetPath, edit: LimitsEdit, store: AppStore, actor: Actor
+) -> AgreementLimits:
     """How far annotations may lie apart and still agree; counts for what is handed in from now on."""
-    reply = Reply[AgreementLimits](
-        asked, lambda found: document(LimitsDocument.model_validate(found))
-    )
     wanted = AgreementLimits(**edit.model_dump())
-    return reply.of(limits.set_limits(store, dataset, wanted, actor=actor, keep=reply.keep))
+    return limits.set_limits(store, dataset, wanted, actor=actor)
 
 
 @router.get(
@@ -122,21 +121,17 @@ def get_case(group: Id, store: AppStore, actor: Actor) -> Response:
     response_model=GroupDocument,
     responses={**responses(403, 404, 409, 413, 415), 200: {"headers": ETAG}},
 )
-def decide(
-    group: Id, decision: Decision, services: AppServices, actor: Actor, asked: AskedUnder
-) -> Response:
+@responds(group_answer)
+def decide(group: Id, decision: Decision, services: AppServices, actor: Actor) -> GroupState:
     """Take one annotation over into the group, or let a third one begin from it."""
-    reply = Reply(asked, group_answer)
-    state = adjudicate.decide(
+    return adjudicate.decide(
         services.store,
         group,
         decision.take,
         as_start=decision.as_start,
         actor=actor,
         paint=services.paint,
-        keep=reply.keep,
     )
-    return reply.of(state)
 
 
 @router.post(
@@ -145,10 +140,7 @@ def decide(
     status_code=204,
     responses=responses(403, 404, 409, 413, 415),
 )
-def hand_back(
-    group: Id, back: TakeHandBack, store: AppStore, actor: Actor, asked: AskedUnder
-) -> Response:
+@responds(no_content)
+def hand_back(group: Id, back: TakeHandBack, store: AppStore, actor: Actor) -> TakeView:
     """Hand one of the annotations back to its person; it is compared again when it is handed in."""
-    reply: Reply[TakeView] = Reply(asked, nothing)
-    take = adjudicate.hand_back(store, group, back.take, back.reason, actor=actor, keep=reply.keep)
-    return reply.made or nothing(take)
+    return adjudicate.hand_back(store, group, back.take, back.reason, actor=actor)

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from fastapi import APIRouter, Query, Response
+from fastapi import APIRouter, Query
 
 from app.api.cursor import first_below
 from app.api.deps import AppStore
 from app.api.paging import Before, Cursor
 from app.api.problem import responses
-from app.api.reply import AskedUnder, Reply, document
+from app.api.respond import as_document, responds
 from app.api.routers.sessions import Me
 from app.api.schemas.bell import BellDocument, BellRead
 from app.api.team import AppTeam
@@ -44,9 +44,7 @@ def get_bell(
     response_model=BellDocument,
     responses=responses(401, 409, 413, 415),
 )
-def read_bell(
-    said: BellRead, store: AppStore, _team: AppTeam, me: Me, asked: AskedUnder
-) -> Response:
+@responds(as_document(BellDocument.model_validate))
+def read_bell(said: BellRead, store: AppStore, _team: AppTeam, me: Me) -> Bell:
     """One has seen some of it, or all."""
-    reply = Reply[Bell](asked, lambda seen: document(BellDocument.model_validate(seen)))
-    return reply.of(bell.read_all(store, me, said.ids, keep=reply.keep))
+    return bell.read_all(store, me, said.ids)

@@ -8,7 +8,7 @@ from fastapi import APIRouter, Response
 
 from app.api.deps import STRONG_ETAG, Actor, AppServices, DatasetPath, DryRun
 from app.api.problem import responses
-from app.api.reply import AskedUnder, Reply, document
+from app.api.respond import as_document, document, responds
 from app.api.schemas.bulk_edits import BulkEdit, BulkEditDocument
 from app.errors import InputError
 from app.review.datasets.dataset import dataset_id
@@ -24,14 +24,14 @@ router = APIRouter(prefix="/datasets/{dataset}/edits", tags=["views"])
     response_model=BulkEditDocument,
     responses=responses(404, 413, 415),
 )
+@responds(as_document(BulkEditDocument.of))
 def edit_many(
     dataset: DatasetPath,
     edit: BulkEdit,
     services: AppServices,
     actor: Actor,
-    asked: AskedUnder,
     dry_run: DryRun = False,
-) -> Response:
+) -> BulkEditReport | Response:
     """Set balls and lines of many views, each as `PATCH /views/{view}/ball` and `/lines` do.
 
     The views of one group are one edit, which is done whole or not at all and undone like any
@@ -42,18 +42,14 @@ def edit_many(
     if dry_run:
         plan = plan_edits(store, found, edit.edits(), actor=actor)
         return document(BulkEditDocument.of(plan))
-    reply = Reply[BulkEditReport](asked, lambda report: document(BulkEditDocument.of(report)))
-    report = edit_views(
+    return edit_views(
         store,
         found,
         edit.edits(),
         actor=actor,
-        keep=reply.keep,
-        progress=reply.progress,
         paint=services.paint,
         solve=partial(services.large.run, solve_encoded),
     )
-    return reply.of(report)
 
 
 def _require_states(edit: BulkEdit) -> None:

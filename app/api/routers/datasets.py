@@ -10,7 +10,7 @@ from app.api.deps import Actor, AppServices, AppStore, DatasetPath, QueryText, S
 from app.api.jobs import by_job, job_answer
 from app.api.paging import paged
 from app.api.problem import responses
-from app.api.reply import AskedUnder, Reply, document
+from app.api.respond import document, responds
 from app.api.schemas.dataset import (
     DatasetDeletion,
     DatasetDocument,
@@ -22,6 +22,7 @@ from app.api.security.access import login_of
 from app.review.datasets import dataset as review
 from app.review.datasets import delete as deletion
 from app.review.datasets.delete import DatasetContents, read_contents
+from app.review.jobs.records import Job
 from app.review.jobs.solve import request_solve
 from app.review.queue.progress import summary
 
@@ -57,18 +58,18 @@ def get_summary(dataset: DatasetPath, store: AppStore, query: QueryText = "") ->
 
 
 @router.post("/{dataset}/solve", operation_id="solveDataset", **by_job(404))
-def solve_dataset(
-    dataset: DatasetPath, services: AppServices, actor: Actor, asked: AskedUnder
-) -> Response:
+@responds(job_answer)
+def solve_dataset(dataset: DatasetPath, services: AppServices, actor: Actor) -> Job:
     """Solve what has no solution for its present state, policy and solver, as a job.
 
     The server does so by itself after whatever makes groups stale; this waits for it, too.
     """
-    reply = Reply(asked, job_answer)
     found = review.dataset_id(services.store, dataset)
-    return reply.of(
-        request_solve(services.jobs, services.store, found, actor=actor, keep=reply.keep)
-    )
+    return request_solve(services.jobs, services.store, found, actor=actor)
+
+
+def _deleted(gone: DatasetContents, dry_run: bool) -> Response:
+    return document(DeletedDocument(dry_run=dry_run, **vars(gone)))
 
 
 @router.delete(
@@ -77,29 +78,26 @@ def solve_dataset(
     response_model=DeletedDocument,
     responses=responses(404, 409, 413, 415),
 )
+@responds(_deleted, "dry_run")
 def delete_dataset(
     dataset: DatasetPath,
     request: DatasetDeletion,
     services: AppServices,
     actor: Actor,
-    asked: AskedUnder,
     dry_run: Annotated[bool, Query(description="Only report what would be deleted.")] = False,
-) -> Response:
+) -> DatasetContents:
     """Delete a dataset with everything that belongs to it; `confirm` is its name, else 409.
 
     Its jobs are cancelled first. Cannot be undone; the log of what was said stays.
     """
     contents = read_contents(services.store, dataset)
-    reply = Reply[DatasetContents](
-        asked, lambda gone: document(DeletedDocument(dry_run=dry_run, **vars(gone)))
-    )
     if not dry_run:
         exports = services.jobs.every(dataset_id=contents.id, kind="export")
         if request.confirm == contents.name:
             services.jobs.cancel_all(contents.id)
         contents = deletion.delete_dataset(
-            services.store, contents.id, confirm=request.confirm, actor=actor, keep=reply.keep
+            services.store, contents.id, confirm=request.confirm, actor=actor
         )
         for export in exports:
             services.exports.forget(str(export))
-    return reply.of(contents)
+    return contents

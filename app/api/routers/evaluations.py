@@ -13,7 +13,7 @@ from app.api.deps import Actor, AppServices, AppStore, DatasetPath, Id
 from app.api.jobs import by_job, job_answer
 from app.api.paging import paged
 from app.api.problem import Responses, responses
-from app.api.reply import AskedUnder, Reply, nothing
+from app.api.respond import no_content, responds
 from app.api.schemas.evaluation import (
     ComparisonDocument,
     EvaluationBody,
@@ -33,6 +33,7 @@ from app.evaluation.table import TABLES
 from app.finite import MAX_ID
 from app.review.evaluating import evaluation as review
 from app.review.jobs.evaluations import request_evaluation
+from app.review.jobs.records import Job
 from app.review.versions.version import version_called
 
 router = APIRouter(tags=["evaluations"])
@@ -81,13 +82,10 @@ def list_evaluations(dataset: DatasetPath, store: AppStore) -> EvaluationList:
     operation_id="startEvaluation",
     **by_job(404, 409, 413, 415),
 )
+@responds(job_answer)
 def start_evaluation(
-    dataset: DatasetPath,
-    request: EvaluationBody,
-    services: AppServices,
-    actor: Actor,
-    asked: AskedUnder,
-) -> Response:
+    dataset: DatasetPath, request: EvaluationBody, services: AppServices, actor: Actor
+) -> Job:
     """Evaluate predictions against a frozen version, or the dataset as it is now.
 
     The job's result names the evaluation.
@@ -95,9 +93,7 @@ def start_evaluation(
     store, named = services.store, request.version
     version = None if named is None else version_called(store, str(named), dataset)
     wanted = request.value(version)
-    reply = Reply(asked, job_answer)
-    job = request_evaluation(services.jobs, store, dataset, wanted, actor=actor, keep=reply.keep)
-    return reply.of(job)
+    return request_evaluation(services.jobs, store, dataset, wanted, actor=actor)
 
 
 @router.get(
@@ -117,11 +113,10 @@ def get_evaluation(evaluation: Id, store: AppStore) -> review.StoredEvaluation:
     status_code=204,
     responses=responses(404),
 )
-def delete_evaluation(evaluation: Id, store: AppStore, actor: Actor, asked: AskedUnder) -> Response:
+@responds(no_content)
+def delete_evaluation(evaluation: Id, store: AppStore, actor: Actor) -> None:
     """Delete an evaluation; its predictions stay."""
-    reply: Reply[None] = Reply(asked, nothing)
-    review.remove_evaluation(store, evaluation, actor=actor, keep=reply.keep)
-    return reply.of(None)
+    review.remove_evaluation(store, evaluation, actor=actor)
 
 
 @router.get(

@@ -14,7 +14,7 @@ from app.api.deps import Actor, AppServices, AppStore, DatasetPath, SeesWhole
 from app.api.jobs import ACCEPTED, job_address
 from app.api.paging import paged
 from app.api.problem import Responses, responses
-from app.api.reply import AskedUnder, Reply, document, nothing
+from app.api.respond import document, no_content, responds
 from app.api.routers.jobs import Cursor, DatasetFilter, Limit
 from app.api.schemas.export import (
     ExportDocument,
@@ -74,6 +74,11 @@ def list_formats(
     )
 
 
+def _export_answer(job: Job) -> Response:
+    started = ExportJobDocument.of_export(JobDocument.model_validate(job))
+    return document(started, 202, job_address(job))
+
+
 @router.post(
     "/exports",
     operation_id="makeExport",
@@ -81,26 +86,17 @@ def list_formats(
     response_model=ExportJobDocument,
     responses={**responses(404, 409, 413, 415, 507), **ACCEPTED},
 )
-def make_export(
-    request: ExportRequest, services: AppServices, actor: Actor, asked: AskedUnder
-) -> Response:
+@responds(_export_answer)
+def make_export(request: ExportRequest, services: AppServices, actor: Actor) -> Job:
     """Write accepted groups, or all of them, to a zip; 400 when there is nothing to write."""
-    reply = Reply(asked, _export_answer)
-    job = request_export(
+    return request_export(
         services.jobs,
         services.store,
         services.exports,
         services.frames,
         request.model_dump(),
         actor=actor,
-        keep=reply.keep,
     )
-    return reply.of(job)
-
-
-def _export_answer(job: Job) -> Response:
-    started = ExportJobDocument.of_export(JobDocument.model_validate(job))
-    return document(started, 202, job_address(job))
 
 
 @router.get("/exports", operation_id="listExports", responses=responses(404))
@@ -139,9 +135,8 @@ def get_export(export: ExportId, services: AppServices) -> ExportDocument:
     response_class=Response,
     responses={**responses(404, 409), 204: {"description": "It is gone."}},
 )
-def delete_export(
-    export: ExportId, services: AppServices, actor: Actor, asked: AskedUnder
-) -> Response:
+@responds(no_content)
+def delete_export(export: ExportId, services: AppServices, actor: Actor) -> None:
     """Delete the file of an export, or one that failed altogether; 409 while it is being written."""
     document = _document(services, export)
     if document.state in ("waiting", "running"):
@@ -151,9 +146,7 @@ def delete_export(
     if document.state in ("failed", "cancelled"):
         services.jobs.forget(int(export))
     services.exports.forget(export)
-    reply: Reply[None] = Reply(asked, nothing)
-    record_deed(services.store, actor, "export deleted", None, keep=reply.keep(None), export=export)
-    return reply.of(None)
+    record_deed(services.store, actor, "export deleted", None, export=export)
 
 
 async def written(export: ExportId, services: AppServices) -> str:

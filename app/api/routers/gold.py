@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from fastapi import APIRouter, Response
+from fastapi import APIRouter
 
 from app.api.deps import Actor, AppStore, DatasetPath, Id
 from app.api.problem import responses
-from app.api.reply import AskedUnder, Reply, document
+from app.api.respond import as_document, responds
 from app.api.schemas.take import (
     GoldChoiceDocument,
     GoldChosenDocument,
@@ -37,20 +37,14 @@ def get_report(dataset: DatasetPath, store: AppStore) -> gold.GoldReport:
     response_model=GoldChosenDocument,
     responses=responses(404, 409, 413, 415),
 )
+@responds(as_document(GoldChosenDocument.model_validate))
 def choose(
-    dataset: DatasetPath,
-    choice: GoldChoiceDocument,
-    store: AppStore,
-    actor: Actor,
-    asked: AskedUnder,
-) -> Response:
+    dataset: DatasetPath, choice: GoldChoiceDocument, store: AppStore, actor: Actor
+) -> GoldChosen:
     """Make gold groups of those whose truth is known, also while batches are under way."""
     values = choice.model_dump(exclude={"q", "source"})
     wanted = GoldChoice(gold.TruthSource(choice.source), query=choice.q, **values)
-    reply = Reply[GoldChosen](
-        asked, lambda chosen: document(GoldChosenDocument.model_validate(chosen))
-    )
-    return reply.of(mark_known(store, dataset, wanted, actor=actor, keep=reply.keep))
+    return mark_known(store, dataset, wanted, actor=actor)
 
 
 @router.put(
@@ -59,10 +53,10 @@ def choose(
     response_model=GoldGroupDocument,
     responses=responses(404, 409, 413, 415),
 )
-def mark(group: Id, edit: GoldEdit, store: AppStore, actor: Actor, asked: AskedUnder) -> Response:
+@responds(as_document(GoldGroupDocument.model_validate))
+def mark(group: Id, edit: GoldEdit, store: AppStore, actor: Actor) -> gold.GoldGroup:
     """Say that what a group holds now, with its verdict, is true."""
-    reply = Reply(asked, _gold_answer)
-    return reply.of(gold.mark(store, group, edit.start, actor=actor, keep=reply.keep))
+    return gold.mark(store, group, edit.start, actor=actor)
 
 
 @router.patch(
@@ -71,10 +65,10 @@ def mark(group: Id, edit: GoldEdit, store: AppStore, actor: Actor, asked: AskedU
     response_model=GoldGroupDocument,
     responses=responses(404, 413, 415),
 )
-def change(group: Id, edit: GoldEdit, store: AppStore, actor: Actor, asked: AskedUnder) -> Response:
+@responds(as_document(GoldGroupDocument.model_validate))
+def change(group: Id, edit: GoldEdit, store: AppStore, actor: Actor) -> gold.GoldGroup:
     """Let annotators of a gold group begin with something else; what is true of it stays."""
-    reply = Reply(asked, _gold_answer)
-    return reply.of(gold.start_with(store, group, edit.start, actor=actor, keep=reply.keep))
+    return gold.start_with(store, group, edit.start, actor=actor)
 
 
 @router.delete(
@@ -83,11 +77,7 @@ def change(group: Id, edit: GoldEdit, store: AppStore, actor: Actor, asked: Aske
     response_model=GoldGroupDocument,
     responses=responses(404),
 )
-def unmark(group: Id, store: AppStore, actor: Actor, asked: AskedUnder) -> Response:
+@responds(as_document(GoldGroupDocument.model_validate))
+def unmark(group: Id, store: AppStore, actor: Actor) -> gold.GoldGroup:
     """Let a gold group be an ordinary one again; what people made of it is no longer shown."""
-    reply = Reply(asked, _gold_answer)
-    return reply.of(gold.unmark(store, group, actor=actor, keep=reply.keep))
-
-
-def _gold_answer(group: gold.GoldGroup) -> Response:
-    return document(GoldGroupDocument.model_validate(group))
+    return gold.unmark(store, group, actor=actor)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import partial
 from typing import Annotated
 
 from fastapi import APIRouter, Query, Request, Response
@@ -22,7 +20,7 @@ from app.api.deps import (
 )
 from app.api.paging import paged
 from app.api.problem import Responses, responses
-from app.api.reply import AskedUnder, KeyedRequest, Reply, document
+from app.api.respond import document, responds
 from app.api.schemas.group import GroupDocument
 from app.api.schemas.past import StepDocument
 from app.api.schemas.preview import PreviewDocument, PreviewRequest
@@ -36,7 +34,6 @@ from app.api.schemas.queue import (
 )
 from app.api.schemas.solution import SolutionDocument
 from app.api.security.access import login_of
-from app.api.services import Services
 from app.errors import NotFoundError
 from app.finite import MAX_ID
 from app.review.datasets.dataset import dataset_id
@@ -70,28 +67,6 @@ def load_document(store: Store, group_id: int) -> GroupDocument:
 def load_document_of_view(store: Store, view_id: int) -> GroupDocument:
     """The document of the group of a view as it is now."""
     return GroupDocument.of(submit.load_solved_of_view(store, view_id))
-
-
-def change_group(
-    asked: KeyedRequest | None,
-    present: Callable[[], GroupDocument],
-    change: Callable[..., GroupState],
-    then: Callable[[GroupState], object] | None = None,
-) -> Response:
-    """Change a group and answer with it.
-
-    Args:
-        asked: The key under which it was asked for.
-        present: Reads the group, to be shown to who comes too late.
-        change: Does it; told by ``keep`` how the answer is kept.
-        then: What follows from it.
-    """
-    reply = Reply(asked, group_answer)
-    with current_state(present):
-        state = change(keep=reply.keep)
-    if then is not None:
-        then(state)
-    return reply.of(state)
 
 
 @router.get("", operation_id="listGroups", responses=responses(404))
@@ -219,11 +194,12 @@ async def preview_group(
     response_model=GroupDocument,
     responses={**responses(*CONFLICTS), **CHANGED},
 )
-def undo(
-    group: Id, services: AppServices, actor: Actor, if_match: IfMatch, asked: AskedUnder
-) -> Response:
+@responds(group_answer)
+def undo(group: Id, services: AppServices, actor: Actor, if_match: IfMatch) -> GroupState:
     """Take the last edit back; 409 when there is none."""
-    return _step(undoing.undo, services, group, actor, if_match, asked)
+    store = services.store
+    with current_state(lambda: load_document(store, group)):
+        return undoing.undo(store, group, if_match=if_match, actor=actor, paint=services.paint)
 
 
 @router.post(
@@ -232,21 +208,9 @@ def undo(
     response_model=GroupDocument,
     responses={**responses(*CONFLICTS), **CHANGED},
 )
-def redo(
-    group: Id, services: AppServices, actor: Actor, if_match: IfMatch, asked: AskedUnder
-) -> Response:
+@responds(group_answer)
+def redo(group: Id, services: AppServices, actor: Actor, if_match: IfMatch) -> GroupState:
     """Do again what was undone last; 409 when there is nothing."""
-    return _step(undoing.redo, services, group, actor, if_match, asked)
-
-
-def _step(
-    step: Callable[..., GroupState],
-    services: Services,
-    group: int,
-    actor: str,
-    if_match: str,
-    asked: KeyedRequest | None,
-) -> Response:
     store = services.store
-    change = partial(step, store, group, if_match=if_match, actor=actor, paint=services.paint)
-    return change_group(asked, lambda: load_document(store, group), change)
+    with current_state(lambda: load_document(store, group)):
+        return undoing.redo(store, group, if_match=if_match, actor=actor, paint=services.paint)

@@ -8,7 +8,7 @@ from fastapi import APIRouter, Path, Query, Request, Response
 
 from app.api.deps import Actor, AppServices, AppStore, DatasetPath, etag_matches
 from app.api.problem import responses
-from app.api.reply import AskedUnder, Reply, document
+from app.api.respond import as_document, responds
 from app.api.schemas.take import (
     GuidelinePictureDocument,
     GuidelinesDocument,
@@ -45,17 +45,14 @@ def get_guidelines(
     response_model=GuidelinesDocument,
     responses=responses(404, 409, 413, 415),
 )
+@responds(as_document(GuidelinesDocument.model_validate))
 def write_guidelines(
-    dataset: DatasetPath, edit: GuidelinesEdit, store: AppStore, actor: Actor, asked: AskedUnder
-) -> Response:
+    dataset: DatasetPath, edit: GuidelinesEdit, store: AppStore, actor: Actor
+) -> guidelines.Guidelines:
     """Write another version; 409 where somebody wrote one meanwhile."""
-    reply = Reply[guidelines.Guidelines](
-        asked, lambda written: document(GuidelinesDocument.model_validate(written))
+    return guidelines.write_guidelines(
+        store, dataset, edit.text, based_on=edit.based_on, actor=actor
     )
-    written = guidelines.write_guidelines(
-        store, dataset, edit.text, based_on=edit.based_on, actor=actor, keep=reply.keep
-    )
-    return reply.of(written)
 
 
 @router.post(
@@ -65,17 +62,12 @@ def write_guidelines(
     status_code=201,
     responses=responses(404, 409, 413, 415, 503),
 )
+@responds(as_document(GuidelinePictureDocument.model_validate, 201))
 def add_picture(
-    dataset: DatasetPath, new: NewGuidelinePicture, services: AppServices, asked: AskedUnder
-) -> Response:
+    dataset: DatasetPath, new: NewGuidelinePicture, services: AppServices
+) -> guidelines.GuidelinePicture:
     """Keep an uploaded picture; the text shows it by its digest."""
-    reply = Reply[guidelines.GuidelinePicture](
-        asked, lambda picture: document(GuidelinePictureDocument.model_validate(picture), 201)
-    )
-    kept = guidelines.add_picture(
-        services.store, dataset, new.upload, services.frames, keep=reply.keep
-    )
-    return reply.of(kept)
+    return guidelines.add_picture(services.store, dataset, new.upload, services.frames)
 
 
 @router.get(

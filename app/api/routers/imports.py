@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from fastapi import APIRouter, Query, Response
+from fastapi import APIRouter, Query
 
 from app.api.deps import Actor, AppServices, DryRun
 from app.api.jobs import by_job, job_answer
 from app.api.paging import paged
 from app.api.problem import responses
-from app.api.reply import AskedUnder, Reply
+from app.api.respond import responds
 from app.api.schemas.imports import FolderDocument, ImportBody
 from app.review.importing.folders import FolderListing, list_folder
 from app.review.jobs.imports import request_import
+from app.review.jobs.records import Job
 
 router = APIRouter(prefix="/imports", tags=["imports"])
 
@@ -39,25 +40,19 @@ def get_folders(services: AppServices, path: FolderPath = "") -> FolderListing:
     operation_id="startImport",
     **by_job(404, 413, 415, 503),
 )
+@responds(job_answer)
 def start_import(
-    request: ImportBody,
-    services: AppServices,
-    actor: Actor,
-    asked: AskedUnder,
-    dry_run: DryRun = False,
-) -> Response:
+    request: ImportBody, services: AppServices, actor: Actor, dry_run: DryRun = False
+) -> Job:
     """Read files into a dataset, which is made when there is none of that name.
 
     The job's result is the report: read, imported, new, changed, unchanged, findings, and what
     was skipped with file, record and reason. A dry run reports the same and keeps nothing.
     """
-    reply = Reply(asked, job_answer)
-    job = request_import(
+    return request_import(
         services.jobs,
         services.store,
         services.settings,
         request.value(dry_run=dry_run),
         actor=actor,
-        keep=reply.keep,
     )
-    return reply.of(job)

@@ -4,17 +4,15 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from fastapi import APIRouter, Query, Response
+from fastapi import APIRouter, Query
 
 from app.api.cursor import parse_cursor
 from app.api.deps import Actor, AppServices, Id, SeesWhole
 from app.api.problem import responses
-from app.api.reply import AskedUnder, Reply, document
+from app.api.respond import as_document, responds
 from app.api.schemas.job import JobDocument, JobKind, JobPage
-from app.review.answers.keep import Kept
 from app.review.datasets.dataset import dataset_id
 from app.review.jobs.records import Job
-from app.review.people.deeds import with_deed
 from app.soccer.choices import JobState
 
 router = APIRouter(prefix="/jobs", tags=["jobs"])
@@ -59,13 +57,7 @@ def get_job(job: Id, services: AppServices) -> Job:
 @router.delete(
     "/{job}", operation_id="cancelJob", response_model=JobDocument, responses=responses(404, 409)
 )
-def cancel_job(job: Id, services: AppServices, actor: Actor, asked: AskedUnder) -> Response:
+@responds(as_document(JobDocument.model_validate))
+def cancel_job(job: Id, services: AppServices, actor: Actor) -> Job:
     """End a job: one that waits at once, one that runs at its next step; 409 when it is over."""
-    reply = Reply[Job](asked, lambda found: document(JobDocument.model_validate(found)))
-
-    def keep(ended: Job) -> Kept:
-        did, of = "job cancelled", ended.dataset_id
-        return with_deed(reply.keep(ended), actor, did, of, job=ended.id, title=ended.title)
-
-    ended = services.jobs.cancel(job, keep)
-    return reply.of(ended)
+    return services.jobs.cancel(job, by=actor)

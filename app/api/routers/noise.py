@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from fastapi import APIRouter, Response
+from fastapi import APIRouter
 
 from app.api.deps import Actor, AppServices, DatasetPath
 from app.api.jobs import by_job, job_answer
 from app.api.problem import responses
-from app.api.reply import AskedUnder, Reply
+from app.api.respond import responds
 from app.api.schemas.noise import NoiseDocument
 from app.review.jobs.noise import request_noise, request_noise_back
+from app.review.jobs.records import Job
 from app.review.policies.noise import Noise
 
 router = APIRouter(prefix="/datasets/{dataset}/noise", tags=["policies"])
@@ -30,17 +31,14 @@ def get_noise(dataset: DatasetPath, services: AppServices) -> Noise:
     operation_id="acceptNoise",
     **by_job(404, 412),
 )
-def accept_noise(
-    dataset: DatasetPath, services: AppServices, actor: Actor, asked: AskedUnder
-) -> Response:
+@responds(job_answer)
+def accept_noise(dataset: DatasetPath, services: AppServices, actor: Actor) -> Job:
     """Judge by the estimates: `values` go into the policy, `factors` to the balls; the job solves.
 
     A ball that is placed later has the factor of its camera and of who places it.
     """
-    reply = Reply(asked, job_answer)
     found = services.noises.read(dataset)
-    job = request_noise(services.jobs, services.store, found, actor=actor, keep=reply.keep)
-    return reply.of(job)
+    return request_noise(services.jobs, services.store, found, actor=actor)
 
 
 @router.delete(
@@ -48,13 +46,10 @@ def accept_noise(
     operation_id="takeNoiseBack",
     **by_job(404),
 )
-def take_noise_back(
-    dataset: DatasetPath, services: AppServices, actor: Actor, asked: AskedUnder
-) -> Response:
+@responds(job_answer)
+def take_noise_back(dataset: DatasetPath, services: AppServices, actor: Actor) -> Job:
     """Take the balls of all cameras and people to be as noisy as the dataset's; the job solves.
 
     The policy stays as it is.
     """
-    reply = Reply(asked, job_answer)
-    job = request_noise_back(services.jobs, services.store, dataset, actor=actor, keep=reply.keep)
-    return reply.of(job)
+    return request_noise_back(services.jobs, services.store, dataset, actor=actor)

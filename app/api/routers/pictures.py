@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from fastapi import APIRouter, Response
+from fastapi import APIRouter
 
 from app.api.deps import Actor, AppServices, AppStore, DatasetPath
 from app.api.jobs import by_job, job_answer
 from app.api.paging import paged
 from app.api.problem import responses
-from app.api.reply import AskedUnder, Reply
+from app.api.respond import responds
 from app.api.schemas.pictures import (
     MatchPictureChange,
     MatchPicturesDocument,
@@ -16,6 +16,7 @@ from app.api.schemas.pictures import (
 )
 from app.review.editing.pictures import read_pictures
 from app.review.jobs.pictures import PICTURES, request_pictures
+from app.review.jobs.records import Job
 
 router = APIRouter(prefix="/datasets/{dataset}/pictures", tags=["datasets"])
 
@@ -32,23 +33,16 @@ def list_match_pictures(dataset: DatasetPath, store: AppStore) -> MatchPicturesD
     operation_id="estimateMatchPictures",
     **by_job(404, 413, 415),
 )
+@responds(job_answer)
 def estimate_match_pictures(
-    dataset: DatasetPath,
-    request: PictureEstimateRequest,
-    services: AppServices,
-    actor: Actor,
-    asked: AskedUnder,
-) -> Response:
+    dataset: DatasetPath, request: PictureEstimateRequest, services: AppServices, actor: Actor
+) -> Job:
     """Look at up to thirty frames of each match together; changes nothing.
 
     `result.items` of the job has what they show (`estimate`), what to use instead (`proposed`, null
     where nothing certainly happened), and both in words.
     """
-    reply = Reply(asked, job_answer)
-    job = PICTURES.request(
-        services.jobs, services.store, dataset, request.match, actor=actor, keep=reply.keep
-    )
-    return reply.of(job)
+    return PICTURES.request(services.jobs, services.store, dataset, request.match, actor=actor)
 
 
 @router.patch(
@@ -56,25 +50,15 @@ def estimate_match_pictures(
     operation_id="setMatchPicture",
     **by_job(404, 413, 415),
 )
+@responds(job_answer)
 def set_match_picture(
-    dataset: DatasetPath,
-    change: MatchPictureChange,
-    services: AppServices,
-    actor: Actor,
-    asked: AskedUnder,
-) -> Response:
+    dataset: DatasetPath, change: MatchPictureChange, services: AppServices, actor: Actor
+) -> Job:
     """Say what was done to the pictures of a match's main camera; the job solves its groups.
 
     Each group gets an edit that it can undo. Replays are left alone: each shot has its own.
     """
     picture = None if change.picture is None else change.picture.picture()
-    reply = Reply(asked, job_answer)
-    job = request_pictures(
-        services.jobs,
-        services.store,
-        dataset,
-        {change.match: picture},
-        actor=actor,
-        keep=reply.keep,
+    return request_pictures(
+        services.jobs, services.store, dataset, {change.match: picture}, actor=actor
     )
-    return reply.of(job)

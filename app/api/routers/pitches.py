@@ -9,10 +9,11 @@ from app.api.deps import Actor, AppServices, AppStore, DatasetPath, IfMatch
 from app.api.jobs import by_job, job_address, job_answer
 from app.api.paging import paged
 from app.api.problem import Responses, responses
-from app.api.reply import AskedUnder, Reply, document
+from app.api.respond import document, responds
 from app.api.schemas.job import JobDocument
 from app.api.schemas.pitches import PitchChange, PitchesDocument
 from app.review.editing.pitches import DatasetPitches, read_pitches
+from app.review.jobs.records import Job
 from app.review.jobs.solve import PitchJob, request_estimates, request_pitches
 from app.soccer.pitch import Pitch
 
@@ -42,16 +43,20 @@ def list_pitches(dataset: DatasetPath, store: AppStore, response: Response) -> P
 
 
 @router.post("", operation_id="estimatePitches", **by_job(404))
-def estimate_pitches(
-    dataset: DatasetPath, services: AppServices, actor: Actor, asked: AskedUnder
-) -> Response:
+@responds(job_answer)
+def estimate_pitches(dataset: DatasetPath, services: AppServices, actor: Actor) -> Job:
     """Estimate the pitches of the matches whose lines were not looked at as they are now.
 
     The job solves what is stale, too: it is the one that follows an import.
     """
-    reply = Reply(asked, job_answer)
-    job = request_estimates(services.jobs, services.store, dataset, actor=actor, keep=reply.keep)
-    return reply.of(job)
+    return request_estimates(services.jobs, services.store, dataset, actor=actor)
+
+
+def _sized(sized: PitchJob) -> Response:
+    pitches = PitchesDocument.model_validate(sized.state)
+    job = JobDocument.model_validate(sized.job)
+    job.result = {"pitches": pitches.model_dump(mode="json")}
+    return document(job, 202, {**_tagged(sized.state), **job_address(sized.job)})
 
 
 @router.patch(
@@ -61,14 +66,14 @@ def estimate_pitches(
     response_model=JobDocument,
     responses={**responses(404, 412, 413, 415, 428), **CHANGED},
 )
+@responds(_sized)
 def set_pitch(
     dataset: DatasetPath,
     change: PitchChange,
     services: AppServices,
     actor: Actor,
     if_match: IfMatch,
-    asked: AskedUnder,
-) -> Response:
+) -> PitchJob:
     """Give a match another pitch, all its groups at once.
 
     They are solved again by the job; `result.pitches` of the answer is the list as it is now.
@@ -76,25 +81,15 @@ def set_pitch(
     """
     store = services.store
     present = read_pitches(store, dataset)
-    reply = Reply(asked, _sized)
     with current_state(lambda: PitchesDocument.model_validate(read_pitches(store, dataset))):
-        sized = request_pitches(
+        return request_pitches(
             services.jobs,
             store,
             present.dataset_id,
             {change.match: Pitch(change.length, change.width)},
             if_match=if_match,
             actor=actor,
-            keep=reply.keep,
         )
-    return reply.of(sized)
-
-
-def _sized(sized: PitchJob) -> Response:
-    pitches = PitchesDocument.model_validate(sized.state)
-    job = JobDocument.model_validate(sized.job)
-    job.result = {"pitches": pitches.model_dump(mode="json")}
-    return document(job, 202, {**_tagged(sized.state), **job_address(sized.job)})
 
 
 def _tagged(state: DatasetPitches) -> dict[str, str]:

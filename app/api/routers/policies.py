@@ -9,7 +9,7 @@ from app.api.deps import Actor, AppServices, AppStore, DatasetPath, IfMatch
 from app.api.jobs import job_address
 from app.api.paging import paged
 from app.api.problem import Responses, responses
-from app.api.reply import AskedUnder, Reply, document
+from app.api.respond import document, responds
 from app.api.schemas.job import JobDocument
 from app.api.schemas.policy import (
     PolicyCatalogue,
@@ -57,6 +57,12 @@ def get_policy(dataset: DatasetPath, store: AppStore, response: Response) -> Pol
     return policy
 
 
+def _judged(judged: PolicyJob) -> Response:
+    policy, job = PolicyStateDocument.of(judged.state), JobDocument.model_validate(judged.job)
+    job.result = {"policy": policy.model_dump(mode="json"), "to_solve": judged.to_solve}
+    return document(job, 202, {**_tagged(policy), **job_address(judged.job)})
+
+
 @router.put(
     "/datasets/{dataset}/policy",
     operation_id="setPolicy",
@@ -64,14 +70,14 @@ def get_policy(dataset: DatasetPath, store: AppStore, response: Response) -> Pol
     response_model=JobDocument,
     responses={**responses(404, 412, 413, 415, 428), **CHANGED},
 )
+@responds(_judged)
 def put_policy(
     dataset: DatasetPath,
     change: PolicyChange,
     services: AppServices,
     actor: Actor,
     if_match: IfMatch,
-    asked: AskedUnder,
-) -> Response:
+) -> PolicyJob:
     """Judge the dataset by another policy.
 
     What that leaves without a solution is stale and solved by the job; `result.policy` of the
@@ -80,24 +86,10 @@ def put_policy(
     store = services.store
     present = read_policy(store, dataset)
     policy = wanted(change, present.policy)
-    reply = Reply(asked, _judged)
     with current_state(lambda: PolicyStateDocument.of(read_policy(store, dataset))):
-        judged = request_policy(
-            services.jobs,
-            store,
-            present.dataset_id,
-            policy,
-            if_match=if_match,
-            actor=actor,
-            keep=reply.keep,
+        return request_policy(
+            services.jobs, store, present.dataset_id, policy, if_match=if_match, actor=actor
         )
-    return reply.of(judged)
-
-
-def _judged(judged: PolicyJob) -> Response:
-    policy, job = PolicyStateDocument.of(judged.state), JobDocument.model_validate(judged.job)
-    job.result = {"policy": policy.model_dump(mode="json"), "to_solve": judged.to_solve}
-    return document(job, 202, {**_tagged(policy), **job_address(judged.job)})
 
 
 def wanted(change: PolicyChange, present: Policy) -> Policy:

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from fastapi import APIRouter, Depends, Request, Response
+from fastapi import APIRouter, Depends, Request
 
 from app.api.deps import Actor, AppServices, Id, Sees
 from app.api.jobs import by_job, job_answer
 from app.api.problem import responses
-from app.api.reply import AskedUnder, Reply
+from app.api.respond import responds
 from app.api.schemas.practice import LessonDocument, PracticeBody, PracticeDocument
 from app.api.security.access import login_of
 from app.review.editing.submit import load
+from app.review.jobs.records import Job
 from app.review.practice.practice import (
     Practice,
     PracticeLesson,
@@ -52,13 +53,10 @@ def get_practice(services: AppServices, sight: Sees, person: Person) -> Practice
     operation_id="startPractice",
     **by_job(409, 413, 415, 503),
 )
+@responds(job_answer)
 def start_practice(
-    request: PracticeBody,
-    services: AppServices,
-    actor: Actor,
-    person: Person,
-    asked: AskedUnder,
-) -> Response:
+    request: PracticeBody, services: AppServices, actor: Actor, person: Person
+) -> Job:
     """Make the dataset `practice`; sent again it changes nothing, with `again` it begins afresh.
 
     Where people log in, the dataset is the person's own, `practice NAME`: they are a reviewer in
@@ -66,17 +64,14 @@ def start_practice(
 
     The job's result has `dataset`, `groups` and `first`, the id of the first lesson's group.
     """
-    reply = Reply(asked, job_answer)
-    job = request_practice(
+    return request_practice(
         services.jobs,
         services.store,
         services.settings,
         again=request.again,
         actor=actor,
         person=person,
-        keep=reply.keep,
     )
-    return reply.of(job)
 
 
 @router.get(

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from functools import partial
 from typing import Annotated
 
 from fastapi import APIRouter, Query, Response
 
+from app.api.conflicts import current_state
 from app.api.deps import Actor, AppServices, AppStore, DatasetPath, DryRun, Id, IfMatch
 from app.api.jobs import ACCEPTED, job_answer
 from app.api.paging import paged
 from app.api.problem import responses
-from app.api.reply import AskedUnder, Reply, document, nothing
-from app.api.routers.groups import CHANGED, CONFLICTS, change_group, load_document_of_view
+from app.api.respond import document, no_content, responds
+from app.api.routers.groups import CHANGED, CONFLICTS, group_answer, load_document_of_view
 from app.api.schemas.group import GroupDocument
 from app.api.schemas.job import JobDocument
 from app.api.schemas.prediction import (
@@ -28,11 +28,13 @@ from app.api.schemas.prediction import (
 )
 from app.config import Settings
 from app.review.editing.found_view import find_view
+from app.review.editing.state import GroupState
 from app.review.evaluating import predictions as review
 from app.review.evaluating.accept import AcceptReport, accept, accept_box, plan_accept
 from app.review.evaluating.group_predictions import group_predictions
 from app.review.evaluating.prediction_reader import PredictionFiles, uploaded_files
 from app.review.jobs.evaluations import request_accept
+from app.review.jobs.records import Job
 
 router = APIRouter(tags=["predictions"])
 
@@ -49,6 +51,11 @@ def list_predictions(dataset: DatasetPath, store: AppStore) -> PredictionSetList
     return PredictionSetList(items=found)
 
 
+def _added(found: review.PredictionSet) -> Response:
+    headers = {"Location": f"/api/v1/predictions/{found.id}"}
+    return document(PredictionSetDocument.model_validate(found), 201, headers)
+
+
 @router.post(
     "/datasets/{dataset}/predictions",
     operation_id="addPredictions",
@@ -59,35 +66,28 @@ def list_predictions(dataset: DatasetPath, store: AppStore) -> PredictionSetList
         201: {"headers": LOCATION, "description": "The set, with what could not be read."},
     },
 )
+@responds(_added)
 def add_predictions(
-    dataset: DatasetPath,
-    request: PredictionRequest,
-    services: AppServices,
-    actor: Actor,
-    asked: AskedUnder,
-) -> Response:
+    dataset: DatasetPath, request: PredictionRequest, services: AppServices, actor: Actor
+) -> review.PredictionSet:
     """Read uploaded files into a new set of predictions, or find the set that they gave before.
 
     What is wrong is left out and listed with file, record and field; frames that the dataset does
     not have are counted and listed. 400 where nothing can be used, 413 where reading takes too
     much memory or time, 503 while too many others are read. No solve reads predictions.
     """
-    reply = Reply(asked, _added)
-    found = review.add_predictions(
+    return review.add_predictions(
         services.store,
         dataset,
         request.name,
         _files(services.settings, request),
         actor=actor,
         read=services.predictions.read,
-        keep=reply.keep,
     )
-    return reply.of(found)
 
 
-def _added(found: review.PredictionSet) -> Response:
-    headers = {"Location": f"/api/v1/predictions/{found.id}"}
-    return document(PredictionSetDocument.model_validate(found), 201, headers)
+def _accepted(found: AcceptReport | Job) -> Response:
+    return job_answer(found) if isinstance(found, Job) else document(AcceptOutcome.done(found))
 
 
 @router.post(
@@ -103,13 +103,10 @@ def _added(found: review.PredictionSet) -> Response:
         },
     },
 )
+@responds(_accepted)
 def accept_predictions(
-    request: AcceptBody,
-    services: AppServices,
-    actor: Actor,
-    asked: AskedUnder,
-    dry_run: DryRun = False,
-) -> AcceptOutcome | Response:
+    request: AcceptBody, services: AppServices, actor: Actor, dry_run: DryRun = False
+) -> AcceptReport | Job | Response:
     """Make annotations of predictions, as edits in the log that can be undone.
 
     Only the surest prediction of a view counts. Named views are changed at once (200); a query
@@ -117,13 +114,10 @@ def accept_predictions(
     """
     store, value = services.store, request.value()
     if dry_run or request.dry_run:
-        return AcceptOutcome.planned(plan_accept(store, request.dataset, value))
+        return document(AcceptOutcome.planned(plan_accept(store, request.dataset, value)))
     if request.views is not None:
-        done = Reply[AcceptReport](asked, lambda report: document(AcceptOutcome.done(report)))
-        return done.of(accept(store, request.dataset, value, actor=actor, keep=done.keep))
-    reply = Reply(asked, job_answer)
-    job = request_accept(services.jobs, store, request.dataset, value, actor=actor, keep=reply.keep)
-    return reply.of(job)
+        return accept(store, request.dataset, value, actor=actor)
+    return request_accept(services.jobs, store, request.dataset, value, actor=actor)
 
 
 @router.get(
@@ -143,13 +137,10 @@ def get_predictions(predictions: Id, store: AppStore) -> review.PredictionSet:
     status_code=204,
     responses=responses(404),
 )
-def delete_predictions(
-    predictions: Id, store: AppStore, actor: Actor, asked: AskedUnder
-) -> Response:
+@responds(no_content)
+def delete_predictions(predictions: Id, store: AppStore, actor: Actor) -> None:
     """Throw a set away; evaluations of it stay, and so do balls that were accepted from it."""
-    reply: Reply[None] = Reply(asked, nothing)
-    review.delete_predictions(store, predictions, actor=actor, keep=reply.keep)
-    return reply.of(None)
+    review.delete_predictions(store, predictions, actor=actor)
 
 
 @router.get(
@@ -180,22 +171,20 @@ def get_group_predictions(group: Id, store: AppStore) -> GroupPredictionsDocumen
     response_model=GroupDocument,
     responses={**responses(*CONFLICTS), **CHANGED},
 )
+@responds(group_answer)
 def accept_prediction(
     view: Id,
     prediction: Id,
     store: AppStore,
     actor: Actor,
     if_match: IfMatch,
-    asked: AskedUnder,
     replace: Annotated[
         bool, Query(description="Also where the view has another ball; else that is a 409.")
     ] = False,
-) -> Response:
+) -> GroupState:
     """Make this very prediction the ball of its view: an edit that can be undone."""
-    change = partial(
-        accept_box, store, view, prediction, if_match=if_match, actor=actor, replace=replace
-    )
-    return change_group(asked, lambda: load_document_of_view(store, view), change)
+    with current_state(lambda: load_document_of_view(store, view)):
+        return accept_box(store, view, prediction, if_match=if_match, actor=actor, replace=replace)
 
 
 def _files(settings: Settings, request: PredictionRequest) -> PredictionFiles:

@@ -8,7 +8,7 @@ from app.api.deps import Actor, AppServices, AppStore, DatasetPath, DryRun, Id
 from app.api.jobs import ACCEPTED, job_answer
 from app.api.paging import paged
 from app.api.problem import responses
-from app.api.reply import AskedUnder, Reply, document
+from app.api.respond import document, responds
 from app.api.schemas.job import JobDocument
 from app.api.schemas.proposals import (
     DatasetProposalsDocument,
@@ -20,6 +20,7 @@ from app.api.schemas.proposals import (
 )
 from app.review.editing.proposals import get_group_proposals, get_proposals
 from app.review.jobs.proposals import PROPOSALS, stop_and_forget
+from app.review.jobs.records import Job
 
 router = APIRouter(tags=["datasets"])
 
@@ -47,14 +48,14 @@ def list_proposals(dataset: DatasetPath, store: AppStore) -> DatasetProposalsDoc
         },
     },
 )
+@responds(job_answer)
 def propose_lines(
     dataset: DatasetPath,
     request: DatasetProposalsRequest,
     services: AppServices,
     actor: Actor,
-    asked: AskedUnder,
     dry_run: DryRun = False,
-) -> Response:
+) -> Job | Response:
     """Look at the pictures of views without a camera, neither given nor from their lines.
 
     What is found is kept as predictions: nothing counts before a person saves the lines of one.
@@ -66,11 +67,11 @@ def propose_lines(
         found = get_proposals(services.store, dataset, matches)
         counts = {name: found.count(name) for name in ("views", "looked")}
         return document(ProposalPlanDocument(**counts))
-    reply = Reply(asked, job_answer)
-    job = PROPOSALS.request(
-        services.jobs, services.store, dataset, request.match, actor=actor, keep=reply.keep
-    )
-    return reply.of(job)
+    return PROPOSALS.request(services.jobs, services.store, dataset, request.match, actor=actor)
+
+
+def _forgotten(gone: int) -> Response:
+    return document(ForgottenProposalsDocument(forgotten=gone))
 
 
 @router.delete(
@@ -79,13 +80,13 @@ def propose_lines(
     response_model=ForgottenProposalsDocument,
     responses=responses(404),
 )
-def forget(dataset: DatasetPath, services: AppServices, asked: AskedUnder) -> Response:
+@responds(_forgotten)
+def forget(dataset: DatasetPath, services: AppServices) -> int:
     """Forget everything that was proposed for a dataset; lines that were accepted stay.
 
     A search that waits or runs is cancelled, and nothing that it finds is kept afterwards.
     """
-    reply = Reply[int](asked, lambda gone: document(ForgottenProposalsDocument(forgotten=gone)))
-    return reply.of(stop_and_forget(services.jobs, services.store, dataset, keep=reply.keep))
+    return stop_and_forget(services.jobs, services.store, dataset)
 
 
 @router.get(

@@ -7,8 +7,9 @@ from fastapi import APIRouter, Response
 from app.api.deps import Actor, AppServices, DatasetPath
 from app.api.jobs import by_job, job_answer
 from app.api.problem import responses
-from app.api.reply import AskedUnder, Reply, document
+from app.api.respond import document, responds
 from app.api.schemas.rig import RigRequest, RigTakenBack
+from app.review.jobs.records import Job
 from app.review.jobs.rig import request_rig, take_rig_back
 
 router = APIRouter(tags=["stations"])
@@ -19,30 +20,28 @@ router = APIRouter(tags=["stations"])
     operation_id="adjustRig",
     **by_job(404, 409, 413, 415),
 )
+@responds(job_answer)
 def adjust_rig(
-    dataset: DatasetPath,
-    request: RigRequest,
-    services: AppServices,
-    actor: Actor,
-    asked: AskedUnder,
-) -> Response:
+    dataset: DatasetPath, request: RigRequest, services: AppServices, actor: Actor
+) -> Job:
     """Adjust the static cameras of a dataset to lines and balls over time.
 
     The job's result is the proposal: each camera and each pair before and after, on instants that
     were used and on instants that were held out. With `accept` and the `inputs` of the
     proposal that was looked at it is saved as an edit of each camera.
     """
-    reply = Reply(asked, job_answer)
-    job = request_rig(
+    return request_rig(
         services.jobs,
         services.store,
         dataset,
         what=request.accept,
         inputs=request.inputs,
         actor=actor,
-        keep=reply.keep,
     )
-    return reply.of(job)
+
+
+def _taken_back(count: int) -> Response:
+    return document(RigTakenBack(taken_back=count))
 
 
 @router.delete(
@@ -51,10 +50,7 @@ def adjust_rig(
     response_model=RigTakenBack,
     responses=responses(404, 409),
 )
-def delete_rig(
-    dataset: DatasetPath, services: AppServices, actor: Actor, asked: AskedUnder
-) -> Response:
+@responds(_taken_back)
+def delete_rig(dataset: DatasetPath, services: AppServices, actor: Actor) -> int:
     """Take an accepted rig back, all its cameras at once; 409 when there is none."""
-    reply: Reply[int] = Reply(asked, lambda count: document(RigTakenBack(taken_back=count)))
-    count = take_rig_back(services.jobs, services.store, dataset, actor=actor, keep=reply.keep)
-    return reply.of(count)
+    return take_rig_back(services.jobs, services.store, dataset, actor=actor)

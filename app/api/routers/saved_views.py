@@ -7,7 +7,7 @@ from fastapi import APIRouter, Response
 from app.api.deps import Actor, AppStore, DatasetPath, Id
 from app.api.paging import paged
 from app.api.problem import responses
-from app.api.reply import AskedUnder, Reply, document
+from app.api.respond import as_document, document, responds
 from app.api.schemas.saved_view import (
     NewSavedView,
     ReviewerList,
@@ -32,6 +32,11 @@ def list_saved_views(dataset: DatasetPath, store: AppStore) -> SavedViewList:
     return SavedViewList(items=found)
 
 
+def _saved(view: SavedView) -> Response:
+    headers = {"Location": f"/api/v1/saved-views/{view.id}"}
+    return document(SavedViewDocument.model_validate(view), 201, headers)
+
+
 @router.post(
     "/datasets/{dataset}/saved-views",
     operation_id="createSavedView",
@@ -45,20 +50,10 @@ def list_saved_views(dataset: DatasetPath, store: AppStore) -> SavedViewList:
         },
     },
 )
-def save_view(
-    dataset: DatasetPath, view: NewSavedView, store: AppStore, actor: Actor, asked: AskedUnder
-) -> Response:
+@responds(_saved)
+def save_view(dataset: DatasetPath, view: NewSavedView, store: AppStore, actor: Actor) -> SavedView:
     """Keep a query under a name; 409 when the name is taken."""
-    reply = Reply(asked, _saved)
-    saved = saved_views.save_view(
-        store, dataset_id(store, dataset), view.name, view.q, actor=actor, keep=reply.keep
-    )
-    return reply.of(saved)
-
-
-def _saved(view: SavedView) -> Response:
-    headers = {"Location": f"/api/v1/saved-views/{view.id}"}
-    return document(SavedViewDocument.model_validate(view), 201, headers)
+    return saved_views.save_view(store, dataset_id(store, dataset), view.name, view.q, actor=actor)
 
 
 @router.get(
@@ -78,10 +73,10 @@ def get_saved_view(view: Id, store: AppStore) -> saved_views.SavedView:
     response_model=SavedViewDocument,
     responses=responses(404),
 )
-def delete_saved_view(view: Id, store: AppStore, asked: AskedUnder) -> Response:
+@responds(as_document(SavedViewDocument.model_validate))
+def delete_saved_view(view: Id, store: AppStore) -> SavedView:
     """Forget a saved view; the answer is what it was, so that it can be saved again."""
-    reply = Reply[SavedView](asked, lambda gone: document(SavedViewDocument.model_validate(gone)))
-    return reply.of(saved_views.delete_view(store, view, keep=reply.keep))
+    return saved_views.delete_view(store, view)
 
 
 @router.get("/datasets/{dataset}/reviewers", operation_id="listReviewers", responses=responses(404))

@@ -11,7 +11,7 @@ from fastapi import APIRouter, Query, Response
 from app.api.conflicts import current_state
 from app.api.deps import Actor, AppServices, AppStore, Id, IfMatch
 from app.api.problem import Responses, responses
-from app.api.reply import AskedUnder, KeyedRequest, Reply
+from app.api.respond import responds
 from app.api.routers.groups import CHANGED, CONFLICTS, group_answer, load_document
 from app.api.schemas.annotation import LinesEdit
 from app.api.schemas.group import GroupDocument
@@ -21,6 +21,7 @@ from app.api.services import Services
 from app.errors import NotFoundError
 from app.finite import MAX_ID
 from app.review.editing.edit import SetStationCalibration, SetStationLines
+from app.review.editing.state import GroupState
 from app.review.editing.stations import (
     StationState,
     load_station,
@@ -29,6 +30,7 @@ from app.review.editing.stations import (
     undo_station,
 )
 from app.review.editing.submit import solved
+from app.review.idempotency import without_response
 from app.review.jobs.solve import request_solve
 
 router = APIRouter(prefix="/stations", tags=["stations"])
@@ -65,22 +67,22 @@ def get_station(station: Id, store: AppStore, response: Response) -> StationDeta
     response_model=GroupDocument,
     responses=STATION_CHANGED,
 )
+@responds(group_answer)
 def patch_lines(
     station: Id,
     lines: LinesEdit,
     services: AppServices,
     actor: Actor,
     if_match: IfMatch,
-    asked: AskedUnder,
     group: GroupOfStation = None,
-) -> Response:
+) -> GroupState:
     """Change the lines of a static camera; If-Match takes the station's ETag.
 
     The group that is answered is solved at once, the others in the background.
     """
     edit = SetStationLines(lines.points(), tuple(lines.proposed), tuple(lines.not_visible))
     change = partial(submit_station, edit=edit)
-    return _change(services, station, group, change, if_match, actor, asked)
+    return _change(services, station, group, change, if_match, actor)
 
 
 @router.patch(
@@ -89,18 +91,18 @@ def patch_lines(
     response_model=GroupDocument,
     responses=STATION_CHANGED,
 )
+@responds(group_answer)
 def patch_station(
     station: Id,
     change: StationEdit,
     services: AppServices,
     actor: Actor,
     if_match: IfMatch,
-    asked: AskedUnder,
     group: GroupOfStation = None,
-) -> Response:
+) -> GroupState:
     """Choose whether the given calibration counts or the lines; If-Match as for lines."""
     edited = partial(submit_station, edit=SetStationCalibration(change.calibration))
-    return _change(services, station, group, edited, if_match, actor, asked)
+    return _change(services, station, group, edited, if_match, actor)
 
 
 @router.post(
@@ -109,16 +111,16 @@ def patch_station(
     response_model=GroupDocument,
     responses=STATION_CHANGED,
 )
+@responds(group_answer)
 def undo(
     station: Id,
     services: AppServices,
     actor: Actor,
     if_match: IfMatch,
-    asked: AskedUnder,
     group: GroupOfStation = None,
-) -> Response:
+) -> GroupState:
     """Take the last edit of a static camera back; 409 when there is none."""
-    return _change(services, station, group, undo_station, if_match, actor, asked)
+    return _change(services, station, group, undo_station, if_match, actor)
 
 
 @router.post(
@@ -127,16 +129,16 @@ def undo(
     response_model=GroupDocument,
     responses=STATION_CHANGED,
 )
+@responds(group_answer)
 def redo(
     station: Id,
     services: AppServices,
     actor: Actor,
     if_match: IfMatch,
-    asked: AskedUnder,
     group: GroupOfStation = None,
-) -> Response:
+) -> GroupState:
     """Do again what was undone last; 409 when there is nothing."""
-    return _change(services, station, group, redo_station, if_match, actor, asked)
+    return _change(services, station, group, redo_station, if_match, actor)
 
 
 def _change(
@@ -146,16 +148,15 @@ def _change(
     change: Callable[..., StationState],
     if_match: str,
     actor: str,
-    asked: KeyedRequest | None,
-) -> Response:
+) -> GroupState:
     """Change a station with the group in view, and queue the others."""
     store = services.store
     shown = _shown_group(load_station(store, station), group)
-    reply = Reply(asked, group_answer)
     with current_state(lambda: load_document(store, shown)):
-        state = change(store, station, if_match=if_match, actor=actor, shown=shown, keep=reply.keep)
-    request_solve(services.jobs, store, state.dataset_id, actor=actor, edited=True)
-    return reply.made or group_answer(solved(store, shown))
+        state = change(store, station, if_match=if_match, actor=actor, shown=shown)
+    with without_response():
+        request_solve(services.jobs, store, state.dataset_id, actor=actor, edited=True)
+    return state.shown or solved(store, shown)
 
 
 def _shown_group(state: StationState, group: int | None) -> int:

@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from fastapi import APIRouter, Request, Response
-from starlette.background import BackgroundTask
+from fastapi import APIRouter, BackgroundTasks, Request
 
 from app.api.deps import Actor, AppServices, AppStore, DatasetPath, Id
 from app.api.paging import paged
 from app.api.problem import responses
-from app.api.reply import AskedUnder, Reply, document
+from app.api.respond import as_document, responds
 from app.api.routers.groups import ETAG, group_answer
 from app.api.schemas.group import GroupDocument
 from app.api.schemas.take import HandBack, TakeDocument, TakeList
 from app.api.security.access import login_of
 from app.review.agreement.adjudicate import take_over
 from app.review.agreement.weigh import after_hand_in
+from app.review.editing.state import GroupState
 from app.review.people.roles import Action, may
 from app.review.takes import take as takes
 from app.review.takes.hand_back import hand_back_take
@@ -43,11 +43,10 @@ def list_takes(dataset: DatasetPath, store: AppStore, request: Request, actor: A
     status_code=201,
     responses=responses(404, 409),
 )
-def begin(group: Id, store: AppStore, actor: Actor, asked: AskedUnder) -> Response:
+@responds(as_document(TakeDocument.model_validate, 201))
+def begin(group: Id, store: AppStore, actor: Actor) -> takes.TakeView:
     """Begin an own annotation of a group, on a copy that nobody else sees; the one begun, if so."""
-    reply = Reply[takes.TakeView](asked, lambda take: _take_answer(take, 201))
-    take = takes.begin_take(store, group, person=actor, keep=reply.keep)
-    return reply.made or _take_answer(takes.shown(store, take), 201)
+    return takes.begin_take(store, group, person=actor)
 
 
 @router.get(
@@ -67,14 +66,15 @@ def get_take(group: Id, store: AppStore) -> takes.TakeView:
     response_model=TakeDocument,
     responses=responses(403, 404, 409),
 )
-def hand_in(group: Id, services: AppServices, actor: Actor, asked: AskedUnder) -> Response:
+@responds(as_document(TakeDocument.model_validate))
+def hand_in(
+    group: Id, services: AppServices, actor: Actor, background: BackgroundTasks
+) -> takes.TakeView:
     """Submit an independent annotation; a verdict on it does the same. Only a lead can return it."""
-    store, reply = services.store, Reply(asked, _take_answer)
+    store = services.store
     take = takes.get_take_of(store, group)
-    handed = takes.hand_in(store, take.id, actor=actor, keep=reply.keep)
-    answer = reply.made or _take_answer(takes.shown(store, handed))
-    answer.background = BackgroundTask(after_hand_in, store, group, services.paint)
-    return answer
+    background.add_task(after_hand_in, store, group, services.paint)
+    return takes.hand_in(store, take.id, actor=actor)
 
 
 @router.post(
@@ -83,18 +83,13 @@ def hand_in(group: Id, services: AppServices, actor: Actor, asked: AskedUnder) -
     response_model=TakeDocument,
     responses=responses(404, 409, 413, 415),
 )
+@responds(as_document(TakeDocument.model_validate))
 def hand_back(
-    group: Id, store: AppStore, actor: Actor, asked: AskedUnder, why: HandBack | None = None
-) -> Response:
+    group: Id, store: AppStore, actor: Actor, why: HandBack | None = None
+) -> takes.TakeView:
     """Let the person of an annotation that was handed in go on with it, and tell them why."""
     take, reason = takes.get_take_of(store, group), "" if why is None else why.reason
-    reply = Reply(asked, _take_answer)
-    back = hand_back_take(store, take.id, reason, actor=actor, keep=reply.keep)
-    return reply.made or _take_answer(takes.shown(store, back))
-
-
-def _take_answer(take: takes.TakeView, status: int = 200) -> Response:
-    return document(TakeDocument.model_validate(take), status)
+    return hand_back_take(store, take.id, reason, actor=actor)
 
 
 @router.post(
@@ -103,12 +98,11 @@ def _take_answer(take: takes.TakeView, status: int = 200) -> Response:
     response_model=GroupDocument,
     responses={**responses(404, 409, 412), 200: {"headers": ETAG}},
 )
-def adopt(group: Id, services: AppServices, actor: Actor, asked: AskedUnder) -> Response:
+@responds(group_answer)
+def adopt(group: Id, services: AppServices, actor: Actor) -> GroupState:
     """Take an annotation and its verdict over into the group that it is of; the answer is that group.
 
     They are its person's there, as one edit that undo takes back.
     """
     take = takes.get_take_of(services.store, group)
-    reply = Reply(asked, group_answer)
-    state = take_over(services.store, take, actor=actor, paint=services.paint, keep=reply.keep)
-    return reply.of(state)
+    return take_over(services.store, take, actor=actor, paint=services.paint)

@@ -9,7 +9,7 @@ from fastapi import APIRouter, Response
 from app.api.deps import Actor, AppStore, Id
 from app.api.paging import paged
 from app.api.problem import responses
-from app.api.reply import AskedUnder, Reply, document, nothing
+from app.api.respond import document, no_content, responds
 from app.api.schemas.thread import (
     NewComment,
     NewThread,
@@ -37,6 +37,10 @@ def list_threads(group: Id, store: AppStore, actor: Actor) -> ThreadList:
     return ThreadList(items=[ThreadDocument.of(thread, actor) for thread in found])
 
 
+def _told(thread: comments.StoredThread, actor: str, status: int = 200) -> Response:
+    return document(ThreadDocument.of(thread, actor), status)
+
+
 @router.post(
     "/threads",
     operation_id="beginThread",
@@ -44,19 +48,14 @@ def list_threads(group: Id, store: AppStore, actor: Actor) -> ThreadList:
     status_code=201,
     responses=responses(404, 409, 413, 415),
 )
-def begin_thread(
-    group: Id, new: NewThread, store: AppStore, actor: Actor, asked: AskedUnder
-) -> Response:
+@responds(partial(_told, status=201), "actor")
+def begin_thread(group: Id, new: NewThread, store: AppStore, actor: Actor) -> comments.StoredThread:
     """Say something about the group, a view of it, or a place there.
 
     Whom it mentions is told, where they see the dataset.
     """
     at = None if new.at is None else (new.at.x, new.at.y)
-    reply = Reply(asked, partial(_told, actor=actor, status=201))
-    thread = comments.begin_thread(
-        store, group, new.text, actor=actor, view=new.view, at=at, keep=reply.keep
-    )
-    return reply.of(thread)
+    return comments.begin_thread(store, group, new.text, actor=actor, view=new.view, at=at)
 
 
 @router.patch(
@@ -65,13 +64,12 @@ def begin_thread(
     response_model=ThreadDocument,
     responses=responses(404, 409, 413, 415),
 )
+@responds(_told, "actor")
 def change_thread(
-    group: Id, thread: Id, change: ThreadEdit, store: AppStore, actor: Actor, asked: AskedUnder
-) -> Response:
+    group: Id, thread: Id, change: ThreadEdit, store: AppStore, actor: Actor
+) -> comments.StoredThread:
     """Settle a thread, or open it again."""
-    reply = Reply(asked, partial(_told, actor=actor))
-    found = comments.resolve(store, group, thread, change.resolved, actor=actor, keep=reply.keep)
-    return reply.of(found)
+    return comments.resolve(store, group, thread, change.resolved, actor=actor)
 
 
 @router.post(
@@ -81,13 +79,12 @@ def change_thread(
     status_code=201,
     responses=responses(404, 409, 413, 415),
 )
+@responds(partial(_told, status=201), "actor")
 def reply(
-    group: Id, thread: Id, new: NewComment, store: AppStore, actor: Actor, asked: AskedUnder
-) -> Response:
+    group: Id, thread: Id, new: NewComment, store: AppStore, actor: Actor
+) -> comments.StoredThread:
     """Say something in a thread; who spoke there before is told."""
-    answer = Reply(asked, partial(_told, actor=actor, status=201))
-    found = comments.reply(store, group, thread, new.text, actor=actor, keep=answer.keep)
-    return answer.of(found)
+    return comments.reply(store, group, thread, new.text, actor=actor)
 
 
 @router.patch(
@@ -96,19 +93,12 @@ def reply(
     response_model=ThreadDocument,
     responses=responses(403, 404, 409, 413, 415),
 )
+@responds(_told, "actor")
 def change_comment(
-    group: Id,
-    thread: Id,
-    comment: Id,
-    new: NewComment,
-    store: AppStore,
-    actor: Actor,
-    asked: AskedUnder,
-) -> Response:
+    group: Id, thread: Id, comment: Id, new: NewComment, store: AppStore, actor: Actor
+) -> comments.StoredThread:
     """Give a comment of one's own another text; it is marked as edited."""
-    reply = Reply(asked, partial(_told, actor=actor))
-    found = comments.change(store, group, thread, comment, new.text, actor=actor, keep=reply.keep)
-    return reply.of(found)
+    return comments.change(store, group, thread, comment, new.text, actor=actor)
 
 
 @router.delete(
@@ -117,14 +107,7 @@ def change_comment(
     status_code=204,
     responses=responses(403, 404),
 )
-def delete_comment(
-    group: Id, thread: Id, comment: Id, store: AppStore, actor: Actor, asked: AskedUnder
-) -> Response:
+@responds(no_content)
+def delete_comment(group: Id, thread: Id, comment: Id, store: AppStore, actor: Actor) -> None:
     """Delete a comment of one's own; a thread in which nothing else is said goes with it."""
-    reply: Reply[None] = Reply(asked, nothing)
-    comments.remove(store, group, thread, comment, actor=actor, keep=reply.keep)
-    return reply.of(None)
-
-
-def _told(thread: comments.StoredThread, *, actor: str, status: int = 200) -> Response:
-    return document(ThreadDocument.of(thread, actor), status)
+    comments.remove(store, group, thread, comment, actor=actor)

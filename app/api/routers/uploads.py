@@ -15,7 +15,7 @@ from starlette.requests import ClientDisconnect
 from app.api.deps import Actor, AppServices, Sees
 from app.api.paging import paged
 from app.api.problem import responses
-from app.api.reply import AskedUnder, Reply, nothing
+from app.api.respond import no_content, responds
 from app.api.schemas.upload import UploadDocument, UploadList
 from app.api.services import Services
 from app.errors import InputError, OverloadedError
@@ -158,13 +158,10 @@ def get_one(upload: UploadId, services: AppServices) -> UploadDocument:
     response_class=Response,
     responses={**responses(404), 204: {"description": "It is gone."}},
 )
-def delete_one(upload: UploadId, services: AppServices, sight: Sees, asked: AskedUnder) -> Response:
+@responds(no_content)
+def delete_one(upload: UploadId, services: AppServices, sight: Sees) -> None:
     """Delete a file; 400 while a dataset reads its frames from it.
 
     Where others have sent the same file, it stays with them; an admin deletes it for all.
     """
-    reply: Reply[None] = Reply(asked, nothing)
-    mine = partial(sight.sees, None)
-    keep, progress = reply.keep(None), reply.progress
-    delete_sent(services.store, upload, mine, keep=keep, progress=progress)
-    return reply.of(None)
+    delete_sent(services.store, upload, partial(sight.sees, None))

@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from functools import partial
 from typing import Annotated
 
-from fastapi import APIRouter, Query, Response
-from starlette.background import BackgroundTasks
+from fastapi import APIRouter, BackgroundTasks, Query, Response
 
+from app.api.conflicts import current_state
 from app.api.cursor import parse_cursor
 from app.api.deps import Actor, AppServices, AppStore, DatasetPath, DryRun, Id, IfMatch
 from app.api.paging import MAX_ITEMS, Cursor
 from app.api.problem import responses
-from app.api.reply import AskedUnder, Reply, document
-from app.api.routers.groups import CHANGED, CONFLICTS, change_group, load_document
+from app.api.respond import as_document, document, responds
+from app.api.routers.groups import CHANGED, CONFLICTS, group_answer, load_document
 from app.api.schemas.bulk import (
     BatchList,
     BulkResult,
@@ -40,28 +39,23 @@ router = APIRouter()
     response_model=GroupDocument,
     responses={**responses(*CONFLICTS), **CHANGED},
 )
+@responds(group_answer)
 def put_verdict(
     group: Id,
     verdict: VerdictEdit,
     services: AppServices,
     actor: Actor,
     if_match: IfMatch,
-    asked: AskedUnder,
-) -> Response:
+    background: BackgroundTasks,
+) -> GroupState:
     """Accept, reject with a reason, defer, or take a verdict back."""
-    said = (verdict.state, verdict.reason, verdict.note)
-    change = partial(set_verdict, services.store, group, *said, if_match=if_match, actor=actor)
-
-    after = BackgroundTasks()
-
-    def hand_in(state: GroupState) -> None:
-        """A verdict on an independent annotation of a group, and on nothing else, submits that."""
-        if state.is_copy:
-            after.add_task(after_hand_in, services.store, group, services.paint)
-
-    answer = change_group(asked, lambda: load_document(services.store, group), change, hand_in)
-    answer.background = after
-    return answer
+    store, said = services.store, (verdict.state, verdict.reason, verdict.note)
+    with current_state(lambda: load_document(store, group)):
+        state = set_verdict(store, group, *said, if_match=if_match, actor=actor)
+    # A verdict on an independent annotation of a group, and on nothing else, submits that.
+    if state.is_copy:
+        background.add_task(after_hand_in, store, group, services.paint)
+    return state
 
 
 @router.put(
@@ -71,14 +65,10 @@ def put_verdict(
     response_model=GroupDocument,
     responses={**responses(*CONFLICTS), **CHANGED},
 )
+@responds(group_answer)
 def put_dismissal(
-    group: Id,
-    said: DismissalEdit,
-    services: AppServices,
-    actor: Actor,
-    if_match: IfMatch,
-    asked: AskedUnder,
-) -> Response:
+    group: Id, said: DismissalEdit, services: AppServices, actor: Actor, if_match: IfMatch
+) -> GroupState:
     """Say that a finding was checked and is fine, or that it is to be looked at again.
 
     A dismissed finding stays in the solution with `dismissed`. It stands again by itself once it
@@ -86,17 +76,16 @@ def put_dismissal(
     another.
     """
     named = FindingName(said.kind, said.view, said.marking, said.suggested, said.number)
-    change = partial(
-        set_dismissal,
-        services.store,
-        group,
-        named,
-        dismissed=said.dismissed,
-        note=said.note,
-        if_match=if_match,
-        actor=actor,
-    )
-    return change_group(asked, lambda: load_document(services.store, group), change)
+    with current_state(lambda: load_document(services.store, group)):
+        return set_dismissal(
+            services.store,
+            group,
+            named,
+            dismissed=said.dismissed,
+            note=said.note,
+            if_match=if_match,
+            actor=actor,
+        )
 
 
 @router.post(
@@ -106,14 +95,14 @@ def put_dismissal(
     response_model=BulkResult,
     responses=responses(404, 409, 413, 415),
 )
+@responds(as_document(BulkResult.done))
 def post_verdicts(
     dataset: DatasetPath,
     verdict: BulkVerdict,
     store: AppStore,
     actor: Actor,
-    asked: AskedUnder,
     dry_run: DryRun = False,
-) -> Response:
+) -> bulk.BatchReport | Response:
     """Judge every group that the query matches, as each of them is when its turn comes.
 
     Accepting a group that fails a gate needs a note; without one such groups are refused and
@@ -124,17 +113,7 @@ def post_verdicts(
     said = (verdict.q, verdict.state, verdict.reason, verdict.note)
     if dry_run:
         return document(BulkResult.planned(bulk.plan_verdicts(store, found, *said)))
-    reply = Reply[bulk.BatchReport](asked, lambda report: document(BulkResult.done(report)))
-    report = bulk.give_verdicts(
-        store,
-        found,
-        *said,
-        actor=actor,
-        expected=verdict.expected,
-        keep=reply.keep,
-        progress=reply.progress,
-    )
-    return reply.of(report)
+    return bulk.give_verdicts(store, found, *said, actor=actor, expected=verdict.expected)
 
 
 @router.get(
@@ -163,19 +142,14 @@ def list_batches(
     response_model=RedoDocument,
     responses=responses(404, 409),
 )
-def redo_batch(batch: Id, store: AppStore, actor: Actor, asked: AskedUnder) -> Response:
+@responds(as_document(RedoDocument.model_validate))
+def redo_batch(batch: Id, store: AppStore, actor: Actor) -> bulk_redo.RedoReport:
     """Give the verdicts of a batch again that was taken back, as a new batch.
 
     Groups that somebody has judged or edited since stay as they are. 409 when the batch was not
     taken back, or was given again already.
     """
-    reply = Reply[bulk_redo.RedoReport](
-        asked, lambda report: document(RedoDocument.model_validate(report))
-    )
-    report = bulk_redo.redo_batch(
-        store, batch, actor=actor, keep=reply.keep, progress=reply.progress
-    )
-    return reply.of(report)
+    return bulk_redo.redo_batch(store, batch, actor=actor)
 
 
 @router.post(
@@ -185,12 +159,10 @@ def redo_batch(batch: Id, store: AppStore, actor: Actor, asked: AskedUnder) -> R
     response_model=UndoDocument,
     responses=responses(404, 409),
 )
-def undo_batch(batch: Id, store: AppStore, actor: Actor, asked: AskedUnder) -> Response:
+@responds(as_document(UndoDocument.model_validate))
+def undo_batch(batch: Id, store: AppStore, actor: Actor) -> bulk_undo.UndoReport:
     """Give each group of a batch the verdict back that it had before; 409 the second time.
 
     Groups that somebody has judged since keep that verdict.
     """
-    reply = Reply[bulk_undo.UndoReport](
-        asked, lambda report: document(UndoDocument.model_validate(report))
-    )
-    return reply.of(bulk_undo.undo_batch(store, batch, actor=actor, keep=reply.keep))
+    return bulk_undo.undo_batch(store, batch, actor=actor)

@@ -10,7 +10,7 @@ from app.api.deps import Actor, AppServices, AppStore, DatasetPath, DryRun
 from app.api.jobs import ACCEPTED, by_job, job_answer
 from app.api.paging import paged
 from app.api.problem import responses
-from app.api.reply import AskedUnder, Reply, document
+from app.api.respond import document, responds
 from app.api.schemas.job import JobDocument
 from app.api.schemas.version import (
     Changelog,
@@ -22,6 +22,7 @@ from app.api.schemas.version import (
     VersionRequest,
 )
 from app.review.jobs import versions as version_jobs
+from app.review.jobs.records import Job
 from app.review.versions import version as versions
 from app.review.versions.diff import changelog, diff_versions
 from app.review.versions.freeze import plan_freeze
@@ -69,14 +70,14 @@ def list_versions(dataset: DatasetPath, store: AppStore) -> VersionList:
         200: {"model": FreezePlanDocument, "description": "After a dry run: what would be frozen."},
     },
 )
+@responds(job_answer)
 def freeze_version(
     dataset: DatasetPath,
     request: VersionRequest,
     services: AppServices,
     actor: Actor,
-    asked: AskedUnder,
     dry_run: DryRun = False,
-) -> Response:
+) -> Job | Response:
     """Freeze the dataset as it is into a version that never changes.
 
     409 when the name is taken or groups that might enter are not solved; 400 when none enters.
@@ -85,11 +86,9 @@ def freeze_version(
     if dry_run or request.dry_run:
         plan = plan_freeze(services.store, dataset, request.value())
         return document(FreezePlanDocument.model_validate(plan))
-    reply = Reply(asked, job_answer)
-    job = version_jobs.request_freeze(
-        services.jobs, services.store, dataset, request.value(), actor=actor, keep=reply.keep
+    return version_jobs.request_freeze(
+        services.jobs, services.store, dataset, request.value(), actor=actor
     )
-    return reply.of(job)
 
 
 @router.get(
@@ -142,12 +141,7 @@ def get_diff(
     operation_id="verifyVersion",
     **by_job(404),
 )
-def verify_version(
-    version: VersionId, services: AppServices, actor: Actor, asked: AskedUnder
-) -> Response:
+@responds(job_answer)
+def verify_version(version: VersionId, services: AppServices, actor: Actor) -> Job:
     """Compute a version from scratch and compare it bit for bit; the job's result reports."""
-    reply = Reply(asked, job_answer)
-    job = version_jobs.request_verify(
-        services.jobs, services.store, version, actor=actor, keep=reply.keep
-    )
-    return reply.of(job)
+    return version_jobs.request_verify(services.jobs, services.store, version, actor=actor)

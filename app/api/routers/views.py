@@ -11,11 +11,12 @@ from typing import Annotated
 from anyio import to_thread
 from fastapi import APIRouter, Body, Query, Request, Response
 
+from app.api.conflicts import current_state
 from app.api.deps import Actor, AppServices, Id, IfMatch, etag_matches
 from app.api.paging import paged
 from app.api.problem import Responses, responses
-from app.api.reply import AskedUnder, KeyedRequest
-from app.api.routers.groups import CHANGED, CONFLICTS, change_group, load_document_of_view
+from app.api.respond import responds
+from app.api.routers.groups import CHANGED, CONFLICTS, group_answer, load_document_of_view
 from app.api.schemas.annotation import BallEdit, LinesEdit
 from app.api.schemas.group import GroupDocument
 from app.api.schemas.view import NeighbourList, ViewEdit, frames_away
@@ -32,6 +33,7 @@ from app.review.editing.edit import (
 )
 from app.review.editing.found_view import FoundView, find_view
 from app.review.editing.solve_encoded import Solve, solve_encoded
+from app.review.editing.state import GroupState
 from app.review.editing.submit import submit_view
 from app.review.editing.view_paint import NO_FRAME_HINT
 from app.soccer.frame_number import FARTHEST
@@ -67,15 +69,15 @@ IMAGES: Responses = {
     response_model=GroupDocument,
     responses={**responses(*CONFLICTS), **CHANGED},
 )
+@responds(group_answer)
 def patch_lines(
     view: Id,
     lines: LinesEdit,
     services: AppServices,
     actor: Actor,
     if_match: IfMatch,
-    asked: AskedUnder,
     request: Request,
-) -> Response:
+) -> GroupState:
     """Draw, move or delete markings; 409 names the station when the camera is static."""
     said = (lines.points(), tuple(lines.proposed), tuple(lines.not_visible))
 
@@ -84,7 +86,7 @@ def patch_lines(
 
     apart = partial(services.large.run, solve_encoded)
     solve = apart if is_large(request.scope) else solve_encoded
-    return _submit(services, view, edit, if_match, actor, asked, solve)
+    return _submit(services, view, edit, if_match, actor, solve)
 
 
 @router.patch(
@@ -93,17 +95,17 @@ def patch_lines(
     response_model=GroupDocument,
     responses={**responses(*CONFLICTS), **CHANGED},
 )
+@responds(group_answer)
 def patch_ball(
     view: Id,
     ball: Annotated[BallEdit | None, Body(description="null: no ball is annotated.")],
     services: AppServices,
     actor: Actor,
     if_match: IfMatch,
-    asked: AskedUnder,
-) -> Response:
+) -> GroupState:
     """Say where the ball is in this view, that it is out of view, or that there is none."""
     said = None if ball is None else ball.ball()
-    return _submit(services, view, lambda key: SetBall(key, said), if_match, actor, asked)
+    return _submit(services, view, lambda key: SetBall(key, said), if_match, actor)
 
 
 @router.patch(
@@ -112,14 +114,10 @@ def patch_ball(
     response_model=GroupDocument,
     responses={**responses(*CONFLICTS), **CHANGED},
 )
+@responds(group_answer)
 def patch_view(
-    view: Id,
-    change: ViewEdit,
-    services: AppServices,
-    actor: Actor,
-    if_match: IfMatch,
-    asked: AskedUnder,
-) -> Response:
+    view: Id, change: ViewEdit, services: AppServices, actor: Actor, if_match: IfMatch
+) -> GroupState:
     """Leave the view out and say why, take it in again, choose its calibration, say its picture."""
 
     def edit(key: str) -> Edit:
@@ -130,7 +128,7 @@ def patch_view(
             return SetPicture(key, None if picture is None else picture.picture())
         return IncludeView(key, change.included, change.reason, change.note)
 
-    return _submit(services, view, edit, if_match, actor, asked)
+    return _submit(services, view, edit, if_match, actor)
 
 
 def _submit(
@@ -139,13 +137,13 @@ def _submit(
     edit_of: Callable[[str], Edit],
     if_match: str,
     actor: str,
-    asked: KeyedRequest | None,
     solve: Solve = solve_encoded,
-) -> Response:
-    store = services.store
-    change = partial(submit_view, store, view, edit_of, if_match=if_match, actor=actor)
-    change = partial(change, paint=services.paint, solve=solve)
-    return change_group(asked, lambda: load_document_of_view(store, view), change)
+) -> GroupState:
+    store, paint = services.store, services.paint
+    with current_state(lambda: load_document_of_view(store, view)):
+        return submit_view(
+            store, view, edit_of, if_match=if_match, actor=actor, paint=paint, solve=solve
+        )
 
 
 @router.get(

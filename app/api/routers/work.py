@@ -5,13 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated
 
-from fastapi import APIRouter, Depends, Request, Response
-from starlette.background import BackgroundTask
+from fastapi import APIRouter, BackgroundTasks, Depends, Request, Response
 
 from app.api.deps import Actor, AppServices, AppStore, DatasetPath, Id, Sees
 from app.api.paging import paged
 from app.api.problem import responses
-from app.api.reply import AskedUnder, Reply, document, nothing
+from app.api.respond import as_document, document, no_content, responds
 from app.api.schemas.take import HandBack
 from app.api.schemas.work import (
     BatchEdit,
@@ -65,14 +64,10 @@ async def _workers(request: Request) -> Workers:
 Asks = Annotated[Workers, Depends(_workers)]
 
 
-def _lease_answer(lease: Lease) -> Response:
-    return document(LeaseDocument.model_validate(lease))
-
-
-def _told(services: Services, lease: Lease, reply: Reply[Lease] | None = None) -> Response:
-    """The answer with a lease of which everybody has been told who looks."""
+def _told(services: Services, lease: Lease) -> Lease:
+    """A lease of which everybody has been told who looks."""
     services.events.tell_lease(lease)
-    return _lease_answer(lease) if reply is None else reply.of(lease)
+    return lease
 
 
 @router.get("/work", operation_id="getMyWork", responses=responses())
@@ -89,6 +84,11 @@ def list_batches(dataset: DatasetPath, store: AppStore) -> WorkBatchList:
     return WorkBatchList.model_validate({"items": own.seen_batches(store, dataset)})
 
 
+def _made(batch: Batch) -> Response:
+    headers = {"Location": f"/api/v1/batches/{batch.id}"}
+    return document(WorkBatchDocument.model_validate(batch), 201, headers)
+
+
 @router.post(
     "/datasets/{dataset}/batches",
     operation_id="makeBatch",
@@ -102,22 +102,11 @@ def list_batches(dataset: DatasetPath, store: AppStore) -> WorkBatchList:
         },
     },
 )
-def make_batch(
-    dataset: DatasetPath, new: NewBatchDocument, store: AppStore, actor: Actor, asked: AskedUnder
-) -> Response:
+@responds(_made)
+def make_batch(dataset: DatasetPath, new: NewBatchDocument, store: AppStore, actor: Actor) -> Batch:
     """Give out the groups that a query finds now, in its order."""
-    reply = Reply(asked, _made)
     wanted = NewBatch(query=new.q, **new.model_dump(exclude={"q"}))
-    return reply.of(batches.make_batch(store, dataset, wanted, actor=actor, keep=reply.keep))
-
-
-def _batch_answer(batch: Batch) -> Response:
-    return document(WorkBatchDocument.model_validate(batch))
-
-
-def _made(batch: Batch) -> Response:
-    headers = {"Location": f"/api/v1/batches/{batch.id}"}
-    return document(WorkBatchDocument.model_validate(batch), 201, headers)
+    return batches.make_batch(store, dataset, wanted, actor=actor)
 
 
 @router.get("/datasets/{dataset}/team-work", operation_id="getTeamWork", responses=responses(404))
@@ -148,26 +137,21 @@ def get_batch(batch: Id, store: AppStore) -> Batch:
     response_model=WorkBatchDocument,
     responses=responses(404, 409, 413, 415),
 )
-def change_batch(
-    batch: Id, change: BatchEdit, store: AppStore, actor: Actor, asked: AskedUnder
-) -> Response:
+@responds(as_document(WorkBatchDocument.model_validate))
+def change_batch(batch: Id, change: BatchEdit, store: AppStore, actor: Actor) -> Batch:
     """Give a batch on to others, close it, or name it otherwise."""
     values = change.model_dump(exclude_unset=True)
     never, none = ({name: None}.items() <= values.items() for name in ("due", "gold_every"))
-    reply = Reply(asked, _batch_answer)
-    changed = batches.change_batch(
-        store, batch, actor=actor, never_due=never, no_gold=none, keep=reply.keep, **values
-    )
-    return reply.of(changed)
+    return batches.change_batch(store, batch, actor=actor, never_due=never, no_gold=none, **values)
 
 
 @router.delete(
     "/batches/{batch}", operation_id="deleteBatch", status_code=204, responses=responses(404)
 )
-def delete_batch(batch: Id, store: AppStore, actor: Actor, asked: AskedUnder) -> Response:
+@responds(no_content)
+def delete_batch(batch: Id, store: AppStore, actor: Actor) -> Batch:
     """Delete a batch; what was said of its groups stays."""
-    reply: Reply[Batch] = Reply(asked, nothing)
-    return reply.of(batches.remove_batch(store, batch, actor=actor, keep=reply.keep))
+    return batches.remove_batch(store, batch, actor=actor)
 
 
 @router.get("/batches/{batch}/groups", operation_id="listBatchGroups", responses=responses(404))
@@ -183,7 +167,7 @@ def list_batch_groups(batch: Id, store: AppStore) -> BatchGroupList:
     response_model=LeaseDocument,
     responses=responses(404, 409, 413, 415),
 )
-def take_next(batch: Id, come: NextGroup, services: AppServices, asks: Asks) -> Response:
+def take_next(batch: Id, come: NextGroup, services: AppServices, asks: Asks) -> Lease:
     """Take the next group that waits for whoever asks, and that nobody else has open.
 
     The lease lasts three minutes, and three more each time that it is taken again.
@@ -198,9 +182,7 @@ def take_next(batch: Id, come: NextGroup, services: AppServices, asks: Asks) -> 
     response_model=LeaseDocument,
     responses=responses(404, 409, 413, 415),
 )
-def take_group(
-    batch: Id, group: Id, how: LeaseRequest, services: AppServices, asks: Asks
-) -> Response:
+def take_group(batch: Id, group: Id, how: LeaseRequest, services: AppServices, asks: Asks) -> Lease:
     """Take a group, or keep it for another three minutes; 409 where somebody has it open."""
     worker = asks.of_batch(services.store, batch)
     taken = Leases(services.store).take(batch, group, worker, take_over=how.take_over)
@@ -225,15 +207,19 @@ def give_back(batch: Id, group: Id, services: AppServices, asks: Asks) -> None:
     response_model=LeaseDocument,
     responses=responses(404, 409, 413, 415),
 )
+@responds(as_document(LeaseDocument.model_validate))
 def hand_in(
-    batch: Id, group: Id, services: AppServices, actor: Actor, asks: Asks, asked: AskedUnder
-) -> Response:
+    batch: Id,
+    group: Id,
+    services: AppServices,
+    actor: Actor,
+    asks: Asks,
+    background: BackgroundTasks,
+) -> Lease:
     """Say that a group is annotated, so that a reviewer gets it."""
-    worker, reply = asks.of_batch(services.store, batch), Reply(asked, _lease_answer)
-    lease = Leases(services.store).hand_in(batch, group, worker, actor=actor, keep=reply.keep)
-    answer = _told(services, lease, reply)
-    answer.background = BackgroundTask(after_hand_in, services.store, group, services.paint)
-    return answer
+    worker = asks.of_batch(services.store, batch)
+    background.add_task(after_hand_in, services.store, group, services.paint)
+    return _told(services, Leases(services.store).hand_in(batch, group, worker, actor=actor))
 
 
 @router.delete(
@@ -242,15 +228,12 @@ def hand_in(
     response_model=LeaseDocument,
     responses=responses(404, 409),
 )
-def take_back(
-    batch: Id, group: Id, services: AppServices, actor: Actor, asks: Asks, asked: AskedUnder
-) -> Response:
+@responds(as_document(LeaseDocument.model_validate))
+def take_back(batch: Id, group: Id, services: AppServices, actor: Actor, asks: Asks) -> Lease:
     """Say that a group is not annotated yet, after all; 409 for one's own copy that is submitted."""
-    worker, reply = asks.of_batch(services.store, batch), Reply(asked, _lease_answer)
-    lease = Leases(services.store).hand_in(
-        batch, group, worker, actor=actor, done=False, keep=reply.keep
-    )
-    return _told(services, lease, reply)
+    worker = asks.of_batch(services.store, batch)
+    lease = Leases(services.store).hand_in(batch, group, worker, actor=actor, done=False)
+    return _told(services, lease)
 
 
 @router.post(
@@ -259,18 +242,11 @@ def take_back(
     response_model=LeaseDocument,
     responses=responses(404, 409, 413, 415),
 )
+@responds(as_document(LeaseDocument.model_validate))
 def hand_back(
-    batch: Id,
-    group: Id,
-    why: HandBack,
-    services: AppServices,
-    actor: Actor,
-    asks: Asks,
-    asked: AskedUnder,
-) -> Response:
+    batch: Id, group: Id, why: HandBack, services: AppServices, actor: Actor, asks: Asks
+) -> Lease:
     """Give a group back to the annotator who handed it in, and tell them why."""
-    worker, reply = asks.of_batch(services.store, batch), Reply(asked, _lease_answer)
-    lease = Leases(services.store).hand_back(
-        batch, group, worker, why.reason, actor=actor, keep=reply.keep
-    )
-    return _told(services, lease, reply)
+    worker = asks.of_batch(services.store, batch)
+    lease = Leases(services.store).hand_back(batch, group, worker, why.reason, actor=actor)
+    return _told(services, lease)

@@ -9,7 +9,6 @@ from app.errors import ForbiddenError, NotFoundError
 from app.review.agreement.compare import Comparison, compare_states
 from app.review.agreement.limits import read_limits
 from app.review.agreement.weigh import ready_takes, settle
-from app.review.answers.keep import Keep, keep_nothing
 from app.review.datasets.dataset import dataset_id
 from app.review.editing.follow_paint import PaintFollower
 from app.review.editing.state import GroupState
@@ -114,13 +113,11 @@ def decide(
     as_start: bool = False,
     actor: str,
     paint: PaintFollower | None = None,
-    keep: Keep[GroupState] = keep_nothing,
 ) -> GroupState:
     """Take one of the annotations, or begin a third one from it.
 
     The annotation goes into the group in its person's name, the verdict upon it is the
-    adjudicator's. A third one is edited and judged in the group itself from then on. ``keep`` keeps
-    the answer in the transaction.
+    adjudicator's. A third one is edited and judged in the group itself from then on.
 
     Raises:
         NotFoundError: Nothing of the group waits for a decision, or it is no such annotation.
@@ -143,17 +140,11 @@ def decide(
         actor=actor,
         paint=paint,
         judge=not as_start,
-        keep=keep,
     )
 
 
 def take_over(
-    store: Store,
-    take: Take,
-    *,
-    actor: str,
-    paint: PaintFollower | None = None,
-    keep: Keep[GroupState] = keep_nothing,
+    store: Store, take: Take, *, actor: str, paint: PaintFollower | None = None
 ) -> GroupState:
     """Take an annotation and its verdict over into the group; where it waits for a decision, this is it.
 
@@ -166,33 +157,17 @@ def take_over(
             for row in agreements_on(session, take.group_id)
         )
     if not waits:
-        return adopt_take(store, take.id, actor=actor, paint=paint, keep=keep)
+        return adopt_take(store, take.id, actor=actor, paint=paint)
     ready = ready_takes(store, take.group_id, take.batch_id)
     return settle(
-        store,
-        take.group_id,
-        take.batch_id,
-        ready,
-        take,
-        outcome="take",
-        actor=actor,
-        paint=paint,
-        keep=keep,
+        store, take.group_id, take.batch_id, ready, take, outcome="take", actor=actor, paint=paint
     )
 
 
 def hand_back(
-    store: Store,
-    group_id: int,
-    take_id: int,
-    reason: str = "",
-    *,
-    actor: str,
-    keep: Keep[TakeView] = keep_nothing,
-) -> Take:
+    store: Store, group_id: int, take_id: int, reason: str = "", *, actor: str
+) -> TakeView:
     """Hand one of the annotations that disagree back to its person; the group waits no longer.
-
-    ``keep`` keeps the answer in the transaction.
 
     Raises:
         NotFoundError: Nothing of the group waits for a decision, or it is no such annotation.
@@ -206,7 +181,7 @@ def hand_back(
         raise NotFoundError(f"annotation {take_id} is not one that waits for a decision here")
     if take.person == person_of(actor) != LOCAL_USER:
         raise ForbiddenError("you submitted this annotation yourself", hint="A lead can return it.")
-    return hand_back_take(store, take_id, reason, actor=actor, keep=keep)
+    return hand_back_take(store, take_id, reason, actor=actor)
 
 
 def _others(store: Store, dataset: int, takes: Sequence[Take]) -> list[str]:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import asdict
 
 from app.evaluation.agreement_limits import AgreementLimits
-from app.review.answers.keep import Keep, keep_nothing
 from app.review.datasets.dataset import dataset_id
 from app.store.agreement import limits_of, put_limits
 from app.store.clock import now
@@ -24,20 +23,12 @@ def read_limits(session: Session, dataset: int) -> AgreementLimits:
 
 
 def set_limits(
-    store: Store,
-    dataset: str | int,
-    limits: AgreementLimits,
-    *,
-    actor: str,
-    keep: Keep[AgreementLimits] = keep_nothing,
+    store: Store, dataset: str | int, limits: AgreementLimits, *, actor: str
 ) -> AgreementLimits:
-    """Let other limits count for whatever is handed in from now on.
-
-    ``keep`` keeps the answer in its transaction.
-    """
+    """Let other limits count for whatever is handed in from now on."""
     number, at = dataset_id(store, dataset), now()
     with store.write() as session:
         put_limits(session, number, {**asdict(limits), "changed": at, "changed_by": actor})
         append(session, [Entry(KIND, actor, at, {"did": "limits", **asdict(limits)}, number)])
-        keep(limits)(session)
+        session.respond(limits)
     return limits

@@ -12,7 +12,6 @@ from app.errors import ReviewError, StorageError
 from app.evaluation.annotation_distance import GroupDistance
 from app.review.agreement.compare import Comparison, compare_states
 from app.review.agreement.limits import KIND, read_limits
-from app.review.answers.keep import Keep, keep_nothing
 from app.review.editing.follow_paint import PaintFollower
 from app.review.editing.state import GroupState
 from app.review.editing.submit import solved
@@ -179,14 +178,12 @@ def settle(
     paint: PaintFollower | None = None,
     judge: bool = False,
     found: Mapping[str, Any] | None = None,
-    keep: Keep[GroupState] = keep_nothing,
 ) -> GroupState:
     """Take one annotation over, and be done with all of them, in one transaction.
 
     Args:
         judge: ``actor`` judges the group as the annotation's person did.
         found: What the comparison came to, where it is not kept yet.
-        keep: Keeps the answer in the transaction.
 
     Raises:
         ConflictError: Somebody was faster.
@@ -215,7 +212,7 @@ def settle(
             note = f"as {taken.person} judged it"
             give_verdict_of(session, taken, actor=actor, note=note)
 
-    return adopt_take(store, taken.id, actor=actor, paint=paint, also=done, keep=keep)
+    return adopt_take(store, taken.id, actor=actor, paint=paint, also=done)
 
 
 def _known(session: Session, group_id: int, batch_id: int | None) -> Any | None:

@@ -8,9 +8,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from app.errors import ConflictError
-from app.review.answers.keep import Keep, keep_nothing
 from app.review.datasets.dataset import dataset_id, insert_dataset, read_dataset_head
 from app.review.datasets.spare_calibrations import delete_spare_calibrations
+from app.review.idempotency import without_response
 from app.soccer.policy import Policy
 from app.store import removal
 from app.store.clock import now
@@ -44,13 +44,7 @@ def read_contents(store: Store, dataset: str | int) -> DatasetContents:
 
 
 def delete_dataset(
-    store: Store,
-    dataset: str | int,
-    *,
-    confirm: str,
-    actor: str,
-    afresh: Policy | None = None,
-    keep: Keep[DatasetContents] = keep_nothing,
+    store: Store, dataset: str | int, *, confirm: str, actor: str, afresh: Policy | None = None
 ) -> DatasetContents:
     """Delete a dataset with everything that belongs to it; returns what that was.
 
@@ -64,7 +58,6 @@ def delete_dataset(
         actor: Who wants it.
         afresh: Policy of an empty dataset of the same name, which is made in its place with its
             roles, tokens and webhooks; None: none is.
-        keep: Keeps the answer in the last transaction.
 
     Raises:
         NotFoundError: There is no such dataset.
@@ -80,8 +73,9 @@ def delete_dataset(
     identity = dataset_id(store, found.id)
     with store.read() as session:
         copies = copies_of(session, identity)
-    for row in copies:
-        delete_dataset(store, row.dataset_id, confirm=row.name, actor=actor)
+    with without_response():
+        for row in copies:
+            delete_dataset(store, row.dataset_id, confirm=row.name, actor=actor)
     _delete_solutions(store, identity)
     with store.write() as session:
         contents = _contents(session, identity)
@@ -92,7 +86,7 @@ def delete_dataset(
         removal.delete_rows(session, identity)
         if afresh is not None:
             assert insert_dataset(session, contents.name, afresh, actor) == heir
-        keep(contents)(session)
+        session.respond(contents)
     delete_spare_calibrations(store)
     return contents
 

@@ -22,8 +22,6 @@ from app.errors import (
     StaleRevisionError,
     TooManyPointsError,
 )
-from app.review.answers.keep import Keep, Kept, keep_nothing
-from app.review.answers.saved_progress import SavedProgress
 from app.review.editing.copies import require_open
 from app.review.editing.edit import Edit, SetLines
 from app.review.editing.etags import read_etags, require_etag
@@ -31,7 +29,8 @@ from app.review.editing.follow_paint import PaintFollower
 from app.review.editing.point_limits import REQUEST_POINTS
 from app.review.editing.solve_encoded import Solve, solve_encoded
 from app.review.editing.state import GroupState
-from app.review.editing.submit import checked_edit, current_etag, submit_all
+from app.review.editing.submit import Then, checked_edit, current_etag, submit_all
+from app.review.idempotency import read_progress, save_progress
 from app.store.groups import StoredGroup, find_views, read_groups
 from app.store.session import Session
 from app.store.store import Store
@@ -123,20 +122,16 @@ def edit_views(
     items: Sequence[ViewEdits],
     *,
     actor: str,
-    keep: Keep[BulkEditReport] = keep_nothing,
-    progress: SavedProgress | None = None,
     paint: PaintFollower | None = None,
     solve: Solve = solve_encoded,
 ) -> BulkEditReport:
-    """Edit the groups of many views, one after the other.
+    """Edit the groups of many views, one after the other; one that was killed goes on.
 
     Args:
         store: The database.
         dataset_id: The dataset of the views.
         items: What to change; a view is named once.
         actor: Who edits.
-        keep: Keeps the answer with the last edit.
-        progress: What a run that was killed has done, and where this one says so.
         paint, solve: As of ``submit``.
 
     Raises:
@@ -145,14 +140,14 @@ def edit_views(
     """
     _require_few_points(items)
     with store.read() as session:
-        saved = _saved_before(session, progress)
+        saved = _saved_before(session)
         left = {index: item for index, item in enumerate(items) if index not in saved}
         outcomes, groups = _plan(session, dataset_id, left, actor)
-    run = _Run({**outcomes, **saved}, saved, keep, progress)
+    run = _Run({**outcomes, **saved}, saved)
     for group in groups:
-        keep_group = run.keep_with(group, is_last=group is groups[-1])
+        then = run.ending(group, is_last=group is groups[-1])
         try:
-            state = _submit(store, group, actor, keep=keep_group, paint=paint, solve=solve)
+            state = _submit(store, group, actor, then=then, paint=paint, solve=solve)
         except (ConflictError, InputError, NotFoundError, OverloadedError) as error:
             run.refuse(group, error)
         else:
@@ -166,34 +161,26 @@ class _Run:
     Args:
         outcomes: Of every item as planned; those of groups that are saved take their place.
         saved: Items whose groups were saved before the run was killed.
-        keep, progress: As of ``edit_views``.
     """
 
-    def __init__(
-        self,
-        outcomes: dict[int, ItemOutcome],
-        saved: dict[int, ItemOutcome],
-        keep: Keep[BulkEditReport],
-        progress: SavedProgress | None,
-    ):
+    def __init__(self, outcomes: dict[int, ItemOutcome], saved: dict[int, ItemOutcome]):
         self._outcomes, self._saved = outcomes, saved
-        self._keep, self._progress = keep, progress
         self._new: dict[int, ItemOutcome] = {}
-        self._kept: BulkEditReport | None = None
+        self._last: BulkEditReport | None = None
 
-    def keep_with(self, group: _GroupPlan, *, is_last: bool) -> Keep[GroupState]:
-        """What is kept in the transaction of a group: the answer with the last, else how far it is."""
+    def ending(self, group: _GroupPlan, *, is_last: bool) -> Then:
+        """What ends the transaction of a group: the response with the last, else how far it is."""
         self._new = {}
 
-        def keep(state: GroupState) -> Kept:
+        def then(session: Session, state: GroupState) -> None:
             self._new = _with_state(group, self._outcomes, state.etag)
             if is_last:
-                self._kept = _report({**self._outcomes, **self._new})
-                return self._keep(self._kept)
-            done = [*self._saved.values(), *self._new.values()]
-            return lambda session: _save_progress(session, self._progress, done)
+                self._last = _report({**self._outcomes, **self._new})
+                session.respond(self._last)
+            else:
+                _save_progress(session, [*self._saved.values(), *self._new.values()])
 
-        return keep
+        return then
 
     def close(self, group: _GroupPlan, state: GroupState) -> None:
         """The group is as it was asked for."""
@@ -204,16 +191,16 @@ class _Run:
     def refuse(self, group: _GroupPlan, error: ReviewError) -> None:
         """The group was refused when its turn came."""
         self._outcomes |= _refused(group, error)
-        self._kept = None
+        self._last = None
 
     def finish(self, store: Store) -> BulkEditReport:
-        """The report; where the last group was not saved, its answer is kept with those before."""
-        if self._kept is not None:
-            return self._kept
+        """The report; where the last group was not saved, the request is answered here."""
+        if self._last is not None:
+            return self._last
         report = _report(self._outcomes)
         if self._saved:
             with store.write() as session:
-                self._keep(report)(session)
+                session.respond(report)
         return report
 
 
@@ -375,16 +362,13 @@ def _report(outcomes: Mapping[int, ItemOutcome], *, dry_run: bool = False) -> Bu
     return BulkEditReport(dry_run, tuple(outcomes[index] for index in sorted(outcomes)))
 
 
-def _saved_before(session: Session, progress: SavedProgress | None) -> dict[int, ItemOutcome]:
+def _saved_before(session: Session) -> dict[int, ItemOutcome]:
     """The items whose groups were saved before the run was killed."""
-    value = None if progress is None else progress.read(session)
+    value = read_progress(session)
     return {} if value is None else {one[0]: ItemOutcome(*one) for one in value["saved"]}
 
 
-def _save_progress(
-    session: Session, progress: SavedProgress | None, saved: Sequence[ItemOutcome]
-) -> None:
-    """Keep what is saved by now, in the transaction of the newest of it."""
-    if progress is not None:
-        done = [[one.index, one.outcome, one.group, one.view, one.etag] for one in saved]
-        progress.save(session, {"saved": done})
+def _save_progress(session: Session, saved: Sequence[ItemOutcome]) -> None:
+    """Say what is saved by now, in the transaction of the newest of it."""
+    done = [[one.index, one.outcome, one.group, one.view, one.etag] for one in saved]
+    save_progress(session, {"saved": done})

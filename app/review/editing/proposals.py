@@ -15,7 +15,6 @@ from typing import Any
 from app.errors import ImageError, NotFoundError, TooLargeError
 from app.paint.propose import SEARCH_VERSION
 from app.progress import TellProgress
-from app.review.answers.keep import Keep, keep_nothing
 from app.review.datasets.dataset import DatasetHead, need_dataset, require_matches
 from app.review.datasets.proposal_reading import UNREADABLE, ProposalTask, read_proposal
 from app.review.editing.etags import read_head
@@ -169,7 +168,7 @@ def propose_views(
     return run
 
 
-def forget_proposals(store: Store, dataset: str | int, *, keep: Keep[int] = keep_nothing) -> int:
+def forget_proposals(store: Store, dataset: str | int) -> int:
     """Forget everything that was proposed for a dataset; what was accepted stays what it is.
 
     Returns how many proposals there were.
@@ -179,7 +178,7 @@ def forget_proposals(store: Store, dataset: str | int, *, keep: Keep[int] = keep
     """
     with store.write() as session:
         gone = delete_proposals(session, need_dataset(session, dataset))
-        keep(gone)(session)
+        session.respond(gone)
     return gone
 
 

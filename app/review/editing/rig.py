@@ -11,7 +11,6 @@ from typing import Any
 from app.datasets.report import Report
 from app.datasets.sn_calibration_reader import read_line_files
 from app.errors import ConflictError, InputError
-from app.review.answers.keep import Keep, keep_nothing
 from app.review.datasets.dataset import need_dataset, read_dataset_head
 from app.review.editing.edit import SetStationCamera
 from app.review.editing.stations import (
@@ -183,9 +182,7 @@ def accept(store: Store, proposed: ProposedRig, what: str, *, actor: str) -> Non
     submit_stations(store, edits, actor=actor, check=check)
 
 
-def take_back(
-    store: Store, dataset: str | int, *, actor: str, keep: Keep[int] = keep_nothing
-) -> int:
+def take_back(store: Store, dataset: str | int, *, actor: str) -> int:
     """Undo an accepted rig, all its cameras at once; returns how many there were.
 
     Raises:
@@ -203,8 +200,7 @@ def take_back(
             "no static camera was adjusted by its last edit, so there is nothing to take back"
         )
     states = [load_station(store, station) for station in adjusted]
-    undo_stations(store, states, actor=actor, keep=keep)
-    return len(states)
+    return undo_stations(store, states, actor=actor)
 
 
 def proposal_values(proposed: ProposedRig) -> dict[str, Any]:

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NotRequired, TypedDict, Unpack
 
 from app.errors import ConflictError, NotFoundError
-from app.review.answers.keep import Keep, keep_nothing
 from app.review.editing.codec import station_edit_from_json, step_to_json
 from app.review.editing.edit import SetStationLines, StationEdit, with_station
 from app.review.editing.etags import require_etag
@@ -43,7 +42,10 @@ from app.store.stored_json import Json
 
 @dataclass(frozen=True)
 class StationState:
-    """A station as it is now; ``groups`` are the ids of the groups that it takes part in."""
+    """A station as it is now; ``groups`` are the ids of the groups that it takes part in.
+
+    ``shown`` is one of them as it was saved with a step of the station.
+    """
 
     id: int
     dataset_id: int
@@ -55,6 +57,7 @@ class StationState:
     can_undo: bool
     can_redo: bool
     stored: StoredStation
+    shown: GroupState | None = None
 
 
 @dataclass(frozen=True)
@@ -71,13 +74,11 @@ class _How(TypedDict):
         if_match: ETag of the station that it builds on.
         actor: Who says so.
         shown: One of its groups, which is solved and saved with it.
-        keep: Keeps the answer, that group, with it.
     """
 
     if_match: str
     actor: str
     shown: NotRequired[int | None]
-    keep: NotRequired[Keep[GroupState]]
 
 
 _Plan = Callable[[Session, StationState], _Change]
@@ -109,7 +110,7 @@ def submit_station(
         station_id: The station.
         edit: What to change.
         how: ETag of the station that the edit builds on (``if_match``), who says so (``actor``), the
-            group that is solved and saved with it (``shown``), and what keeps that (``keep``).
+            group that is solved and saved with it (``shown``).
 
     Raises:
         StaleRevisionError: ``if_match`` is not the station's present ETag.
@@ -146,21 +147,14 @@ def submit_stations(
         _save_all(session, steps, actor)
 
 
-def undo_stations(
-    store: Store,
-    states: Sequence[StationState],
-    *,
-    actor: str,
-    keep: Keep[int] = keep_nothing,
-) -> None:
-    """Take the last edit of several static cameras back: of all of them, or of none.
-
-    ``keep`` is given how many there were.
-    """
+def undo_stations(store: Store, states: Sequence[StationState], *, actor: str) -> int:
+    """Take the last edit of several static cameras back, of all or none; returns how many."""
     steps = [(state.id, _plan_step("undo"), state.etag) for state in states]
+    count = len(steps)
     with store.write() as session:
         _save_all(session, steps, actor)
-        keep(len(states))(session)
+        session.respond(count)
+    return count
 
 
 def _save_all(session: Session, steps: Iterable[tuple[int, _Plan, str]], actor: str) -> None:
@@ -191,7 +185,6 @@ def _change(
     if_match: str,
     actor: str,
     shown: int | None = None,
-    keep: Keep[GroupState] = keep_nothing,
 ) -> StationState:
     with store.read() as session:
         state, change = _planned(session, station_id, plan, if_match)
@@ -205,9 +198,10 @@ def _change(
         _save(session, state, change, actor)
         insert_solutions(session, solutions)
         refresh_queue(session, state.groups)
-        if shown is not None:
-            keep(read_state(session, shown))(session)
-    return load_station(store, station_id)
+        saved = None if shown is None else read_state(session, shown)
+        if saved is not None:
+            session.respond(saved)
+    return replace(load_station(store, station_id), shown=saved)
 
 
 def _planned(

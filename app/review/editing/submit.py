@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 from typing import NotRequired, TypedDict, Unpack
 
 from app.errors import NotFoundError, SharedStationError
-from app.review.answers.keep import Keep, keep_nothing
 from app.review.editing.ball_noise import keeping_noise, with_noise
 from app.review.editing.codec import step_to_json
 from app.review.editing.copies import require_open
@@ -73,19 +72,20 @@ class How(TypedDict):
     Attributes:
         if_match: ETag of the state that it builds on.
         actor: Who says so.
-        keep: Keeps the answer with the step.
+        then: Ends the transaction; default: the request is answered with the group.
         paint: Reads the paint of edited lines again, as part of it; None: it stays as it is.
         solve: Solves the group that comes of it.
     """
 
     if_match: str
     actor: str
-    keep: NotRequired[Keep[GroupState]]
+    then: NotRequired[Then]
     paint: NotRequired[PaintFollower | None]
     solve: NotRequired[Solve]
 
 
 Solver = Callable[[Group, Policy, Mapping[str, Calibration]], Solution]
+Then = Callable[[Session, GroupState], None]
 Find = Callable[[Session], int]
 Plan = Callable[[Session, Record, str], GroupChange]
 
@@ -261,7 +261,7 @@ def take_step(
     *,
     if_match: str,
     actor: str,
-    keep: Keep[GroupState] = keep_nothing,
+    then: Then = Session.respond,
     paint: PaintFollower | None = None,
     solve: Solve = solve_encoded,
 ) -> GroupState:
@@ -271,7 +271,7 @@ def take_step(
         store: The database.
         find: Finds the group.
         plan: Makes the step for the state that it builds on.
-        if_match, actor, keep, paint, solve: See ``How``.
+        if_match, actor, then, paint, solve: See ``How``.
 
     Raises:
         StaleRevisionError: Somebody else was faster.
@@ -293,13 +293,12 @@ def take_step(
             painted = paint.follow(painted, before.stored.policy.calibration, known)
         outcome = _outcome(before, change, painted, solve(painted, before.stored.policy, known))
         state = outcome.after.state(outcome.solution)
-        kept = keep(state)
         with store.write() as session:
             judge = require_unchanged(session, state.id, if_match, what)
             require_open(session, state.dataset_id, state.id)
             if judge == before.stored.policy.hash:
                 _save(session, outcome, actor)
-                kept(session)
+                then(session, state)
                 return state
         # Another policy judges the dataset by now, so another solution belongs to the edit.
 

@@ -9,12 +9,10 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import partial
 
 from app.errors import ConflictError, InputError, NotFoundError, StaleRevisionError
 from app.evaluation.prediction_run import box_problem
 from app.progress import TellProgress
-from app.review.answers.keep import Keep, Kept, keep_nothing
 from app.review.datasets.dataset import read_dataset_head
 from app.review.editing.edit import SetBall, need_view
 from app.review.editing.etags import require_unchanged, said_of
@@ -128,7 +126,6 @@ def accept(
     *,
     actor: str,
     progress: TellProgress | None = None,
-    keep: Keep[AcceptReport] = keep_nothing,
 ) -> AcceptReport:
     """Make an edit of every prediction that a person accepts; done again it changes nothing.
 
@@ -139,7 +136,6 @@ def accept(
         actor: Who accepts them.
         progress: Called with groups done and in all; an error that it raises ends it, and what
             was accepted before stays.
-        keep: Keeps the answer with the last edit.
 
     Raises:
         As ``plan_accept``.
@@ -148,22 +144,22 @@ def accept(
     refused = Counter(plan.refused)
     views = 0
     changed: set[int] = set()
+    done: AcceptReport | None = None
     groups = list(_by_group(plan.changes))
     for number, (group_id, items) in enumerate(groups):
         if progress is not None:
             progress(number, plan.groups, "Accepting predictions.")
         for item in items:
-            kept: Keep[GroupState] = keep_nothing
             if item is groups[-1][1][-1]:
-                report = AcceptReport(views + 1, len(changed | {group_id}), dict(refused))
-                kept = partial(_kept_with, keep, report)
-            why = _accept(store, item, plan.predictions.name, request, actor, kept)
+                done = AcceptReport(views + 1, len(changed | {group_id}), dict(refused))
+            why = _accept(store, item, plan.predictions.name, request, actor, done)
             if why is None:
                 views += 1
                 changed.add(group_id)
             else:
                 refused[why] += 1
-    return AcceptReport(views, len(changed), dict(refused))
+                done = None
+    return done or AcceptReport(views, len(changed), dict(refused))
 
 
 def accept_box(
@@ -174,7 +170,6 @@ def accept_box(
     if_match: str,
     actor: str,
     replace: bool = False,
-    keep: Keep[GroupState] = keep_nothing,
 ) -> GroupState:
     """Make one prediction the ball of its view, however sure it is.
 
@@ -185,7 +180,6 @@ def accept_box(
         if_match: ETag of the group's state that the person saw.
         actor: Who accepts it.
         replace: Also where the view has another ball.
-        keep: Keeps the answer with the edit.
 
     Returns:
         The group as it is then, solved.
@@ -212,7 +206,7 @@ def accept_box(
     edit = SetBall(view.key, accepted_ball(box, name))
     if not replace:
         _require_free(load(store, view.group_id), edit, if_match)
-    return submit(store, view.group_id, edit, if_match=if_match, actor=actor, keep=keep)
+    return submit(store, view.group_id, edit, if_match=if_match, actor=actor)
 
 
 def _require_free(state: GroupState, edit: SetBall, if_match: str) -> None:
@@ -267,19 +261,23 @@ def _by_group(items: Sequence[Accepted]) -> Iterator[tuple[int, list[Accepted]]]
     yield from groups.items()
 
 
-def _kept_with(keep: Keep[AcceptReport], report: AcceptReport, _state: GroupState) -> Kept:
-    return keep(report)
-
-
 def _accept(
     store: Store,
     item: Accepted,
     name: str,
     request: AcceptRequest,
     actor: str,
-    keep: Keep[GroupState],
+    report: AcceptReport | None,
 ) -> str | None:
-    """Submit one edit; why not, where the view is no longer as planned or the edit impossible."""
+    """Submit one edit; why not, where the view is no longer as planned or the edit impossible.
+
+    The request is answered with the report, which only the last edit has.
+    """
+
+    def then(session: Session, _state: GroupState) -> None:
+        if report is not None:
+            session.respond(report)
+
     edit = SetBall(item.view, accepted_ball(item.box, name))
     for _ in range(TRIES):
         try:
@@ -289,7 +287,7 @@ def _accept(
         if not _still_fits(state, item, request):
             break
         try:
-            submit(store, item.group_id, edit, if_match=state.etag, actor=actor, keep=keep)
+            submit(store, item.group_id, edit, if_match=state.etag, actor=actor, then=then)
         except StaleRevisionError:
             continue
         except InputError:

@@ -17,7 +17,6 @@ from app.evaluation.comparison import (
 from app.evaluation.figure import Figure
 from app.evaluation.result import NUMBERS, FrameResult
 from app.evaluation.table import Table
-from app.review.answers.keep import Keep, keep_nothing
 from app.review.datasets.dataset import read_dataset_head
 from app.review.people.deeds import note_deed
 from app.store import evaluation_frames as frame_rows
@@ -99,10 +98,8 @@ def get_evaluation(store: Store, evaluation_id: int) -> StoredEvaluation:
         return read_evaluation(session, evaluation_id)
 
 
-def remove_evaluation(
-    store: Store, evaluation_id: int, *, actor: str, keep: Keep[None] = keep_nothing
-) -> None:
-    """Delete a run; ``keep`` keeps the answer in its transaction.
+def remove_evaluation(store: Store, evaluation_id: int, *, actor: str) -> None:
+    """Delete a run.
 
     Raises:
         NotFoundError: There is none.
@@ -111,7 +108,7 @@ def remove_evaluation(
         found = read_evaluation(session, evaluation_id)
         delete_evaluation(session, evaluation_id)
         note_deed(session, actor, "evaluation deleted", found.dataset_id, evaluation=evaluation_id)
-        keep(None)(session)
+        session.respond(None)
 
 
 def tables_of(evaluation: StoredEvaluation) -> list[Table]:

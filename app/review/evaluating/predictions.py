@@ -23,7 +23,6 @@ from app.evaluation.prediction_run import ReadPredictions, listed
 from app.finite import quoted
 from app.geometry.camera import Camera
 from app.object_store.address import unseal
-from app.review.answers.keep import Keep, keep_nothing
 from app.review.datasets.dataset import read_dataset_head
 from app.review.datasets.naming import require_name
 from app.review.evaluating.prediction_reader import PredictionFiles, Read, read_files
@@ -59,7 +58,6 @@ def add_predictions(
     *,
     actor: str,
     read: Read = read_files,
-    keep: Keep[PredictionSet] = keep_nothing,
 ) -> PredictionSet:
     """Read files into a new set.
 
@@ -71,7 +69,6 @@ def add_predictions(
         files: What to read.
         actor: Who brings them.
         read: Reads the files, here or in another process.
-        keep: Keeps the answer with the set.
 
     Raises:
         InputError: A file cannot be used, no box or camera belongs to a frame of the dataset, or
@@ -98,7 +95,6 @@ def add_predictions(
         unknown=len(boxes.unknown) + len(cameras.unknown),
         actor=actor,
         reuse=name is None,
-        keep=keep,
     )
 
 
@@ -116,7 +112,6 @@ def save_predictions(
     unknown: int = 0,
     actor: str,
     reuse: bool = False,
-    keep: Keep[PredictionSet] = keep_nothing,
 ) -> PredictionSet:
     """Keep what was read, or found by a detector, as a new set.
 
@@ -150,7 +145,7 @@ def save_predictions(
             own = dataset_prediction_sets(session, found.id)
             known = next((item for item in own if _same_reading(item, values)), None)
             if known is not None:
-                keep(known)(session)
+                session.respond(known)
                 return known
             values["name"] = name = _free_name(name, {item.name for item in own})
         require_free(session, found.id, name)
@@ -163,7 +158,7 @@ def save_predictions(
             {view: camera for view, camera in cameras.items() if view in present},
         )
         made = read_set(session, identity)
-        keep(made)(session)
+        session.respond(made)
         return made
 
 
@@ -219,12 +214,8 @@ def find_predictions(store: Store, dataset: str | int, name: str) -> PredictionS
     return found
 
 
-def delete_predictions(
-    store: Store, set_id: int, *, actor: str, keep: Keep[None] = keep_nothing
-) -> None:
+def delete_predictions(store: Store, set_id: int, *, actor: str) -> None:
     """Throw a set away; evaluations of it stay, and so do balls that were accepted from it.
-
-    ``keep`` keeps the answer in its transaction.
 
     Raises:
         NotFoundError: There is none.
@@ -233,7 +224,7 @@ def delete_predictions(
         found = read_set(session, set_id)
         delete_prediction_set(session, set_id)
         note_deed(session, actor, "predictions deleted", found.dataset_id, name=found.name)
-        keep(None)(session)
+        session.respond(None)
 
 
 def view_predictions(store: Store, view_id: int) -> list[tuple[PredictionSet, list[PredictedBox]]]:

@@ -8,8 +8,7 @@ from contextlib import suppress
 from app.config import Settings
 from app.datasets.guess_format import guess_format
 from app.errors import NotFoundError
-from app.review.answers.keep import Kept
-from app.review.answers.saved_progress import SavedProgress
+from app.review.idempotency import has_key, read_progress, save_progress
 from app.review.people.roles import Sight
 from app.store.store import Store
 from app.store.stored_json import Json
@@ -66,52 +65,44 @@ def own_uploads(settings: Settings, sight: Sight) -> list[Upload]:
     ]
 
 
-def delete_sent(
-    store: Store,
-    upload_id: str,
-    mine: Callable[[str], bool],
-    *,
-    keep: Kept,
-    progress: SavedProgress | None,
-) -> None:
+def delete_sent(store: Store, upload_id: str, mine: Callable[[str], bool]) -> None:
     """Delete an upload, or no longer be among those who sent it while others have sent it, too.
 
-    What goes is a file, which no transaction holds. That it is to go is written down before, and
-    the answer afterwards: sent again, a request that was stopped in between does the rest.
+    What goes is a file, which no transaction holds. Under a key, that it is to go is written down
+    before, and the response stored afterwards: sent again, a request that was stopped in between
+    does the rest.
 
     Args:
         store: Of the home.
         upload_id: Which.
         mine: Whether whoever asks is that sender.
-        keep: Keeps the answer once it is gone.
-        progress: Where a request under a key says what it deletes; None: it has none.
 
     Raises:
         NotFoundError: There is none of that id.
         InputError: A dataset reads frames from it.
     """
-    if progress is None:
+    if not has_key():
         delete_upload(store.settings, upload_id, mine)
         return
-    begun = _begun(store, progress) or _begin(store, progress, upload_id)
+    begun = _begun(store) or _begin(store, upload_id)
     with suppress(NotFoundError):
         # One that was sent once more meanwhile is another.
         if get_upload(store.settings, begun["upload"]).created == begun["created"]:
             delete_upload(store.settings, begun["upload"], mine)
     with store.write() as session:
-        keep(session)
+        session.respond(None)
 
 
-def _begun(store: Store, progress: SavedProgress) -> Json | None:
+def _begun(store: Store) -> Json | None:
     """Which upload the same request was deleting when it was stopped; None: it was not."""
     with store.read() as session:
-        return progress.read(session)
+        return read_progress(session)
 
 
-def _begin(store: Store, progress: SavedProgress, upload_id: str) -> Json:
+def _begin(store: Store, upload_id: str) -> Json:
     upload = get_upload(store.settings, upload_id)
     require_unread(upload)
     begun = {"upload": upload.id, "created": upload.created}
     with store.write() as session:
-        progress.save(session, begun)
+        save_progress(session, begun)
     return begun

@@ -6,7 +6,6 @@ from dataclasses import asdict
 from typing import Any
 
 from app.progress import TellProgress
-from app.review.answers.keep import Keep, keep_nothing
 from app.review.datasets.dataset import get_dataset_head
 from app.review.evaluating.accept import AcceptReport, AcceptRequest, accept, plan_accept
 from app.review.evaluating.evaluation import list_evaluations
@@ -22,17 +21,9 @@ EVALUATE, ACCEPT = "evaluate", "bulk"
 
 
 def request_evaluation(
-    jobs: Jobs,
-    store: Store,
-    dataset: str,
-    request: EvaluationRequest,
-    *,
-    actor: str,
-    keep: Keep[Job] = keep_nothing,
+    jobs: Jobs, store: Store, dataset: str, request: EvaluationRequest, *, actor: str
 ) -> Job:
     """Evaluate, soon; what can be refused is refused at once.
-
-    ``keep`` keeps the answer with the job.
 
     Raises:
         InputError, NotFoundError: As ``run_evaluation`` does.
@@ -46,20 +37,13 @@ def request_evaluation(
         dataset_id=found.id,
         actor=actor,
         request=asdict(request),
-        keep=keep,
     )
 
 
 def request_accept(
-    jobs: Jobs,
-    store: Store,
-    dataset: str,
-    request: AcceptRequest,
-    *,
-    actor: str,
-    keep: Keep[Job] = keep_nothing,
+    jobs: Jobs, store: Store, dataset: str, request: AcceptRequest, *, actor: str
 ) -> Job:
-    """Accept predictions, soon; ``keep`` keeps the answer with the job.
+    """Accept predictions, soon.
 
     Raises:
         InputError, NotFoundError: As ``plan_accept`` does.
@@ -73,7 +57,6 @@ def request_accept(
         dataset_id=found.id,
         actor=actor,
         request={"accept": asdict(request)},
-        keep=keep,
     )
 
 

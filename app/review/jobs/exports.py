@@ -13,7 +13,6 @@ from app.errors import InputError, NotFoundError
 from app.object_store.address import SCHEME
 from app.object_store.path import StoredPath, target_path
 from app.plural import plural
-from app.review.answers.keep import Keep, keep_nothing
 from app.review.datasets.dataset import get_dataset_head
 from app.review.exporting.export import ExportReport, export, require_possible
 from app.review.exporting.folder import ExportFolder
@@ -37,7 +36,6 @@ def request_export(
     request: Mapping[str, Any],
     *,
     actor: str,
-    keep: Keep[Job] = keep_nothing,
 ) -> Job:
     """Write an export, soon; what can be refused is refused at once.
 
@@ -48,7 +46,6 @@ def request_export(
         frames: Reads the frames that go into it.
         request: The fields of an export request, plain JSON values.
         actor: Who wants it.
-        keep: Keeps the answer with the job.
 
     Raises:
         NotFoundError: There is no such dataset or version.
@@ -77,7 +74,6 @@ def request_export(
         dataset_id=found.id,
         actor=actor,
         request=asked,
-        keep=keep,
     )
 
 

@@ -11,7 +11,6 @@ from app.datasets.file_tree import Root
 from app.errors import InputError, TooLargeError
 from app.plural import plural
 from app.progress import TellProgress
-from app.review.answers.keep import Keep, keep_nothing
 from app.review.datasets.dataset import get_dataset_head
 from app.review.datasets.naming import require_name
 from app.review.editing.paint import has_pictures
@@ -93,13 +92,7 @@ class Outcome:
 
 
 def request_import(
-    jobs: Jobs,
-    store: Store,
-    settings: Settings,
-    request: ImportRequest,
-    *,
-    actor: str,
-    keep: Keep[Job] = keep_nothing,
+    jobs: Jobs, store: Store, settings: Settings, request: ImportRequest, *, actor: str
 ) -> Job:
     """Import, soon; what can be refused is refused at once.
 
@@ -109,7 +102,6 @@ def request_import(
         settings: Where uploads lie, and which folders may be read.
         request: What to import.
         actor: Who imports.
-        keep: Keeps the answer with the job.
 
     Raises:
         InputError: Format, name or path cannot be used.
@@ -128,7 +120,6 @@ def request_import(
         dataset_id=None if row is None else int(row.id),
         actor=actor,
         request=request.values(),
-        keep=keep,
     )
 
 

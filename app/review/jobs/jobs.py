@@ -25,8 +25,7 @@ from app.errors import (
     OverloadedError,
     StorageError,
 )
-from app.review.answers.keep import Keep, keep_nothing
-from app.review.jobs.records import JobRecords, need_job
+from app.review.jobs.records import JobRecords, Then, cancelled_by, need_job
 from app.review.jobs.run import JobProgress, JobRun, RunQueue, Work
 from app.review.people.deeds import note_job
 from app.store.clock import now
@@ -141,7 +140,7 @@ class Jobs(JobRecords):
         actor: str,
         request: Json = None,
         once: bool = False,
-        keep: Keep[Job] = keep_nothing,
+        then: Then = Session.respond,
     ) -> Job:
         """Queue work; not to be called inside a transaction.
 
@@ -154,7 +153,7 @@ class Jobs(JobRecords):
             request: What was asked for; a kind that is resumed finds its way from it.
             once: Where a job of this kind waits for this dataset already, answer that one; without
                 a dataset one's own, for nobody sees another person's.
-            keep: Keeps the answer, or whatever else belongs to the job, in its transaction.
+            then: Ends the transaction; default: the request is answered with the job.
 
         Raises:
             OverloadedError: Too many jobs wait.
@@ -169,7 +168,7 @@ class Jobs(JobRecords):
             job = need_job(session, insert_job(session, new) if known is None else known)
             if known is None:
                 note_job(session, actor, job.id, kind, title, dataset_id)
-            keep(job)(session)
+            then(session, job)
             if known is None:
                 progress = JobProgress(job.id, self._closing)
                 enter(JobRun(job.id, kind, dataset_id, actor, work, progress))
@@ -178,12 +177,13 @@ class Jobs(JobRecords):
         self._announce(job)
         return job
 
-    def cancel(self, job_id: int, keep: Keep[Job] = keep_nothing) -> Job:
+    def cancel(self, job_id: int, *, by: str | None = None) -> Job:
         """End a job: one that waits at once, one that runs at its next step.
 
         Args:
             job_id: Which.
-            keep: Keeps the answer, or who did it, in the transaction that says so.
+            by: Who asks for it, as the log says; the request is answered with the job. None: it
+                ends with other work.
 
         Raises:
             NotFoundError: There is none of that id.
@@ -200,13 +200,12 @@ class Jobs(JobRecords):
             elif running is not None:
                 running.progress.cancelled.set()
         if run is not None:
-            self._finish(run, keep, state=CANCELLED, sentence="Cancelled before it began.")
-        elif keep is not keep_nothing:
-            with self._store.write() as session:
-                job = need_job(session, job_id)
-                keep(job)(session)
-            return job
-        return self.get(job_id)
+            sentence = "Cancelled before it began."
+            return self._finish(run, by, state=CANCELLED, sentence=sentence) or self.get(job_id)
+        if by is None:
+            return self.get(job_id)
+        with self._store.write() as session:
+            return cancelled_by(session, need_job(session, job_id), by)
 
     def belongs(self, job_id: int, dataset_id: int) -> None:
         """Note whose a running job is, where its dataset came to be while it ran."""
@@ -441,15 +440,17 @@ class Jobs(JobRecords):
             with suppress(StorageError):
                 self._save(run.id, begun=-1)
 
-    def _finish(self, run: JobRun, keep: Keep[Job] = keep_nothing, **values: Any) -> None:
-        place = run.columns
+    def _finish(self, run: JobRun, by: str | None = None, **values: Any) -> Job | None:
+        """Save how a job ended; ``by``: see ``cancel``. None where it cannot be written."""
+        place, job = run.columns, None
         # Where the disk is full for a moment, the record waits for it.
         for _ in range(5):
             try:
-                self._save_end(run.id, keep, **{**place, "ended": now(), **values})
+                job = self._save_end(run.id, by, **{**place, "ended": now(), **values})
             except StorageError as error:
                 log.warning("the record of a job could not be written", error=str(error))
                 self._closing.wait(1.0)
             else:
                 break
         run.over.set()
+        return job

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Collection
 from dataclasses import dataclass
 
-from app.review.answers.keep import Keep, keep_nothing
 from app.review.datasets.dataset import Dataset, DatasetHead, dataset_id, require_matches
 from app.review.jobs.jobs import Jobs
 from app.review.jobs.records import need_job
@@ -75,14 +74,7 @@ class MatchJob:
     has_runs: bool = False
 
     def request(
-        self,
-        jobs: Jobs,
-        store: Store,
-        dataset: str | int,
-        match: str | None,
-        *,
-        actor: str,
-        keep: Keep[Job] = keep_nothing,
+        self, jobs: Jobs, store: Store, dataset: str | int, match: str | None, *, actor: str
     ) -> Job:
         """Have it done soon, in one match or all.
 
@@ -99,7 +91,6 @@ class MatchJob:
             dataset_id=found.id,
             actor=actor,
             request={"match": match} if run is None else {"match": match, "run": run},
-            keep=keep,
         )
 
     def resume(self, jobs: Jobs, store: Store) -> None:
@@ -125,7 +116,6 @@ class MatchJob:
         apply: Callable[[Session, int, list[Job]], list[Job]],
         *,
         actor: str,
-        keep: Keep[Job] = keep_nothing,
     ) -> Job:
         """Take back what such jobs gave, end those at it, and solve what that leaves stale, soon:
         all of it, or nothing.
@@ -137,7 +127,6 @@ class MatchJob:
             apply: Takes back from the dataset of an id, given the jobs that wait or run; returns
                 those of them that end.
             actor: Who wants it.
-            keep: Keeps the answer with the change.
         """
         number = dataset_id(store, dataset)
         ended: list[int] = []
@@ -149,7 +138,7 @@ class MatchJob:
             jobs.end_with(session, ended)
             return job
 
-        job = solve_after(jobs, store, number, change, actor=actor, keep=keep)
+        job = solve_after(jobs, store, number, change, actor=actor)
         jobs.cancel_each(ended)
         return job
 

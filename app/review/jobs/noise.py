@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from app.review.answers.keep import Keep, keep_nothing
 from app.review.datasets.dataset import dataset_id
 from app.review.editing.ball_noise import give_factors
 from app.review.jobs.jobs import Jobs
@@ -14,9 +13,7 @@ from app.store.session import Session
 from app.store.store import Store
 
 
-def request_noise(
-    jobs: Jobs, store: Store, noise: Noise, *, actor: str, keep: Keep[Job] = keep_nothing
-) -> Job:
+def request_noise(jobs: Jobs, store: Store, noise: Noise, *, actor: str) -> Job:
     """Judge a dataset by the noise that was estimated, and solve it, soon.
 
     Raises:
@@ -28,12 +25,10 @@ def request_noise(
         accept_noise(session, noise, state, actor)
         return job
 
-    return solve_after(jobs, store, noise.dataset_id, change, actor=actor, keep=keep)
+    return solve_after(jobs, store, noise.dataset_id, change, actor=actor)
 
 
-def request_noise_back(
-    jobs: Jobs, store: Store, dataset: str | int, *, actor: str, keep: Keep[Job] = keep_nothing
-) -> Job:
+def request_noise_back(jobs: Jobs, store: Store, dataset: str | int, *, actor: str) -> Job:
     """Take all balls to be as noisy as their dataset's, and solve it, soon.
 
     Raises:
@@ -45,4 +40,4 @@ def request_noise_back(
         give_factors(session, number, (), actor)
         return job
 
-    return solve_after(jobs, store, number, change, actor=actor, keep=keep)
+    return solve_after(jobs, store, number, change, actor=actor)

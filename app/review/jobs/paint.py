@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from app.review.answers.keep import Keep, keep_nothing
 from app.review.editing.paint import apply_take_back, read_paint, require_readable
 from app.review.jobs.jobs import Jobs
 from app.review.jobs.matches import MatchesAsked, MatchJob
@@ -20,14 +19,7 @@ TOLD = (
 """What a result counts of all matches."""
 
 
-def take_paint_back(
-    jobs: Jobs,
-    store: Store,
-    dataset: str | int,
-    *,
-    actor: str,
-    keep: Keep[Job] = keep_nothing,
-) -> Job:
+def take_paint_back(jobs: Jobs, store: Store, dataset: str | int, *, actor: str) -> Job:
     """Take the last reading of a dataset's paint back, and solve it, soon.
 
     One that waits or runs is cancelled and gives nothing afterwards; it is the last one.
@@ -41,7 +33,7 @@ def take_paint_back(
         apply_take_back(session, number, actor=actor, stopped=stopped)
         return present
 
-    return PAINT.take_back(jobs, store, dataset, apply, actor=actor, keep=keep)
+    return PAINT.take_back(jobs, store, dataset, apply, actor=actor)
 
 
 def _read(asked: MatchesAsked, progress: JobProgress) -> Json:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from app.review.answers.keep import Keep, keep_nothing
 from app.review.datasets.dataset import dataset_id
 from app.review.editing.pictures import apply_pictures, estimate_pictures
 from app.review.jobs.jobs import Jobs
@@ -26,7 +25,6 @@ def request_pictures(
     wanted: Mapping[str, PictureGeometry | None],
     *,
     actor: str,
-    keep: Keep[Job] = keep_nothing,
 ) -> Job:
     """Say what main cameras' pictures of matches are, and solve what that leaves stale, soon.
 
@@ -39,7 +37,7 @@ def request_pictures(
         apply_pictures(session, number, wanted, actor=actor)
         return job
 
-    return solve_after(jobs, store, number, change, actor=actor, keep=keep)
+    return solve_after(jobs, store, number, change, actor=actor)
 
 
 def _estimate(asked: MatchesAsked, progress: JobProgress) -> Json:

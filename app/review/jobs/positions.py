@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from app.review.answers.keep import Keep, keep_nothing
 from app.review.editing.positions import apply_take_back, require_sharable, share_positions
 from app.review.jobs.jobs import Jobs
 from app.review.jobs.matches import MatchesAsked, MatchJob
@@ -15,13 +14,7 @@ from app.store.stored_json import Json
 
 
 def take_positions_back(
-    jobs: Jobs,
-    store: Store,
-    dataset: str | int,
-    match: str,
-    *,
-    actor: str,
-    keep: Keep[Job] = keep_nothing,
+    jobs: Jobs, store: Store, dataset: str | int, match: str, *, actor: str
 ) -> Job:
     """Take shared positions of a match back, and solve its dataset, soon.
 
@@ -38,7 +31,7 @@ def take_positions_back(
         apply_take_back(session, number, match, actor=actor, stopped=stopped)
         return ended
 
-    return POSITIONS.take_back(jobs, store, dataset, apply, actor=actor, keep=keep)
+    return POSITIONS.take_back(jobs, store, dataset, apply, actor=actor)
 
 
 def _share(asked: MatchesAsked, progress: JobProgress) -> Json:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import asdict
 
-from app.review.answers.keep import Keep, keep_nothing
 from app.review.datasets.dataset import dataset_id
 from app.review.editing.proposals import forget_proposals, propose_views
 from app.review.jobs.jobs import Jobs
@@ -14,9 +13,7 @@ from app.store.store import Store
 from app.store.stored_json import Json
 
 
-def stop_and_forget(
-    jobs: Jobs, store: Store, dataset: str | int, *, keep: Keep[int] = keep_nothing
-) -> int:
+def stop_and_forget(jobs: Jobs, store: Store, dataset: str | int) -> int:
     """``forget_proposals``, and no search that was asked for before keeps anything after it.
 
     Raises:
@@ -25,7 +22,7 @@ def stop_and_forget(
     number = dataset_id(store, dataset)
     # Told before the transaction begins: what a search keeps in one before it is forgotten in it.
     jobs.cancel_kind(number, PROPOSALS.kind)
-    return forget_proposals(store, number, keep=keep)
+    return forget_proposals(store, number)
 
 
 def _propose(asked: MatchesAsked, progress: JobProgress) -> Json:

@@ -8,9 +8,9 @@ from contextlib import suppress
 from typing import Any
 
 from app.errors import ConflictError, NotFoundError, StorageError
-from app.review.answers.keep import Keep, keep_nothing
 from app.review.jobs.run import JobRun
 from app.review.people.bell import RingKind, tell
+from app.review.people.deeds import note_deed
 from app.soccer.actors import person_of
 from app.store.jobs import DONE as DONE
 from app.store.jobs import FAILED, OPEN, delete_job, job_ids, read_job, read_jobs, update_job
@@ -26,6 +26,7 @@ _TOLD = {DONE: "done", FAILED: "it failed"}
 """Ends of jobs of which people are told, in words."""
 
 Listener = Callable[[Job], None]
+Then = Callable[[Session, Job], None]
 
 
 class JobRecords:
@@ -108,13 +109,13 @@ class JobRecords:
         if job is not None:
             self._announce(job)
 
-    def _save_end(self, job_id: int, keep: Keep[Job] = keep_nothing, **values: Any) -> None:
-        """Save how a job ended, and tell who asked for it, at once; ``keep``: see ``cancel``."""
+    def _save_end(self, job_id: int, by: str | None = None, **values: Any) -> Job | None:
+        """Save how a job ended, and tell who asked for it, at once; ``by``: see ``cancel``."""
         with self._store.write() as session:
             update_job(session, job_id, **values)
             job = read_job(session, job_id)
             if job is not None:
-                keep(job)(session)
+                cancelled_by(session, job, by)
             if job is not None and job.state in _TOLD:
                 tell(
                     session,
@@ -127,6 +128,7 @@ class JobRecords:
                 )
         if job is not None:
             self._announce(job)
+        return job
 
     def _announce(self, job: Job) -> None:
         for listener in self._listeners:
@@ -138,4 +140,12 @@ def need_job(session: Session, job_id: int) -> Job:
     job = read_job(session, job_id)
     if job is None:
         raise NotFoundError(f"there is no job {job_id}")
+    return job
+
+
+def cancelled_by(session: Session, job: Job, by: str | None) -> Job:
+    """Note who cancels a job and answer their request with it; None: it ends with other work."""
+    if by is not None:
+        note_deed(session, by, "job cancelled", job.dataset_id, job=job.id, title=job.title)
+        session.respond(job)
     return job

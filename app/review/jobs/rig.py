@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from app.errors import ConflictError
-from app.review.answers.keep import Keep, keep_nothing
 from app.review.datasets.dataset import get_dataset_head
 from app.review.editing.rig import accept, adjustable, proposal_values, propose, take_back
+from app.review.idempotency import without_response
 from app.review.jobs.jobs import Jobs
 from app.review.jobs.run import JobProgress, Work
 from app.review.jobs.solve import request_solve
@@ -17,14 +17,7 @@ KIND = "rig"
 
 
 def request_rig(
-    jobs: Jobs,
-    store: Store,
-    dataset: str,
-    *,
-    what: str | None,
-    inputs: str | None,
-    actor: str,
-    keep: Keep[Job] = keep_nothing,
+    jobs: Jobs, store: Store, dataset: str, *, what: str | None, inputs: str | None, actor: str
 ) -> Job:
     """Adjust the static cameras of a dataset, soon; what can be refused is refused at once.
 
@@ -35,7 +28,6 @@ def request_rig(
         what: What of the proposal is saved, as ``editing.rig.accept`` takes it; None: nothing.
         inputs: Of the proposal that a person saw; no other one is saved.
         actor: Who wants it.
-        keep: Keeps the answer with the job.
 
     Raises:
         InputError, ConflictError: As ``editing.rig.adjustable`` does.
@@ -49,7 +41,6 @@ def request_rig(
         dataset_id=found.id,
         actor=actor,
         request={"what": what, "inputs": inputs},
-        keep=keep,
     )
 
 
@@ -63,17 +54,16 @@ def make_rigs(jobs: Jobs, store: Store) -> None:
     jobs.makes(KIND, work_of)
 
 
-def take_rig_back(
-    jobs: Jobs, store: Store, dataset: str, *, actor: str, keep: Keep[int] = keep_nothing
-) -> int:
+def take_rig_back(jobs: Jobs, store: Store, dataset: str, *, actor: str) -> int:
     """Take an accepted rig back, and solve its dataset, soon; returns the number of cameras.
 
     Raises:
         ConflictError: There is nothing to take back.
     """
     found = get_dataset_head(store, dataset)
-    count = take_back(store, found.id, actor=actor, keep=keep)
-    request_solve(jobs, store, found.id, actor=actor)
+    count = take_back(store, found.id, actor=actor)
+    with without_response():
+        request_solve(jobs, store, found.id, actor=actor)
     return count
 
 

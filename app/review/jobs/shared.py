@@ -16,9 +16,8 @@ from typing import Any
 import structlog
 
 from app.errors import ConflictError, JobCancelled, ReviewError, StorageError
-from app.review.answers.keep import Keep, keep_nothing
 from app.review.jobs.jobs import CLOSE_SECONDS, KEPT, Jobs, Pool
-from app.review.jobs.records import need_job
+from app.review.jobs.records import cancelled_by, need_job
 from app.review.jobs.run import JobProgress, JobRun, Work
 from app.store.clock import now
 from app.store.jobs import (
@@ -120,14 +119,13 @@ class SharedJobs(Jobs):
         super().close(max(until - time.monotonic(), 0.0))
         self._store.sharing.give_back(CLAIM)
 
-    def cancel(self, job_id: int, keep: Keep[Job] = keep_nothing) -> Job:
+    def cancel(self, job_id: int, *, by: str | None = None) -> Job:
         """See ``Jobs``."""
         with self._store.write() as session:
             if need_job(session, job_id).state in (DONE, FAILED):
                 raise ConflictError(f"job {job_id} is over already")
             self._ask_to_end(session, [job_id])
-            job = need_job(session, job_id)
-            keep(job)(session)
+            job = cancelled_by(session, need_job(session, job_id), by)
         self._announce(job)
         return job
 
@@ -331,9 +329,9 @@ class SharedJobs(Jobs):
         self._announce(job)
         return True
 
-    def _finish(self, run: JobRun, keep: Keep[Job] = keep_nothing, **values: Any) -> None:
+    def _finish(self, run: JobRun, by: str | None = None, **values: Any) -> Job | None:
         if self._alone or self.leads():
-            super()._finish(run, keep, **values)
-        else:
-            # Whoever carries out jobs now begins it again.
-            run.over.set()
+            return super()._finish(run, by, **values)
+        # Whoever carries out jobs now begins it again.
+        run.over.set()
+        return None

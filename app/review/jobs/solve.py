@@ -7,12 +7,12 @@ from contextlib import nullcontext
 from dataclasses import dataclass
 from typing import TypeVar
 
-from app.review.answers.keep import Keep, Kept, keep_nothing
 from app.review.datasets.dataset import get_dataset_head, list_datasets
 from app.review.editing.pitches import DatasetPitches, apply_pitches, stale_matches
 from app.review.editing.recompute import SolveReport, stale_groups
 from app.review.jobs.full_solve import count_yield, solve_fully
 from app.review.jobs.jobs import Jobs, Pool
+from app.review.jobs.records import Then
 from app.review.jobs.run import JobProgress, Work, counting
 from app.review.policies.policy import PolicyState, apply_policy
 from app.soccer.actors import LOCAL_USER
@@ -63,7 +63,7 @@ def request_solve(
     actor: str,
     title: str | None = None,
     edited: bool = False,
-    keep: Keep[Job] = keep_nothing,
+    then: Then = Session.respond,
 ) -> Job:
     """Solve what is stale in a dataset, soon; one job a dataset waits at most.
 
@@ -79,7 +79,7 @@ def request_solve(
         actor=actor,
         request={EDITED: True} if edited else None,
         once=True,
-        keep=keep,
+        then=then,
     )
 
 
@@ -90,7 +90,6 @@ def solve_after(
     change: Callable[[Session, Job], Changed],
     *,
     actor: str,
-    keep: Keep[Changed] = keep_nothing,
 ) -> Changed:
     """Change something of a dataset and solve what that leaves stale, soon: both, or neither.
 
@@ -98,32 +97,22 @@ def solve_after(
         jobs: Where the job is queued.
         store: The database.
         dataset_id: The dataset.
-        change: Makes the change, in the transaction of the job's record; what it returns is kept.
+        change: Makes the change, in the transaction of the job's record; the request is
+            answered with what it returns.
         actor: Who says so.
-        keep: Keeps the answer with the change.
     """
     changed: list[Changed] = []
 
-    def both(job: Job) -> Kept:
-        def write(session: Session) -> None:
-            changed.append(change(session, job))
-            keep(changed[0])(session)
+    def both(session: Session, job: Job) -> None:
+        changed.append(change(session, job))
+        session.respond(changed[0])
 
-        return write
-
-    request_solve(jobs, store, dataset_id, actor=actor, keep=both)
+    request_solve(jobs, store, dataset_id, actor=actor, then=both)
     return changed[0]
 
 
 def request_policy(
-    jobs: Jobs,
-    store: Store,
-    dataset_id: int,
-    policy: Policy,
-    *,
-    if_match: str,
-    actor: str,
-    keep: Keep[PolicyJob] = keep_nothing,
+    jobs: Jobs, store: Store, dataset_id: int, policy: Policy, *, if_match: str, actor: str
 ) -> PolicyJob:
     """Judge a dataset by another policy, and solve what that leaves stale, soon.
 
@@ -135,7 +124,7 @@ def request_policy(
         state = apply_policy(session, dataset_id, policy, if_match=if_match, actor=actor)
         return PolicyJob(state, job, len(unsolved_groups(session, dataset_id)))
 
-    return solve_after(jobs, store, dataset_id, change, actor=actor, keep=keep)
+    return solve_after(jobs, store, dataset_id, change, actor=actor)
 
 
 def request_pitches(
@@ -146,7 +135,6 @@ def request_pitches(
     *,
     if_match: str,
     actor: str,
-    keep: Keep[PitchJob] = keep_nothing,
 ) -> PitchJob:
     """Give matches of a dataset another pitch, and solve what that leaves stale, soon.
 
@@ -159,12 +147,10 @@ def request_pitches(
         state = apply_pitches(session, dataset_id, wanted, if_match=if_match, actor=actor)
         return PitchJob(state, job)
 
-    return solve_after(jobs, store, dataset_id, change, actor=actor, keep=keep)
+    return solve_after(jobs, store, dataset_id, change, actor=actor)
 
 
-def request_estimates(
-    jobs: Jobs, store: Store, dataset: str | int, *, actor: str, keep: Keep[Job] = keep_nothing
-) -> Job:
+def request_estimates(jobs: Jobs, store: Store, dataset: str | int, *, actor: str) -> Job:
     """Estimate the pitches of a dataset's matches that are not estimated yet, soon.
 
     That is a part of solving; where the dataset is being solved already, that job does it.
@@ -174,7 +160,7 @@ def request_estimates(
     """
     found = get_dataset_head(store, dataset)
     title = f"Estimate the pitches of {found.name}"
-    return request_solve(jobs, store, found.id, actor=actor, title=title, keep=keep)
+    return request_solve(jobs, store, found.id, actor=actor, title=title)
 
 
 def resume_solving(jobs: Jobs, store: Store) -> None:

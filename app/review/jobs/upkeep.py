@@ -14,8 +14,8 @@ from app.errors import ReviewError
 from app.review.datasets.spare_calibrations import delete_spare_calibrations
 from app.review.exporting.folder import ExportFolder
 from app.review.jobs.jobs import Jobs
-from app.store.answers import forget_answers, shorten_answers
 from app.store.clock import text_of
+from app.store.idempotency import delete_old_responses, shorten_responses
 from app.store.jobs import forget_jobs
 from app.store.leftovers import delete_leftovers
 from app.store.orphans import expire_cache
@@ -63,7 +63,7 @@ def tidy(store: Store, wanted: Callable[[], bool] = lambda: True) -> Tidied:
     """
     settings = store.settings
     steps: dict[str, Callable[[], int]] = {
-        "answers": lambda: _shorten_answers(store),
+        "answers": lambda: _shorten_responses(store),
         "jobs": lambda: _forget_jobs(store),
         "uploads": lambda: expire_uploads(settings),
         "cached": lambda: expire_cache(settings),
@@ -89,9 +89,10 @@ def _attempt(name: str, step: Callable[[], T]) -> T | None:
     return None
 
 
-def _shorten_answers(store: Store) -> int:
+def _shorten_responses(store: Store) -> int:
     with store.write() as session:
-        return forget_answers(session) + shorten_answers(session, store.settings.answer_bytes)
+        deleted = delete_old_responses(session)
+        return deleted + shorten_responses(session, store.settings.answer_bytes)
 
 
 def _forget_jobs(store: Store) -> int:

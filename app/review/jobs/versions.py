@@ -6,7 +6,6 @@ from typing import Any
 
 from app.errors import OverloadedError
 from app.progress import TellProgress
-from app.review.answers.keep import Keep, keep_nothing
 from app.review.datasets.dataset import get_dataset_head
 from app.review.jobs.jobs import Jobs
 from app.review.jobs.run import JobProgress, Work, run_job_in_worker
@@ -25,13 +24,7 @@ MOST_LOOKED_AT = 1000
 
 
 def request_freeze(
-    jobs: Jobs,
-    store: Store,
-    dataset: str,
-    request: FreezeRequest,
-    *,
-    actor: str,
-    keep: Keep[Job] = keep_nothing,
+    jobs: Jobs, store: Store, dataset: str, request: FreezeRequest, *, actor: str
 ) -> Job:
     """Freeze a dataset, soon; what can be refused is refused at once.
 
@@ -47,13 +40,10 @@ def request_freeze(
         dataset_id=found.id,
         actor=actor,
         request=_request_values(request),
-        keep=keep,
     )
 
 
-def request_verify(
-    jobs: Jobs, store: Store, version_id: int, *, actor: str, keep: Keep[Job] = keep_nothing
-) -> Job:
+def request_verify(jobs: Jobs, store: Store, version_id: int, *, actor: str) -> Job:
     """Verify a version, soon."""
     version = get_version(store, version_id)
     return jobs.submit(
@@ -63,7 +53,6 @@ def request_verify(
         dataset_id=version.dataset_id,
         actor=actor,
         request={"version": version_id},
-        keep=keep,
     )
 
 

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from enum import StrEnum
 
-from app.review.answers.keep import Keep, keep_nothing
 from app.review.people.logins import Login, read_roles
 from app.review.people.roles import Role
 from app.soccer.actors import person_of
@@ -96,21 +95,12 @@ def read_bell(store: Store, login: Login, limit: int = 50, before: int | None = 
         return _read(session, login, limit, before)
 
 
-def read_all(
-    store: Store,
-    login: Login,
-    ids: Sequence[int] | None = None,
-    *,
-    keep: Keep[Bell] = keep_nothing,
-) -> Bell:
-    """They have seen some of what they were told, or (None) all of it.
-
-    ``keep`` keeps the answer in its transaction.
-    """
+def read_all(store: Store, login: Login, ids: Sequence[int] | None = None) -> Bell:
+    """They have seen some of what they were told, or (None) all of it."""
     with store.write() as session:
         mark_read(session, login.person_id, login.sight, ids, now())
         bell = _read(session, login)
-        keep(bell)(session)
+        session.respond(bell)
         return bell
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from app.review.answers.keep import Kept, keep_nothing
 from app.store.clock import now
 from app.store.log import Entry, append
 from app.store.session import Session
@@ -12,7 +11,6 @@ DEED = "deed"
 """Kind of the log's entries about what was made, changed or deleted beside the groups."""
 JOB = "job"
 """Kind of the log's entries about jobs that somebody asked for."""
-_NOTHING = keep_nothing(None)
 
 
 def note_deed(
@@ -38,30 +36,10 @@ def note_job(
     append(session, [Entry(JOB, actor, now(), body, dataset_id)])
 
 
-def with_deed(
-    keep: Kept, actor: str, did: str, dataset_id: int | None, **what: str | int | None
-) -> Kept:
-    """``keep``, which writes into the log, too, who did something; see ``note_deed``."""
-
-    def write(session: Session) -> None:
-        note_deed(session, actor, did, dataset_id, **what)
-        keep(session)
-
-    return write
-
-
 def record_deed(
-    store: Store,
-    actor: str,
-    did: str,
-    dataset_id: int | None,
-    *,
-    keep: Kept = _NOTHING,
-    **what: str | int | None,
+    store: Store, actor: str, did: str, dataset_id: int | None, **what: str | int | None
 ) -> None:
-    """The same where what happens is in no transaction: a file that goes.
-
-    ``keep`` keeps the answer with the word.
-    """
+    """The same where what happens is in no transaction: a file that goes. Answers the request."""
     with store.write() as session:
-        with_deed(keep, actor, did, dataset_id, **what)(session)
+        note_deed(session, actor, did, dataset_id, **what)
+        session.respond(None)

@@ -16,7 +16,6 @@ from app.config import Settings
 from app.datasets.match_frames import ARCHIVE
 from app.errors import ConflictError, NotFoundError
 from app.progress import TellProgress, telling
-from app.review.answers.keep import Keep, keep_nothing
 from app.review.datasets.dataset import insert_dataset
 from app.review.datasets.delete import delete_dataset
 from app.review.editing.recompute import solve_dataset
@@ -93,11 +92,10 @@ def request_practice(
     again: bool,
     actor: str,
     person: str | None = None,
-    keep: Keep[Job] = keep_nothing,
 ) -> Job:
     """Make the practice dataset soon; what is there already stays, unless it shall begin again.
 
-    ``person`` is whose practice it is (``practice_name``); ``keep`` keeps the answer with the job.
+    ``person`` is whose practice it is (``practice_name``).
 
     Raises:
         ConflictError: There is a dataset of that name that is not the practice.
@@ -110,7 +108,6 @@ def request_practice(
         actor=actor,
         request={"again": again, "person": person},
         once=True,
-        keep=keep,
     )
 
 

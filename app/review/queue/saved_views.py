@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import Any
 
 from app.errors import ConflictError, InputError, NotFoundError
-from app.review.answers.keep import Keep, keep_nothing
 from app.review.datasets.naming import checked_title
 from app.review.queue.fields import asks_blind
 from app.review.queue.query import parse_query
@@ -47,16 +46,8 @@ def list_saved_views(store: Store, dataset_id: int) -> list[SavedView]:
         return [_saved_view(row, _matching(session, row)) for row in rows if _is_told(row)]
 
 
-def save_view(
-    store: Store,
-    dataset_id: int,
-    name: str,
-    query: str,
-    *,
-    actor: str,
-    keep: Keep[SavedView] = keep_nothing,
-) -> SavedView:
-    """Keep a query under a name, and with it, by ``keep``, the answer.
+def save_view(store: Store, dataset_id: int, name: str, query: str, *, actor: str) -> SavedView:
+    """Keep a query under a name.
 
     Raises:
         InputError: There is no name, or the query cannot be understood.
@@ -83,7 +74,7 @@ def save_view(
             )
         identity = insert_saved_view(session, dataset_id, name, query.strip(), actor=actor)
         saved = _read(session, identity)
-        keep(saved)(session)
+        session.respond(saved)
     return saved
 
 
@@ -93,7 +84,7 @@ def get_view(store: Store, view_id: int) -> SavedView:
         return _read(session, view_id)
 
 
-def delete_view(store: Store, view_id: int, *, keep: Keep[SavedView] = keep_nothing) -> SavedView:
+def delete_view(store: Store, view_id: int) -> SavedView:
     """Forget a saved view; returns what it was.
 
     Raises:
@@ -102,7 +93,7 @@ def delete_view(store: Store, view_id: int, *, keep: Keep[SavedView] = keep_noth
     with store.write() as session:
         view = _read(session, view_id)
         delete_saved_view(session, view_id)
-        keep(view)(session)
+        session.respond(view)
     return view
 
 

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 from app.errors import ConflictError
-from app.review.answers.keep import Keep, Kept, keep_nothing
 from app.review.editing.codec import step_to_json
 from app.review.editing.edit import (
     Edit,
@@ -45,14 +44,13 @@ def adopt_take(
     *,
     actor: str,
     paint: PaintFollower | None = None,
-    also: Kept | None = None,
-    keep: Keep[GroupState] = keep_nothing,
+    also: Callable[[Session], None] | None = None,
 ) -> GroupState:
     """Take a person's annotation and verdict over into the original, in one transaction.
 
     The edit and the verdict are that person's; that ``actor`` decided so is an entry of its own.
     Undo takes the edit back as any other. Lines of a static camera are edits of that camera.
-    ``also`` writes what becomes true with it into the same transaction, and ``keep`` the answer.
+    ``also`` writes what becomes true with it into the same transaction.
 
     Raises:
         NotFoundError: There is no such take.
@@ -82,7 +80,7 @@ def adopt_take(
             also(session)
         refresh_queue(session, [original.id])
         after.append(solved_in(session, original.id))
-        keep(after[-1])(session)
+        session.respond(after[-1])
 
     if edit.edits:
         submit(
@@ -91,7 +89,7 @@ def adopt_take(
             edit,
             if_match=etag,
             actor=take.person,
-            keep=lambda _state: settle,
+            then=lambda session, _state: settle(session),
             paint=paint,
         )
     if not after:

@@ -10,7 +10,6 @@ from typing import Any
 
 from app.datasets.camera_json import camera_from_json
 from app.errors import ConflictError, InputError, NotFoundError
-from app.review.answers.keep import Keep, keep_nothing
 from app.review.datasets.dataset import need_dataset
 from app.review.editing.known import known_calibrations
 from app.review.editing.state import GroupState, need_group, read_states
@@ -129,17 +128,8 @@ class GoldReport:
     people: tuple[PersonResults, ...]
 
 
-def mark(
-    store: Store,
-    group_id: int,
-    start: str,
-    *,
-    actor: str,
-    keep: Keep[GoldGroup] = keep_nothing,
-) -> GoldGroup:
+def mark(store: Store, group_id: int, start: str, *, actor: str) -> GoldGroup:
     """Say that what a group holds now is true; annotators begin with what ``start`` leaves of it.
-
-    ``keep`` keeps the answer in its transaction.
 
     Raises:
         NotFoundError: There is no such group.
@@ -161,21 +151,14 @@ def mark(
         body = {"group": group_id, "did": "marked", "start": start}
         append(session, [Entry(KIND, actor, now(), body, state.dataset_id)])
         _, marked = _need_gold(session, group_id)
-        keep(marked)(session)
+        session.respond(marked)
     return marked
 
 
-def start_with(
-    store: Store,
-    group_id: int,
-    start: str,
-    *,
-    actor: str,
-    keep: Keep[GoldGroup] = keep_nothing,
-) -> GoldGroup:
+def start_with(store: Store, group_id: int, start: str, *, actor: str) -> GoldGroup:
     """Let annotators of a gold group begin with something else; what is true of it stays.
 
-    Copies that were begun stay as they are. ``keep`` keeps the answer in its transaction.
+    Copies that were begun stay as they are.
 
     Raises:
         InputError: There is no such start.
@@ -189,16 +172,12 @@ def start_with(
             start_gold(session, group_id, start)
             body = {"group": group_id, "did": "changed", "start": start}
             append(session, [Entry(KIND, actor, now(), body, dataset_id)])
-        keep(changed)(session)
+        session.respond(changed)
     return changed
 
 
-def unmark(
-    store: Store, group_id: int, *, actor: str, keep: Keep[GoldGroup] = keep_nothing
-) -> GoldGroup:
+def unmark(store: Store, group_id: int, *, actor: str) -> GoldGroup:
     """Let a gold group be an ordinary one again; what was measured by it is no longer shown.
-
-    ``keep`` keeps the answer in its transaction.
 
     Raises:
         NotFoundError: It is none.
@@ -208,7 +187,7 @@ def unmark(
         unmark_gold(session, group_id)
         body = {"group": group_id, "did": "unmarked"}
         append(session, [Entry(KIND, actor, now(), body, dataset_id)])
-        keep(gone)(session)
+        session.respond(gone)
     return gone
 
 

@@ -6,7 +6,6 @@ import hashlib
 from dataclasses import dataclass
 
 from app.errors import ConflictError, InputError, NotFoundError, TooLargeError
-from app.review.answers.keep import Keep, keep_nothing
 from app.review.datasets.dataset import need_dataset
 from app.soccer.media import Media
 from app.store.clock import now
@@ -84,13 +83,7 @@ def read_guidelines(store: Store, dataset: str | int, number: int | None = None)
 
 
 def write_guidelines(
-    store: Store,
-    dataset: str | int,
-    text: str,
-    *,
-    based_on: int,
-    actor: str,
-    keep: Keep[Guidelines] = keep_nothing,
+    store: Store, dataset: str | int, text: str, *, based_on: int, actor: str
 ) -> Guidelines:
     """Write another version of a dataset's guidelines, which counts from now on.
 
@@ -100,7 +93,6 @@ def write_guidelines(
         text: Markdown.
         based_on: Number of the version that was changed; 0: there was none.
         actor: Who writes.
-        keep: Keeps the answer in the transaction.
 
     Raises:
         NotFoundError: There is no such dataset.
@@ -125,22 +117,14 @@ def write_guidelines(
             body = {"number": newest + 1, "digest": digest}
             append(session, [Entry(GUIDELINE, actor, now(), body, told)])
         written = _read(session, told)
-        keep(written)(session)
+        session.respond(written)
         return written
 
 
-def add_picture(
-    store: Store,
-    dataset: str | int,
-    upload: str,
-    frames: Frames,
-    *,
-    keep: Keep[GuidelinePicture] = keep_nothing,
-) -> GuidelinePicture:
+def add_picture(store: Store, dataset: str | int, upload: str, frames: Frames) -> GuidelinePicture:
     """Keep an uploaded picture for a dataset's guidelines, under the digest of its bytes.
 
-    ``frames`` decodes it where it can take nobody down; ``keep`` keeps the answer in its
-    transaction.
+    ``frames`` decodes it where it can take nobody down.
 
     Raises:
         NotFoundError: There is no such dataset or upload.
@@ -159,7 +143,7 @@ def add_picture(
         if count_pictures(session, told) >= MAX_PICTURES:
             raise ConflictError(f"guidelines have at most {MAX_PICTURES} pictures")
         insert_picture(session, told, picture.digest, picture.type, picture.body)
-        keep(picture)(session)
+        session.respond(picture)
     return picture
 
 

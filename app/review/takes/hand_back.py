@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from app.errors import InputError
-from app.review.answers.keep import Keep, keep_nothing
 from app.review.editing.state import need_group
 from app.review.people.bell import RingKind, tell
-from app.review.takes.take import Take, TakeView, read_take, show
+from app.review.takes.take import TakeView, read_take, show
 from app.soccer.actors import person_of
 from app.store.clock import now
 from app.store.groups import StoredGroup
@@ -21,18 +20,11 @@ MAX_REASON = 500
 """Letters of the sentence that says why."""
 
 
-def hand_back_take(
-    store: Store,
-    take_id: int,
-    reason: str = "",
-    *,
-    actor: str,
-    keep: Keep[TakeView] = keep_nothing,
-) -> Take:
+def hand_back_take(store: Store, take_id: int, reason: str = "", *, actor: str) -> TakeView:
     """Let the person of an annotation that was handed in go on with it, and tell them why.
 
     A comparison of it that waits for a decision waits no longer: it is made anew once it is handed
-    in again. ``keep`` keeps the answer in the transaction.
+    in again.
 
     Raises:
         NotFoundError: There is no such take.
@@ -51,8 +43,8 @@ def hand_back_take(
         return_copy(session, take)
         copy = take.copy_id
         note_hand_back(session, KIND, copy, take.person, said, actor=actor, batch=take.batch_id)
-        back = read_take(session, take_id)
-        keep(show(session, back))(session)
+        back = show(session, read_take(session, take_id))
+        session.respond(back)
         return back
 
 

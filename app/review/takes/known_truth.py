@@ -16,7 +16,6 @@ import numpy as np
 
 from app.datasets.camera_json import camera_to_json
 from app.errors import ConflictError, InputError
-from app.review.answers.keep import Keep, keep_nothing
 from app.review.datasets.dataset import dataset_id
 from app.review.queue.query import MAX_LISTED_LENGTH, parse_query
 from app.review.takes.gold import KIND, TruthSource, check_start
@@ -72,19 +71,11 @@ class GoldChosen:
     left_out: int
 
 
-def mark_known(
-    store: Store,
-    dataset: str | int,
-    choice: GoldChoice,
-    *,
-    actor: str,
-    keep: Keep[GoldChosen] = keep_nothing,
-) -> GoldChosen:
+def mark_known(store: Store, dataset: str | int, choice: GoldChoice, *, actor: str) -> GoldChosen:
     """Make gold groups of those whose truth is known, also while batches are under way.
 
     Of a sample those are left out whose pictures do not show one moment, or were taken from one
-    place; of a version those upon which nobody agreed or decided, and what is not in it. ``keep``
-    keeps the answer in the transaction.
+    place; of a version those upon which nobody agreed or decided, and what is not in it.
 
     Raises:
         InputError: There is no such start, version or query, or nothing is known of any group.
@@ -111,7 +102,7 @@ def mark_known(
         body: Json = {"did": "marked", "start": choice.start, "source": str(choice.source)}
         body |= {"groups": [*truths], "version": choice.version}
         append(session, [Entry(KIND, actor, now(), body, number)])
-        keep(chosen)(session)
+        session.respond(chosen)
     return chosen
 
 

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from typing import Any
 
 from app.errors import ConflictError, NotFoundError
-from app.review.answers.keep import Keep, keep_nothing
 from app.review.datasets.dataset import need_dataset
 from app.review.editing.state import need_group
 from app.review.editing.submit import solved
@@ -92,20 +91,13 @@ class TakeView:
     handed_back: HandedBack | None = None
 
 
-def begin_take(
-    store: Store,
-    group_id: int,
-    *,
-    person: str,
-    keep: Keep[TakeView] = keep_nothing,
-) -> Take:
+def begin_take(store: Store, group_id: int, *, person: str) -> TakeView:
     """Let a person begin their own annotation of a group; the one that they have already, if so.
 
     Args:
         store: The database.
         group_id: The original.
         person: Whose it is; also of a token, the person's.
-        keep: Keeps the answer in the transaction.
 
     Raises:
         NotFoundError: There is no such group.
@@ -113,9 +105,10 @@ def begin_take(
     """
     with store.write() as session:
         take = begin(session, group_id, person=person_of(person))
-        keep(show(session, take))(session)
+        begun = show(session, take)
+        session.respond(begun)
     solved(store, take.copy_id)
-    return take
+    return begun
 
 
 def begin(
@@ -177,10 +170,8 @@ def begin(
     return read_take(session, take_id)
 
 
-def hand_in(store: Store, take_id: int, *, actor: str, keep: Keep[TakeView] = keep_nothing) -> Take:
+def hand_in(store: Store, take_id: int, *, actor: str) -> TakeView:
     """Submit an independent annotation; from then on it stays as it is.
-
-    ``keep`` keeps the answer in the transaction.
 
     Raises:
         NotFoundError: There is no such take.
@@ -190,8 +181,8 @@ def hand_in(store: Store, take_id: int, *, actor: str, keep: Keep[TakeView] = ke
     with store.write() as session:
         take = read_take(session, take_id)
         submit_copy(session, take, actor=actor, at=now())
-        handed = read_take(session, take_id)
-        keep(show(session, handed))(session)
+        handed = show(session, read_take(session, take_id))
+        session.respond(handed)
         return handed
 
 

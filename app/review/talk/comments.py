@@ -1,7 +1,6 @@
 """Comments: what people say to each other about a group, in threads that are open until settled.
 
-Each word goes into the log, like everything that people say; the tables show how it stands. Where a
-function takes ``keep``, that keeps the answer in the transaction of what was said.
+Each word goes into the log, like everything that people say; the tables show how it stands.
 """
 
 from __future__ import annotations
@@ -11,7 +10,6 @@ from collections.abc import Iterable
 from typing import Any
 
 from app.errors import ConflictError, ForbiddenError, InputError, NotFoundError
-from app.review.answers.keep import Keep, keep_nothing
 from app.review.people.bell import RingKind, tell
 from app.review.people.logins import read_roles
 from app.review.people.roles import Role
@@ -85,7 +83,6 @@ def begin_thread(
     actor: str,
     view: str | None = None,
     at: tuple[float, float] | None = None,
-    keep: Keep[StoredThread] = keep_nothing,
 ) -> StoredThread:
     """Say something about a group, a view of it, or a place there (pixels of its annotated size).
 
@@ -103,18 +100,10 @@ def begin_thread(
         thread_id = insert_thread(session, group, view, at, now())
         where = {"view": view, "at": None if at is None else [*at]}
         _say(session, group, thread_id, text, actor, (), **where)
-        return _answered(session, group_id, thread_id, keep)
+        return _answered(session, group_id, thread_id)
 
 
-def reply(
-    store: Store,
-    group_id: int,
-    thread_id: int,
-    text: str,
-    *,
-    actor: str,
-    keep: Keep[StoredThread] = keep_nothing,
-) -> StoredThread:
+def reply(store: Store, group_id: int, thread_id: int, text: str, *, actor: str) -> StoredThread:
     """Say something in a thread; who spoke there before is told.
 
     Raises:
@@ -131,17 +120,11 @@ def reply(
             )
         before = {person_of(one.actor) for one in thread.comments if one.text is not None}
         _say(session, group, thread_id, text, actor, sorted(before))
-        return _answered(session, group_id, thread_id, keep)
+        return _answered(session, group_id, thread_id)
 
 
 def resolve(
-    store: Store,
-    group_id: int,
-    thread_id: int,
-    resolved: bool,
-    *,
-    actor: str,
-    keep: Keep[StoredThread] = keep_nothing,
+    store: Store, group_id: int, thread_id: int, resolved: bool, *, actor: str
 ) -> StoredThread:
     """Settle a thread, or open it again.
 
@@ -155,18 +138,11 @@ def resolve(
             set_resolved(session, thread_id, *((time, actor) if resolved else (None, None)))
             did = "resolved" if resolved else "reopened"
             _log(session, group, actor, time, did=did, thread=thread_id)
-        return _answered(session, group_id, thread_id, keep)
+        return _answered(session, group_id, thread_id)
 
 
 def change(
-    store: Store,
-    group_id: int,
-    thread_id: int,
-    comment_id: int,
-    text: str,
-    *,
-    actor: str,
-    keep: Keep[StoredThread] = keep_nothing,
+    store: Store, group_id: int, thread_id: int, comment_id: int, text: str, *, actor: str
 ) -> StoredThread:
     """Give a comment of one's own another text; it is marked as edited.
 
@@ -190,18 +166,10 @@ def change(
             _log(session, group, actor, time, did="edited", thread=thread_id, **said)
             new = [name for name in people if name not in comment.mentions]
             _ring(session, group, thread_id, actor, new, ())
-        return _answered(session, group_id, thread_id, keep)
+        return _answered(session, group_id, thread_id)
 
 
-def remove(
-    store: Store,
-    group_id: int,
-    thread_id: int,
-    comment_id: int,
-    *,
-    actor: str,
-    keep: Keep[None] = keep_nothing,
-) -> None:
+def remove(store: Store, group_id: int, thread_id: int, comment_id: int, *, actor: str) -> None:
     """Delete a comment of one's own; a thread in which nothing else is said goes with it.
 
     Raises:
@@ -217,7 +185,7 @@ def remove(
         thread = _need_thread(session, group_id, thread_id)
         if all(one.text is None for one in thread.comments):
             delete_thread(session, thread_id)
-        keep(None)(session)
+        session.respond(None)
 
 
 def _say(
@@ -301,12 +269,10 @@ def _need_group(session: Session, group_id: int) -> ThreadGroup:
     return group
 
 
-def _answered(
-    session: Session, group_id: int, thread_id: int, keep: Keep[StoredThread]
-) -> StoredThread:
-    """A thread as it is by now, which is the answer."""
+def _answered(session: Session, group_id: int, thread_id: int) -> StoredThread:
+    """Answer the request with a thread as it is by now."""
     thread = _need_thread(session, group_id, thread_id)
-    keep(thread)(session)
+    session.respond(thread)
     return thread
 
 

@@ -14,8 +14,7 @@ from typing import Any
 
 from app.errors import ConflictError
 from app.plural import plural
-from app.review.answers.keep import Keep, keep_nothing
-from app.review.answers.saved_progress import SavedProgress
+from app.review.idempotency import read_progress, save_progress
 from app.review.queue.fields import asks_blind
 from app.review.queue.query import MAX_LISTED_LENGTH, parse_query
 from app.review.verdicts.verdict import Verdict, check_verdict
@@ -138,8 +137,6 @@ def give_verdicts(
     *,
     actor: str,
     expected: int | None = None,
-    keep: Keep[BatchReport] = keep_nothing,
-    progress: SavedProgress | None = None,
 ) -> BatchReport:
     """Give a verdict to all groups of a query, as each of them is when its turn comes.
 
@@ -157,8 +154,6 @@ def give_verdicts(
         state: As ``verdict.set_verdict`` takes it, like ``reason`` and ``note``.
         actor: Who says so.
         expected: How many groups ``plan_verdicts`` said would change; refuse another number.
-        keep: Keeps the answer with the last verdicts.
-        progress: What a run that was killed has left to do, and where this one says so.
 
     Raises:
         InputError: The query or the verdict cannot be.
@@ -167,7 +162,7 @@ def give_verdicts(
     """
     verdict = check_verdict(state, reason, note)
     conditions = parse_query(query, MAX_LISTED_LENGTH).conditions
-    run = BatchRun(dataset_id, query, verdict, actor, progress=progress)
+    run = BatchRun(dataset_id, query, verdict, actor)
     with store.read() as session:
         begun = run.resume(session)
         rows = Listing(session, dataset_id, conditions).columns(ASKED, by_number=True)
@@ -195,7 +190,7 @@ def give_verdicts(
             else:
                 run.close(session)
                 report = BatchReport(run.batch, run.changed, refused)
-                keep(report)(session)
+                session.respond(report)
     return report
 
 
@@ -304,19 +299,11 @@ class BatchRun:
 
     Args:
         again: The batch that it gives again, or None.
-        progress: Where it says how far it is, so that it can go on after a stop.
     """
 
     def __init__(
-        self,
-        dataset_id: int,
-        query: str,
-        verdict: Verdict,
-        actor: str,
-        again: int | None = None,
-        progress: SavedProgress | None = None,
+        self, dataset_id: int, query: str, verdict: Verdict, actor: str, again: int | None = None
     ):
-        self._progress = progress
         self._left: Any = None
         self._again = {} if again is None else {"again": again}
         self.batch: int | None = None
@@ -330,7 +317,7 @@ class BatchRun:
         Raises:
             ConflictError: What it had given was taken back meanwhile.
         """
-        self._left = None if self._progress is None else self._progress.read(session)
+        self._left = read_progress(session)
         if self._left is None:
             return None
         self.batch = self._left["batch"]
@@ -339,12 +326,12 @@ class BatchRun:
 
     def interrupt(self, session: Session, left: dict[str, Any]) -> None:
         """Say in the transaction of a chunk what is left once it is saved."""
-        if self._progress is None:
+        if session.idempotency_key is None:
             return
-        if self._progress.read(session) != self._left:
+        if read_progress(session) != self._left:
             raise ConflictError("this very request is being carried out", hint="Send it again.")
         self._left = {"batch": self.batch, **left}
-        self._progress.save(session, self._left)
+        save_progress(session, self._left)
 
     def save(self, session: Session, rows: Sequence[Any]) -> None:
         """Save the verdicts of one chunk with its log entries, in one transaction.

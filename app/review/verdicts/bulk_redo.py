@@ -6,8 +6,6 @@ from collections import Counter
 from dataclasses import dataclass
 
 from app.errors import ConflictError
-from app.review.answers.keep import Keep, keep_nothing
-from app.review.answers.saved_progress import SavedProgress
 from app.review.verdicts.bulk import ASKED, BatchRun, Refusal, chunks, sort_out
 from app.review.verdicts.bulk_undo import read_batch
 from app.review.verdicts.verdict import check_verdict
@@ -36,14 +34,7 @@ class RedoReport:
     refused: tuple[Refusal, ...]
 
 
-def redo_batch(
-    store: Store,
-    batch_id: int,
-    *,
-    actor: str,
-    keep: Keep[RedoReport] = keep_nothing,
-    progress: SavedProgress | None = None,
-) -> RedoReport:
+def redo_batch(store: Store, batch_id: int, *, actor: str) -> RedoReport:
     """Give the verdicts of a batch again after they were taken back.
 
     A group keeps what it has when somebody judged it after the batch was taken back, or edited
@@ -58,7 +49,7 @@ def redo_batch(
     with store.read() as session:
         batch = read_batch(session, batch_id)
         verdict = check_verdict(batch.state, batch.reason, batch.note)
-        run = BatchRun(batch.dataset_id, batch.query, verdict, actor, batch_id, progress)
+        run = BatchRun(batch.dataset_id, batch.query, verdict, actor, batch_id)
         begun = run.resume(session)
     spans = _spans(batch) if begun is None else begun["left"]
     refused: Counter[str] = Counter({} if begun is None else begun["refused"])
@@ -80,7 +71,7 @@ def redo_batch(
             else:
                 run.close(session)
                 report = _report(batch, run, refused)
-                keep(report)(session)
+                session.respond(report)
     return report
 
 

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from app.errors import ConflictError, NotFoundError
-from app.review.answers.keep import Keep, keep_nothing
 from app.review.verdicts.bulk import chunks, save_verdicts
 from app.store.batches import Spans, StoredBulkVerdict, find_batch, update_batch, with_span
 from app.store.clock import now
@@ -25,9 +24,7 @@ class UndoReport:
     kept: int
 
 
-def undo_batch(
-    store: Store, batch_id: int, *, actor: str, keep: Keep[UndoReport] = keep_nothing
-) -> UndoReport:
+def undo_batch(store: Store, batch_id: int, *, actor: str) -> UndoReport:
     """Give every group of a batch the verdict back that it had before.
 
     A group that somebody has judged since keeps that verdict.
@@ -57,7 +54,7 @@ def undo_batch(
                     restored = _restored(session, spans)
                 report = UndoReport(batch_id, restored, batch.changed - restored)
                 _close(session, batch, report, actor)
-                keep(report)(session)
+                session.respond(report)
                 return report
 
 

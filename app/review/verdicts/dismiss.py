@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from app.errors import InputError
-from app.review.answers.keep import Keep, keep_nothing
 from app.review.editing.copies import require_open
 from app.review.editing.etags import require_said, require_unchanged
 from app.review.editing.state import GroupState
@@ -39,7 +38,6 @@ def set_dismissal(
     note: str | None = None,
     if_match: str,
     actor: str,
-    keep: Keep[GroupState] = keep_nothing,
 ) -> GroupState:
     """Dismiss a finding of a group, or open one again; the group is what it was.
 
@@ -53,7 +51,6 @@ def set_dismissal(
         note: Why it is fine.
         if_match: ETag of the group that the person saw.
         actor: Who says so.
-        keep: Keeps the answer with the dismissal.
 
     Raises:
         InputError: The group has no such finding.
@@ -77,7 +74,7 @@ def set_dismissal(
                 refresh_queue(session, [group_id])
                 dismissals = read_noticed(session, [group_id])[1][group_id]
                 after = replace(record, dismissals=dismissals).state(solution)
-                keep(after)(session)
+                session.respond(after)
                 return after
 
 

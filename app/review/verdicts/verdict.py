@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 from typing import get_args
 
 from app.errors import InputError
-from app.review.answers.keep import Keep, keep_nothing
 from app.review.editing.etags import require_said, require_unchanged
 from app.review.editing.state import GroupState
 from app.review.editing.submit import read_solved
@@ -42,7 +41,6 @@ def set_verdict(
     *,
     if_match: str,
     actor: str,
-    keep: Keep[GroupState] = keep_nothing,
 ) -> GroupState:
     """Save a person's verdict on a group as it is; the newest of all people's counts.
 
@@ -74,7 +72,7 @@ def set_verdict(
                 passes = None if solution is None else solution.passes
                 update_verdict(session, stored, given, passes)
                 after = replace(record, verdicts=(given, *record.verdicts)).state(solution)
-                keep(after)(session)
+                session.respond(after)
                 return after
 
 

@@ -11,7 +11,6 @@ from typing import Any
 
 from app.errors import ConflictError, InputError, NotFoundError
 from app.plural import plural
-from app.review.answers.keep import Keep, keep_nothing
 from app.review.datasets.dataset import dataset_id
 from app.review.datasets.naming import checked_title
 from app.review.people.bell import RingKind, tell
@@ -192,17 +191,8 @@ def list_batch_groups(store: Store, batch_id: int) -> list[BatchGroup]:
         ]  # fmt: skip
 
 
-def make_batch(
-    store: Store,
-    dataset: str | int,
-    new: NewBatch,
-    *,
-    actor: str,
-    keep: Keep[Batch] = keep_nothing,
-) -> Batch:
+def make_batch(store: Store, dataset: str | int, new: NewBatch, *, actor: str) -> Batch:
     """Give out what a query finds now; what comes to match later is not part of it.
-
-    ``keep`` keeps the answer in its transaction.
 
     Raises:
         InputError: The query cannot be understood or finds nothing, or somebody named may not.
@@ -248,7 +238,7 @@ def make_batch(
         _note(session, batch, "made", actor)
         _tell(session, batch, (*batch.annotators, *batch.reviewers), actor)
         announce_batch(session, made, GIVEN_OUT, actor=actor, at=batch.created)
-        keep(batch)(session)
+        session.respond(batch)
         return batch
 
 
@@ -265,12 +255,10 @@ def change_batch(
     state: str | None = None,
     gold_every: int | None = None,
     no_gold: bool = False,
-    keep: Keep[Batch] = keep_nothing,
 ) -> Batch:
     """Give a batch on to others, close or open it, or name it otherwise; None leaves as it is.
 
     ``gold_every`` counts from the next group on that somebody begins, ``no_gold``: none is one.
-    ``keep`` keeps the answer in its transaction.
 
     Raises:
         NotFoundError: There is none.
@@ -309,22 +297,17 @@ def change_batch(
         _tell(session, batch, new, actor)
         if known != (*batch.annotators, *batch.reviewers):
             announce_batch(session, batch_id, HANDED_ON, actor=actor, at=now())
-        keep(batch)(session)
+        session.respond(batch)
         return batch
 
 
-def remove_batch(
-    store: Store, batch_id: int, *, actor: str, keep: Keep[Batch] = keep_nothing
-) -> Batch:
-    """Delete a batch; verdicts and edits of its groups stay. Returns what it was.
-
-    ``keep`` keeps the answer in its transaction.
-    """
+def remove_batch(store: Store, batch_id: int, *, actor: str) -> Batch:
+    """Delete a batch; verdicts and edits of its groups stay. Returns what it was."""
     with store.write() as session:
         batch = read_batch(session, batch_id)
         delete_batch(session, batch_id)
         _note(session, batch, "deleted", actor)
-        keep(batch)(session)
+        session.respond(batch)
         return batch
 
 

@@ -11,7 +11,6 @@ from datetime import UTC, datetime, timedelta
 from typing import Any
 
 from app.errors import ConflictError, HeldGroupError, NotFoundError
-from app.review.answers.keep import Keep, keep_nothing
 from app.review.takes.hand_back import checked_reason, note_hand_back
 from app.review.takes.handed_back import HandedBack, read_handed_back
 from app.review.takes.take import Take
@@ -185,18 +184,9 @@ class Leases:
             return Lease(batch, group, here=_here(session, batch, group, self._now()))
 
     def hand_in(
-        self,
-        batch_id: int,
-        group: int,
-        worker: Worker,
-        *,
-        actor: str,
-        done: bool = True,
-        keep: Keep[Lease] = keep_nothing,
+        self, batch_id: int, group: int, worker: Worker, *, actor: str, done: bool = True
     ) -> Lease:
         """Say that the annotation of a group is done, so that a reviewer gets it; or that it is not.
-
-        ``keep`` keeps the answer in the transaction.
 
         Raises:
             NotFoundError: There is no such batch, or it has no such group.
@@ -208,7 +198,9 @@ class Leases:
             own = own_of(session, batch, group, worker.name)
         if own is not None:
             lease = Lease(batch, group)
-            hand_in_own(self._store, batch, own, actor=actor, done=done, keep=lambda _: keep(lease))
+            with self._store.write() as session:
+                hand_in_own(session, own, actor=actor, done=done)
+                session.respond(lease)
             return lease
         with self._store.write() as session:
             batch = _open_batch(session, batch_id)
@@ -224,21 +216,12 @@ class Leases:
             did = "handed in" if done else "taken back"
             body = {"batch": batch.id, "dataset": batch.dataset_id, "did": did, "group": group}
             append(session, [Entry(WORK, actor, self._now(), body)])
-            return self._ended(session, batch_id, group, worker, keep)
+            return self._ended(session, batch_id, group, worker)
 
     def hand_back(
-        self,
-        batch_id: int,
-        group: int,
-        worker: Worker,
-        reason: str = "",
-        *,
-        actor: str,
-        keep: Keep[Lease] = keep_nothing,
+        self, batch_id: int, group: int, worker: Worker, reason: str = "", *, actor: str
     ) -> Lease:
         """Give a group that was handed in back to who did, and tell them why; they get it next.
-
-        ``keep`` keeps the answer in the transaction.
 
         Raises:
             NotFoundError: There is no such batch, or it has no such group.
@@ -256,16 +239,14 @@ class Leases:
             person = row.handed_in_by
             hand_in(session, batch_id, group, at=None, by=person, returned=True)
             note_hand_back(session, WORK, group, person, said, actor=actor, batch=batch_id)
-            return self._ended(session, batch_id, group, worker, keep)
+            return self._ended(session, batch_id, group, worker)
 
-    def _ended(
-        self, session: Session, batch_id: int, group: int, worker: Worker, keep: Keep[Lease]
-    ) -> Lease:
-        """The answer once somebody's lease has ended with what they said of the group."""
+    def _ended(self, session: Session, batch_id: int, group: int, worker: Worker) -> Lease:
+        """The response once somebody's lease has ended with what they said of the group."""
         end_lease_of(session, batch_id, group, worker.name)
         batch = as_seen(session, read_batch(session, batch_id))
         lease = Lease(batch, group, here=_here(session, batch, group, self._now()))
-        keep(lease)(session)
+        session.respond(lease)
         return lease
 
     def _kept(self, session: Session, batch: Batch, row: Any, part: Part, worker: Worker) -> Lease:

@@ -8,18 +8,17 @@ from collections.abc import Collection
 from dataclasses import replace
 
 from app.errors import ConflictError
-from app.review.answers.keep import Keep, keep_nothing
 from app.review.queue.fields import asks_blind
 from app.review.takes.adopt import adopt_take
 from app.review.takes.mixing import Terms, begin_next, count_gold_left, fresh_outside
-from app.review.takes.take import Take, TakeView, hand_in, read_take
+from app.review.takes.take import Take, read_take
 from app.review.work.batches import Batch, Part, get_batch, list_batches
 from app.soccer.actors import person_of
 from app.store.clock import now
 from app.store.reader import READER, judges_in
 from app.store.session import Session
 from app.store.store import Store
-from app.store.submissions import require_open
+from app.store.submissions import require_open, submit_copy
 from app.store.takes import INDEPENDENT, count_left, take_of_copy, takes_of_batch
 from app.store.work import groups_of, groups_returned
 from app.store.work import hand_in as hand_in_group
@@ -176,18 +175,8 @@ def own_of(session: Session, batch: Batch, group: int, person: str) -> Take | No
     return read_take(session, row.id)
 
 
-def hand_in_own(
-    store: Store,
-    batch: Batch,
-    take: Take,
-    *,
-    actor: str,
-    done: bool,
-    keep: Keep[TakeView] = keep_nothing,
-) -> None:
+def hand_in_own(session: Session, take: Take, *, actor: str, done: bool) -> None:
     """Submit an own annotation; ``done`` False: refused, only a lead lets its person go on with it.
-
-    ``keep`` keeps the answer in the transaction.
 
     Raises:
         ConflictError: It was submitted before, or is not and shall be taken back.
@@ -195,4 +184,4 @@ def hand_in_own(
     if not done:
         require_open(take)
         raise ConflictError("this annotation is not submitted yet")
-    hand_in(store, take.id, actor=actor, keep=keep)
+    submit_copy(session, read_take(session, take.id), actor=actor, at=now())

@@ -1,4 +1,4 @@
-"""The tables of background work: jobs, and the first answers to requests that may come twice."""
+"""The tables of background work: jobs, and the responses to requests that may come twice."""
 
 from __future__ import annotations
 
@@ -38,8 +38,8 @@ class JobModel(Base):
     ending: Mapped[bool] = mapped_column(server_default=false())
 
 
-class AnswerModel(Base):
-    """The first answer to a request that carried an Idempotency-Key (the body compressed)."""
+class StoredResponseModel(Base):
+    """The response to a request that carried an Idempotency-Key (the body compressed)."""
 
     __tablename__ = "answer"
     __table_args__ = (Index("answer_at", "at"),)

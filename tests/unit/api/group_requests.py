@@ -178,7 +178,7 @@ def comment_deleted(api: Any) -> Request:
 def own_annotations(api: Any) -> list[int]:
     """Copies of a group that two people annotated, who do not agree."""
     store = api.app.state.services.store
-    copies = [begin_take(store, 1, person=person).copy_id for person in ("ann", "ben")]
+    copies = [begin_take(store, 1, person=person).group for person in ("ann", "ben")]
     for copy, state in zip(copies, ("accepted", "rejected"), strict=True):
         body = {"state": state, "note": "seen", "reason": None if copy == copies[0] else "other"}
         headers = etag_of(api, f"/groups/{copy}")
@@ -215,7 +215,7 @@ def take_handed_in(api: Any) -> Request:
 def take_handed_back(api: Any) -> Request:
     own = begin_take(store_of(api), 1, person="ann")
     hand_in(store_of(api), own.id, actor="ann")
-    return "POST", f"/groups/{own.copy_id}/hand-back", {"reason": "Look again."}, {}
+    return "POST", f"/groups/{own.group}/hand-back", {"reason": "Look again."}, {}
 
 
 def gold(api: Any) -> Request:

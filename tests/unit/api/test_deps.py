@@ -9,7 +9,7 @@ import pytest
 
 from app.api.deps import get_actor, get_services, get_store, require_if_match
 from app.api.errors import PreconditionRequiredError
-from app.api.reply import get_asked
+from app.api.respond import get_keyed_request
 from app.errors import InputError
 
 
@@ -29,5 +29,5 @@ class TestRequireIfMatch:
 
 class TestDependencies:
     def test_those_of_every_request_are_coroutines_and_take_no_thread(self) -> None:
-        for given in (get_services, get_store, get_actor, require_if_match, get_asked):
+        for given in (get_services, get_store, get_actor, require_if_match, get_keyed_request):
             assert iscoroutinefunction(given), given.__name__

@@ -1,4 +1,4 @@
-"""Idempotency-Key: the first answer again, whatever became of the state since."""
+"""Idempotency-Key: the first response again, whatever became of the state since."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ from app.api.routers import verdicts
 from app.api.security.lanes import EDITS
 from app.api.server import Server, listen
 from app.errors import StorageError
-from app.review.answers import answers
+from app.review import idempotency
 from app.review.verdicts.verdict import set_verdict
-from app.store.answers import shorten_answers
-from app.store.tables.jobs import AnswerModel
+from app.store.idempotency import shorten_responses
+from app.store.tables.jobs import StoredResponseModel
 from tests.waiting import SECONDS
 
 API = "/api/v1"
@@ -55,7 +55,7 @@ class TestRepetition:
         etag = api.get(f"{API}/groups/1").headers["etag"]
         accept(api, etag=etag)
         with app.state.services.store.write() as session:
-            assert shorten_answers(session, 0) == 1
+            assert shorten_responses(session, 0) == 1
         again = accept(api, etag=etag)
         assert (again.status_code, again.headers["idempotency-replayed"]) == (409, "true")
         assert "carried out, once" in again.json()["hint"]
@@ -126,7 +126,7 @@ class TestRepetition:
         etag = api.get(f"{API}/groups/1").headers["etag"]
         accept(api, etag=etag)
         with app.state.services.store.write() as session:
-            session.execute(update(AnswerModel).values(at="2020-01-01"))
+            session.execute(update(StoredResponseModel).values(at="2020-01-01"))
         again = accept(api, etag=etag)
         assert (again.status_code, "idempotency-replayed" in again.headers) == (412, False)
         assert len(api.get(f"{API}/groups/1/history").json()["items"]) == 2
@@ -155,13 +155,13 @@ class TestFailure:
         def full(*_: object) -> None:
             raise StorageError("the disk is full")
 
-        monkeypatch.setattr(answers, "keep_answer", full)
+        monkeypatch.setattr(idempotency, "insert_response", full)
         with capture_logs() as logs:
             headers = {"Content-Type": "application/octet-stream", **KEY}
             sent = api.post(f"{API}/uploads?name=a.json", content=b"{}", headers=headers)
             assert sent.status_code == 201
         assert [entry["event"] for entry in logs] == [
-            "an answer could not be kept",
+            "a response could not be stored",
             "request answered",
         ]
 
@@ -172,7 +172,7 @@ class TestFailure:
             raise StorageError("the disk is full")
 
         with monkeypatch.context() as patch:
-            patch.setattr(answers, "keep_answer", full)
+            patch.setattr(idempotency, "insert_response", full)
             assert accept(api).status_code == 503
         assert api.get(f"{API}/groups/1").json()["verdict"]["state"] == "unreviewed"
         assert accept(api).json()["verdict"]["state"] == "deferred"
@@ -180,7 +180,7 @@ class TestFailure:
     def test_of_two_servers_that_answer_the_same_request_one_does_it(
         self, api, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        monkeypatch.setattr(answers, "keep_answer", lambda *_: False)
+        monkeypatch.setattr(idempotency, "insert_response", lambda *_: False)
         assert accept(api).status_code == 409
         assert api.get(f"{API}/groups/1").json()["verdict"]["state"] == "unreviewed"
 
@@ -191,7 +191,7 @@ class TestFailure:
             raise StorageError("the database is busy")
 
         with monkeypatch.context() as patch:
-            patch.setattr(answers, "find_answer", busy)
+            patch.setattr(idempotency, "find_response", busy)
             answer = accept(api)
         assert (answer.status_code, answer.headers["retry-after"]) == (503, "5")
         assert api.get(f"{API}/groups/1").json()["verdict"]["state"] == "unreviewed"

@@ -12,7 +12,7 @@ from app.review.editing.point_limits import REQUEST_POINTS
 from app.store.log import read_log
 from tests.databases import content
 from tests.unit.api.group_requests import etag_of, send, take_handed_in
-from tests.unit.api.test_reply import stopped_after_a_commit
+from tests.unit.api.test_respond import stopped_after_a_commit
 
 API = "/api/v1"
 EDITS = f"{API}/datasets/broadcast/edits"

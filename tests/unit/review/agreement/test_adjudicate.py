@@ -20,9 +20,10 @@ from app.review.people.people import invite
 from app.review.people.roles import Role
 from app.review.queue.listing import list_groups
 from app.review.takes.hand_back import hand_back_take
-from app.review.takes.take import Take, begin_take, get_take, list_takes
+from app.review.takes.take import Take, get_take, list_takes
 from app.review.verdicts.verdict import set_verdict
 from app.store.store import Store
+from tests.unit.review.takes.begun import begin_take
 
 
 def judged(store: Store, group_id: int, person: str, moved: float = 0.0) -> Take:

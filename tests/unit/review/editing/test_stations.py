@@ -13,6 +13,7 @@ from app.review.queue.listing import list_groups
 from app.review.verdicts.verdict import set_verdict
 from app.soccer.frames import ImagePoint
 from app.solving.solve import solve
+from tests.unit.review.pending import stored_by
 
 EDIT = SetStationLines({"Middle line": (ImagePoint(1.5, 2.5), ImagePoint(3.0, 4.0))})
 
@@ -61,12 +62,11 @@ class TestSubmitStation:
     def test_the_group_in_view_is_solved_and_kept_with_the_edit(self, store, ids, station) -> None:
         kept = []
 
-        def keep(state):
-            return lambda session: kept.append((state, session.in_transaction()))
-
-        change(store, station, shown=ids[1], keep=keep)
+        with stored_by(lambda session, state: kept.append((state, session.in_transaction()))):
+            after = change(store, station, shown=ids[1])
         ((shown, within),) = kept
         assert within
+        assert after.shown is shown
         assert shown == load(store, ids[1])
         assert shown.solution == solve(shown.group, shown.policy)
         assert load(store, ids[0]).solution is None

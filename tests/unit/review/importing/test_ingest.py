@@ -16,12 +16,12 @@ from app.review.editing.submit import load, submit
 from app.review.editing.undo import undo
 from app.review.importing.cameras import ingest_cameras
 from app.review.importing.ingest import ensure_dataset, ingest
-from app.review.takes.take import begin_take
 from app.soccer.annotation import BallAnnotation, make_lines
 from app.soccer.frames import Box, ImagePoint
 from app.soccer.group import Group
 from app.soccer.media import Media
 from app.store.store import Store
+from tests.unit.review.takes.begun import begin_take
 
 
 def again(store: Store, *groups: Group):

@@ -110,12 +110,9 @@ class Slow:
     def __init__(self) -> None:
         self.started, self.finish = threading.Event(), threading.Event()
 
-    def __call__(self, job: Job) -> Callable[[Session], None]:
-        def keep(_session: Session) -> None:
-            self.started.set()
-            assert self.finish.wait(SECONDS)
-
-        return keep
+    def __call__(self, _session: Session, _job: Job) -> None:
+        self.started.set()
+        assert self.finish.wait(SECONDS)
 
 
 class TestSubmitting:
@@ -126,7 +123,7 @@ class TestSubmitting:
         running = submit(jobs, gate, kind="export")
         assert gate.started.wait(SECONDS)
         with ThreadPoolExecutor(2) as threads:
-            writes = threads.submit(submit, jobs, lambda _: 7, keep=slow)
+            writes = threads.submit(submit, jobs, lambda _: 7, then=slow)
             assert slow.started.wait(SECONDS)
             looks = threads.submit(
                 lambda: (
@@ -163,13 +160,13 @@ class TestSubmitting:
             time.sleep(0.1)
             raise StorageError("the disk is full")
 
-        def keep(_job: Job) -> Callable[[Session], None]:
-            return lambda session: setattr(session, "commit", full)
+        def then(session: Session, _job: Job) -> None:
+            setattr(session, "commit", full)  # noqa: B010
 
         began: list[int] = []
         jobs.wait(submit(jobs, lambda _: None).id, SECONDS)
         with pytest.raises(StorageError):
-            submit(jobs, lambda _: began.append(1), keep=keep)
+            submit(jobs, lambda _: began.append(1), then=then)
         assert jobs.wait(submit(jobs, lambda _: 7).id, SECONDS).result == 7
         assert (began, len(jobs.find())) == ([], 2)
 

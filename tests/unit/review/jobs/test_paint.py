@@ -22,6 +22,7 @@ from app.store.log import read_log
 from app.store.store import Store
 from tests.unit.review.editing.test_positions import match
 from tests.unit.review.jobs.steps import Held, stopped_at_its_first_step
+from tests.unit.review.pending import stored_by
 from tests.waiting import SECONDS
 
 
@@ -91,15 +92,15 @@ def test_one_that_is_stopped_before_it_gave_anything_takes_no_earlier_one_along(
 
 
 def test_one_that_runs_goes_on_where_the_take_back_is_not_kept(asked: Store, monkeypatch) -> None:
-    def full(_job):
+    def full(_session, _job):
         raise StorageError("the disk is full")
 
     jobs, looked = Jobs(asked), Held(editing._readings, calls=1)
     monkeypatch.setattr(editing, "_readings", looked)
     job = PAINT.request(jobs, asked, "demo", None, actor="ann")
     looked.wait()
-    with pytest.raises(StorageError):
-        take_paint_back(jobs, asked, "demo", actor="ann", keep=full)
+    with pytest.raises(StorageError), stored_by(full):
+        take_paint_back(jobs, asked, "demo", actor="ann")
     looked.go_on.set()
     assert jobs.wait(job.id, SECONDS).state == "done"
     assert get_paint(asked, "demo").items[0].read == 12

@@ -22,6 +22,7 @@ from app.soccer.picture import PictureGeometry
 from app.store.jobs import Job
 from app.store.store import Store
 from tests.cameras import SIZE, looking
+from tests.unit.review.pending import stored_by
 from tests.unit.solving.conftest import BEND, click
 from tests.waiting import SECONDS
 
@@ -115,11 +116,8 @@ def test_a_picture_that_is_said_is_solved_and_no_longer_proposed(jobs: Jobs, two
     picture = PictureGeometry(said["aspect"], tuple(said["shift"]), tuple(said["sigma"]))
     kept: list[Job] = []
 
-    def keep(job: Job) -> Any:
-        kept.append(job)
-        return lambda _session: None
-
-    job = request_pictures(jobs, two, "demo", {WIDE: picture}, actor="lea", keep=keep)
+    with stored_by(lambda _session, job: kept.append(job)):
+        job = request_pictures(jobs, two, "demo", {WIDE: picture}, actor="lea")
     assert (finished(jobs, job).kind, [one.id for one in kept]) == ("solve", [job.id])
     assert aspects(two) == {WIDE: picture.aspect, PLAIN: None}
     assert stale_groups(two, "demo") == []

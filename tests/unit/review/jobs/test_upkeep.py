@@ -17,10 +17,10 @@ from app.review.datasets.delete import delete_dataset
 from app.review.jobs import upkeep as module
 from app.review.jobs.jobs import Jobs
 from app.review.jobs.upkeep import Tidied, Upkeep, tidy
-from app.store.answers import Answer, find_answer, keep_answer
+from app.store.idempotency import StoredResponse, find_response, insert_response
 from app.store.jobs import NewJob, insert_job, update_job
 from app.store.store import Store
-from app.store.tables.jobs import AnswerModel, JobModel
+from app.store.tables.jobs import JobModel, StoredResponseModel
 
 OLD = time.time() - 40 * 86_400
 
@@ -82,16 +82,16 @@ class TestAnswers:
         body = os.urandom(1000)
         for number in range(5):
             with store.write() as session:
-                keep_answer(session, f"k{number}", "ann", Answer("d", 200, {}, body))
+                insert_response(session, f"k{number}", "ann", StoredResponse("d", 200, {}, body))
         with store.write() as session:
-            oldest = update(AnswerModel).where(AnswerModel.key == "k0")
+            oldest = update(StoredResponseModel).where(StoredResponseModel.key == "k0")
             session.execute(oldest.values(at="2020-01-01T00:00:00"))
         monkeypatch.setattr(
             store, "settings", store.settings.model_copy(update={"answer_bytes": 2100})
         )
         assert tidy(store).answers == 3
         with store.read() as session:
-            found = [find_answer(session, f"k{number}", "ann") for number in range(5)]
+            found = [find_response(session, f"k{number}", "ann") for number in range(5)]
         assert [answer and answer.body for answer in found] == [None, None, None, body, body]
         assert [answer is None for answer in found] == [True, False, False, False, False]
 
@@ -176,7 +176,7 @@ class TestUpkeep:
             raise error
 
         old = place(store.settings.home / "cache" / "frames" / "ab" / "c.jpg", OLD)
-        monkeypatch.setattr(module, "forget_answers", fail)
+        monkeypatch.setattr(module, "delete_old_responses", fail)
         with capture_logs() as logs:
             assert tidy(store).cached == 1
         assert [(entry["event"], entry["step"]) for entry in logs] == [("upkeep failed", "answers")]

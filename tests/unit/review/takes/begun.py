@@ -5,13 +5,19 @@ from __future__ import annotations
 from typing import Any
 
 from app.review.editing.submit import solved
-from app.review.takes.take import Take, begin
+from app.review.takes import take
+from app.review.takes.take import Take, begin, get_take
 from app.store.store import Store
 
 
 def begin_for_batch(store: Store, group_id: int, person: str, **terms: Any) -> Take:
     """Let a person begin a group on a batch's terms, and solve their copy."""
     with store.write() as session:
-        take = begin(session, group_id, person=person, **terms)
-    solved(store, take.copy_id)
-    return take
+        begun = begin(session, group_id, person=person, **terms)
+    solved(store, begun.copy_id)
+    return begun
+
+
+def begin_take(store: Store, group_id: int, *, person: str) -> Take:
+    """The take that a person begins of a group."""
+    return get_take(store, take.begin_take(store, group_id, person=person).id)

@@ -8,11 +8,11 @@ import pytest
 from app.errors import ConflictError, ImageError, NotFoundError
 from app.review.editing.submit import load
 from app.review.takes.guidelines import add_picture, read_guidelines, read_picture, write_guidelines
-from app.review.takes.take import begin_take
 from app.store import media
 from app.store.frames import Frames
 from app.store.uploads import UploadWriter
 from tests.integration.conftest import picture
+from tests.unit.review.takes.begun import begin_take
 
 
 def upload(store, content: bytes) -> str:

@@ -21,7 +21,7 @@ from app.review.people.roles import EVERYTHING, Role
 from app.review.takes.gold import TruthSource, read_report, start_with
 from app.review.takes.known_truth import GoldChoice, mark_known
 from app.review.takes.mixing import Terms, begin_next
-from app.review.takes.take import begin_take, get_take_of
+from app.review.takes.take import get_take_of
 from app.review.verdicts.verdict import set_verdict
 from app.review.versions.freeze import FreezeRequest, freeze
 from app.review.work.batches import NewBatch, change_batch, make_batch
@@ -36,7 +36,7 @@ from app.store.audit import AuditQuery
 from app.store.store import Store
 from app.store.takes import GOLD
 from tests.scenes import make_scenes
-from tests.unit.review.takes.begun import begin_for_batch
+from tests.unit.review.takes.begun import begin_for_batch, begin_take
 
 SAMPLE = GoldChoice(TruthSource.SAMPLE, start="bare")
 

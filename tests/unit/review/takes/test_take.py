@@ -26,7 +26,7 @@ from app.review.takes.adopt import adopt_take
 from app.review.takes.gold import mark
 from app.review.takes.hand_back import hand_back_take
 from app.review.takes.mixing import Terms, begin_next, count_gold_left, is_gold_turn
-from app.review.takes.take import begin_take, get_take, get_take_of, hand_in, list_takes
+from app.review.takes.take import get_take, get_take_of, hand_in, list_takes
 from app.review.verdicts.bulk import give_verdicts, list_batches, plan_verdicts
 from app.review.verdicts.bulk_undo import undo_batch
 from app.review.verdicts.verdict import set_verdict
@@ -39,7 +39,7 @@ from app.store.log import newest_entry, verify_chain
 from app.store.reader import READER, Reader
 from app.store.sight import COPIES, Sight
 from app.store.takes import GOLD, INDEPENDENT
-from tests.unit.review.takes.begun import begin_for_batch
+from tests.unit.review.takes.begun import begin_for_batch, begin_take
 
 BALL = BallAnnotation(box=Box(500.0, 300.0, 14.0, 14.0))
 HERE = (ImagePoint(1.5, 2.5), ImagePoint(3.0, 4.0))

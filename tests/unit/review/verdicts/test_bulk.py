@@ -9,7 +9,6 @@ import pytest
 from sqlalchemy import func, insert, select, text, update
 
 from app.errors import ConflictError, InputError, NotFoundError
-from app.review.answers.saved_progress import SavedProgress
 from app.review.editing.edit import SetBall
 from app.review.editing.ledger import read_ledger
 from app.review.editing.recompute import solve_dataset
@@ -29,6 +28,7 @@ from app.store.session import Session
 from app.store.store import Store
 from app.store.tables.groups import GroupModel
 from app.store.tables.queue import QueueModel
+from tests.unit.review.pending import keyed_request
 
 
 def judge(store: Store, group: int, state: str, actor: str = "ann", **more: Any) -> None:
@@ -238,16 +238,16 @@ class TestGiveVerdicts:
 
     def test_a_request_that_is_being_carried_out_is_not_carried_out_twice(self, store, ids) -> None:
         verdict = check_verdict("deferred", None, None)
-        progress = SavedProgress("key", "ann", "digest")
-        first, second = (BatchRun(1, "", verdict, "ann", progress=progress) for _ in range(2))
-        with store.write() as session:
-            assert (first.resume(session), second.resume(session)) == (None, None)
-        with store.write() as session:
-            first.interrupt(session, {"left": [[1, 2]]})
-        with pytest.raises(ConflictError, match="is being carried out"), store.write() as session:
-            second.interrupt(session, {"left": [[1, 2]]})
-        with store.write() as session:
-            first.interrupt(session, {"left": [[2, 2]]})
+        first, second = (BatchRun(1, "", verdict, "ann") for _ in range(2))
+        with keyed_request().open():
+            with store.write() as session:
+                assert (first.resume(session), second.resume(session)) == (None, None)
+            with store.write() as session:
+                first.interrupt(session, {"left": [[1, 2]]})
+            with pytest.raises(ConflictError, match="is being carried"), store.write() as session:
+                second.interrupt(session, {"left": [[1, 2]]})
+            with store.write() as session:
+                first.interrupt(session, {"left": [[2, 2]]})
 
     def test_another_number_than_expected_changes_nothing(self, store, ids) -> None:
         with pytest.raises(ConflictError, match="4 groups would change, not 3"):

@@ -21,6 +21,7 @@ from app.review.webhooks.webhooks import make_webhook
 from app.review.work.batches import NewBatch, change_batch, make_batch
 from app.review.work.leases import Leases, Worker
 from app.store.store import Store
+from tests.unit.review.pending import stored_by
 from tests.unit.review.webhooks.conftest import Receiver
 
 OF_WORK = {
@@ -152,9 +153,9 @@ def test_a_batch_that_stands_still_or_is_late_is_told_of_once(allowed, told, gro
 
 
 def test_what_did_not_happen_is_not_told(allowed, told, groups) -> None:
-    def fails(_batch):
+    def fails(_session, _batch):
         raise ConflictError("the answer cannot be kept")
 
-    with pytest.raises(ConflictError):
-        make_batch(allowed, "demo", NewBatch("never"), actor="lea", keep=fails)
+    with pytest.raises(ConflictError), stored_by(fails):
+        make_batch(allowed, "demo", NewBatch("never"), actor="lea")
     assert told.new() == []

@@ -9,7 +9,6 @@ import pytest
 
 from app.errors import ConflictError, HeldGroupError, InputError, NotFoundError
 from app.review.agreement.weigh import after_hand_in, weigh_left
-from app.review.answers.keep import Kept
 from app.review.editing.replay import replay
 from app.review.editing.submit import load
 from app.review.people.audit import read_audit
@@ -35,7 +34,9 @@ from app.review.work.progress import my_work, team_work
 from app.store.audit import AuditQuery
 from app.store.bells import read_rings
 from app.store.people import person_by_name
+from app.store.session import Session
 from app.store.takes import INDEPENDENT, take_of_copy
+from tests.unit.review.pending import stored_by
 
 ADA, BO, CY = (Worker(name) for name in ("ada", "bo", "cy"))
 NOTED = "looked at"
@@ -98,15 +99,12 @@ class TestBatch:
         assert (again.groups, again.waiting) == (6, 6)
 
     def test_is_made_with_the_answer_that_is_kept_of_it_or_not_at_all(self, store, dataset):
-        def keep(made):
-            def kept(session):
-                assert read_batch(session, made.id) == made
-                raise OSError("the power went")
+        def stop(session, made):
+            assert read_batch(session, made.id) == made
+            raise OSError("the power went")
 
-            return kept
-
-        with pytest.raises(OSError, match="power"):
-            make_batch(store, dataset, NewBatch("a"), actor="lead", keep=keep)
+        with pytest.raises(OSError, match="power"), stored_by(stop):
+            make_batch(store, dataset, NewBatch("a"), actor="lead")
         assert list_batches(store, dataset) == []
 
     def test_is_a_query_in_its_own_order(self, store, dataset, groups):
@@ -271,10 +269,11 @@ class TestLeases:
         batch = make_batch(store, dataset, new, actor="lead").id
         kept = []
 
-        def keep(lease: Lease) -> Kept:
-            return lambda session: kept.append((lease, read_batch(session, batch).handed_in))
+        def keep(session: Session, lease: Lease) -> None:
+            kept.append((lease, read_batch(session, batch).handed_in))
 
-        lease = leases.hand_in(batch, groups[0], ADA, actor="ada", done=done, keep=keep)
+        with stored_by(keep):
+            lease = leases.hand_in(batch, groups[0], ADA, actor="ada", done=done)
         assert kept == [(lease, int(done))]
 
     def test_what_is_handed_back_waits_for_its_annotator_first_and_says_why(

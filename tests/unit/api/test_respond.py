@@ -8,15 +8,19 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from starlette.responses import Response
 from structlog.testing import capture_logs
 
+from app.api import idempotency
+from app.api.respond import no_content, responds
 from app.api.services import Services
+from app.review.takes.take import begin_take
 from app.store import uploads
-from app.store.session import Session
+from app.store.session import Session, pending_response
 from app.store.store import Store
 from tests.databases import content
 from tests.unit.api import dataset_requests, group_requests
-from tests.unit.api.group_requests import API, Made, ball, verdict
+from tests.unit.api.group_requests import API, Made, Request, ball, store_of, verdict
 
 KEY = {"Idempotency-Key": "one"}
 KEPT: dict[str, Made] = {
@@ -252,6 +256,83 @@ class TestUpload:
         path = f"{API}/uploads/{dataset_requests.uploaded(api, 'a.csv', b'a')}"
         told = [api.delete(path, headers={"Idempotency-Key": key}) for key in ("one", "two", "two")]
         assert [answer.status_code for answer in told] == [204, 404, 404]
+
+
+def dataset_with_a_copy(api: Any) -> Request:
+    """A dataset goes with the annotations that people made of its groups on their own."""
+    request = dataset_requests.no_dataset(api)
+    dataset = api.get(f"{API}/datasets/demo").json()["id"]
+    (group,) = api.get(f"{API}/groups/ids", params={"dataset": dataset}).json()["ids"]
+    begin_take(store_of(api), group, person="ann")
+    return request
+
+
+class TestInnerWork:
+    """Services that other services use, each of which could answer a request of its own."""
+
+    @pytest.mark.parametrize(
+        "made",
+        [
+            dataset_with_a_copy,
+            dataset_requests.accepted_at_once,
+            dataset_requests.bulk,
+            dataset_requests.no_rig,
+            group_requests.adjudication,
+            group_requests.adoption,
+            group_requests.bulk_edits,
+            group_requests.handed_in,
+            group_requests.station_lines,
+        ],
+    )
+    def test_the_response_is_of_the_whole_and_stored_with_the_last_of_it(
+        self, api, monkeypatch: pytest.MonkeyPatch, made: Made
+    ) -> None:
+        method, path, body, headers = made(api)
+        # As where the server stops once the work is done.
+        monkeypatch.setattr(idempotency, "store_sent", lambda *_: None)
+        first, again = (
+            api.request(method, f"{API}{path}", json=body, headers={**headers, **KEY})
+            for _ in range(2)
+        )
+        assert first.status_code // 100 == 2
+        assert again.headers["idempotency-replayed"] == "true"
+        assert (again.status_code, again.content) == (first.status_code, first.content)
+
+
+class TestResponds:
+    def test_a_route_gives_its_parameters_to_what_makes_the_response(self) -> None:
+        @responds(lambda outcome, status: Response(outcome, status), "status")
+        def route(name: str, status: int) -> str:
+            return name
+
+        answer = route(name="ann", status=202)
+        assert (answer.body, answer.status_code) == (b"ann", 202)
+
+    def test_a_response_that_a_route_makes_itself_is_sent_as_it_is(self) -> None:
+        made = Response(b"planned")
+
+        @responds(no_content)
+        def route() -> Response:
+            return made
+
+        assert route() is made
+
+    def test_a_coroutine_is_refused_as_it_shares_its_thread(self) -> None:
+        async def route() -> None:
+            """Does nothing."""
+
+        with pytest.raises(AssertionError):
+            responds(no_content)(route)
+
+    def test_what_follows_a_response_has_no_request_to_answer(self) -> None:
+        seen: list[bool] = []
+
+        @responds(no_content)
+        def route() -> None:
+            seen.append(pending_response.get() is not None)
+
+        route()
+        assert (seen, pending_response.get()) == ([True], None)
 
 
 class TestCost:
