@@ -33,6 +33,7 @@ from app.soccer.media import Media
 from app.store.frames import Frames, SentPicture, make_picture
 from app.store.store import Store
 from app.store.stored_json import Json
+from app.worker_process import WorkerProcess
 from tests.e2e.service import serving
 from tests.moto_server import SIGNED, Door, store_settings, stored_settings
 
@@ -188,7 +189,8 @@ class Apart:
         monkeypatch.setattr(job_run, "STOP_SECONDS", 0.0)
         self._store, self._folder = store, ExportFolder(store.settings.exports)
         self.processes: set[int] = set()
-        # Other tests of this process may have left workers for the next one.
+        # Unit tests that ran in this process may have left workers for the next one.
+        monkeypatch.setattr("app.store.database_worker.WorkerProcess", WorkerProcess)
         self._before = self._children()
         self.killed = False
 
