@@ -33,6 +33,7 @@ from app.soccer.media import Media
 from app.store.frames import Frames, SentPicture, make_picture
 from app.store.store import Store
 from app.store.stored_json import Json
+from app.worker_process import WorkerProcess
 from tests.e2e.service import serving
 from tests.moto_server import SIGNED, Door, store_settings, stored_settings
 
@@ -188,17 +189,24 @@ class Apart:
         monkeypatch.setattr(job_run, "STOP_SECONDS", 0.0)
         self._store, self._folder = store, ExportFolder(store.settings.exports)
         self.processes: set[int] = set()
+        # Unit tests that ran in this process may have left workers for the next one.
+        monkeypatch.setattr("app.store.database_worker.WorkerProcess", WorkerProcess)
+        self._before = self._children()
         self.killed = False
 
     def read(self, media: Media, width: int | None, flipped: bool) -> SentPicture:
         """A frame for the process, which may be its last one."""
-        children = {process.pid for process in multiprocessing.active_children()}
-        self.processes |= {number for number in children if number is not None}
+        self.processes |= self._children() - self._before
         if self.killed:
             assert self.half_written() != []
             for number in self.processes:
                 os.kill(number, signal.SIGKILL)
         return make_picture(media, width, flipped, self._store.settings)
+
+    @staticmethod
+    def _children() -> set[int]:
+        found = {process.pid for process in multiprocessing.active_children()}
+        return {number for number in found if number is not None}
 
     def export(self, to: str, progress: JobProgress) -> Json:
         """The result of the job."""
