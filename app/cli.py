@@ -6,7 +6,7 @@ from __future__ import annotations
 def main() -> None:
     """Entry point of ``touchline``."""
     # A process that the program starts reads the program's own file first, and needs nothing of it.
-    from app.commands.command_line import run
+    from app.command_line import run
 
     run()
 

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from app.datasets.cameras_writer import camera_name, camera_text
-from app.datasets.view_files import write_below
+from app.formats.cameras_writer import camera_name, camera_text
+from app.formats.view_files import write_below
 from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
 from app.geometry.lens import ARCTAN_POLYNOMIAL, FISHEYE

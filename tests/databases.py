@@ -14,12 +14,12 @@ import pytest
 from sqlalchemy import Connection, event, inspect, select
 
 from app.config import Settings
-from app.store.dialect.dialect import dialect_in, dialect_of
-from app.store.engine import WRITE, make_engine
-from app.store.session import Session
-from app.store.store import Store
-from app.store.tables import Base
-from app.store.tables.jobs import StoredResponseModel
+from app.db.dialects.dialect import WRITE, dialect_in, dialect_of
+from app.db.engine import make_engine
+from app.db.session import Session
+from app.db.store import Store
+from app.db.stored_responses import StoredResponseModel
+from app.features.tables import Base
 from tests.cluster import ADVICE, Cluster, find_programs, running_cluster
 from tests.on_postgresql import shared_cluster
 

@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 
 from app.worker_process import WorkerLimits, WorkerProcess
 
-USERS = ("app.worker_pool", "app.review.datasets.picture_files", "app.store.database_worker")
+USERS = ("app.worker_pool", "app.features.file_tools.paint", "app.db.database_worker")
 """Modules that start workers."""
 
 

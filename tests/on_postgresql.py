@@ -39,7 +39,7 @@ _OWN = (
 
 def run(arguments: list[str]) -> int:
     """Run pytest; its exit code."""
-    from app.store.store import Store
+    from app.db.store import Store
 
     with running_cluster() as cluster:
         url = cluster.make(EMPTY, "template0")
@@ -103,7 +103,7 @@ def install(cluster: Cluster) -> None:
     _say_url(homes)
     _pass_on(homes)
     shutil.copytree = _copying(homes, shutil.copytree)
-    from app.store.dialect.postgresql import PostgreSQL
+    from app.db.dialects.postgresql import PostgreSQL
 
     make = PostgreSQL.make_engine
 

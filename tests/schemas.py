@@ -12,8 +12,8 @@ import pysqlite3.dbapi2 as sqlite
 import pytest
 from sqlalchemy import Engine
 
-from app.store import migrate
-from app.store.dialect.dialect import Dialect
+from app.db import migrate
+from app.db.dialects.dialect import Dialect
 
 make_schema = migrate.make_schema
 """What the product does: run every migration."""

@@ -31,10 +31,10 @@ import httpx
 import psutil
 import yaml
 
-from app.commands.command_line import app as touchline
+from app.command_line import app as touchline
 from app.config import Settings
+from app.features.solve.jobs import WORTH_A_POOL
 from app.object_store.store import ObjectStore, open_store
-from app.review.jobs.solve import WORTH_A_POOL
 from tests.cluster import running_cluster
 from tests.e2e.service import ROOT, SERVE, free_port
 from tests.moto_server import moto_server

@@ -14,7 +14,7 @@ from pathlib import PurePosixPath
 
 import numpy as np
 
-from app.datasets.viper_reader import ViperTrack
+from app.formats.viper_reader import ViperTrack
 from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
 

@@ -26,15 +26,6 @@ from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
 from typing import Any, get_args
 
-from app.datasets import fields
-from app.datasets.ball_names import is_ball
-from app.datasets.cameras_reader import read_cameras
-from app.datasets.file_tree import DEFAULT_LIMITS, FileTree, Limits
-from app.datasets.json_document import json_kind
-from app.datasets.json_text import read_json, read_json_lines
-from app.datasets.record_ids import IdIndex, id_text
-from app.datasets.report import Report
-from app.datasets.trees import opened_tree
 from app.errors import DatasetFormatError, InputError
 from app.evaluation.frame_names import FrameNames, NamedFrame
 from app.evaluation.prediction_run import (
@@ -47,6 +38,15 @@ from app.evaluation.prediction_run import (
 )
 from app.evaluation.prediction_table import is_mot, read_table
 from app.finite import quoted
+from app.formats import fields
+from app.formats.ball_names import is_ball
+from app.formats.cameras_reader import read_cameras
+from app.formats.file_tree import DEFAULT_LIMITS, FileTree, Limits
+from app.formats.json_document import json_kind
+from app.formats.json_text import read_json, read_json_lines
+from app.formats.record_ids import IdIndex, id_text
+from app.formats.report import Report
+from app.formats.trees import opened_tree
 from app.geometry.camera import Camera
 from app.soccer.camera_size import other_size
 from app.soccer.choices import PredictionFormat

@@ -8,12 +8,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar
 
-from app.datasets.ball_names import is_ball
-from app.datasets.corner_origin import box_from_corner, box_to_corner
-from app.datasets.report import Report
 from app.errors import InputError
 from app.evaluation.frame import Detection
 from app.evaluation.frame_names import FrameNames, NamedFrame
+from app.formats.ball_names import is_ball
+from app.formats.corner_origin import box_from_corner, box_to_corner
+from app.formats.report import Report
 from app.soccer.frames import Box, ImageSize
 
 MAX_PER_FRAME = 1000

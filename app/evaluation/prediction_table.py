@@ -10,13 +10,13 @@ import re
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
-from app.datasets import fields
-from app.datasets.csv_text import is_missing, numbers_in, read_rows
-from app.datasets.file_tree import FileTree, Limits
-from app.datasets.record_ids import id_text
 from app.errors import DatasetFormatError
 from app.evaluation.frame_names import NamedFrame
 from app.evaluation.prediction_run import FieldError, PredictionRun, in_field, noted, read_field
+from app.formats import fields
+from app.formats.csv_text import is_missing, numbers_in, read_rows
+from app.formats.file_tree import FileTree, Limits
+from app.formats.record_ids import id_text
 from app.soccer.frames import Box, ImageSize
 
 SCORES = ("score", "confidence", "conf", "probability", "prob")

@@ -15,9 +15,9 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from app.datasets.ball_names import is_ball
 from app.errors import InputError
 from app.evaluation.frame import Detection
+from app.formats.ball_names import is_ball
 from app.geometry.arrays import FloatArray
 from app.soccer.frames import Box, ImageSize
 

@@ -12,6 +12,7 @@ from app.config import Settings
 from app.errors import GeometryError
 from app.geometry.lens import BROWN_CONRADY
 from app.geometry.resection import PARAMETERS
+from app.media.files import decode_frame
 from app.paint.agreement import agreement
 from app.paint.evidence import Image, seen_field
 from app.paint.grass import field_of_play, why_no_field
@@ -24,7 +25,6 @@ from app.soccer.paint_evidence import NO_PAINT, PAINT_DISAGREES, PaintEvidence
 from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy
 from app.soccer.solution import Calibration
-from app.store.media import decode_frame
 
 SENTENCES = {
     NO_PAINT: "Too little paint is seen near the lines.",

@@ -10,6 +10,7 @@ import numpy as np
 from app.config import Settings
 from app.errors import GeometryError
 from app.geometry.camera import Camera
+from app.media.files import decode_frame
 from app.paint.evidence import Image
 from app.paint.goal import goal_lines
 from app.paint.picture_scale import PictureScale, why_unreadable
@@ -20,7 +21,6 @@ from app.soccer.frames import ImageSize
 from app.soccer.media import Media
 from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy
-from app.store.media import decode_frame
 
 
 @dataclass(frozen=True)

@@ -12,9 +12,9 @@ from pathlib import Path
 
 import cv2
 
-from app.datasets.match_frames import ARCHIVE
-from app.datasets.soccernet_v3_writer import write_soccernet_v3
 from app.finite import json_text
+from app.formats.match_frames import ARCHIVE
+from app.formats.soccernet_v3_writer import write_soccernet_v3
 from app.progress import TellProgress
 from app.sample.faults import FaultPlan
 from app.sample.render import render

@@ -8,8 +8,8 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from app.datasets.soccernet_record import IMAGE
 from app.errors import NotFoundError
+from app.formats.soccernet_record import IMAGE
 from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
 from app.sample.figures import DrawnPerson, draw_person, people_in_view

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from app.datasets.soccernet_record import IMAGE
-from app.datasets.soccernet_v3 import group_label
+from app.formats.soccernet_record import IMAGE
+from app.formats.soccernet_v3 import group_label
 from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
 from app.geometry.sphere import tight_box

@@ -10,11 +10,11 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import IO, Any
 
-from app.datasets.camera_json import camera_from_json, camera_to_json
-from app.datasets.fields import whole
-from app.datasets.json_text import read_json
 from app.errors import DatasetFormatError
 from app.finite import json_text
+from app.formats.camera_json import camera_from_json, camera_to_json
+from app.formats.fields import whole
+from app.formats.json_text import read_json
 from app.sample.scene import PRACTICE_KINDS, PlantedFault, SceneTruth, ViewTruth
 from app.soccer.frames import Box
 

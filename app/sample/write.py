@@ -16,11 +16,11 @@ from typing import TypeVar
 
 import cv2
 
-from app.datasets.match_frames import ARCHIVE
-from app.datasets.soccernet_v3_writer import write_soccernet_v3
 from app.durable import PARTIAL
 from app.errors import InputError
 from app.finite import json_text
+from app.formats.match_frames import ARCHIVE
+from app.formats.soccernet_v3_writer import write_soccernet_v3
 from app.progress import TellProgress
 from app.sample.fixture import group_counts, make_fixture
 from app.sample.order import GROUPS, SEED

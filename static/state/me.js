@@ -11,7 +11,7 @@ import { inform } from './notice.js';
 
 /** @import {Action, SessionJson, WaysIn} from '../api/people.js' */
 
-/** Ids of datasets of copies lie above it (app/store/sight.py). */
+/** Ids of datasets of copies lie above it (app/features/people/visibility_queries.py). */
 export const COPIES = 1e9;
 
 /** Whether people log in here. */

@@ -8,7 +8,7 @@ import { question } from '../state/hand_back.js';
 import { FormDialog } from './dialog.js';
 import { FormError } from './form_error.js';
 
-/** As the server has it (app/review/takes/hand_back.py). */
+/** As the server has it (app/features/independent_annotations/return_work.py). */
 const MAX_REASON = 500;
 
 export function HandBackDialog() {

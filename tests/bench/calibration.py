@@ -10,8 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
-from app.datasets.report import Report
-from app.datasets.sn_calibration_reader import read_line_files
+from app.formats.report import Report
+from app.formats.sn_calibration_reader import read_line_files
 from app.soccer.annotation import Lines, make_lines
 from app.soccer.frames import ImageSize
 from app.soccer.pitch import CIRCLES, MARKINGS, Pitch

@@ -20,8 +20,8 @@ import cv2
 import numpy as np
 from scipy.stats import chi2
 
-from app.datasets.report import Report
-from app.datasets.sn_calibration_reader import lines_from_json
+from app.formats.report import Report
+from app.formats.sn_calibration_reader import lines_from_json
 from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
 from app.geometry.resection import PARAMETERS, X, Z, parameters_from_camera, projection_jacobians

@@ -12,10 +12,10 @@ from functools import partial
 from pathlib import Path
 
 from app.config import Settings
-from app.review.editing.recompute import solve_dataset
-from app.review.workers.cluster import Cluster, SchedulerPlace
-from app.review.workers.executors import process_pool
-from app.store.store import Store
+from app.db.store import Store
+from app.features.solutions.service import solve_dataset
+from app.workers.cluster import Cluster, SchedulerPlace
+from app.workers.executors import process_pool
 from tests.bench.table import print_table
 from tests.e2e.service import run_touchline
 from tests.torture.cluster import members

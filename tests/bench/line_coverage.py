@@ -17,9 +17,9 @@ from pathlib import Path
 import numpy as np
 from scipy.stats import chi2
 
-from app.datasets.report import Report
-from app.datasets.sn_calibration_reader import read_line_files
 from app.errors import DegenerateGeometryError
+from app.formats.report import Report
+from app.formats.sn_calibration_reader import read_line_files
 from app.geometry.arrays import FloatArray
 from app.geometry.resection import residuals
 from app.soccer.annotation import Lines, make_lines

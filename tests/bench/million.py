@@ -18,12 +18,12 @@ import numpy as np
 import pysqlite3.dbapi2 as sqlite3
 
 from app.config import Settings
-from app.review.queue.listing import list_groups, neighbours
-from app.review.queue.statistics import statistics
-from app.review.yields.funnel import get_yield
-from app.review.yields.statistics import StatisticsStore
-from app.review.yields.store import YieldStore
-from app.store.store import Store
+from app.db.store import Store
+from app.features.queue.service import list_groups, neighbours
+from app.features.queue.statistics import statistics
+from app.features.what_if.funnel import get_yield
+from app.features.what_if.service import YieldStore
+from app.features.what_if.statistics import StatisticsStore
 from tests.bench.table import print_table
 from tests.e2e.service import run_touchline
 

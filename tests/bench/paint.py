@@ -15,8 +15,14 @@ import numpy as np
 from scipy.stats import chi2
 
 from app.config import Settings
-from app.datasets.report import Report
-from app.datasets.sn_calibration_reader import lines_from_json
+from app.db.store import Store
+from app.features.groups.submit import load
+from app.features.imports.ingest import ingest
+from app.features.paint.service import get_paint, read_paint
+from app.features.policies.service import change_policy
+from app.features.solutions.service import solve_dataset
+from app.formats.report import Report
+from app.formats.sn_calibration_reader import lines_from_json
 from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
 from app.geometry.resection import parameters_from_camera
@@ -26,11 +32,6 @@ from app.paint.grass import field_of_play
 from app.paint.ridges import line_like
 from app.paint.snap import Snapped, snap
 from app.paint.view_paint import paint_of
-from app.review.editing.paint import get_paint, read_paint
-from app.review.editing.recompute import solve_dataset
-from app.review.editing.submit import load
-from app.review.importing.ingest import ingest
-from app.review.policies.policy import change_policy
 from app.sample.render import render
 from app.sample.scene import Scene
 from app.soccer.annotation import Lines, make_lines
@@ -44,7 +45,6 @@ from app.solving.calibrate import calibrate, calibration_key, measure
 from app.solving.observations import observe
 from app.solving.resect import ResectionProblem
 from app.solving.solve import solve
-from app.store.store import Store
 from tests.bench.table import print_table
 from tests.scenes import make_scenes
 

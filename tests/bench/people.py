@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from app.datasets.issia_people import MIRRORED, on_grass, turned
-from app.datasets.issia_reader import IssiaFolder, IssiaOptions, open_issia
-from app.datasets.report import Report
+from app.formats.issia_reader import IssiaFolder, IssiaOptions, open_issia
+from app.formats.report import Report
 from tests.bench.table import print_table
 
 CAMERAS = ((1, 2), (5, 6), (3, 4), (2, 3), (2, 4), (3, 6), (4, 6))

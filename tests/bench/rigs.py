@@ -13,8 +13,8 @@ from pathlib import Path
 
 import numpy as np
 
-from app.datasets.issia_reader import IssiaOptions, open_issia
-from app.datasets.report import Report
+from app.formats.issia_reader import IssiaOptions, open_issia
+from app.formats.report import Report
 from app.geometry.camera import Camera
 from app.soccer.annotation import make_lines
 from app.soccer.group import Group, Station

@@ -15,15 +15,15 @@ from pathlib import Path
 import numpy as np
 
 from app.config import Settings
-from app.review.datasets.dataset import need_dataset
-from app.review.editing.state import read_states
-from app.review.importing.ingest import ingest
-from app.review.jobs.full_solve import solve_fully
+from app.db.store import Store
+from app.features.datasets.queries import group_ids
+from app.features.datasets.service import need_dataset
+from app.features.groups.state import read_states
+from app.features.imports.ingest import ingest
+from app.features.solve.jobs import solve_fully
 from app.soccer.pitch import Pitch
 from app.soccer.policy import CLICKED, PAPER, TOUCHLINE
 from app.soccer.solution import Solution
-from app.store.datasets import group_ids
-from app.store.store import Store
 from tests.bench.cases import Case, Made, make_case
 from tests.bench.table import print_table
 from tests.bench.truth import SEED, compare, judge

@@ -12,7 +12,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from app.review.queue.fields import FIELDS, ORDERS
+from app.features.queue.fields import FIELDS, ORDERS
 from app.soccer.pitch import MARKINGS
 
 ROOT = Path(__file__).resolve().parents[2]

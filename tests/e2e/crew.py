@@ -10,7 +10,7 @@ import httpx
 import pyotp
 from playwright.sync_api import Page
 
-from app.review.people.roles import Role
+from app.features.people.roles import Role
 from tests.e2e.forms import API, Json
 from tests.e2e.screen import CHANGED_MEANWHILE
 from tests.e2e.team import SECRET, OpenPage

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from app.datasets.camera_json import camera_to_json
+from app.formats.camera_json import camera_to_json
 from app.geometry.camera import Camera
 from app.soccer.pitch import MARKINGS, Pitch
 from tests.cameras import FULL_HD, looking

@@ -5,11 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 from app.config import Settings
-from app.review.editing.recompute import solve_dataset
-from app.review.importing.ingest import ingest
+from app.db.store import Store
+from app.features.imports.ingest import ingest
+from app.features.solutions.service import solve_dataset
 from app.soccer.frames import ImageSize
 from app.soccer.group import Group, Station, View
-from app.store.store import Store
 
 SEASON = 2000
 SIZE = ImageSize(960, 540)

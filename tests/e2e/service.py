@@ -23,7 +23,7 @@ SERVE = "from app.cli import main; main()"
 # One process for all of them: each would load the solver again.
 COMMANDS = """
 import shlex, sys
-from app.commands.command_line import app
+from app.command_line import app
 for line in sys.argv[1:]:
     app(shlex.split(line), standalone_mode=False)
 """

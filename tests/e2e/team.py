@@ -11,16 +11,16 @@ from typing import Any
 from playwright.sync_api import Page, expect
 
 from app.config import Settings
-from app.review.agreement.weigh import after_hand_in
-from app.review.editing.edit import SetBall
-from app.review.editing.submit import load, submit
-from app.review.people import links
-from app.review.people.members import give_role
-from app.review.people.people import find_person, invite
-from app.review.people.roles import Role
-from app.review.takes.take import begin_take
-from app.review.verdicts.verdict import set_verdict
-from app.store.store import Store
+from app.db.store import Store
+from app.features.agreement.service import after_hand_in
+from app.features.groups.edit import SetBall
+from app.features.groups.submit import load, submit
+from app.features.independent_annotations.service import begin_take
+from app.features.people import links
+from app.features.people.members import give_role
+from app.features.people.roles import Role
+from app.features.people.service import find_person, invite
+from app.features.verdicts.service import set_verdict
 
 OpenPage = Callable[..., Page]
 SECRET = "three plain words"

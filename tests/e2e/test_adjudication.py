@@ -9,9 +9,9 @@ from pathlib import Path
 from playwright.sync_api import Page, expect
 
 from app.config import Settings
-from app.review.agreement.weigh import after_hand_in
-from app.review.takes.take import begin_take, hand_in
-from app.store.store import Store
+from app.db.store import Store
+from app.features.agreement.service import after_hand_in
+from app.features.independent_annotations.service import begin_take, hand_in
 from tests.e2e.screen import passing, until, withdraw_verdict
 from tests.e2e.team import annotate
 from tests.e2e.test_access import serious_in_both

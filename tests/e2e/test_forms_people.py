@@ -9,11 +9,11 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Page, Route, expect
 
-from app.review.people.people import find_person
-from app.review.people.roles import Role
-from app.review.people.second_factor import SecondFactors
-from app.store.identities import put_identity
-from app.store.store import Store
+from app.db.store import Store
+from app.features.people.login_queries import put_identity
+from app.features.people.roles import Role
+from app.features.people.second_factor import SecondFactors
+from app.features.people.service import find_person
 from tests.e2e.conftest import Console
 from tests.e2e.crew import Crew, enrol, judged, open_as, sent
 from tests.e2e.forms import Row, carry_out, choose, fill, press, read, tick

@@ -9,8 +9,8 @@ from typing import Any
 
 from playwright.sync_api import Page, Response, expect
 
-from app.store.jobs import NewJob, insert_job, update_job
-from app.store.store import Store
+from app.db.store import Store
+from app.features.jobs.queries import NewJob, insert_job, update_job
 from tests.e2e.conftest import Console
 from tests.e2e.crew import Crew, judged, open_as
 from tests.e2e.forms import DIALOG, Json, Row, carry_out, fixed, press, read, says, tick

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 from playwright.sync_api import Page, expect
 
-from app.datasets.camera_json import camera_from_json
+from app.formats.camera_json import camera_from_json
 from tests.e2e.screen import (
     Screen,
     at_rest,

@@ -8,9 +8,9 @@ from typing import Any
 
 from playwright.sync_api import Page, expect
 
-from app.review.people.people import list_people
-from app.review.people.roles import Role
-from app.review.takes.guidelines import read_guidelines, write_guidelines
+from app.features.guidelines.service import read_guidelines, write_guidelines
+from app.features.people.roles import Role
+from app.features.people.service import list_people
 from tests.e2e.screen import Screen, hears, holding, refusing, until
 from tests.e2e.team import (
     REFUSED,

@@ -11,14 +11,14 @@ import httpx
 import pyotp
 from playwright.sync_api import Page, expect
 
-from app.review.editing.submit import load
-from app.review.people.maintenance import clear_banner, set_banner
-from app.review.people.people import find_person, invite
-from app.review.people.roles import Role
-from app.review.people.second_factor import SecondFactors
-from app.review.verdicts.verdict import set_verdict
-from app.store.logins import delete_logins
-from app.store.store import Store
+from app.db.store import Store
+from app.features.groups.submit import load
+from app.features.maintenance.service import clear_banner, set_banner
+from app.features.people.login_queries import delete_logins
+from app.features.people.roles import Role
+from app.features.people.second_factor import SecondFactors
+from app.features.people.service import find_person, invite
+from app.features.verdicts.service import set_verdict
 from tests.e2e.screen import Screen, holding, until
 from tests.e2e.team import (
     REFUSED,

@@ -8,10 +8,10 @@ from typing import Any
 
 from playwright.sync_api import Page, expect
 
-from app.review.people.roles import Role
-from app.review.work.batches import NewBatch, make_batch
-from app.review.work.leases import Leases, Worker
-from app.store.store import Store
+from app.db.store import Store
+from app.features.batches.leases import Leases, Worker
+from app.features.batches.service import NewBatch, make_batch
+from app.features.people.roles import Role
 from tests.e2e.screen import TWO_FRAMES, Screen, hears, holding, until
 from tests.e2e.team import (
     REFUSED,

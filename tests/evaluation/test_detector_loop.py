@@ -10,26 +10,25 @@ import pytest
 from sqlalchemy import update
 from typer.testing import CliRunner
 
-from app.commands.command_line import app as cli
+from app.command_line import app as cli
 from app.config import Settings
+from app.db.store import Store
 from app.errors import InputError
 from app.evaluation.frame import Detection
 from app.evaluation.overlap import iou
-from app.review.editing.edit import SetBall
-from app.review.editing.recompute import solve_dataset
-from app.review.editing.submit import load, submit
-from app.review.evaluating.accept import AcceptRequest, accept
-from app.review.evaluating.detect import DetectRequest, detect
-from app.review.evaluating.evaluation import tables_of
-from app.review.evaluating.evaluation_run import EvaluationRequest, run_evaluation
-from app.review.evaluating.onnx_model import OnnxModel
-from app.review.evaluating.predictions import delete_predictions, view_predictions
-from app.review.importing.sources import Source, import_source
+from app.features.datasets.tables import ViewModel
+from app.features.groups.edit import SetBall
+from app.features.groups.submit import load, submit
+from app.features.imports.sources import Source, import_source
+from app.features.predictions.accept import AcceptRequest, accept
+from app.features.predictions.detect import DetectRequest, OnnxModel, detect
+from app.features.predictions.evaluation import tables_of
+from app.features.predictions.evaluation_run import EvaluationRequest, run_evaluation
+from app.features.predictions.service import delete_predictions, view_predictions
+from app.features.solutions.service import solve_dataset
 from app.sample.truth import read_truth
 from app.sample.write import write_sample
 from app.soccer.frames import Box, ImageSize
-from app.store.store import Store
-from app.store.tables.groups import ViewModel
 from tests.evaluation.tiny_detector import write_tiny_detector
 
 GROUPS = 4
@@ -192,8 +191,8 @@ def found_at_least(frames: int) -> int:
 
 
 def _states(store: Store):
-    from app.review.datasets.dataset import get_dataset
-    from app.review.queue.listing import list_groups
+    from app.features.datasets.service import get_dataset
+    from app.features.queue.service import list_groups
 
     page = list_groups(store, get_dataset(store, "drawn").id, limit=500)
     return [load(store, row.id) for row in page.items]

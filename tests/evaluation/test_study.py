@@ -7,10 +7,10 @@ from pathlib import Path
 import pytest
 
 from app.config import Settings
+from app.db.store import Store
 from app.soccer.frames import ImagePoint, ImageSize
 from app.soccer.pitch import Pitch
 from app.solving.jaccard import camera_jaccard, project_markings
-from app.store.store import Store
 from tests.cameras import looking
 from tests.paper.page import page
 from tests.paper.printed_jac import printed_jaccard

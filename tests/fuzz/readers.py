@@ -18,28 +18,28 @@ from itertools import islice
 from pathlib import Path
 from typing import Any
 
-from app.commands.options import read_text
 from app.config import Settings
-from app.datasets.export_record import ExportRecord
-from app.datasets.file_tree import Limits
-from app.datasets.format_names import ImportFormat
-from app.datasets.guess_format import guess_format
-from app.datasets.output import output_tree
-from app.datasets.report import Report
+from app.db.store import Store
 from app.errors import DatasetFormatError, ReviewError
 from app.evaluation.frame_names import FrameNames, NamedFrame
 from app.evaluation.prediction_files import read_predicted_cameras, read_predictions
+from app.features.imports.sources import STATIC, Source, _groups, _static, import_source
+from app.features.policies.text import MAX_CHARACTERS, policy_from_yaml
+from app.features.queue.query import parse_query
 from app.finite import json_text
-from app.review.exporting.formats import FORMATS, WriteOptions, write_format
-from app.review.importing.sources import STATIC, Source, _groups, _static, import_source
-from app.review.policies.text import MAX_CHARACTERS, policy_from_yaml
-from app.review.queue.query import parse_query
+from app.formats.export_formats import FORMATS, WriteOptions, write_format
+from app.formats.export_record import ExportRecord
+from app.formats.file_tree import Limits
+from app.formats.format_names import ImportFormat
+from app.formats.guess_format import guess_format
+from app.formats.output import output_tree
+from app.formats.report import Report
+from app.media.files import read_frame
 from app.soccer.group import Group
 from app.soccer.media import Media
 from app.soccer.policy import PAPER
 from app.solving.solve import solve
-from app.store.media import read_frame
-from app.store.store import Store
+from app.terminal.options import read_text
 from tests.cameras import SIZE
 from tests.fuzz.case import Case
 

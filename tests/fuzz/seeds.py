@@ -14,17 +14,17 @@ import numpy as np
 from PIL import Image
 
 from app.config import Settings
-from app.datasets.camera_json import camera_to_json
-from app.datasets.export_record import ExportRecord
-from app.review.exporting.formats import FORMATS, WriteOptions, write_format
-from app.review.importing.carry import carry_out
-from app.review.importing.ingest import ingest
-from app.review.policies.text import policy_to_yaml
+from app.db.store import Store
+from app.features.imports.edits_export import carry_out
+from app.features.imports.ingest import ingest
+from app.features.policies.text import policy_to_yaml
+from app.formats.camera_json import camera_to_json
+from app.formats.export_formats import FORMATS, WriteOptions, write_format
+from app.formats.export_record import ExportRecord
 from app.soccer.annotation import Extras, make_lines
 from app.soccer.group import Group, Station, View
 from app.soccer.policy import PAPER
 from app.solving.solve import solve
-from app.store.store import Store
 from tests.balls import box_around
 from tests.cameras import SIZE, looking
 from tests.fuzz.case import Case, Files

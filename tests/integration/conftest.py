@@ -20,7 +20,7 @@ import httpx
 import numpy as np
 import pytest
 
-from app.datasets.soccernet_v3_writer import write_soccernet_v3
+from app.formats.soccernet_v3_writer import write_soccernet_v3
 from app.sample.scene import Scene
 from app.soccer.group import Group
 from tests import starting

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from app.errors import ClusterError
-from app.review.workers.cluster import Cluster, SchedulerPlace
+from app.workers.cluster import Cluster, SchedulerPlace
 from tests.certificates import write_keys
 from tests.databases import count_rows
 from tests.e2e.service import run_touchline

@@ -13,8 +13,8 @@ import httpx
 import pytest
 
 from app.config import Settings
-from app.review.importing.ingest import ensure_dataset
-from app.store.store import Store
+from app.db.store import Store
+from app.features.imports.ingest import ensure_dataset
 from tests.integration.conftest import COMMAND, environment
 from tests.waiting import SECONDS
 

@@ -28,7 +28,7 @@ LOAD_ALL = """(modules) => {
   const folder = new URL('..', document.querySelector('script[src$="/built/main.js"]').src);
   return Promise.all(modules.map(async (name) => { await import(new URL(name, folder).href); }));
 }"""
-ASK = """from app.commands import command_line
+ASK = """from app import command_line
 print(command_line.__file__)
 for words in (["--version"], ["backup", "-h"]):
     command_line.app(words, standalone_mode=False)

@@ -15,15 +15,15 @@ import pytest
 from PIL import Image, ImageOps
 
 from app.config import Settings
-from app.datasets.report import Report
-from app.review.datasets.picture_files import read_pictures
-from app.review.evaluating.detect import _picture
-from app.review.exporting.images import ExportImages
+from app.features.exports.images import ExportImages
+from app.features.file_tools.paint import read_pictures
+from app.features.predictions.detect import _picture
+from app.formats.report import Report
+from app.media.files import decode_frame, picture_header, read_frame, read_pixels
+from app.media.frames import Frames, make_picture
 from app.soccer.frames import ImageSize
 from app.soccer.group import Group, Station, View
 from app.soccer.media import Media
-from app.store.frames import Frames, make_picture
-from app.store.media import decode_frame, picture_header, read_frame, read_pixels
 
 ORIENTATIONS = range(1, 9)
 STORED = np.zeros((48, 80, 3), np.uint8)
@@ -174,4 +174,4 @@ class TestOneOrientation:
             for path in app.rglob("*.py")
             if decoders.search(path.read_text())
         }
-        assert found == {"store/media.py", "store/image_header.py"}
+        assert found == {"media/files.py", "media/images.py"}

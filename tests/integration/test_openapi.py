@@ -27,28 +27,28 @@ from schemathesis.generation.jsonschema.context import Alphabet
 from schemathesis.specs.openapi import _hypothesis as drawing
 from schemathesis.specs.openapi import negative
 
-from app.api.application import create_app
 from app.config import Settings
-from app.datasets.report import Report
-from app.datasets.soccernet_v3_reader import read_soccernet_v3
-from app.review.editing.past import history
-from app.review.editing.pitches import read_pitches
-from app.review.editing.recompute import solve_dataset
-from app.review.editing.stations import load_station
-from app.review.editing.submit import load
-from app.review.evaluating.evaluation_run import EvaluationRequest, run_evaluation
-from app.review.evaluating.prediction_reader import PredictionFiles
-from app.review.evaluating.predictions import add_predictions
-from app.review.importing.ingest import ingest
-from app.review.jobs.exports import request_export
-from app.review.policies.policy import read_policy
-from app.review.talk.comments import begin_thread, reply
-from app.review.versions.freeze import FreezeRequest, freeze
-from app.review.webhooks.messages import Kind
-from app.review.webhooks.webhooks import make_webhook, send_ping
-from app.review.work.batches import NewBatch, make_batch
-from app.store.store import Store
-from app.store.uploads import UploadWriter
+from app.db.store import Store
+from app.features.batches.service import NewBatch, make_batch
+from app.features.comments.service import begin_thread, reply
+from app.features.exports.jobs import request_export
+from app.features.groups.history import history
+from app.features.groups.submit import load
+from app.features.imports.ingest import ingest
+from app.features.imports.upload_queries import UploadWriter
+from app.features.pitches.service import read_pitches
+from app.features.policies.service import read_policy
+from app.features.predictions.evaluation_run import EvaluationRequest, run_evaluation
+from app.features.predictions.reader import PredictionFiles
+from app.features.predictions.service import add_predictions
+from app.features.solutions.service import solve_dataset
+from app.features.stations.service import load_station
+from app.features.versions.freeze import FreezeRequest, freeze
+from app.features.webhooks.messages import Kind
+from app.features.webhooks.service import make_webhook, send_ping
+from app.formats.report import Report
+from app.formats.soccernet_v3_reader import read_soccernet_v3
+from app.main import create_app
 from tests.waiting import SECONDS
 
 EXAMPLES = 5
@@ -328,7 +328,7 @@ class TestOperations:
         for found in api_schema.get_all_operations():
             attack, operation = Attack(application.state.services.store), found.ok()
             if operation.path.endswith("/events"):
-                # It has no end; tests/unit/api/routers/test_events.py listens to it.
+                # It has no end; tests/unit/http/test_event_routes.py listens to it.
                 continue
             try:
                 attack.run(operation, mode)

@@ -14,23 +14,24 @@ from pwdlib import PasswordHash
 from pwdlib.hashers.argon2 import Argon2Hasher
 
 import touchline
-from app.api.application import create_app
-from app.api.server import listen, make_server
 from app.config import Settings
-from app.review.editing.recompute import solve_dataset
-from app.review.evaluating.evaluation_run import EvaluationRequest, run_evaluation
-from app.review.evaluating.prediction_reader import PredictionFiles
-from app.review.evaluating.predictions import add_predictions
-from app.review.importing.ingest import ingest
-from app.review.people import links, passwords
-from app.review.people.people import invite
-from app.review.people.roles import Role
-from app.review.talk.comments import begin_thread
-from app.review.versions.freeze import FreezeRequest, freeze
-from app.review.webhooks.messages import Kind
-from app.review.webhooks.webhooks import make_webhook, send_ping
-from app.review.work.batches import NewBatch, make_batch
-from app.store.store import Store
+from app.db.store import Store
+from app.features.batches.service import NewBatch, make_batch
+from app.features.comments.service import begin_thread
+from app.features.imports.ingest import ingest
+from app.features.people import links
+from app.features.people import links as passwords
+from app.features.people.roles import Role
+from app.features.people.service import invite
+from app.features.predictions.evaluation_run import EvaluationRequest, run_evaluation
+from app.features.predictions.reader import PredictionFiles
+from app.features.predictions.service import add_predictions
+from app.features.solutions.service import solve_dataset
+from app.features.versions.freeze import FreezeRequest, freeze
+from app.features.webhooks.messages import Kind
+from app.features.webhooks.service import make_webhook, send_ping
+from app.http.server import listen, make_server
+from app.main import create_app
 from tests.scenes import make_scenes
 from tests.waiting import SECONDS
 

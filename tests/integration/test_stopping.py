@@ -19,8 +19,8 @@ import httpx
 import pytest
 
 from app.config import Settings
-from app.review.jobs.records import need_job
-from app.store.store import Store
+from app.db.store import Store
+from app.features.jobs.records import need_job
 from tests.databases import holding_the_write_lock
 from tests.e2e.service import serving
 from tests.homes import copy_home

@@ -15,7 +15,7 @@ import pytest
 from sqlalchemy import text
 
 from app.config import Settings
-from app.store.store import Store
+from app.db.store import Store
 from tests.cluster import ADVICE, find_programs
 from tests.e2e.service import serving
 from tests.torture import (

@@ -6,16 +6,16 @@ import os
 from dataclasses import dataclass
 from pathlib import Path
 
-from app.datasets.issia_reader import IssiaOptions, open_issia
-from app.datasets.report import Report
+from app.db.store import Store
 from app.evaluation.evaluate import Evaluation, Inputs, Options, evaluate
 from app.evaluation.frame import Frame
-from app.review.datasets.dataset import get_dataset
-from app.review.editing.recompute import solve_dataset
-from app.review.evaluating.frames import live_truth
-from app.review.importing.ingest import ingest
+from app.features.datasets.service import get_dataset
+from app.features.imports.ingest import ingest
+from app.features.predictions.frames import live_truth
+from app.features.solutions.service import solve_dataset
+from app.formats.issia_reader import IssiaOptions, open_issia
+from app.formats.report import Report
 from app.soccer.split import TEST_CAMERAS
-from app.store.store import Store
 from tests.paper.simulated import SimulatedDetector
 
 FOLDER = (

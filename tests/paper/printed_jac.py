@@ -13,8 +13,8 @@ from pathlib import Path
 
 import numpy as np
 
-from app.datasets.report import Report
-from app.datasets.sn_calibration_reader import read_line_files
+from app.formats.report import Report
+from app.formats.sn_calibration_reader import read_line_files
 from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
 from app.geometry.polyline import distance_to_polyline

@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from app.db.store import Store
 from app.evaluation.evaluate import Evaluation, Inputs, Options, evaluate
 from app.evaluation.frame import Detection, Frame
-from app.review.datasets.dataset import get_dataset
-from app.review.editing.recompute import solve_dataset
-from app.review.evaluating.frames import Truth, live_truth
-from app.review.importing.ingest import ingest
+from app.features.datasets.service import get_dataset
+from app.features.imports.ingest import ingest
+from app.features.predictions.frames import Truth, live_truth
+from app.features.solutions.service import solve_dataset
 from app.sample.scene import Scene
 from app.soccer.frames import Box
-from app.store.store import Store
 from tests.paper.simulated import SimulatedDetector, camera_from_noisy_lines, looseness
 from tests.scenes import make_scenes
 

@@ -8,11 +8,11 @@ from pathlib import Path
 import pytest
 
 from app.config import Settings
-from app.datasets.issia_reader import IssiaOptions, open_issia
-from app.datasets.report import Report
-from app.review.editing.recompute import solve_dataset
-from app.review.importing.ingest import ingest
-from app.store.store import Store
+from app.db.store import Store
+from app.features.imports.ingest import ingest
+from app.features.solutions.service import solve_dataset
+from app.formats.issia_reader import IssiaOptions, open_issia
+from app.formats.report import Report
 from tests.homes import once_for_all
 
 DATA = Path(os.environ.get("TOUCHLINE_REAL_DATA", Path(__file__).parents[3] / "shared" / "data"))

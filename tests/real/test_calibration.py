@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.datasets.cameras_reader import read_cameras
-from app.datasets.report import Report
-from app.datasets.sn_calibration_reader import read_line_files
+from app.formats.cameras_reader import read_cameras
+from app.formats.report import Report
+from app.formats.sn_calibration_reader import read_line_files
 from app.soccer.frames import ImageSize
 from app.soccer.pitch import GOAL_PARTS, Pitch
 from app.soccer.policy import CLICKED, CalibrationPolicy

@@ -10,15 +10,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.datasets.camera_json import camera_from_json, camera_to_json
-from app.datasets.cameras_reader import read_cameras
-from app.datasets.export_record import ExportRecord
-from app.datasets.issia_3d_writer import write_issia_3d
-from app.datasets.issia_reader import IssiaFolder, IssiaOptions, open_issia
-from app.datasets.report import Report
-from app.datasets.sn_calibration import DEFAULT_SIZE
-from app.datasets.sn_calibration_reader import read_line_files, read_sn_calibration
-from app.datasets.sn_calibration_writer import write_line_files, write_sn_calibration
+from app.formats.camera_json import camera_from_json, camera_to_json
+from app.formats.cameras_reader import read_cameras
+from app.formats.export_record import ExportRecord
+from app.formats.issia_3d_writer import write_issia_3d
+from app.formats.issia_reader import IssiaFolder, IssiaOptions, open_issia
+from app.formats.report import Report
+from app.formats.sn_calibration import DEFAULT_SIZE
+from app.formats.sn_calibration_reader import read_line_files, read_sn_calibration
+from app.formats.sn_calibration_writer import write_line_files, write_sn_calibration
 from app.soccer.frames import ImageSize
 from app.soccer.pitch import MARKINGS
 

@@ -11,17 +11,17 @@ import numpy as np
 import pytest
 
 from app.config import Settings
-from app.datasets.issia_reader import IssiaOptions, open_issia
-from app.datasets.report import Report
-from app.review.datasets.dataset import get_dataset
-from app.review.editing.recompute import solve_dataset
-from app.review.editing.state import GroupState, read_states
-from app.review.exporting.export import export
-from app.review.importing.ingest import ingest
-from app.review.queue.listing import list_ids
+from app.db.store import Store
+from app.features.datasets.service import get_dataset
+from app.features.exports.service import export
+from app.features.groups.state import GroupState, read_states
+from app.features.imports.ingest import ingest
+from app.features.queue.service import list_ids
+from app.features.solutions.service import solve_dataset
+from app.formats.issia_reader import IssiaOptions, open_issia
+from app.formats.report import Report
 from app.soccer.policy import PAPER
 from app.soccer.solution import Solution
-from app.store.store import Store
 from tests.bench.people import apart as people_apart
 from tests.homes import copy_home
 

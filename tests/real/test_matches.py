@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.datasets.report import Report
-from app.datasets.sn_calibration_reader import read_line_files
-from app.review.datasets.matches import shares_of
+from app.features.file_tools.matches import shares_of
+from app.formats.report import Report
+from app.formats.sn_calibration_reader import read_line_files
 from app.soccer.frames import ImageSize
 from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy

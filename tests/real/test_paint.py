@@ -8,14 +8,14 @@ from pathlib import Path
 import pytest
 
 from app.config import Settings
+from app.features.file_tools.paint import agree_files, snap_files
+from app.media.files import decode_frame
 from app.paint.view_proposal import proposal_of
-from app.review.datasets.paint_files import agree_files, snap_files
 from app.soccer.frames import ImageSize
 from app.soccer.media import Media
 from app.soccer.pitch import Pitch
 from app.soccer.policy import PAPER
 from app.solving.calibrate import calibrate
-from app.store.media import decode_frame
 
 DATA = Path(
     os.environ.get("TOUCHLINE_REAL_DATA", Path(__file__).parents[3] / "shared" / "data")

@@ -13,20 +13,20 @@ import pytest
 from sqlalchemy import select
 
 from app.config import Settings
-from app.datasets.file_tree import DEFAULT_LIMITS
-from app.datasets.issia_reader import IssiaOptions, open_issia
-from app.datasets.report import Report
-from app.review.editing.recompute import solve_dataset
-from app.review.editing.submit import load
-from app.review.exporting.export import export
-from app.review.importing.carry_in import carry_in
-from app.review.importing.ingest import ingest
-from app.review.verdicts.verdict import set_verdict
-from app.review.versions.freeze import FreezeRequest, freeze
-from app.review.versions.verify import verify
+from app.db.store import Store
+from app.features.datasets.tables import GroupModel
+from app.features.exports.service import export
+from app.features.groups.submit import load
+from app.features.imports.ingest import ingest
+from app.features.imports.merge import carry_in
+from app.features.solutions.service import solve_dataset
+from app.features.verdicts.service import set_verdict
+from app.features.versions.freeze import FreezeRequest, freeze
+from app.features.versions.verify import verify
+from app.formats.file_tree import DEFAULT_LIMITS
+from app.formats.issia_reader import IssiaOptions, open_issia
+from app.formats.report import Report
 from app.soccer.split import Split
-from app.store.store import Store
-from app.store.tables.groups import GroupModel
 from tests.homes import copy_home
 
 DATA = (

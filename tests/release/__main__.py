@@ -16,7 +16,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-from app.datasets.manifest import software_version
+from app.formats.manifest import software_version
 from tests.release.advisories import ask_browser, ask_python
 from tests.release.bill import write_bill
 from tests.release.libraries import EXTRAS, ROOT, closure, pins

@@ -16,18 +16,19 @@ from fastapi import FastAPI
 from pwdlib import PasswordHash
 from pwdlib.hashers.argon2 import Argon2Hasher
 
-from app.api.application import create_app
-from app.api.security.asked_datasets import BODY, QUERY, kind_of_path
 from app.config import Settings
-from app.review.editing.recompute import solve_dataset
-from app.review.importing.ingest import ingest
-from app.review.people import links, passwords
-from app.review.people.logins import Logins
-from app.review.people.members import give_role
-from app.review.people.ownership import OwnedKind
-from app.review.people.people import invite
-from app.review.people.roles import Role
-from app.store.store import Store
+from app.db.store import Store
+from app.features.imports.ingest import ingest
+from app.features.people import links
+from app.features.people import links as passwords
+from app.features.people.logins import Logins
+from app.features.people.members import give_role
+from app.features.people.ownership import OwnedKind
+from app.features.people.roles import Role
+from app.features.people.service import invite
+from app.features.solutions.service import solve_dataset
+from app.http.datasets_of_request import BODY, QUERY, kind_of_path
+from app.main import create_app
 from tests.scenes import make_scenes
 from tests.security.table import Row
 

@@ -18,14 +18,14 @@ from limits import parse
 from pwdlib import PasswordHash
 from pwdlib.hashers.argon2 import Argon2Hasher
 
-from app.api.application import create_app
-from app.api.security import access, tries
-from app.api.server import listen, make_server
 from app.config import Settings
-from app.datasets.soccernet_v3_writer import write_soccernet_v3
-from app.review.people import passwords
-from app.review.people.roles import Role
-from app.store.store import Store
+from app.db.store import Store
+from app.features.people import links as passwords
+from app.features.people.roles import Role
+from app.formats.soccernet_v3_writer import write_soccernet_v3
+from app.http import access, tries
+from app.http.server import listen, make_server
+from app.main import create_app
 from tests.e2e.service import NOBODY, run_touchline, serving
 from tests.integration.conftest import picture
 from tests.provider import CLIENT, SECRET, Provider, providing

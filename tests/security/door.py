@@ -9,9 +9,9 @@ from urllib.parse import parse_qs, urlsplit
 
 import httpx
 
-from app.review.people.people import invite
-from app.review.people.roles import Role
-from app.review.people.sign_on import SignOn
+from app.features.people.roles import Role
+from app.features.people.service import invite
+from app.features.people.sign_on import SignOn
 from tests.provider import Provider
 from tests.security.asking import Answer
 from tests.security.team import API, Team, cookie_in

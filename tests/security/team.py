@@ -9,11 +9,11 @@ from typing import Any
 from fastapi import FastAPI
 from sqlalchemy import delete
 
-from app.review.people import links
-from app.review.people.people import invite
-from app.review.people.roles import Role
-from app.store.store import Store
-from app.store.tables.people import AttemptModel
+from app.db.ephemeral_state import AttemptModel
+from app.db.store import Store
+from app.features.people import links
+from app.features.people.roles import Role
+from app.features.people.service import invite
 from tests.security.asking import Answer, Asker
 from tests.security.table import Row, rows
 

@@ -8,19 +8,11 @@ from typing import Any
 
 import pytest
 
-from app.api.security.asked_datasets import (
-    BODY,
-    EVERYWHERE,
-    LISTS,
-    OWN,
-    QUERY,
-    is_known,
-    kind_of_path,
-)
-from app.api.security.rules import RULES
-from app.review.people.ownership import OwnedKind
-from app.review.people.roles import Action, Role
-from app.store.jobs import NewJob, insert_job, update_job
+from app.features.jobs.queries import NewJob, insert_job, update_job
+from app.features.people.ownership import OwnedKind
+from app.features.people.roles import Action, Role
+from app.http.datasets_of_request import BODY, EVERYWHERE, LISTS, OWN, QUERY, is_known, kind_of_path
+from app.http.rules import RULES
 from tests.security.apart import (
     API,
     MINE,

@@ -9,12 +9,12 @@ from urllib.parse import quote
 
 import pytest
 
-from app.api.security.asked_datasets import QUERIES
-from app.api.security.rules import RULES
-from app.review.editing.recompute import solve_dataset
-from app.review.importing.ingest import ingest
-from app.review.people.roles import Action, Role
-from app.store.sight import COPIES
+from app.features.imports.ingest import ingest
+from app.features.people.roles import Action, Role
+from app.features.people.visibility_queries import COPIES
+from app.features.solutions.service import solve_dataset
+from app.http.datasets_of_request import QUERIES
+from app.http.rules import RULES
 from tests.scenes import make_scenes
 from tests.security.apart import API, Apart, opened
 from tests.security.table import rows

@@ -20,10 +20,10 @@ from urllib.parse import unquote, urlencode, urlsplit
 import pytest
 import yaml
 
-from app.api.application import create_app
 from app.config import Settings
-from app.datasets.soccernet_v3_writer import write_soccernet_v3
-from app.store.store import Store
+from app.db.store import Store
+from app.formats.soccernet_v3_writer import write_soccernet_v3
+from app.main import create_app
 from tests.databases import content
 from tests.scenes import make_scenes
 from tests.security.asking import JSON, Answer, assert_guarded

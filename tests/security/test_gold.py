@@ -15,12 +15,12 @@ import cv2
 import numpy as np
 import pytest
 
-from app.review.editing.recompute import solve_dataset
-from app.review.importing.ingest import ingest
-from app.review.people.roles import Role
-from app.review.takes import mixing
+from app.features.imports.ingest import ingest
+from app.features.independent_annotations import known_truth as mixing
+from app.features.independent_annotations.queries import GOLD, takes_in
+from app.features.people.roles import Role
+from app.features.solutions.service import solve_dataset
 from app.soccer.media import Media
-from app.store.takes import GOLD, takes_in
 from tests.scenes import make_scenes
 from tests.security.apart import API, BODIES, Apart, opened
 from tests.security.cheat import features_of, in_order, telling

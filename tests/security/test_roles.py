@@ -15,19 +15,19 @@ import pytest
 import structlog
 from limits import parse
 
-from app.api.pages import PAGES
-from app.api.security import access, tries
-from app.api.security.rules import OPEN, RULES
 from app.config import Settings
-from app.review.importing.ingest import ensure_dataset
-from app.review.people import links
-from app.review.people.devices import LASTS, Devices
-from app.review.people.members import give_role
-from app.review.people.people import change_person, find_person, renew_link
-from app.review.people.roles import LEAST, Role, Scope
-from app.store.clock import now
-from app.store.log import Entry, append, read_log
-from app.store.store import Store
+from app.db.log import Entry, append, read_log
+from app.db.session import now
+from app.db.store import Store
+from app.features.imports.ingest import ensure_dataset
+from app.features.people import links
+from app.features.people.devices import LASTS, Devices
+from app.features.people.members import give_role
+from app.features.people.roles import LEAST, Role, Scope
+from app.features.people.service import change_person, find_person, renew_link
+from app.http import access, tries
+from app.http.pages import PAGES
+from app.http.rules import OPEN, RULES
 from tests.security.asking import Answer, assert_guarded
 from tests.security.table import MISSING, TABLE, Row, rows
 from tests.security.team import API, BYTES, DEVICE, GUARDED, HIDDEN, SECRET, Team, asked, cookie_in
@@ -184,7 +184,7 @@ class TestSessions:
         assert "secure" not in said, "there is no TLS on loopback"
 
     def test_behind_tls_it_is_secure_and_bound_to_its_name(self, tmp_path: Path) -> None:
-        from app.api.team import Team as Way
+        from app.http.team import Team as Way
 
         settings = Settings(home=tmp_path, team=True, url="https://touchline.example.org")
         with closing(Store.open(settings)) as store:

@@ -13,15 +13,15 @@ import pytest
 from fastapi import Request
 from limits import parse
 
-from app.api.security import tries
-from app.api.team import Team as WayIn
 from app.config import Settings
+from app.db.store import Store
 from app.errors import ConflictError
-from app.review.people.passkeys import PasskeySite
-from app.review.people.people import find_person
-from app.review.people.roles import Role
-from app.review.people.second_factor import SecondFactors
-from app.store.store import Store
+from app.features.people.passkeys import PasskeySite
+from app.features.people.roles import Role
+from app.features.people.second_factor import SecondFactors
+from app.features.people.service import find_person
+from app.http import tries
+from app.http.team import Team as WayIn
 from tests.authenticator import Authenticator
 from tests.security.asking import Answer, assert_guarded
 from tests.security.team import API, GUARDED, SECRET, Team, asked, cookie_in

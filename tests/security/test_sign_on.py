@@ -10,13 +10,13 @@ import httpx
 import pyotp
 import pytest
 
-from app.review.people.attempts import Attempts
-from app.review.people.links import make_first_link
-from app.review.people.logins import Way
-from app.review.people.people import change_person, find_person
-from app.review.people.roles import Role
-from app.review.people.second_factor import SecondFactors
-from app.review.people.sign_on import LASTS
+from app.features.people.devices import Attempts
+from app.features.people.links import make_first_link
+from app.features.people.logins import Way
+from app.features.people.roles import Role
+from app.features.people.second_factor import SecondFactors
+from app.features.people.service import change_person, find_person
+from app.features.people.sign_on import LASTS
 from tests.security.door import BEGIN, FINISH, Door, assert_refused, name_in, session_in
 from tests.security.team import API, SECRET, cookie_in
 
@@ -68,7 +68,7 @@ class TestComingIn:
         assert_refused(door.enter(), word="nobody here is linked")
 
     def test_the_first_admin_may_come_by_it(self, door: Door, monkeypatch: Any) -> None:
-        monkeypatch.setattr("app.review.people.links.count_able", lambda *_: 0)
+        monkeypatch.setattr("app.features.people.links.count_able", lambda *_: 0)
         link = make_first_link(door.team.store, actor="local")
         assert link is not None
         door.provider.who = {"sub": "s-root"}

@@ -16,7 +16,7 @@ import pytest
 from cryptography.hazmat.primitives.serialization import Encoding, PublicFormat
 from joserfc import jwk
 
-from app.review.people import provider_answers
+from app.features.people import provider as provider_answers
 from tests.provider import CLIENT, Provider, send_away, tell
 from tests.provider import SECRET as CLIENT_SECRET
 from tests.security.asking import Answer

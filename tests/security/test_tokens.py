@@ -11,15 +11,15 @@ import pytest
 from limits import parse
 from sqlalchemy import update
 
-from app.api.security import tries
-from app.api.security.bearer import bearer_of
-from app.review.importing.ingest import ensure_dataset
-from app.review.people import access_tokens
-from app.review.people.access_tokens import new_text
-from app.review.people.people import change_person, find_person
-from app.review.people.roles import Role, Scope
-from app.store.jobs import NewJob, insert_job
-from app.store.tables.people import AccessTokenModel
+from app.features.imports.ingest import ensure_dataset
+from app.features.jobs.queries import NewJob, insert_job
+from app.features.people import access_tokens
+from app.features.people.access_tokens import new_text
+from app.features.people.roles import Role, Scope
+from app.features.people.service import change_person, find_person
+from app.features.people.tables import AccessTokenModel
+from app.http import tries
+from app.http.headers import bearer_of
 from tests.security.asking import Answer, assert_guarded
 from tests.security.team import API, BYTES, Team
 from tests.waiting import SECONDS

@@ -13,8 +13,8 @@ from typing import Any
 
 import httpx
 
-from app.api.security.lanes import UPLOADS
-from app.review.editing.point_limits import VIEW_POINTS
+from app.features.groups.edit_codec import VIEW_POINTS
+from app.http.request_limits import UPLOADS
 from app.soccer.pitch import MARKINGS
 from tests.torture.background import Background, Busy
 from tests.torture.connection import API, Connection, read_answer, write_head

@@ -16,7 +16,7 @@ from pathlib import Path
 import psutil
 from distributed import Client
 
-from app.review.workers.cluster import SchedulerPlace
+from app.workers.cluster import SchedulerPlace
 from tests.e2e.service import ROOT, SERVE, run_touchline
 from tests.starting import Process
 from tests.torture.commands import Report, differences

@@ -19,9 +19,9 @@ from typing import Any
 from sqlalchemy import text
 
 from app.config import Settings
-from app.datasets.manifest import MANIFEST
-from app.review.doctor.database import examine
-from app.store.store import Store
+from app.db.store import Store
+from app.features.integrity.database import examine
+from app.formats.manifest import MANIFEST
 from tests.e2e.service import ROOT, SERVE, run_touchline
 from tests.starting import Process
 

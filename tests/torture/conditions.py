@@ -19,7 +19,7 @@ from typing import Any
 
 import httpx
 
-from app.datasets.soccernet_v3_writer import write_soccernet_v3
+from app.formats.soccernet_v3_writer import write_soccernet_v3
 from tests.e2e.service import run_touchline
 from tests.integration.conftest import picture
 from tests.scenes import make_scenes
@@ -30,7 +30,7 @@ DAY = 24 * 3600
 ROOM = "24m"
 """Of the disk that is filled."""
 NFS = """
-import app.store.home as home, pathlib
+import app.db.home as home, pathlib
 home.file_system.__defaults__ = (pathlib.Path({!r}),)
 """
 """Lets a server believe another list of mounts."""
@@ -43,8 +43,8 @@ class Clock(when.datetime):
     @classmethod
     def now(cls, tz=None):
         return when.datetime.fromtimestamp(time.time(), tz)
-import app.store.idempotency, app.store.clock
-app.store.clock.datetime = app.store.idempotency.datetime = Clock
+import app.db.stored_responses, app.db.session
+app.db.session.datetime = app.db.stored_responses.datetime = Clock
 """
 """Gives a server a clock that is as many seconds aside as a file says.
 

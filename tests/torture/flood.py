@@ -37,7 +37,7 @@ MOST_TIMES = 3.0
 LEAST_MS = 15.0
 """A p99 below this is quiet, whatever the machine does besides."""
 UNBOUNDED = """
-from app.api.security import lanes
+from app.http import request_limits as lanes
 object.__setattr__(lanes.UPLOADS, "queue", 100_000)
 lanes.PATIENCE = 1000.0
 """

@@ -23,10 +23,10 @@ from typing import Any
 import httpx
 
 from app.config import Settings
-from app.review.datasets.dataset import list_datasets
-from app.review.doctor.database import examine
-from app.store.log import read_log
-from app.store.store import Store
+from app.db.log import read_log
+from app.db.store import Store
+from app.features.datasets.service import list_datasets
+from app.features.integrity.database import examine
 from tests.e2e.service import ROOT, SERVE, free_port, run_touchline
 from tests.starting import Process
 from tests.torture.connection import API

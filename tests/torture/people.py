@@ -26,11 +26,12 @@ from pwdlib import PasswordHash
 from pwdlib.hashers.argon2 import Argon2Hasher
 
 from app.config import Settings
-from app.review.people import links, passwords
-from app.review.people.people import invite
-from app.review.people.roles import Role
-from app.store.store import Store
-from app.store.verdicts import read_verdicts
+from app.db.store import Store
+from app.features.people import links
+from app.features.people import links as passwords
+from app.features.people.roles import Role
+from app.features.people.service import invite
+from app.features.verdicts.queries import read_verdicts
 from tests.torture import counting
 from tests.torture.crowd import Load
 from tests.torture.kills import API, Server

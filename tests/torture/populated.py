@@ -11,19 +11,19 @@ import pysqlite3.dbapi2 as sqlite
 from sqlalchemy import text
 
 from app.config import Settings
-from app.review.datasets.dataset import list_datasets
-from app.review.doctor.database import examine
-from app.review.editing.edit import SetBall
-from app.review.editing.submit import load, submit
-from app.review.verdicts.verdict import set_verdict
-from app.review.versions.freeze import FreezeRequest, freeze
-from app.review.versions.verify import verify
-from app.review.versions.version import list_versions
+from app.db.log import read_log, verify_chain
+from app.db.store import Store
+from app.features.datasets.service import list_datasets
+from app.features.groups.edit import SetBall
+from app.features.groups.submit import load, submit
+from app.features.integrity.database import examine
+from app.features.verdicts.queries import read_verdicts
+from app.features.verdicts.service import set_verdict
+from app.features.versions.freeze import FreezeRequest, freeze
+from app.features.versions.service import list_versions
+from app.features.versions.verify import verify
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import Box
-from app.store.log import read_log, verify_chain
-from app.store.store import Store
-from app.store.verdicts import read_verdicts
 
 BALL = BallAnnotation(box=Box(321.0, 123.0, 12.0, 12.0))
 

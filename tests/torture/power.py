@@ -15,10 +15,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from app.config import Settings
+from app.db.log import verify_chain
+from app.db.store import Store
 from app.errors import NotFoundError, StorageError
-from app.store.log import verify_chain
-from app.store.store import Store
-from app.store.uploads import upload_path
+from app.features.imports.upload_queries import upload_path
 from tests.torture.recording import (
     SHARED_MEMORY,
     Acknowledge,
@@ -31,7 +31,7 @@ from tests.torture.recording import (
 
 SECTOR = 512
 WEAK = """
-import app.store.uploads as uploads
+import app.features.imports.upload_queries as uploads
 uploads.sync = lambda path: None
 """
 """Lets an upload be acknowledged before its name is on the disk."""

@@ -23,13 +23,13 @@ WRITER = """
 import sys
 from pathlib import Path
 from app.config import Settings
-from app.review.editing.edit import SetBall
-from app.review.editing.submit import load, submit
+from app.features.groups.edit import SetBall
+from app.features.groups.submit import load, submit
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import Box
-from app.store.dialect import sqlite
-from app.store.store import Store
-from app.store.uploads import UploadWriter
+from app.db.dialects import sqlite
+from app.db.store import Store
+from app.features.imports.upload_queries import UploadWriter
 
 def acknowledge(upload=""):
     sys.stdout.buffer.write(f"acknowledged {upload}\\n".encode())

@@ -24,14 +24,14 @@ from alembic.operations import Operations
 from sqlalchemy import MetaData, func, select, text
 
 from app.config import Settings
-from app.store.clock import now
-from app.store.engine import WRITE, make_engine
-from app.store.home import make_home
-from app.store.log import Entry, append
-from app.store.migrate import KNOWN_REVISIONS, migrate, migrations_folder, schema_revision
-from app.store.restore import restore
-from app.store.session import Session
-from app.store.stored_json import pack
+from app.db.dialects.dialect import WRITE
+from app.db.engine import make_engine
+from app.db.home import make_home
+from app.db.json_columns import pack
+from app.db.log import Entry, append
+from app.db.migrate import KNOWN_REVISIONS, migrate, migrations_folder, schema_revision
+from app.db.restore import restore
+from app.db.session import Session, now
 from tests.e2e.service import ROOT
 from tests.torture import populated
 

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from functools import cache
 from multiprocessing.context import SpawnProcess
 from pathlib import Path
+from shutil import copytree
 from typing import Any
 
 import pytest
@@ -18,12 +19,42 @@ from sqlalchemy import event
 from typer.main import get_command
 
 from app.cli import main
-from app.store import migrate
-from app.store.store import Store
+from app.db import migrate
+from app.db.store import Store
 from tests.databases import SQLITE, Databases, databases_of, opened_databases
 from tests.kept_worker import USERS, KeptWorker
 from tests.schemas import copied_schemas, make_schema
 from tests.spawning import ANEW
+from tests.unit.applications import api as api
+from tests.unit.applications import app as app
+from tests.unit.applications import client_of as client_of
+from tests.unit.applications import event_loop_of_all as event_loop_of_all
+from tests.unit.applications import group as group
+from tests.unit.applications import only_app as only_app
+from tests.unit.applications import pages_client as pages_client
+from tests.unit.applications import plain_app as plain_app
+from tests.unit.applications import prepared_home as prepared_home
+from tests.unit.applications import static_folder as static_folder
+from tests.unit.applications import static_group as static_group
+from tests.unit.applications import wherever as wherever
+from tests.unit.own_stores import filled as filled
+from tests.unit.own_stores import full_camera as full_camera
+from tests.unit.own_stores import full_group as full_group
+from tests.unit.own_stores import migrated as migrated
+from tests.unit.own_stores import own_store as own_store
+from tests.unit.own_stores import settings as settings
+from tests.unit.stores import empty as empty
+from tests.unit.stores import fill as fill
+from tests.unit.stores import filled_before as filled_before
+from tests.unit.stores import make_group as make_group
+from tests.unit.stores import make_static as make_static
+from tests.unit.stores import once as once
+from tests.unit.stores import only_store as only_store
+from tests.unit.stores import opposite as opposite
+from tests.unit.stores import state as state
+from tests.unit.stores import store as store
+from tests.unit.stores import there as there
+from tests.unit.stores import upgrade_solver as upgrade_solver
 
 # As the server logs. The default draws a traceback with all its variables, half a second each.
 structlog.configure(
@@ -44,37 +75,37 @@ def _no_setting_of_tests() -> None:
 
 ON_BOTH = frozenset(
     {
-        "review/doctor/test_database.py",
-        "review/editing/test_submit.py",
-        "review/verdicts/test_verdict.py",
-        "review/versions/test_check.py",
-        "review/versions/test_freeze.py",
-        "store/test_idempotency.py",
-        "store/test_conditions.py",
-        "store/test_listing.py",
-        "store/test_log.py",
-        "store/test_orphans.py",
-        "store/test_spare.py",
-        "store/test_verdicts.py",
+        "features/integrity/test_database.py",
+        "features/groups/test_submit.py",
+        "features/verdicts/test_service_verdict.py",
+        "features/versions/test_check.py",
+        "features/versions/test_freeze.py",
+        "db/test_stored_responses.py",
+        "features/queue/test_listing_queries_conditions.py",
+        "features/queue/test_listing_queries_listing.py",
+        "db/test_log.py",
+        "features/datasets/test_orphan_queries.py",
+        "features/groups/test_queries.py",
+        "features/verdicts/test_queries_verdicts.py",
     }
 )
 """Files whose tests always run on SQLite and on PostgreSQL: what the engines do differently, what finds
 damage, and one way each of edits, verdicts, versions and answers through the store."""
 WHEN_ALL = ON_BOTH | {
-    "review/test_idempotency.py",
-    "review/datasets/test_delete.py",
-    "review/importing/test_ingest.py",
-    "review/queue/test_listing.py",
-    "review/versions/test_verify.py",
-    "review/work/test_work.py",
-    "store/test_changes.py",
-    "store/test_datasets.py",
-    "store/test_heads.py",
-    "store/test_jobs.py",
-    "store/test_projection.py",
-    "store/test_removal.py",
-    "store/test_solutions.py",
-    "store/test_views.py",
+    "db/test_idempotency.py",
+    "features/datasets/test_service_delete.py",
+    "features/imports/test_ingest.py",
+    "features/queue/test_service_listing.py",
+    "features/versions/test_verify.py",
+    "features/batches/test_work.py",
+    "features/groups/test_revision_queries.py",
+    "features/datasets/test_queries_datasets.py",
+    "features/groups/test_etag_queries.py",
+    "features/jobs/test_queries.py",
+    "features/groups/test_projection_queries.py",
+    "features/datasets/test_queries_removal.py",
+    "features/solutions/test_queries.py",
+    "features/groups/test_view_queries_views.py",
 }
 """Files that do with ``TOUCHLINE_TEST_DATABASES=all``."""
 
@@ -156,9 +187,16 @@ def _usual_umask() -> Iterator[None]:
 
 
 @pytest.fixture
-def home(tmp_path: Path) -> Path:
-    """Where the home of a test is; nothing is there yet."""
-    return tmp_path / "home"
+def home(filled_home: Path | None, tmp_path: Path) -> Path:
+    """The home of a test, its own to change; nothing is there, or what ``filled_home`` holds."""
+    home = tmp_path / "home"
+    return home if filled_home is None else Path(copytree(filled_home, home))
+
+
+@pytest.fixture(scope="module")
+def filled_home() -> Path | None:
+    """The home that each test of a module begins with; None: it begins with nothing."""
+    return None
 
 
 @pytest.fixture

@@ -17,7 +17,7 @@ import yaml
 
 from app.config import Settings, StoreSettings
 from app.object_store.store import read_keys
-from app.review.workers.cluster import read_place
+from app.workers.cluster import read_place
 from tests.team_at_scale import FOLDER, make_secrets, settings_of, together
 
 

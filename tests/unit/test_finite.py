@@ -24,24 +24,23 @@ from hypothesis import strategies as st
 from pydantic import BaseModel
 
 import app
-import app.api.schemas as schemas
-from app.api.schemas.solution import SolutionDocument
-from app.commands.terminal import print_json, print_values
-from app.datasets.export_record import ExportRecord
-from app.datasets.manifest import Manifest, write_manifest
-from app.datasets.parquet import pyarrow_modules
-from app.evaluation.figure import Axis, Figure, Panel, Series
-from app.evaluation.figure_csv import figure_csv
+from app import features
+from app.evaluation.figure import Axis, Figure, Panel, Series, figure_csv
+from app.features.findings.service import GroupFindings
+from app.features.groups.solution_schemas import SolutionDocument
+from app.features.jobs.queries import _text as job_text
+from app.features.solutions.codec import dumps, from_json, to_json
 from app.finite import finite, json_text
+from app.formats.export_formats import FORMATS, WriteOptions, write_format
+from app.formats.export_record import ExportRecord
+from app.formats.manifest import Manifest, write_manifest
+from app.formats.parquet import pyarrow_modules
 from app.geometry.camera import Camera
 from app.log import only_finite
-from app.review.exporting.formats import FORMATS, WriteOptions, write_format
-from app.review.queue.findings import GroupFindings
 from app.soccer.finding import Finding, Fix
 from app.soccer.solution import BestBall, Gate, MarkingFit, Solution, Suspect
-from app.store.jobs import _text as job_text
-from app.store.value_codec import dumps, from_json, to_json
-from tests.unit.datasets.conftest import camera, issia_group, soccer_group, solved  # noqa: F401
+from app.terminal.terminal import print_json, print_values
+from tests.unit.formats.conftest import camera, issia_group, soccer_group, solved  # noqa: F401
 
 BAD = (math.inf, -math.inf, math.nan)
 NOT_A_NUMBER = re.compile(r"(?<![\w'\"])-?(?:Infinity|NaN|inf|nan)(?!\w)")
@@ -50,14 +49,14 @@ WRITERS = {
     "json.dump": {"finite.py"},
     "json.dumps": {
         "finite.py",
-        "store/value_codec.py",  # the database's own text: names of numbers, read back as such
+        "features/solutions/codec.py",  # the database's own text: names of numbers, read back as such
         "soccer/policy.py",  # a hash
         "soccer/paint_evidence.py",  # refuses them: what was read is finite
-        "api/security/bodies.py",  # measures, writes nothing
-        "datasets/json_text.py",  # measures, writes nothing
+        "http/bodies.py",  # measures, writes nothing
+        "formats/json_text.py",  # measures, writes nothing
     },
     "msgspec.json.encode": {"finite.py"},
-    "csv.writer": {"datasets/csv_text.py", "evaluation/figure_csv.py"},
+    "csv.writer": {"formats/csv_text.py", "evaluation/figure.py"},
     "csv.DictWriter": set(),
 }
 """Who may write without ``app.finite``, and why that is sound."""
@@ -190,8 +189,10 @@ def calls_of(path: Path) -> Iterator[str]:
 def models() -> list[type[BaseModel]]:
     """Every document of the REST interface."""
     found: dict[str, type[BaseModel]] = {}
-    for item in pkgutil.iter_modules(schemas.__path__):
-        module = importlib.import_module(f"{schemas.__name__}.{item.name}")
+    for item in pkgutil.walk_packages(features.__path__, f"{features.__name__}."):
+        if not item.name.endswith("schemas"):
+            continue
+        module = importlib.import_module(item.name)
         for name, value in vars(module).items():
             if isinstance(value, type) and issubclass(value, BaseModel) and value is not BaseModel:
                 found[f"{value.__module__}.{name}"] = value

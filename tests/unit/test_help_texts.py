@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from app.review.queue.fields import BY_NAME
+from app.features.queue.fields import BY_NAME
 from app.soccer.policy import STRICT
 from tests.docs.pages import (
     GLOSSARY_PAGE,
@@ -24,55 +24,35 @@ from tests.docs.settings import SETTINGS_PAGE, settings_page
 
 AGAIN = "run: python -m tests.docs"
 PLAIN_WORDS = """
-    lone stadium priors
-    choice give hand handed back lease leases on people work
-    take takes gold guidelines mixing copying copies own errors parts guideline datasets
-    adjudicate compare differences distance limits other panel rater summary weigh workspace
-    comment comments talk threads mentions bells past deeds window before after
-    full tall scroll stalls settling exposure ends many naming tracing local lookup css
-    cluster serving hosts executors packing day browser database
-    stadium priors
-    private kept another smaller index
-    stored tree trees safe path attempt cookie fit
-    categories corner finder ids joins like
-    compiler dialect postgresql sqlite statements transfer triggers
-    attempts lived processes shared sharing short shown web
-    addresses messages sender signing
-    challenges enrol task
-    invitation invitations invite mail maintenance quota
-    joined turns
-    proof provider identities sign
-    access account join links login logins passwords roles team tokens
-    bearer codes devices me remote rules tries users
-    characters null examples property paging endings dismiss dismissals
-    adopt aliases asked concealment needs ownership rights sight
-    actors
-    candidate drawn proposal propose scoring search straight
-    3d accept admission action actions address adjust adjustments advice ahead anchor annotate answers app
-    application archives arrays arrival ask axis backup bar bars batches best binned bodies
-    bundle body boxes bulk button buttons cache calibrate canonical canvas caption card cards cell changes chart
-    chip chooser class cli client clock codec codecs colours command comparison completion
-    conditions config confirm connections contact copy cross csv cursor curve damped delete deps details
-    detect diagram dialog diff doctor document documents drags drawing durable editor empty
-    encoded engine estimator etags evaluate event events exact examination export
-    exports facets facts fan faults fields figure figures files finite first fixes fixture
-    folder folders follow form format formats found frozen gathered gestures glossary grass grid guess guide header
-    headers heads health heat help histograms history hit home hooks idempotency identity if image images
-    import imports in info init insight items jaccard json judged key keys known konva last latest lazy
-    least leftovers legend lens lesson lessons letter licence list listing live locks look loupe
-    kernels profile trace
-    main map markdown marks match matches matrix membership menu merge metrics migrate mini missing
-    model modules name names navigation neighbours notice nudge numbers object
-    observability onnx open openapi opened options order origin orphans output overlap page pages
-    paint palette parquet parse patch pen pins pitch pitches pixel place places plain plural png pointer
-    policies pool popover pose position preopen preview problem process progress projection props query rail reader reasons receiving
-    recompute record remedies removal render report requests resect resource respond restore result
-    revert reviewers rotation router row rows run runs sample save scale scene scene3d scenes score
-    scoreboard sending server service session sets shadows sheet singular site smallest solve
-    solving source sources sphere spill spread squares stacks stage staging standpoints starts
-    state statistics steps storage store stream submit surface swap synloc tab table tally term
-    terminal text textures threshold ticks tools triangulate truth types undo undrawn unknown upload uploads
-    v3 v3d video viewport viewports virtual wal walk warm what when whiskers words worker write writer zip
+    3d accept access account action actions actors address adjudicate adjust adjustments admission adopt advice after
+    ahead anchor annotate another app arrays arrival ask attempt axis back backup bar bars batches before best binned
+    block blocks bodies body boxes browser bulk bundle button buttons cache calibrate candidate canonical canvas
+    caption card cards categories cell changes chart chip choice chooser class cli client cluster codec codecs colours
+    command comment comments compare comparison completion config confirm connections contact copy copying corner
+    counts cross css csv cursor curve damped database datasets day delete deps descriptions details detect devices
+    diagram dialect dialog diff differences dismissals distance document documents drags drawing drawn durable editor
+    empty engine enrol ephemeral errors estimator evaluate event events executors existence export exports facets
+    facts fair faults fields figure figures files finder finite first fit fixture folder folders form format formats
+    frozen gestures give glossary gold grass grid guess guide guideline guidelines hand header headers heat help hide
+    histograms history hit home hooks hosts idempotency identity ids if image images import imports info init insert
+    insight invitation invitations invite items jaccard join joins json kept kernels key keys known konva last latest
+    lazy lease leases least leftovers legend lens lesson lessons letter like limits links list listing live local
+    locks login logins lone look loupe mail main maintenance many map markdown marks match matches matrix me
+    membership mentions menu merge messages metrics migrate mini model name names navigation needs neighbours notice
+    nudge numbers object observability on open openapi opened options order origin other output overlap own ownership
+    packing page pages paint palette panel parameters parquet parse parts past patch path pen people pins pitch
+    pitches pixel place places plain plural png pointer policies pool popover pose position postgresql preopen preview
+    priors private problem process processes profile progress projection proof property proposal propose props
+    provider queries query quota rail rater reader reasons record reimport remote render report requests resect
+    resource respond responses restore result return revert reviewers rights roles rotation router routes row rows
+    rules run runs safe save scale scene scene3d scenes schemas score scoreboard scoring scroll search sender sending
+    serve server service serving session sets shadows shared sharing sheet sign singular site smallest snapshot solve
+    solving source sources sphere spill spread sqlite squares stacks stadium stage staging standpoints starts state
+    statements statistics steps storage store stored straight stream strict submit suggested suggestions summary
+    surface swap synloc tab table take takes tall team term terminal text textures threads threshold ticks tokens
+    tools trace tracing transfer tree trees triangulate tries truth turns types undo undrawn upload v3 v3d video
+    viewport viewports virtual visibility wal walk warm web what when whiskers window words work worker workspace
+    write writer zip
 """
 PLAIN = frozenset(PLAIN_WORDS.split())
 """Words of file names that are plain English, or that every programmer knows; any other has to be

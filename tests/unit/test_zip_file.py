@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from app import zip_file as module
-from app.datasets.report import Report
-from app.datasets.trees import open_tree
+from app.formats.report import Report
+from app.formats.trees import open_tree
 from app.zip_file import count_truncated, first_names
 
 

@@ -19,20 +19,20 @@ import httpx
 import pytest
 
 from app.config import Settings
+from app.db.json_columns import Json
+from app.db.store import Store
 from app.errors import InputError, JobCancelled, NotFoundError, OverloadedError, StorageError
+from app.features.datasets.service import dataset_id
+from app.features.exports.folder import ExportFolder
+from app.features.exports.jobs import export_work
+from app.features.exports.service import export
+from app.features.imports.sources import Source, import_source
+from app.features.jobs import run as job_run
+from app.features.jobs.run import JobProgress
+from app.media.frames import Frames, SentPicture, make_picture
 from app.object_store.path import find_path, target_path
 from app.object_store.store import open_store
-from app.review.datasets.dataset import dataset_id
-from app.review.exporting.export import export
-from app.review.exporting.folder import ExportFolder
-from app.review.importing.sources import Source, import_source
-from app.review.jobs import run as job_run
-from app.review.jobs.exports import export_work
-from app.review.jobs.run import JobProgress
 from app.soccer.media import Media
-from app.store.frames import Frames, SentPicture, make_picture
-from app.store.store import Store
-from app.store.stored_json import Json
 from app.worker_process import WorkerProcess
 from tests.e2e.service import serving
 from tests.moto_server import SIGNED, Door, store_settings, stored_settings
@@ -190,7 +190,7 @@ class Apart:
         self._store, self._folder = store, ExportFolder(store.settings.exports)
         self.processes: set[int] = set()
         # Unit tests that ran in this process may have left workers for the next one.
-        monkeypatch.setattr("app.store.database_worker.WorkerProcess", WorkerProcess)
+        monkeypatch.setattr("app.db.database_worker.WorkerProcess", WorkerProcess)
         self._before = self._children()
         self.killed = False
 

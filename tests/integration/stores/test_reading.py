@@ -14,20 +14,20 @@ from pathlib import Path
 import pytest
 
 from app.config import Settings
-from app.datasets.file_tree import Limits
-from app.datasets.frame_list import read_frame_list
-from app.datasets.report import Report
-from app.datasets.soccernet_v3_reader import read_soccernet_v3
 from app.errors import InputError, NotFoundError, ReviewError, StorageError
+from app.features.imports.folders import list_folder, resolve_folder
+from app.features.integrity.home import examine_stores
+from app.formats.file_tree import Limits
+from app.formats.frame_list import read_frame_list
+from app.formats.report import Report
+from app.formats.soccernet_v3_reader import read_soccernet_v3
+from app.media.files import content_type, read_frame
+from app.media.object_frames import is_kept
 from app.object_store.address import split_address
 from app.object_store.path import find_path
 from app.object_store.store import open_store
-from app.review.doctor.stores import examine_stores
-from app.review.importing.folders import list_folder, resolve_folder
 from app.soccer.group import Group
 from app.soccer.media import Media
-from app.store.media import content_type, read_frame
-from app.store.object_frames import is_kept
 from tests.moto_server import Door, fill_store, store_settings, stored_settings
 
 

@@ -4,8 +4,7 @@ import csv
 import io
 from dataclasses import replace
 
-from app.evaluation.figure import Axis, Figure, Panel, Series
-from app.evaluation.figure_csv import figure_csv, table_csv
+from app.evaluation.figure import Axis, Figure, Panel, Series, figure_csv, table_csv
 from app.evaluation.table import Cell, Column, Row, Table
 
 

@@ -2,10 +2,10 @@ from __future__ import annotations
 
 import pytest
 
-from app.datasets.frame_names import flat_frame, match_frame
-from app.datasets.gamestate import sequence_frame
-from app.datasets.sn_calibration import line_frame
 from app.evaluation.frame_names import FrameNames, NamedFrame
+from app.formats.frame_names import flat_frame, match_frame
+from app.formats.gamestate import sequence_frame
+from app.formats.sn_calibration import line_frame
 from app.soccer.frames import ImageSize
 from app.soccer.group import Group, Station, View
 

@@ -11,7 +11,7 @@ from app.soccer.frames import ImagePoint
 from app.soccer.pitch import twin_marking
 from app.soccer.policy import CalibrationPolicy
 from tests.cameras import SIZE
-from tests.unit.api.conftest import lines_of
+from tests.unit.applications import lines_of
 from tests.unit.paint.lawns import PITCH, TRUE
 
 SEEN = lines_of(TRUE.scaled(4 / 3, 4 / 3))

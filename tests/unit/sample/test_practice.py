@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.datasets.match_frames import ARCHIVE
+from app.formats.match_frames import ARCHIVE
 from app.sample.practice import (
     CLEAN,
     LESSONS,

@@ -9,9 +9,9 @@ import cv2
 import numpy as np
 import pytest
 
-from app.datasets.report import Report
-from app.datasets.soccernet_v3_reader import read_soccernet_v3
 from app.errors import InputError
+from app.formats.report import Report
+from app.formats.soccernet_v3_reader import read_soccernet_v3
 from app.sample.truth import read_truth
 from app.sample.write import write_sample
 from tests.scenes import make_scenes

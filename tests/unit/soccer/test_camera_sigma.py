@@ -9,7 +9,7 @@ import pytest
 from app.geometry.resection import PARAMETERS, camera_from_parameters, parameters_from_camera
 from app.soccer.camera_sigma import camera_sigma
 from app.soccer.solution import Calibration
-from tests.unit.review.conftest import MAIN
+from tests.unit.stores import MAIN
 
 HALF_DIAGONAL = math.hypot(1280, 720) / 2
 SIGMAS = np.array([0.001, 0.002, 0.003, 0.3, 0.4, 0.5, 0.01, 0.004])

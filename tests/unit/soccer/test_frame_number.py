@@ -2,8 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from app.soccer.frame_number import counts_time, numbered
-from app.soccer.media import Media
+from app.soccer.media import Media, counts_time, numbered
 
 
 class TestCountsTime:

@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import pytest
 
+from app.features.solutions.summary import summarize
 from app.soccer.policy import PAPER
 from app.solving.solve import solve
-from app.store.summary import summarize
 from tests.unit.solving.conftest import BEHIND_GOAL, MAIN, OPPOSITE, group, view
 
 BALL = (38.0, 2.0, -1.4)

@@ -14,10 +14,10 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from app.datasets.export_record import ExportRecord, frame_name
-from app.datasets.manifest import Manifest, write_manifest
-from app.datasets.output import output_tree, write_zip
-from app.datasets.parquet_writer import write_parquet
+from app.formats.export_record import ExportRecord, frame_name
+from app.formats.manifest import Manifest, write_manifest
+from app.formats.output import output_tree, write_zip
+from app.formats.parquet_writer import write_parquet
 from app.soccer.policy import PAPER
 from app.solving.solve import solve
 from tests.scenes import make_scenes

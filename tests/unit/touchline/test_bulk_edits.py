@@ -7,9 +7,9 @@ from typing import Any
 
 import pytest
 
-from app.api.security import bodies
-from app.review.editing import bulk_edits as server
-from app.review.editing.point_limits import REQUEST_POINTS
+from app.features.groups import bulk_edits as server
+from app.features.groups.edit_codec import REQUEST_POINTS
+from app.http import bodies
 from touchline import bulk_edits
 from touchline.bulk_edits import requests_of
 from touchline.client import Client

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.datasets.camera_json import camera_from_json, camera_to_json
+from app.formats.camera_json import camera_from_json, camera_to_json
 from app.geometry.camera import Camera as ServerCamera
 from app.geometry.lens import ARCTAN_POLYNOMIAL, FISHEYE, LENSES
 from tests.cameras import CENTER, EVERY_COEFFICIENT, looking, wide

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import touchline
-from app.datasets.export_record import ExportRecord
+from app.formats.export_record import ExportRecord
 from tests.unit.touchline.conftest import zipped
 from touchline.errors import DataError, MissingPackageError
 

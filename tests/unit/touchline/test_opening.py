@@ -15,8 +15,8 @@ from PIL import Image
 from PIL.PngImagePlugin import PngInfo
 
 import touchline
-from app.datasets.export_record import ExportRecord
-from app.store.image_header import read_header
+from app.formats.export_record import ExportRecord
+from app.media.images import read_header
 from tests.unit.touchline.conftest import HASH, write_export, zipped
 from touchline.errors import DataError, HashError
 from touchline.frames import FileFrames

@@ -1,0 +1,199 @@
+"""The command line with all its commands: the place where everything is put together.
+
+A command (``app.features.<resource>.commands``) parses, calls one function of a floor below, prints a table or JSON
+and returns an exit code: 0 done, 1 it could not be done, 2 it was asked for in a wrong way.
+Progress and complaints go to stderr. Heavy modules are imported inside the commands, so that
+``--help`` is quick.
+"""
+
+from __future__ import annotations
+
+import gc
+import sys
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from app import serve as service
+from app.errors import NotFoundError, ReviewError
+from app.features.batches import commands as batches
+from app.features.datasets import commands as datasets
+from app.features.exports import commands as files
+from app.features.file_tools import commands as lines
+from app.features.integrity import commands as backup
+from app.features.integrity import commands as doctor
+from app.features.maintenance import commands as maintenance
+from app.features.match_estimates import commands as picture
+from app.features.match_estimates import commands as pitch
+from app.features.match_estimates import commands as positions
+from app.features.match_estimates import noise_commands as noise
+from app.features.match_estimates import noise_commands as rig
+from app.features.paint import commands as paint
+from app.features.paint import commands as propose
+from app.features.people import commands as users
+from app.features.policies import commands as policy
+from app.features.practice import commands as sample
+from app.features.predictions import commands as predictions
+from app.features.predictions import evaluation_commands as evaluation
+from app.features.solve import commands as solving
+from app.features.verdicts import commands as verdicts
+from app.features.versions import commands as versions
+from app.finite import quoted
+from app.terminal.options import act_as
+from app.terminal.server import work_at
+from app.terminal.terminal import complain, harmless, spell_out
+from app.workers import commands as cluster
+
+READER_GONE = 141
+"""Exit code of a command whose reader has gone, as shells have it."""
+YOUNG = 50_000
+"""New objects before the collector looks at them: what libraries bring is there to stay, and to walk
+through it again and again is a sixth of a start."""
+
+SHOWN = 200
+"""Letters of a name in a complaint that it is too long, or no text."""
+
+
+class _Commands(typer.core.TyperGroup):
+    """Commands whose complaints about what was typed do not steer a terminal with it."""
+
+    def invoke(self, ctx: Any) -> Any:
+        try:
+            return super().invoke(ctx)
+        except typer.BadParameter as error:
+            # What its parser of choices raised, without the words that tell it from other errors.
+            error.message = harmless(error.message.removeprefix("Value error, "))
+            raise
+
+
+app = typer.Typer(
+    name="touchline",
+    cls=_Commands,
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+PARTS = (
+    service,
+    sample,
+    files,
+    solving,
+    rig,
+    verdicts,
+    lines,
+    propose,
+    noise,
+    paint,
+    pitch,
+    positions,
+    picture,
+    versions,
+    evaluation,
+    predictions,
+    doctor,
+    maintenance,
+    backup,
+    cluster,
+)
+for part in PARTS:
+    app.add_typer(part.commands)
+app.add_typer(datasets.commands, name="datasets")
+app.add_typer(batches.commands, name="batch")
+app.add_typer(policy.commands, name="policy")
+app.add_typer(users.commands, name="users")
+
+
+def _tell_version(asked: bool) -> None:
+    if asked:
+        from app.formats.manifest import SOFTWARE, software_version
+
+        typer.echo(f"{SOFTWARE} {software_version()}")
+        raise typer.Exit
+
+
+@app.callback()
+def options(
+    context: typer.Context,
+    actor: Annotated[
+        str | None,
+        typer.Option(
+            envvar="TOUCHLINE_ACTOR",
+            metavar="NAME",
+            help="What this script calls itself; history and verdicts name it as script:NAME.",
+        ),
+    ] = None,
+    server: Annotated[
+        str | None,
+        typer.Option(
+            envvar="TOUCHLINE_SERVER",
+            metavar="URL",
+            help="Work against this server instead of a home on this machine, where a command can.",
+        ),
+    ] = None,
+    token_file: Annotated[
+        Path | None,
+        typer.Option(
+            envvar="TOUCHLINE_TOKEN_FILE",
+            help="File with a token of a team's server, that you alone can read.",
+        ),
+    ] = None,
+    version: Annotated[
+        bool,
+        typer.Option(
+            "--version", help="Tell the version and end.", callback=_tell_version, is_eager=True
+        ),
+    ] = False,
+) -> None:
+    """Turn multi-view soccer frames into a trusted 3D ball dataset."""
+    act_as(actor)
+    work_at(server, token_file, context.invoked_subcommand)
+    if server is not None and token_file is not None and actor is not None:
+        raise typer.BadParameter(
+            "the log names the person of the token; leave it out", param_hint="--actor"
+        )
+
+
+def run() -> None:
+    """Carry out a command line: what a caller can cause is one sentence on stderr and exit code 1."""
+    spell_out()
+    gc.set_threshold(YOUNG)
+    try:
+        app()
+    except SystemExit as end:
+        # Whoever reads, such as head, has seen enough.
+        if isinstance(end.__context__, BrokenPipeError):
+            sys.exit(READER_GONE)
+        raise
+    except ReviewError as error:
+        near = error.nearest() if isinstance(error, NotFoundError) else None
+        complain(error.message, error.hint or near)
+        sys.exit(1)
+    except OSError as error:
+        if error.filename is None:
+            raise
+        name = quoted(str(error.filename), SHOWN)
+        if isinstance(error, PermissionError):
+            complain(
+                f"this user may not look at {name}",
+                "Open it to them (chmod, chown), or give the command as somebody else.",
+            )
+        else:
+            complain(f"{name} cannot be used: {error.strerror}")
+        sys.exit(1)
+    except UnicodeEncodeError as error:
+        # What stands for bytes of the command line that are no UTF-8.
+        if "surrogates" not in error.reason:
+            raise
+        complain(f"{quoted(error.object, SHOWN)} has letters that are no text in UTF-8")
+        sys.exit(1)
+    except RuntimeError as error:
+        # numba's words when it finds no folder to write to; it has no class of its own for them.
+        if "cannot cache function" not in str(error):
+            raise
+        complain(
+            "this user can write neither to the installation nor to a cache of its own, where the"
+            " compiled solver is kept",
+            "Point NUMBA_CACHE_DIR at a folder that this user alone can write.",
+        )
+        sys.exit(1)

@@ -1,0 +1,368 @@
+"""Backups: a home in one zip, with a manifest that tells every byte, taken beside a running server.
+
+``touchline.db`` is the database as one transaction saw it, ``manifest.json`` says what it holds;
+files of the home lie under their own names. Any zip program unpacks it.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import hashlib
+import json
+import os
+import shutil
+import zipfile
+import zlib
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import closing, contextmanager, suppress
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import IO, Any
+
+import pysqlite3.dbapi2
+from sqlalchemy import inspect, text
+
+from app.config import Settings
+from app.db.dialects.dialect import dialect_in, dialect_of
+from app.db.engine import make_engine, reported
+from app.db.home import refused
+from app.db.leftovers import is_half_written
+from app.db.locks import DatabaseLock
+from app.db.log import verify_chain
+from app.db.recovery.anchor import Anchor, anchor_of, require_own_database
+from app.db.recovery.preopen_check import require_sound, signs_of_use
+from app.db.session import Session, now
+from app.durable import PARTIAL, sync
+from app.errors import EXAMINE, DamagedError, InputError, StorageError
+from app.finite import json_text
+
+FORMAT, FORMAT_VERSION = "touchline-backup", 1
+DATABASE, MANIFEST = "touchline.db", "manifest.json"
+FRAMES = ("uploads", "sample", "practice")
+"""Folders of a home that hold frames, and the files that were imported from."""
+EXPORTS = ("exports",)
+_CHUNK = 1 << 20
+_QUICK = 1
+_COUNTED = ("dataset", "groups", "view", "station", "verdict", "version", "solution", "log")
+"""Tables whose rows a backup counts."""
+
+
+@dataclass(frozen=True)
+class BackupManifest:
+    """What a backup holds.
+
+    Attributes:
+        made: When.
+        home: Where the home was, which frames are read from.
+        schema: Revision of the database's schema.
+        installation: Id of the installation, empty where it had none yet.
+        entries: Length of the log; ``hash`` is that of its last entry.
+        rows: Rows by table.
+        frames_elsewhere: How many files hold frames that are not in it.
+        files: Bytes and SHA-256 by name.
+        format: What kind of file this is.
+        version: Of the format.
+    """
+
+    made: str
+    home: str
+    schema: str
+    installation: str
+    entries: int
+    hash: str
+    rows: dict[str, int]
+    frames_elsewhere: int
+    files: dict[str, dict[str, int | str]]
+    format: str = FORMAT
+    version: int = FORMAT_VERSION
+
+
+def back_up(settings: Settings, out: Path, folders: Sequence[str] = ()) -> BackupManifest:
+    """``write_backup`` of a home whose files belong together, beside whoever works in it.
+
+    Raises:
+        InputError: The home has no database, or it is a server's.
+    """
+    require_file(settings, "backed up", "pg_dump --format=custom --file=OUT DATABASE")
+    if not settings.database_file.exists() and not signs_of_use(settings):
+        raise InputError(f"there is no database in {settings.home}", hint="Set TOUCHLINE_HOME.")
+    lock = DatabaseLock(settings)
+    try:
+        if lock.alone:
+            require_sound(settings)
+        lock.share()
+        return write_backup(settings, out, folders)
+    finally:
+        lock.release()
+
+
+def require_file(settings: Settings, done: str, command: str) -> None:
+    """Raise InputError where the database is a server's, whose own programs copy it."""
+    if not dialect_of(settings).is_file:
+        raise InputError(
+            f"{settings.database_name} is {done} by the programs of its server",
+            hint=f"Run {command}; the files of the home (uploads, exports) are copied as files.",
+        )
+
+
+def write_backup(
+    settings: Settings, out: Path, folders: Sequence[str] = (), *, replace: bool = False
+) -> BackupManifest:
+    """Write a backup and read it once more; it is at its place when it is good, or not at all.
+
+    The caller holds a lock of the database, and has looked at its files.
+
+    Args:
+        settings: Which home.
+        out: The zip.
+        folders: Folders of the home that go with it (``FRAMES``, ``EXPORTS``).
+        replace: Whether a file of that name may be replaced.
+
+    Raises:
+        InputError: There is such a file already, or no such folder.
+        DamagedError: The database is damaged; nothing is written.
+        StorageError: The disk is full, or somebody writes the same backup.
+    """
+    _require_place(out, replace)
+    try:
+        with _workshop(out) as folder:
+            copy, partial = folder / DATABASE, folder / "backup.zip"
+            _copy_database(settings, copy)
+            manifest = _write_zip(settings, copy, partial, folders)
+            verify_backup(partial)
+            _require_place(out, replace)
+            partial.replace(out)
+            sync(out.parent)
+    except OSError as error:
+        hint = f"Make {out.parent} writable for this user, or name another folder."
+        raise refused(Path(error.filename or out), error, hint) from error
+    return manifest
+
+
+def read_manifest(backup: zipfile.ZipFile) -> BackupManifest:
+    """What a backup says that it holds.
+
+    Raises:
+        InputError: It is no backup, or one of a newer version.
+    """
+    try:
+        values = json.loads(backup.read(MANIFEST))
+        if values["format"] != FORMAT:
+            raise ValueError(values["format"])
+        if values["version"] != FORMAT_VERSION:
+            raise InputError("the backup was made by a newer version of Touchline")
+        return BackupManifest(**values)
+    except (KeyError, ValueError, TypeError) as error:
+        raise InputError(
+            f"{backup.filename} is no backup of Touchline: its manifest.json is missing or unknown"
+        ) from error
+
+
+def verify_backup(path: Path) -> BackupManifest:
+    """Read every byte of a backup and compare it with its manifest.
+
+    Raises:
+        InputError: It is no backup, or not what was written.
+    """
+    try:
+        with zipfile.ZipFile(path) as backup:
+            manifest = read_manifest(backup)
+            names = [info.filename for info in backup.infolist() if info.filename != MANIFEST]
+            if sorted(names) != sorted(manifest.files):
+                raise InputError(f"{path} does not hold the files that its manifest names")
+            for name in names:
+                with backup.open(name) as member:
+                    if _digest(iter(lambda: member.read(_CHUNK), b"")) != manifest.files[name]:
+                        raise InputError(f"{path}, {name}: not what was written")
+    except (zipfile.BadZipFile, EOFError, OSError, zlib.error) as error:
+        raise InputError(
+            f"{path} is damaged or no backup of Touchline ({error})", hint="Take another one."
+        ) from error
+    return manifest
+
+
+def examine_database(
+    settings: Settings, file: Path, known_as: Path
+) -> tuple[Anchor, dict[str, int]]:
+    """Look at every page of a database that nobody else has open, and at the log's hash chain.
+
+    Args:
+        settings: Any.
+        file: The database.
+        known_as: What complaints call it.
+
+    Returns:
+        What its anchor is, and its rows by table.
+
+    Raises:
+        DamagedError: Something is not as it was written.
+    """
+    own = settings.model_copy(update={"database_url": f"sqlite+pysqlite:///{file}"})
+    engine = make_engine(own)
+    try:
+        with reported(own), Session(engine) as session:
+            dialect, tables = dialect_in(session), set(inspect(session).get_table_names())
+            if "alembic_version" not in tables or "log" not in tables:
+                raise DamagedError(f"{known_as} is no database of Touchline", hint=EXAMINE)
+            if faults := dialect.file_faults(session, 3, thorough=True):
+                raise DamagedError(f"{known_as} is damaged: {'; '.join(faults)}", hint=EXAMINE)
+            if dialect.count_lost_references(session):
+                problem = f"{known_as} has rows that refer to rows that are gone"
+                raise DamagedError(problem, hint=EXAMINE)
+            verify_chain(session)
+            counts = {
+                name: session.execute(text(f"SELECT count(*) FROM {name}")).scalar_one()
+                for name in _COUNTED
+                if name in tables
+            }
+            return anchor_of(session) or _without_installation(session), counts
+    finally:
+        engine.dispose()
+
+
+def _without_installation(session: Session) -> Anchor:
+    schema = session.execute(text("SELECT version_num FROM alembic_version")).scalar_one()
+    last = session.execute(text("SELECT id, hash FROM log ORDER BY id DESC LIMIT 1")).first()
+    return Anchor("", "", schema, *(tuple(last) if last else (0, "")))
+
+
+def _require_place(out: Path, replace: bool) -> None:
+    if out.exists() and not replace:
+        raise InputError(f"{out} is there already", hint="Name a file that does not exist yet.")
+    if not out.parent.is_dir():
+        raise InputError(f"there is no folder {out.parent}")
+
+
+@contextmanager
+def _workshop(out: Path) -> Iterator[Path]:
+    """A folder beside the backup, gone at the end; what a killed run left in it goes first."""
+    folder = out.with_name(f".{out.name}{PARTIAL}")
+    folder.mkdir(mode=0o700, exist_ok=True)
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError as error:
+        os.close(handle)
+        raise StorageError(f"another process is writing {out}") from error
+    try:
+        for path in folder.iterdir():
+            path.unlink()
+        yield folder
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+        os.close(handle)
+
+
+def _copy_database(settings: Settings, copy: Path) -> None:
+    """The database as it is at one moment, in a file of its own that needs no log beside it."""
+    os.close(os.open(copy, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600))
+    engine = make_engine(settings)
+    try:
+        with reported(settings):
+            require_own_database(engine, settings)
+        with (
+            reported(settings),
+            engine.connect() as connection,
+            closing(pysqlite3.dbapi2.connect(str(copy))) as target,
+        ):
+            # All pages at once: writers go on meanwhile, and none of their changes is in it.
+            driver: Any = connection.connection.dbapi_connection
+            driver.backup(target)
+    except pysqlite3.dbapi2.Error as error:
+        raise StorageError(
+            f"the database cannot be copied: {error}", hint="Is there room on the disk? " + EXAMINE
+        ) from error
+    finally:
+        engine.dispose()
+
+
+def _write_zip(
+    settings: Settings, copy: Path, partial: Path, folders: Sequence[str]
+) -> BackupManifest:
+    anchor, rows = examine_database(settings, copy, settings.database_file)
+    with closing(pysqlite3.dbapi2.connect(str(copy))) as connection:
+        connection.execute("PRAGMA journal_mode=DELETE")
+        elsewhere = _frames_elsewhere(connection, [settings.home / name for name in folders])
+    files: dict[str, dict[str, int | str]] = {}
+    handle = os.open(partial, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o600)
+    with os.fdopen(handle, "w+b") as file:
+        with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED, compresslevel=_QUICK) as backup:
+            files[DATABASE] = _add(backup, DATABASE, copy, zipfile.ZIP_DEFLATED)
+            for path in _files(settings.home, folders):
+                name = path.relative_to(settings.home).as_posix()
+                # Uploads expire, and exports are deleted, meanwhile.
+                with suppress(FileNotFoundError):
+                    files[name] = _add(backup, name, path, zipfile.ZIP_STORED)
+            manifest = BackupManifest(
+                made=now(),
+                home=str(settings.home.resolve()),
+                schema=anchor.schema,
+                installation=anchor.installation,
+                entries=anchor.entries,
+                hash=anchor.hash,
+                rows=rows,
+                frames_elsewhere=elsewhere,
+                files=files,
+            )
+            backup.writestr(MANIFEST, json_text(asdict(manifest), indent=1))
+        file.flush()
+        os.fsync(file.fileno())
+    return manifest
+
+
+def _frames_elsewhere(connection: Any, folders: Sequence[Path]) -> int:
+    statement = "SELECT DISTINCT media_path FROM view WHERE media_path IS NOT NULL"
+    paths = [Path(path) for (path,) in connection.execute(statement)]
+    return sum(not any(path.is_relative_to(folder) for folder in folders) for path in paths)
+
+
+def _files(home: Path, folders: Sequence[str]) -> Iterator[Path]:
+    """Files of folders, in order; half-written ones are nobody's yet."""
+    for name in folders:
+        walk = os.walk(home / name)
+        for path in sorted(Path(folder, file) for folder, _, files in walk for file in files):
+            if not is_half_written(path, home) and path.is_file() and not path.is_symlink():
+                yield path
+
+
+def _add(backup: zipfile.ZipFile, name: str, path: Path, packed: int) -> dict[str, int | str]:
+    """Put a file into a backup; FileNotFoundError, and nothing is in it, where there is none."""
+    with _reading(path):
+        info = zipfile.ZipInfo.from_file(path, name)
+        source = path.open("rb")
+    info.compress_type = packed
+    with source, backup.open(info, "w", force_zip64=True) as target:
+        return _digest(_chunks(source, path), target)
+
+
+def _chunks(source: IO[bytes], path: Path) -> Iterator[bytes]:
+    while True:
+        with _reading(path):
+            chunk = source.read(_CHUNK)
+        if not chunk:
+            return
+        yield chunk
+
+
+@contextmanager
+def _reading(path: Path) -> Iterator[None]:
+    try:
+        yield
+    except FileNotFoundError:
+        raise
+    except OSError as error:
+        raise StorageError(
+            f"{path} cannot be read: {error.strerror or error}",
+            hint="Make the file readable for this user, or look after the disk; no backup was"
+            " written.",
+        ) from error
+
+
+def _digest(chunks: Iterable[bytes], target: IO[bytes] | None = None) -> dict[str, int | str]:
+    digest, size = hashlib.sha256(), 0
+    for chunk in chunks:
+        digest.update(chunk)
+        size += len(chunk)
+        if target is not None:
+            target.write(chunk)
+    return {"bytes": size, "sha256": digest.hexdigest()}

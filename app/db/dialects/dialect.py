@@ -1,0 +1,230 @@
+"""What the product asks of a database engine that SQLite and PostgreSQL do differently.
+
+What processes with one database tell each other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager
+from enum import Enum
+from importlib import import_module
+from typing import Protocol, cast
+
+from sqlalchemy import Connection, Engine, Table
+from sqlalchemy.exc import DBAPIError
+
+from app.config import Settings
+from app.db.session import Session
+from app.errors import InputError
+
+Hearer = Callable[[str], None]
+AGAIN = ""
+"""The word that stands for all that may have been said while nobody could listen."""
+
+
+class Sharing(Protocol):
+    """What a process knows of the others.
+
+    Attributes:
+        is_shared: Whether other processes may serve the same database.
+    """
+
+    is_shared: bool
+
+    def take(self, name: str) -> bool:
+        """Claim something; False where another process, or this one, has it. Waits for nobody.
+
+        Raises:
+            StorageError: The database cannot be asked.
+        """
+
+    def holds(self, name: str) -> bool:
+        """Whether a claim of this process still stands."""
+
+    def give_back(self, name: str) -> None:
+        """End a claim; one that is lost already is none."""
+
+    def tell(self, session: Session, word: str) -> None:
+        """Say a word to the others once a transaction is kept."""
+
+    def hear(self, hearer: Hearer) -> None:
+        """Call a function with what others say, once ``listen`` was called; it must be quick."""
+
+    def listen(self) -> None:
+        """Begin to listen, on a thread of its own."""
+
+    def close(self) -> None:
+        """End all claims, and stop listening."""
+
+
+class Alone:
+    """The one server of a database: everything is its own, and nobody listens."""
+
+    is_shared = False
+
+    def take(self, name: str) -> bool:
+        """See ``Sharing``."""
+        return True
+
+    def holds(self, name: str) -> bool:
+        """See ``Sharing``."""
+        return True
+
+    def give_back(self, name: str) -> None:
+        """See ``Sharing``."""
+
+    def tell(self, session: Session, word: str) -> None:
+        """See ``Sharing``."""
+
+    def hear(self, hearer: Hearer) -> None:
+        """See ``Sharing``."""
+
+    def listen(self) -> None:
+        """See ``Sharing``."""
+
+    def close(self) -> None:
+        """See ``Sharing``."""
+
+
+WRITE = {"touchline_write": True}
+"""Options of an engine whose transactions take the write lock at their start."""
+GLANCE = {"touchline_glance": True}
+"""Options of an engine that begins no transactions: each statement is one."""
+
+
+def unkeepable_text() -> InputError:
+    """What is said of a text that one of the databases cannot keep; both refuse it."""
+    return InputError(
+        "a text holds a character that the database cannot keep, such as U+0000",
+        hint="Leave it out.",
+    )
+
+
+class Failure(Enum):
+    """Why a database did not do what it was asked."""
+
+    FULL = "full"
+    BUSY = "busy"
+    DAMAGED = "damaged"
+    UNREADABLE = "unreadable"
+    DISK = "disk"
+    AWAY = "away"
+    TEXT = "text"
+    OTHER = "other"
+
+
+class Dialect(Protocol):
+    """What each engine of databases does in its own way.
+
+    Attributes:
+        name: What people call it.
+        no_fault: What is said of a database without a fault.
+        restoring: How a copy is put into the place of a database, as a sentence.
+        is_file: Whether the database is a file, which is looked at before it is opened and copied
+            as a whole, and lies in the home.
+    """
+
+    name: str
+    no_fault: str
+    restoring: str
+    is_file: bool
+
+    def make_engine(self, settings: Settings, *, lasting: bool = True) -> Engine:
+        """An engine whose connections keep our promises and begin transactions as told.
+
+        Args:
+            settings: Where the database is.
+            lasting: False: what its transactions write may be lost in a power cut, as a whole.
+
+        Raises:
+            InputError: The URL is none, or the driver is not installed.
+            StorageError: The library is too old.
+        """
+
+    def reading(self, engine: Engine) -> Engine:
+        """The same engine for transactions that see one snapshot and keep nothing."""
+
+    def glancing(self, engine: Engine) -> Engine:
+        """The same engine without transactions: each statement is one, and sees one snapshot."""
+
+    def peeking(self, settings: Settings) -> Engine | None:
+        """An engine without transactions whose one connection never waits; None where each statement
+        has to, because the database is reached over a network."""
+
+    def sharing(
+        self, engine: Engine, reported: Callable[[], AbstractContextManager[None]]
+    ) -> Sharing:
+        """What processes with this database say to each other; ``reported`` names what fails."""
+
+    def require_promises(self, engine: Engine) -> None:
+        """Raise StorageError where the database does not keep what we promise."""
+
+    def failure(self, error: DBAPIError) -> tuple[Failure, str]:
+        """Why a statement failed, and the engine's name for it."""
+
+    def interrupted(
+        self, session: Session, ends: Callable[[], bool]
+    ) -> AbstractContextManager[None]:
+        """End what the database is at, and what is done here, once a function says so."""
+
+    def migrating(self, connection: Connection, *, new: bool) -> AbstractContextManager[None]:
+        """Run migrations; ``new``: of a database that is empty."""
+
+    def settle(self, connection: Connection, tables: Sequence[Table], key: str) -> None:
+        """Count ids on from rows that were copied, and belong to the installation of a key."""
+
+    def file_faults(self, session: Session, most: int = 5, *, thorough: bool = False) -> list[str]:
+        """What is wrong with pages and indexes of the file, each a line; a server looks after its own.
+
+        Args:
+            session: Any.
+            most: Lines; SQLite may fail altogether where it goes on after the first.
+            thorough: Compare each index with its table, too, which takes several times as long.
+        """
+
+    def count_lost_references(self, session: Session) -> int:
+        """How many rows refer to rows that are gone."""
+
+
+_MODULES = {"sqlite": "sqlite", "postgresql": "postgresql", "postgres": "postgresql"}
+
+
+def dialect_of(settings: Settings) -> Dialect:
+    """How the database of a home is spoken to.
+
+    Raises:
+        InputError: The URL is neither one of SQLite nor of PostgreSQL.
+    """
+    kind = settings.database.partition(":")[0].partition("+")[0]
+    if kind not in _MODULES:
+        raise InputError(
+            "only SQLite and PostgreSQL databases are supported",
+            hint="Set TOUCHLINE_DATABASE_URL to postgresql://USER:PASSWORD@HOST/DATABASE, or leave"
+            " it unset.",
+        )
+    return _named(_MODULES[kind])
+
+
+def dialect_in(session: Session) -> Dialect:
+    """How the database of a session is spoken to."""
+    return _named(session.dialect.name)
+
+
+def _named(name: str) -> Dialect:
+    # Only the one that is used is imported: a driver takes its time.
+    return cast(Dialect, import_module(f"app.db.dialects.{name}").DIALECT)
+
+
+def require_processes(settings: Settings, count: int) -> None:
+    """Refuse several processes where the database is a file of one.
+
+    Raises:
+        InputError: It is.
+    """
+    if count > 1 and dialect_of(settings).is_file:
+        raise InputError(
+            "several processes can serve a database on PostgreSQL alone, and this one is a file",
+            hint="Leave out --workers (TOUCHLINE_WEB_WORKERS), or set TOUCHLINE_DATABASE_URL:"
+            " docs/operations.md.",
+        )

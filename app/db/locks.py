@@ -1,0 +1,153 @@
+"""Locks of a home: one server, and who has the database open. They end with their process."""
+
+from __future__ import annotations
+
+import fcntl
+import os
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from app.config import Settings
+from app.db.home import DATABASE_LOCK, OPENING_LOCK, PRACTICE_LOCK, SERVER_LOCK, make_home, refused
+from app.errors import BusyError, StorageError
+
+AGAIN_S = 0.005
+"""Between two looks whether a lock is free."""
+TOLD_S = 0.1
+"""Between two words that somebody still waits."""
+OPENING_SECONDS = 60.0
+"""So long who opens the database waits for another process that does, and may be migrating it."""
+
+
+def lock_within(handle: int, seconds: float) -> bool:
+    """Take the lock of an open file or folder; False where others had it all the while."""
+    until = time.monotonic() + seconds
+    while True:
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            return True
+        except BlockingIOError:
+            if time.monotonic() >= until:
+                return False
+            time.sleep(AGAIN_S)
+
+
+def require_lock(handle: int, held: str, seconds: float) -> None:
+    """Take the lock of an open file or folder; ``held`` says what whoever has it has been doing.
+
+    Raises:
+        BusyError: It was not free in time.
+    """
+    if not lock_within(handle, seconds):
+        raise BusyError(
+            f"another Touchline process {held} for {seconds:.0f} seconds",
+            hint="Wait until it is done. One that was stopped (Ctrl-Z) goes on with fg.",
+        )
+
+
+class DatabaseLock:
+    """Says that a process has the database open.
+
+    ``database.lock`` is shared by all who have. Who opens it holds ``opening.lock`` meanwhile:
+    a lock that is changed from exclusive to shared is nobody's for a moment.
+
+    Attributes:
+        alone: Whether nobody else has; others wait until ``share`` before they open it.
+
+    Raises:
+        BusyError: Another process has been opening it for too long.
+    """
+
+    def __init__(self, settings: Settings):
+        home = make_home(settings)
+        self._handle, self._opening = _open(home / DATABASE_LOCK), _open(home / OPENING_LOCK)
+        try:
+            require_lock(self._opening, "has been opening the database", OPENING_SECONDS)
+        except BusyError:
+            self.release()
+            raise
+        self.alone = lock_within(self._handle, 0.0)
+        if not self.alone:
+            self.share()
+
+    def share(self) -> None:
+        """Let others open it, too."""
+        fcntl.flock(self._handle, fcntl.LOCK_SH)
+        self.alone = False
+        self._opening = _closed(self._opening)
+
+    def release(self) -> None:
+        """It is closed."""
+        self._handle, self._opening = _closed(self._handle), _closed(self._opening)
+
+
+@contextmanager
+def database_alone(settings: Settings, why: str) -> Iterator[None]:
+    """Hold the database while its file is replaced or its schema changed.
+
+    Raises:
+        StorageError: Somebody has it open; ``why`` says what cannot be done meanwhile.
+    """
+    lock = DatabaseLock(settings)
+    try:
+        if not lock.alone:
+            raise StorageError(
+                f"another Touchline command has the database open: {why}",
+                hint="Wait until it is done, or stop it; then run this command again.",
+            )
+        yield
+    finally:
+        lock.release()
+
+
+@contextmanager
+def server_lock(settings: Settings, *, shared: bool = False) -> Iterator[None]:
+    """Hold the home for one server, or ``shared`` for several; the file tells a process id.
+
+    Raises:
+        StorageError: Another server holds it.
+    """
+    handle = _open(make_home(settings) / SERVER_LOCK)
+    try:
+        try:
+            kind = fcntl.LOCK_SH if shared else fcntl.LOCK_EX
+            fcntl.flock(handle, kind | fcntl.LOCK_NB)
+        except BlockingIOError as error:
+            holder = os.pread(handle, 32, 0).decode(errors="replace").strip()
+            process = f" (process {holder})" if holder.isdigit() else ""
+            raise StorageError(
+                f"another Touchline server already uses this home folder{process}",
+                hint="Stop it, or set TOUCHLINE_HOME to another folder.",
+            ) from error
+        os.ftruncate(handle, 0)
+        os.pwrite(handle, f"{os.getpid()}\n".encode(), 0)
+        yield
+    finally:
+        os.close(handle)
+
+
+@contextmanager
+def practice_lock(settings: Settings, waiting: Callable[[], None]) -> Iterator[None]:
+    """Hold the practice groups while they are made; ``waiting`` is called while others make them."""
+    handle = _open(make_home(settings) / PRACTICE_LOCK)
+    try:
+        while not lock_within(handle, TOLD_S):
+            waiting()
+        yield
+    finally:
+        os.close(handle)
+
+
+def _closed(handle: int) -> int:
+    if handle >= 0:
+        os.close(handle)
+    return -1
+
+
+def _open(path: Path) -> int:
+    try:
+        return os.open(path, os.O_RDWR | os.O_CREAT, 0o600)
+    except OSError as error:
+        raise refused(path, error) from error

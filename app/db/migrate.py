@@ -1,0 +1,201 @@
+"""Migrations: bring the database to this version's schema, wholly or not at all."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from sqlalchemy import Connection, Engine, inspect, text
+
+from app.config import Settings
+from app.db.backup import write_backup
+from app.db.dialects.dialect import WRITE, Dialect, dialect_of
+from app.db.engine import make_engine, reported
+from app.db.home import make_file
+from app.db.locks import DatabaseLock
+from app.db.recovery.anchor import renew_anchor, require_own_database
+from app.db.recovery.preopen_check import require_sound
+from app.errors import StorageError
+from app.folders import own_folder
+
+KNOWN_REVISIONS = (
+    "0001",
+    "0002",
+    "0003",
+    "0004",
+    "0005",
+    "0006",
+    "0007",
+    "0008",
+    "0009",
+    "0010",
+    "0011",
+    "0013",
+    "0014",
+    "0015",
+    "0016",
+    "0017",
+    "0018",
+    "0019",
+    "0020",
+    "0021",
+    "0022",
+    "0023",
+    "0024",
+    "0025",
+    "0026",
+    "0027",
+    "0028",
+    "0029",
+    "0030",
+    "0031",
+    "0032",
+    "0033",
+    "0034",
+    "0035",
+)
+"""Every revision that this version can migrate, oldest first."""
+SCHEMA_REVISION = KNOWN_REVISIONS[-1]
+"""The revision that this version works with."""
+COPY = "before-schema-{}.zip"
+UNFINISHED = "transfer"
+"""The revision of a database into which another one is being copied: nothing else opens it."""
+
+
+@dataclass(frozen=True)
+class Migrated:
+    """What a migration came to.
+
+    Attributes:
+        revision: The schema's revision now.
+        copy: The backup that was taken before; None where nothing had to be changed, and of a
+            database on a server, whose backups are the server's (``pg_dump``).
+    """
+
+    revision: str
+    copy: Path | None = None
+
+
+def migrations_folder() -> Path:
+    """Where the migration scripts lie.
+
+    Raises:
+        StorageError: They do not.
+    """
+    folder = own_folder("migrations")
+    if not (folder / "env.py").is_file():
+        raise StorageError("the migration scripts are missing from this installation")
+    return folder
+
+
+def migrate(settings: Settings) -> Migrated:
+    """Run the migrations that are missing, after a backup of what is there.
+
+    All of them are one transaction: killed midway nothing has happened.
+
+    Raises:
+        StorageError: The database is newer than this version, or somebody has it open.
+        DamagedError: The database is not what was written, or not the one of its home.
+    """
+    lock = DatabaseLock(settings)
+    try:
+        if lock.alone and dialect_of(settings).is_file:
+            require_sound(settings)
+        return bring_up_to_date(settings, alone=lock.alone)
+    finally:
+        lock.release()
+
+
+def bring_up_to_date(settings: Settings, *, alone: bool) -> Migrated:
+    """The same for who holds the database's lock; ``alone``: and nobody else has it open."""
+    dialect = dialect_of(settings)
+    if dialect.is_file:
+        make_file(settings.database_file)
+    engine = make_engine(settings)
+    copy = None
+    try:
+        with reported(settings):
+            revision = schema_revision(engine)
+            _refuse_newer(revision, settings)
+            require_own_database(engine, settings)
+            if revision not in (None, SCHEMA_REVISION):
+                if not alone:
+                    raise StorageError(
+                        "another Touchline process has the database open: its schema cannot be"
+                        " changed meanwhile",
+                        hint="Stop it, then run touchline migrate.",
+                    )
+                if dialect.is_file:
+                    copy = _backups(settings) / COPY.format(SCHEMA_REVISION)
+                    write_backup(settings, copy, replace=True)
+            if revision != SCHEMA_REVISION:
+                make_schema(engine, dialect, new=revision is None)
+            renew_anchor(engine, settings, alone=alone)
+    finally:
+        engine.dispose()
+    if copy is not None:
+        _forget_other_copies(copy)
+    return Migrated(SCHEMA_REVISION, copy)
+
+
+def make_schema(engine: Engine, dialect: Dialect, *, new: bool) -> None:
+    """Run what is missing of the migrations, in one transaction; ``new``: of an empty database."""
+    # Alembic is slow to import and seldom needed.
+    from alembic import command
+    from alembic.config import Config
+
+    config = Config()
+    config.set_main_option("script_location", str(migrations_folder()).replace("%", "%%"))
+    with (
+        engine.execution_options(**WRITE).begin() as connection,
+        dialect.migrating(connection, new=new),
+    ):
+        config.attributes["connection"] = connection
+        command.upgrade(config, "head")
+
+
+def _backups(settings: Settings) -> Path:
+    folder = settings.home / "backups"
+    folder.mkdir(mode=0o700, exist_ok=True)
+    return folder
+
+
+def _forget_other_copies(copy: Path) -> None:
+    """Of an earlier migration, which this one has shown to be good."""
+    for other in copy.parent.glob(COPY.format("*")):
+        if other != copy:
+            other.unlink()
+
+
+def schema_revision(engine: Engine) -> str | None:
+    """The revision that the database says it has; None for an empty one."""
+    with engine.connect() as connection:
+        return _revision(connection)
+
+
+def _revision(connection: Connection) -> str | None:
+    if not inspect(connection).has_table("alembic_version"):
+        return None
+    revision = connection.execute(text("SELECT version_num FROM alembic_version")).scalar()
+    return None if revision is None else str(revision)
+
+
+def _refuse_newer(revision: str | None, settings: Settings) -> None:
+    if revision is not None and revision not in KNOWN_REVISIONS:
+        raise newer_schema(revision, settings)
+
+
+def newer_schema(revision: str, settings: Settings) -> StorageError:
+    """The refusal of a database that a newer version made, with the way back."""
+    if revision == UNFINISHED:
+        return StorageError(
+            "a transfer into this database has not come to its end",
+            hint="Run touchline transfer again, with what it was given.",
+        )
+    copy = settings.home / "backups" / COPY.format(revision)
+    back = f" To go back to the state before its migration, run touchline restore {copy}."
+    return StorageError(
+        f"the database was made by a newer version of Touchline (schema {revision})",
+        hint="Update Touchline; an older version would damage the data."
+        + (back if copy.exists() else ""),
+    )

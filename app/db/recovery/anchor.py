@@ -1,0 +1,196 @@
+"""The anchor: what the home knows of its database, in a file beside it.
+
+A log whose end is cut off has a hash chain without a flaw, and an empty database looks like a new
+one. The anchor says otherwise: which installation the database is, and how long its log was.
+
+It is written after each commit that says something, in place and without waiting for the disk
+(5 microseconds beside a commit's milliseconds): an anchor that a power cut left behind knows less
+than the log and is right all the same. It waits for the disk when it is made and when the store is
+closed. It fills one sector, so that no power cut leaves half of it.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import time
+from contextlib import suppress
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+
+from sqlalchemy import Connection, Engine, inspect, text
+
+from app.config import Settings
+from app.db.dialects.dialect import dialect_of
+from app.durable import replace_file, sync
+from app.errors import DamagedError
+from app.finite import json_text
+
+ANCHOR_BYTES = 512
+AGAIN_SECONDS = 0.01
+"""A reader beside a writer may see half of an anchor: after so long it is read once more."""
+RESTORE = (
+    "Run touchline restore BACKUP; touchline restore {file} goes on with what that file holds."
+)
+RESTORE_SERVER = (
+    "Restore it with pg_restore, or let TOUCHLINE_DATABASE_URL name the database of this home. Where"
+    " it is the right one all the same, move home.json away."
+)
+
+
+@dataclass(frozen=True)
+class Anchor:
+    """What the home knows of its database.
+
+    Attributes:
+        installation: Id of the installation; also in the database.
+        created: When that began.
+        schema: Revision of the schema.
+        entries: How many entries the log has at least.
+        hash: Of the last of them.
+    """
+
+    installation: str
+    created: str
+    schema: str
+    entries: int
+    hash: str
+
+    def to_bytes(self) -> bytes:
+        """As JSON, filled up with spaces to one sector."""
+        return json_text(asdict(self)).encode().ljust(ANCHOR_BYTES - 1) + b"\n"
+
+
+def anchor_file(database: Path) -> Path:
+    """Where the anchor of a database is."""
+    return database.with_name("home.json")
+
+
+def read_anchor(database: Path) -> Anchor | None:
+    """The anchor of a database, or None where there is none.
+
+    Raises:
+        DamagedError: The file is not one of ours.
+    """
+    with suppress(DamagedError):
+        return _read(database)
+    time.sleep(AGAIN_SECONDS)
+    return _read(database)
+
+
+def _read(database: Path) -> Anchor | None:
+    path = anchor_file(database)
+    try:
+        return Anchor(**json.loads(path.read_bytes()))
+    except FileNotFoundError:
+        return None
+    except (ValueError, TypeError) as error:
+        raise DamagedError(
+            f"{path} is not what was written",
+            hint=f"Run touchline restore BACKUP, or touchline restore {database}.",
+        ) from error
+
+
+def make_anchor(database: Path, anchor: Anchor) -> None:
+    """Write an anchor so that it is there after a power cut."""
+    replace_file(anchor_file(database), anchor.to_bytes())
+
+
+def move_anchor(database: Path, anchor: Anchor) -> None:
+    """Write an anchor over the one that is there; one that was taken away stays away."""
+    try:
+        handle = os.open(anchor_file(database), os.O_WRONLY)
+    except FileNotFoundError:
+        return
+    try:
+        os.pwrite(handle, anchor.to_bytes(), 0)
+    finally:
+        os.close(handle)
+
+
+def sync_anchor(database: Path) -> None:
+    """Wait until the anchor is on the disk."""
+    with suppress(FileNotFoundError):
+        sync(anchor_file(database))
+
+
+def anchor_of(connection: Connection) -> Anchor | None:
+    """The anchor that a database should have; None before it had an installation id."""
+    tables = inspect(connection).get_table_names()
+    if "installation" not in tables:
+        return None
+    key, created, schema, entries, last = connection.execute(
+        text(
+            "SELECT installation.key, created, version_num, coalesce(log.id, 0), log.hash"
+            " FROM installation CROSS JOIN alembic_version"
+            " LEFT JOIN log ON log.id = (SELECT max(id) FROM log)"
+        )
+    ).one()
+    return Anchor(key, created, schema, entries, last or "")
+
+
+def require_own_database(engine: Engine, settings: Settings) -> None:
+    """Raise DamagedError where a database is not the one that its home had."""
+    with suppress(DamagedError):
+        _require_own(engine, settings)
+        return
+    time.sleep(AGAIN_SECONDS)
+    _require_own(engine, settings)
+
+
+def _require_own(engine: Engine, settings: Settings) -> None:
+    anchor = read_anchor(settings.database_file)
+    if anchor is not None:
+        with engine.connect() as connection:
+            if dialect_of(settings).is_file:
+                file = settings.database_file
+                _require_anchored(connection, anchor, str(file), RESTORE.format(file=file))
+            else:
+                _require_anchored(connection, anchor, settings.database_name, RESTORE_SERVER)
+
+
+def renew_anchor(engine: Engine, settings: Settings, *, alone: bool) -> None:
+    """Write the anchor of a database that is in order, where it says anything else.
+
+    Beside others (not ``alone``) the length of the log is left to whoever writes it.
+    """
+    with engine.connect() as connection:
+        anchor = anchor_of(connection)
+    said = read_anchor(settings.database_file)
+    if anchor is None or anchor == said:
+        return
+    if alone or said is None or _without_end(said) != _without_end(anchor):
+        make_anchor(settings.database_file, anchor)
+
+
+def _without_end(anchor: Anchor) -> Anchor:
+    return replace(anchor, entries=0, hash="")
+
+
+def _require_anchored(connection: Connection, anchor: Anchor, database: str, hint: str) -> None:
+    tables = inspect(connection).get_table_names()
+    if "log" not in tables:
+        raise DamagedError(
+            f"{database} is empty, but this home has noted {anchor.entries:,} entries of a log",
+            hint=hint,
+        )
+    if "installation" in tables:
+        own = connection.execute(text("SELECT key FROM installation")).scalar()
+        if own != anchor.installation:
+            raise DamagedError(f"{database} is the database of another installation", hint=hint)
+    entries = connection.execute(text("SELECT coalesce(max(id), 0) FROM log")).scalar_one()
+    if entries < anchor.entries:
+        raise DamagedError(
+            f"the log in {database} ends after {entries:,} entries, but this home has noted"
+            f" {anchor.entries:,}",
+            hint=hint,
+        )
+    if anchor.entries:
+        query = text("SELECT hash FROM log WHERE id = :id")
+        found = connection.execute(query, {"id": anchor.entries}).scalar()
+        if found != anchor.hash:
+            raise DamagedError(
+                f"entry {anchor.entries:,} of the log in {database} is not the one that this home"
+                " has noted",
+                hint=hint,
+            )

@@ -1,0 +1,188 @@
+"""Restoring: a backup becomes the home's database; what was there is moved aside, never deleted."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import zipfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path, PurePosixPath
+
+from app.config import Settings
+from app.db.backup import DATABASE, EXPORTS, FRAMES, examine_database, require_file, verify_backup
+from app.db.home import ASIDE, FOLDER_MODE, RESTORING, make_private, refused
+from app.db.locks import database_alone, server_lock
+from app.db.migrate import KNOWN_REVISIONS, newer_schema
+from app.db.recovery.anchor import Anchor, anchor_file, make_anchor
+from app.db.recovery.preopen_check import log_file
+from app.db.recovery.wal import MAGIC, read_header, read_log
+from app.durable import sync
+from app.errors import DamagedError, InputError
+
+
+@dataclass(frozen=True)
+class Restored:
+    """What a home has been made from.
+
+    Attributes:
+        home: The home.
+        schema: Revision of the database's schema; an older one is migrated by ``serve``.
+        entries: Length of the log.
+        rows: Rows by table.
+        files: How many files came with the database.
+        aside: Folder with what was there before; None where nothing was.
+        foreign_log: Whether a write-ahead log beside the database was another one's, and left out.
+    """
+
+    home: Path
+    schema: str
+    entries: int
+    rows: dict[str, int]
+    files: int
+    aside: Path | None
+    foreign_log: bool = False
+
+
+def restore(settings: Settings, source: Path) -> Restored:
+    """Put a backup, or a database file, into the place of a home's database.
+
+    The source is examined first. Killed at any moment, the home is as it was, or without a
+    database, which no server takes for a new one: restoring again mends it.
+
+    Args:
+        settings: Which home.
+        source: A zip of ``write_backup``, or a database with or without the log beside it.
+
+    Raises:
+        InputError: It is no backup, or not what was written.
+        DamagedError: The database in it is damaged.
+        StorageError: Somebody uses the home, or the disk is full.
+    """
+    require_file(settings, "restored", "pg_restore --clean --if-exists --dbname=DATABASE FILE")
+    if not source.is_file():
+        raise InputError(f"there is no file {source}")
+    with (
+        server_lock(settings),
+        database_alone(settings, "it cannot be replaced meanwhile"),
+    ):
+        try:
+            with _workshop(settings) as folder:
+                return _restore(settings, source, folder)
+        except OSError as error:
+            raise refused(Path(error.filename or settings.home), error) from error
+
+
+def _restore(settings: Settings, source: Path, folder: Path) -> Restored:
+    if zipfile.is_zipfile(source):
+        expected, foreign_log = _unpack(source, folder), False
+    else:
+        expected, foreign_log = None, _copy_files(source, folder)
+    anchor, rows = examine_database(settings, folder / DATABASE, source)
+    if anchor.schema not in KNOWN_REVISIONS:
+        raise newer_schema(anchor.schema, settings)
+    if expected not in (None, (anchor.entries, anchor.hash)):
+        raise DamagedError(f"the log in {source} is not the one that its manifest names")
+    files = sum(1 for path in folder.rglob("*") if path.is_file()) - 1
+    # The files of the backup, and those of its database's log, which SQLite may have left.
+    os.sync()
+    aside = _move_aside(settings, [path.name for path in folder.iterdir() if path.is_dir()])
+    _move_in(settings, folder, anchor)
+    make_private(settings)
+    return Restored(settings.home, anchor.schema, anchor.entries, rows, files, aside, foreign_log)
+
+
+@contextmanager
+def _workshop(settings: Settings) -> Iterator[Path]:
+    folder = settings.database_file.with_name(RESTORING)
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir(mode=FOLDER_MODE)
+    try:
+        yield folder
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+def _unpack(source: Path, folder: Path) -> tuple[int, str]:
+    """Unpack a backup that is what was written; returns length and end of its log."""
+    manifest = verify_backup(source)
+    with zipfile.ZipFile(source) as backup:
+        for name in manifest.files:
+            target = folder / _safe(name, source)
+            target.parent.mkdir(mode=FOLDER_MODE, parents=True, exist_ok=True)
+            handle = os.open(target, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
+            with backup.open(name) as member, os.fdopen(handle, "wb") as file:
+                shutil.copyfileobj(member, file)
+    return manifest.entries, manifest.hash
+
+
+def _safe(name: str, source: Path) -> PurePosixPath:
+    """The path of a member below the home: the database, or in one of our folders."""
+    path = PurePosixPath(name)
+    ours = path.parts[0] in (*FRAMES, *EXPORTS) and len(path.parts) > 1
+    if name != DATABASE and (not ours or ".." in path.parts):
+        raise InputError(f"{source}, {name}: no file of a home")
+    return path
+
+
+def _copy_files(source: Path, folder: Path) -> bool:
+    """Copy a database and the log that belongs to it; returns whether another one lay there."""
+    header = read_header(source)
+    if header is None:
+        raise InputError(
+            f"{source} is neither a backup of Touchline nor a database ({MAGIC[:13].decode()})",
+            hint="touchline backup makes one.",
+        )
+    log = read_log(log_file(source))
+    shutil.copyfile(source, folder / DATABASE)
+    if log.commits and log.belongs_to(header):
+        shutil.copyfile(log_file(source), log_file(folder / DATABASE))
+        return False
+    return log.commits > 0
+
+
+def _move_aside(settings: Settings, folders: list[str]) -> Path | None:
+    """Move what will be replaced into a folder of its own; the anchor stays until the end."""
+    database = settings.database_file
+    present = [
+        *database.parent.glob(f"{database.name}*"),
+        *(settings.home / name for name in folders if (settings.home / name).exists()),
+    ]
+    anchor = anchor_file(database)
+    if not present and not anchor.exists():
+        return None
+    aside = _new_folder(settings.home)
+    if anchor.exists():
+        shutil.copy(anchor, aside)
+    for path in present:
+        shutil.move(path, aside / path.name)
+    for path in (aside, settings.home, database.parent):
+        sync(path)
+    return aside
+
+
+def _new_folder(home: Path) -> Path:
+    name = f"{ASIDE}{datetime.now(UTC):%Y%m%dT%H%M%S}"
+    number = 1
+    while (folder := home / (name if number == 1 else f"{name}-{number}")).exists():
+        number += 1
+    folder.mkdir(mode=FOLDER_MODE)
+    return folder
+
+
+def _move_in(settings: Settings, folder: Path, anchor: Anchor) -> None:
+    """The database last: without it nothing is served."""
+    # Their marks are those of the changes of another database.
+    shutil.rmtree(settings.yields, ignore_errors=True)
+    for path in folder.iterdir():
+        if path.is_dir():
+            shutil.move(path, settings.home / path.name)
+    sync(settings.home)
+    shutil.move(folder / DATABASE, settings.database_file)
+    sync(settings.database_file.parent)
+    if anchor.installation:
+        make_anchor(settings.database_file, anchor)
+    else:
+        anchor_file(settings.database_file).unlink(missing_ok=True)

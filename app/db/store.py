@@ -1,0 +1,373 @@
+"""Store: the database of a home, its reads and its writes."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager, suppress
+from dataclasses import replace
+
+import structlog
+from sqlalchemy import Engine, update
+from sqlalchemy.exc import DBAPIError
+from sqlalchemy.exc import TimeoutError as NoConnectionError
+
+from app.admission import release_admission
+from app.config import Settings
+from app.db.base import InstallationModel
+from app.db.dialects.dialect import AGAIN, WRITE, dialect_of
+from app.db.engine import make_engine, reported
+from app.db.home import make_file
+from app.db.locks import DatabaseLock
+from app.db.migrate import (
+    KNOWN_REVISIONS,
+    SCHEMA_REVISION,
+    bring_up_to_date,
+    newer_schema,
+    schema_revision,
+)
+from app.db.recovery.anchor import (
+    Anchor,
+    move_anchor,
+    read_anchor,
+    renew_anchor,
+    require_own_database,
+    sync_anchor,
+)
+from app.db.recovery.opened_file import OpenedFile
+from app.db.recovery.preopen_check import require_sound
+from app.db.session import Session
+from app.errors import EXAMINE, BusyError, DamagedError, StorageError
+
+log = structlog.get_logger("touchline.store")
+
+_UNCHANGED = update(InstallationModel).values(created=InstallationModel.created)
+"""Writes a row as it is."""
+COMMITTED = "committed"
+"""What other processes are told of a commit."""
+TURN_SECONDS = 10.0
+"""How long a thread waits for the writes of others in its process; SQLite waits for other
+processes (``busy_timeout``)."""
+
+
+class Turn:
+    """The turn to write among the threads of one process.
+
+    Raises:
+        StorageError: Others were writing all the while.
+    """
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+
+    def __enter__(self) -> None:
+        if not self._lock.acquire(timeout=TURN_SECONDS):
+            raise StorageError(
+                "other changes are still being written; this one was not saved",
+                hint="Try again in a moment.",
+            )
+
+    def __exit__(self, *_: object) -> None:
+        self._lock.release()
+
+
+class Store:
+    """The database of one home: short read transactions, and one write at a time.
+
+    Use ``Store.open``; the constructor trusts its engine.
+
+    Attributes:
+        turn: Held while something is written; writers of one process wait for it.
+        sharing: What processes with the same database leave to one of them, and tell each other.
+    """
+
+    def __init__(
+        self,
+        engine: Engine,
+        settings: Settings,
+        lock: DatabaseLock,
+        turn: AbstractContextManager[object],
+    ):
+        self.settings = settings
+        self._engine = engine
+        self._reader = dialect_of(settings).reading(engine)
+        self._writer = engine.execution_options(**WRITE)
+        self._glancer = dialect_of(settings).glancing(engine)
+        self._peeker = dialect_of(settings).peeking(settings)
+        # Connections of its own: one that waits for no disk must never carry what was promised.
+        self._passing = make_engine(settings, lasting=False).execution_options(**WRITE)
+        self.sharing = dialect_of(settings).sharing(engine, lambda: reported(settings))
+        self._lock = lock
+        self.turn = turn
+        self._listeners: list[Callable[[], None]] = []
+        self._anchor = read_anchor(settings.database_file)
+        self._anchor_refused = False
+        file = settings.database_file
+        self._file = OpenedFile(file) if dialect_of(settings).is_file else None
+        self._damage: tuple[str, str] | None = None
+        self._refused: StorageError | None = None
+
+    @staticmethod
+    def open(settings: Settings, turn: AbstractContextManager[object] | None = None) -> Store:
+        """Open the database; an empty home is migrated, an older one must be first.
+
+        Args:
+            settings: Where it lies.
+            turn: The turn to write, where it is shared with another process.
+
+        Raises:
+            StorageError: The schema is older or newer than this version's, or SQLite does not keep
+                the promises asked of it.
+            DamagedError: The database is not what was written, or not the one of its home.
+            InputError: The URL is neither one of SQLite nor of PostgreSQL.
+        """
+        lock = DatabaseLock(settings)
+        engine: Engine | None = None
+        try:
+            engine = _open(settings, lock.alone)
+            lock.share()
+            return Store(engine, settings, lock, Turn() if turn is None else turn)
+        except BaseException:
+            if engine is not None:
+                engine.dispose()
+            lock.release()
+            raise
+
+    @contextmanager
+    def read(self) -> Iterator[Session]:
+        """A session on one consistent snapshot; nothing that it changes is kept."""
+        with self._watched(), Session(self._reader) as session:
+            yield session
+
+    @contextmanager
+    def glance(self) -> Iterator[Session]:
+        """A session for one statement, which is a snapshot by itself and needs no transaction.
+
+        For what every request asks.
+        """
+        with self._watched(), Session(self._glancer) as session:
+            yield session
+
+    @contextmanager
+    def peek(self) -> Iterator[Session]:
+        """A session like that of ``glance`` for whoever may wait for nothing, as the event loop.
+
+        Raises:
+            BusyError: There would be something to wait for; ``glance`` waits for it.
+        """
+        if self._peeker is None:
+            raise BusyError("the database cannot answer without waiting")
+        try:
+            with self._watched(), Session(self._peeker) as session:
+                yield session
+        except NoConnectionError as error:
+            raise BusyError("another thread is using the connection that never waits") from error
+
+    @contextmanager
+    def write(self, *, lasting: bool = True) -> Iterator[Session]:
+        """A session that holds the database's write lock from its start and commits at its end.
+
+        Threads of one process wait for their turn here, processes in SQLite. It does not nest.
+
+        Args:
+            lasting: False: nobody waits until it is on the disk, and a power cut may take it back,
+                as a whole. For what nobody would miss; the log is not written so.
+
+        Raises:
+            StorageError: Others were writing all the while; nothing was changed.
+        """
+        self.require_undamaged()
+        writer = self._writer if lasting else self._passing
+        with self.turn, self._remembered(), self._watched(), Session(writer) as session:
+            # Take the lock before anything is read, so that what is read is still true when it
+            # is written.
+            session.begin()
+            yield session
+            session.store_response()
+            if not lasting and session.log_end is not None:
+                raise RuntimeError("entries of the log must be on the disk")
+            self._require_anchored(session)
+            if self._file is not None:
+                self._file.require_there()
+                self._file.require_log()
+            if lasting:
+                self.sharing.tell(session, COMMITTED)
+                release_admission()
+            session.commit()
+            self._refused = None
+            self._anchored(session)
+        self.tell_listeners()
+
+    def require_writable(self) -> None:
+        """Raise StorageError while changes are refused, as on a full disk.
+
+        Once one was refused, a row is written as it is to know whether the next one would be.
+        """
+        if self._refused is not None:
+            with self.write(lasting=False) as session:
+                session.execute(_UNCHANGED)
+
+    @contextmanager
+    def _remembered(self) -> Iterator[None]:
+        """Note what keeps the database from being written."""
+        try:
+            yield
+        except (BusyError, DamagedError):
+            raise
+        except StorageError as error:
+            if isinstance(error.__cause__, DBAPIError):
+                self._refused = error
+            raise
+
+    def tell_listeners(self) -> None:
+        """Call all who listen: this process has committed, or another one that works for it."""
+        for listener in self._listeners:
+            try:
+                listener()
+            except Exception:
+                log.exception("a change was saved, and somebody could not be told")
+
+    @property
+    def is_damaged(self) -> bool:
+        """Whether the database was seen to be damaged."""
+        return self._damage is not None
+
+    def require_undamaged(self) -> None:
+        """Raise DamagedError once the database was seen to be damaged, or its file is another.
+
+        What is left of it is read as long as it can be; another change could only spoil more.
+        """
+        if self._damage is not None:
+            message, hint = self._damage
+            raise DamagedError(f"nothing can be changed now: {message}", hint=hint)
+        if self._file is not None:
+            with self._watched():
+                self._file.require_there()
+
+    def require_whole(self, wanted: Callable[[], bool] = lambda: True) -> None:
+        """Let SQLite look at every page and index; raise DamagedError where it finds a fault.
+
+        It ends early, without a word, once it is no longer ``wanted``.
+        """
+        dialect = dialect_of(self.settings)
+        with self.read() as session, dialect.interrupted(session, lambda: not wanted()):
+            faults = dialect.file_faults(session, 1)
+            if faults:
+                file = self.settings.database_file
+                log.error("the database is damaged", file=str(file), fault=faults[0])
+                raise DamagedError(f"{file.name} is damaged", hint=EXAMINE)
+
+    @contextmanager
+    def _watched(self) -> Iterator[None]:
+        try:
+            with reported(self.settings):
+                yield
+        except DamagedError as error:
+            self.note_damage(error)
+            raise
+
+    def note_damage(self, error: DamagedError) -> None:
+        """Refuse writes from now on: something read was not what was written. The first sign stays."""
+        self._damage = self._damage or (error.message, error.hint or EXAMINE)
+
+    def _require_anchored(self, session: Session) -> None:
+        """Raise DamagedError where the log had ended before what was said already.
+
+        It only ever grows, whoever writes: not even an anchor that another process moved is ahead.
+        """
+        if session.log_end is None or self._anchor is None:
+            return
+        there: Anchor | None = self._anchor
+        with suppress(OSError, DamagedError):
+            there = read_anchor(self.settings.database_file)
+        # One that was taken away is meant to be.
+        if there is None:
+            return
+        said = max(there.entries, self._anchor.entries)
+        if session.log_before < said:
+            raise DamagedError(
+                f"the log ends after {session.log_before:,} entries, but this home has noted {said:,}",
+                hint=EXAMINE,
+            )
+
+    def _anchored(self, session: Session) -> None:
+        """Tell the home how long the log is by now; an anchor that stays behind is right, too."""
+        end = session.log_end
+        if end is None or self._anchor is None:
+            return
+        self._anchor = replace(self._anchor, entries=end[0], hash=end[1])
+        try:
+            move_anchor(self.settings.database_file, self._anchor)
+        except OSError as error:
+            if not self._anchor_refused:
+                log.warning("home.json cannot be written", error=str(error))
+            self._anchor_refused = True
+        else:
+            self._anchor_refused = False
+
+    def listen(self, listener: Callable[[], None]) -> None:
+        """Call a function after each commit of this process; it must be quick.
+
+        Once ``follow`` was called, after those of others on the same server of databases, too.
+        """
+        self._listeners.append(listener)
+
+    def follow(self) -> None:
+        """Hear of what other processes commit, where the database tells."""
+        self.sharing.hear(self._hear)
+        self.sharing.listen()
+
+    def say(self, word: str) -> None:
+        """Say a word to the other processes, where there may be some; see ``sharing``."""
+        if self.sharing.is_shared:
+            with self.glance() as session:
+                self.sharing.tell(session, word)
+
+    def _hear(self, word: str) -> None:
+        if word in (COMMITTED, AGAIN):
+            self.tell_listeners()
+
+    def close(self) -> None:
+        """Close all connections."""
+        self.sharing.close()
+        for engine in (self._engine, self._passing, self._peeker):
+            if engine is not None:
+                engine.dispose()
+        try:
+            sync_anchor(self.settings.database_file)
+        except OSError as error:
+            # One that stays behind is right, too.
+            log.warning("home.json cannot be synced", error=str(error))
+        finally:
+            self._lock.release()
+
+
+def _open(settings: Settings, alone: bool) -> Engine:
+    dialect, engine = dialect_of(settings), make_engine(settings)
+    if dialect.is_file:
+        if alone:
+            require_sound(settings)
+        make_file(settings.database_file)
+    try:
+        with reported(settings):
+            dialect.require_promises(engine)
+            if schema_revision(engine) is None:
+                bring_up_to_date(settings, alone=alone)
+            _require_schema(engine, settings)
+            require_own_database(engine, settings)
+            renew_anchor(engine, settings, alone=alone)
+    except BaseException:
+        engine.dispose()
+        raise
+    return engine
+
+
+def _require_schema(engine: Engine, settings: Settings) -> None:
+    revision = schema_revision(engine)
+    if revision == SCHEMA_REVISION:
+        return
+    if revision in KNOWN_REVISIONS:
+        raise StorageError(
+            "the database was made by an older version of Touchline", hint="Run touchline migrate."
+        )
+    raise newer_schema(str(revision), settings)

@@ -1,0 +1,200 @@
+"""Adjudicate: somebody decides between annotations that disagree."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from app.db.store import Store
+from app.errors import ForbiddenError, NotFoundError
+from app.features.agreement.compare import Comparison, compare_states, read_limits
+from app.features.agreement.queries import OPEN, agreements_of, agreements_on
+from app.features.agreement.service import ready_takes, settle
+from app.features.datasets.service import dataset_id
+from app.features.groups.state import GroupState
+from app.features.groups.submit import load_solved
+from app.features.groups.view_paint import PaintFollower
+from app.features.independent_annotations.adopt import adopt_take
+from app.features.independent_annotations.return_work import hand_back_take
+from app.features.independent_annotations.service import Take, TakeView
+from app.features.people.members import list_members
+from app.features.people.roles import Action, may
+from app.soccer.actors import LOCAL_USER, person_of
+
+
+@dataclass(frozen=True)
+class OpenCase:
+    """A group that waits for a decision.
+
+    Attributes:
+        worst: How many times its limit the worst disagreement is.
+    """
+
+    group: int
+    number: int
+    batch: int | None
+    people: tuple[str, ...]
+    worst: float
+    disagreements: int
+    since: str
+
+
+@dataclass(frozen=True)
+class Case:
+    """A group that waits for a decision, with what it is to be decided between.
+
+    Attributes:
+        takes: In the order in which they were handed in; ``comparison`` has the same order.
+        refused: Why whoever asks may not decide; None: they may.
+        own: Whether they decide about their own annotation, because nobody else is there.
+    """
+
+    original: GroupState
+    batch: int | None
+    takes: tuple[Take, ...]
+    comparison: Comparison
+    refused: str | None
+    own: bool
+
+
+def list_waiting(store: Store, dataset: str | int) -> list[OpenCase]:
+    """The groups of a dataset that wait for a decision, those that disagree most first."""
+    number = dataset_id(store, dataset)
+    with store.read() as session:
+        rows = agreements_of(session, number, state=OPEN)
+    found = []
+    for row in rows:
+        batch = row.batch_id or None
+        people = tuple(take.person for take in ready_takes(store, row.group_id, batch))
+        found.append(
+            OpenCase(
+                row.group_id, row.number, batch, people, row.worst, row.disagreements, row.found
+            )
+        )
+    return found
+
+
+def get_case(store: Store, group_id: int, *, actor: str) -> Case:
+    """What is to be decided about a group.
+
+    Raises:
+        NotFoundError: Nothing of it waits for a decision.
+    """
+    original = load_solved(store, group_id)
+    with store.read() as session:
+        row = next((one for one in agreements_on(session, group_id) if one.state == OPEN), None)
+        limits = read_limits(session, original.dataset_id)
+    if row is None:
+        raise NotFoundError(f"nothing of group {group_id} waits for a decision")
+    takes = ready_takes(store, group_id, row.batch_id or None)
+    if len(takes) < 2:
+        raise NotFoundError(f"nothing of group {group_id} waits for a decision")
+    states = [load_solved(store, take.copy_id) for take in takes]
+    own = person_of(actor) in {take.person for take in takes}
+    refused = None
+    if own and (others := _others(store, original.dataset_id, takes)):
+        refused = f"you annotated this group yourself; {_named(others)} can decide, who did not"
+    return Case(
+        original,
+        row.batch_id or None,
+        tuple(takes),
+        compare_states(states, limits),
+        refused,
+        own,
+    )
+
+
+def decide(
+    store: Store,
+    group_id: int,
+    take_id: int,
+    *,
+    as_start: bool = False,
+    actor: str,
+    paint: PaintFollower | None = None,
+) -> GroupState:
+    """Take one of the annotations, or begin a third one from it.
+
+    The annotation goes into the group in its person's name, the verdict upon it is the
+    adjudicator's. A third one is edited and judged in the group itself from then on.
+
+    Raises:
+        NotFoundError: Nothing of the group waits for a decision, or it is no such annotation.
+        ForbiddenError: It is one's own, and others could decide.
+        ConflictError: Somebody was faster.
+    """
+    case = get_case(store, group_id, actor=actor)
+    if case.refused is not None:
+        raise ForbiddenError(case.refused)
+    place = next((at for at, take in enumerate(case.takes) if take.id == take_id), None)
+    if place is None:
+        raise NotFoundError(f"annotation {take_id} is not one that waits for a decision here")
+    return settle(
+        store,
+        group_id,
+        case.batch,
+        case.takes,
+        case.takes[place],
+        outcome="start" if as_start else "take",
+        actor=actor,
+        paint=paint,
+        judge=not as_start,
+    )
+
+
+def take_over(
+    store: Store, take: Take, *, actor: str, paint: PaintFollower | None = None
+) -> GroupState:
+    """Take an annotation and its verdict over into the group; where it waits for a decision, this is it.
+
+    Raises:
+        ConflictError: It is not handed in, was decided about, or is of a gold group.
+    """
+    with store.read() as session:
+        waits = any(
+            (row.state, row.batch_id) == (OPEN, take.batch_id or 0)
+            for row in agreements_on(session, take.group_id)
+        )
+    if not waits:
+        return adopt_take(store, take.id, actor=actor, paint=paint)
+    ready = ready_takes(store, take.group_id, take.batch_id)
+    return settle(
+        store, take.group_id, take.batch_id, ready, take, outcome="take", actor=actor, paint=paint
+    )
+
+
+def hand_back(
+    store: Store, group_id: int, take_id: int, reason: str = "", *, actor: str
+) -> TakeView:
+    """Hand one of the annotations that disagree back to its person; the group waits no longer.
+
+    Raises:
+        NotFoundError: Nothing of the group waits for a decision, or it is no such annotation.
+        ForbiddenError: Others have to decide, or it is their own.
+    """
+    case = get_case(store, group_id, actor=actor)
+    if case.refused is not None:
+        raise ForbiddenError(case.refused)
+    take = next((one for one in case.takes if one.id == take_id), None)
+    if take is None:
+        raise NotFoundError(f"annotation {take_id} is not one that waits for a decision here")
+    if take.person == person_of(actor) != LOCAL_USER:
+        raise ForbiddenError("you submitted this annotation yourself", hint="A lead can return it.")
+    return hand_back_take(store, take_id, reason, actor=actor)
+
+
+def _others(store: Store, dataset: int, takes: Sequence[Take]) -> list[str]:
+    """Who may judge in a dataset and annotated none of these."""
+    takers = {take.person for take in takes}
+    return [
+        one.name
+        for one in list_members(store, dataset)
+        if may(one.role, Action.REVIEW) and one.name not in takers
+    ]
+
+
+def _named(names: Sequence[str]) -> str:
+    most = 3
+    if len(names) > most:
+        return f"{', '.join(names[:most])} or another reviewer"
+    return " or ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)

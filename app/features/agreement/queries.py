@@ -1,0 +1,142 @@
+"""Agreement in the database: what annotations of a group came to, and the limits of a dataset."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from sqlalchemy import Select, delete, func, insert, select, update
+
+from app.db.session import Session
+from app.features.agreement.tables import AgreementLimitsModel, AgreementModel
+from app.features.batches.tables import BatchModel
+from app.features.independent_annotations.queries import INDEPENDENT
+from app.features.independent_annotations.tables import TakeModel
+from app.features.queue.tables import QueueModel
+
+AGREED, OPEN, DECIDED = "agreed", "open", "decided"
+"""States of an agreement."""
+_ROWS = select(*AgreementModel.__table__.columns, QueueModel.number, QueueModel.status).join(
+    QueueModel, QueueModel.group_id == AgreementModel.group_id
+)
+
+
+def agreements_of(
+    session: Session, dataset_id: int, *, batch_id: int | None = None, state: str | None = None
+) -> Sequence[Any]:
+    """What the groups of a dataset came to, each with its ``number`` and ``status``; the worst first.
+
+    Args:
+        session: The database.
+        dataset_id: The dataset.
+        batch_id: One batch alone; 0: what belongs to none.
+        state: One state alone.
+    """
+    where = [AgreementModel.dataset_id == dataset_id]
+    if batch_id is not None:
+        where.append(AgreementModel.batch_id == batch_id)
+    if state is not None:
+        where.append(AgreementModel.state == state)
+    order = (AgreementModel.worst.desc(), AgreementModel.group_id)
+    return session.execute(_ROWS.where(*where).order_by(*order)).all()
+
+
+def agreements_on(session: Session, group_id: int) -> Sequence[Any]:
+    """What a group came to in each batch, what waits for a decision first."""
+    order = (AgreementModel.state != OPEN, AgreementModel.batch_id)
+    return session.execute(_ROWS.where(AgreementModel.group_id == group_id).order_by(*order)).all()
+
+
+def put_agreement(session: Session, values: Mapping[str, Any]) -> None:
+    """Write what a group came to in place of what it came to before; all columns are named."""
+    table = AgreementModel
+    where = (table.group_id == values["group_id"], table.batch_id == values["batch_id"])
+    session.execute(delete(table).where(*where))
+    session.execute(insert(table), [dict(values)])
+
+
+def groups_that_came_to(state: str) -> Select[int]:
+    """Ids of the groups whose annotations came to a state, in any batch."""
+    return select(AgreementModel.group_id).where(AgreementModel.state == state)
+
+
+def states_of(session: Session, group_ids: Sequence[int]) -> dict[int, str]:
+    """What groups came to, what waits for a decision first; those that were not compared are left out."""
+    rows = session.execute(
+        select(AgreementModel.group_id, AgreementModel.state)
+        .where(AgreementModel.group_id.in_(group_ids))
+        .order_by(AgreementModel.state == OPEN, AgreementModel.batch_id)
+    )
+    return {row.group_id: row.state for row in rows}
+
+
+def forget_open(session: Session, group_id: int, batch_id: int) -> None:
+    """Nothing of a group waits for a decision in a batch (0: in none) any more."""
+    table = AgreementModel
+    where = (table.group_id == group_id, table.batch_id == batch_id, table.state == OPEN)
+    session.execute(delete(table).where(*where))
+
+
+def decide_agreement(
+    session: Session, group_id: int, batch_id: int, values: Mapping[str, Any]
+) -> int:
+    """Write what was decided; returns the id of the group's dataset."""
+    table = AgreementModel
+    where = (table.group_id == group_id, table.batch_id == batch_id)
+    done = update(table).where(*where).values(**values).returning(table.dataset_id)
+    return int(session.execute(done).scalar_one())
+
+
+def settle_rest(session: Session, take_ids: Sequence[int], at: str) -> None:
+    """Takes that were compared and not taken are over."""
+    rest = (TakeModel.id.in_(take_ids), TakeModel.settled.is_(None))
+    session.execute(update(TakeModel).where(*rest).values(settled=at))
+
+
+def never_compared(session: Session) -> list[tuple[int, int | None]]:
+    """Group and batch (None: none) of annotations that several people handed in and nobody compared."""
+    take, row = TakeModel, AgreementModel
+    same = (row.group_id == take.group_id) & (row.batch_id == func.coalesce(take.batch_id, 0))
+    ready = (take.kind == INDEPENDENT, take.handed_in.is_not(None), take.settled.is_(None))
+    statement = (
+        select(take.group_id, take.batch_id)
+        .outerjoin(row, same)
+        .where(*ready, row.group_id.is_(None))
+        .group_by(take.group_id, take.batch_id)
+        .having(func.count() > 1)
+        .order_by(take.group_id)
+    )
+    return [(found.group_id, found.batch_id) for found in session.execute(statement)]
+
+
+def never_taken_over(session: Session) -> list[int]:
+    """Copies that were submitted in batches which ask for one annotation a group, and wait."""
+    take = TakeModel
+    ready = (take.kind == INDEPENDENT, take.handed_in.is_not(None), take.settled.is_(None))
+    statement = select(take.copy_id).join(BatchModel, BatchModel.id == take.batch_id)
+    return list(session.scalars(statement.where(*ready, BatchModel.verdicts == 1)))
+
+
+def verdicts_asked(session: Session, batch_id: int) -> int | None:
+    """How many annotations of each group a batch asks for; None where there is no such batch."""
+    asked: int | None = session.scalar(select(BatchModel.verdicts).where(BatchModel.id == batch_id))
+    return asked
+
+
+def limits_of(session: Session, dataset_id: int) -> Any | None:
+    """The limits of a dataset; None: nobody has set any."""
+    columns = [
+        column
+        for column in AgreementLimitsModel.__table__.columns
+        if column.name not in ("dataset_id", "changed", "changed_by")
+    ]
+    where = AgreementLimitsModel.dataset_id == dataset_id
+    return session.execute(select(*columns).where(where)).one_or_none()
+
+
+def put_limits(session: Session, dataset_id: int, values: Mapping[str, Any]) -> None:
+    """Write the limits of a dataset."""
+    session.execute(
+        delete(AgreementLimitsModel).where(AgreementLimitsModel.dataset_id == dataset_id)
+    )
+    session.execute(insert(AgreementLimitsModel), [{"dataset_id": dataset_id, **values}])

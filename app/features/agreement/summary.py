@@ -1,0 +1,214 @@
+"""Summary: how far the people of a dataset agree, in verdicts, pixels and metres."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+from typing import Any
+
+from app.db.json_columns import unpack
+from app.db.store import Store
+from app.evaluation.agreement_limits import MEASURES, AgreementLimits, Spread, spreads
+from app.evaluation.annotation_distance import GroupDistance
+from app.evaluation.rater_agreement import (
+    Coefficient,
+    cohen_kappa,
+    fleiss_kappa,
+    krippendorff_alpha,
+)
+from app.features.agreement.compare import read_limits
+from app.features.agreement.queries import AGREED, DECIDED, OPEN, agreements_of
+from app.features.agreement.service import PairOfTakes, Weighed
+from app.features.datasets.service import dataset_id
+from app.features.solutions.codec import from_json
+from app.formats.csv_text import csv_line
+
+
+@dataclass(frozen=True)
+class PeopleAgreement:
+    """How far two people agree, or all of them.
+
+    Attributes:
+        people: Names, sorted.
+        groups: Groups that they annotated alike.
+        kappa: Cohen's of two; Fleiss' of more, where every group was judged by equally many.
+        spreads: Median and bad end of each measure.
+    """
+
+    people: tuple[str, ...]
+    groups: int
+    kappa: Coefficient | None
+    spreads: Mapping[str, Spread]
+
+
+@dataclass(frozen=True)
+class GroupAgreement:
+    """What one group came to.
+
+    Attributes:
+        worst: How many times its limit the worst disagreement was.
+        status: The verdict on the group itself: annotations that agree without one leave it unreviewed.
+        taken: Whose annotation was taken over; None: nobody's yet.
+    """
+
+    group: int
+    number: int
+    batch: int | None
+    state: str
+    status: str
+    people: tuple[str, ...]
+    verdicts: tuple[str | None, ...]
+    worst: float
+    disagreements: int
+    spreads: Mapping[str, Spread]
+    outcome: str | None
+    taken: str | None
+    decided: str | None
+    decided_by: str | None
+
+
+@dataclass(frozen=True)
+class Agreement:
+    """How far people agree in a dataset, or in one batch of it.
+
+    Attributes:
+        agreed, open, decided: How many groups settled themselves, wait, and were decided.
+        alpha: Krippendorff's, of whoever judged whatever.
+        pairs: Of every two people, those with most groups first.
+        groups: The worst first.
+    """
+
+    agreed: int
+    open: int
+    decided: int
+    limits: AgreementLimits
+    alpha: Coefficient
+    overall: PeopleAgreement
+    pairs: list[PeopleAgreement]
+    groups: list[GroupAgreement]
+
+
+@dataclass(frozen=True)
+class _Read:
+    """A row with its pairs as they were kept."""
+
+    row: Any
+    pairs: tuple[PairOfTakes, ...]
+
+    @property
+    def verdicts(self) -> dict[str, str | None]:
+        """What each person judged, in the order of their names."""
+        said: dict[str, str | None] = {}
+        for pair in self.pairs:
+            said |= dict(zip(pair.people, pair.verdicts, strict=True))
+        return dict(sorted(said.items()))
+
+
+def agreement_of(store: Store, dataset: str | int, batch: int | None = None) -> Agreement:
+    """How far people agree in a dataset.
+
+    Args:
+        store: The database.
+        dataset: The dataset.
+        batch: One batch alone; None: all, and what belongs to none.
+    """
+    number = dataset_id(store, dataset)
+    with store.read() as session:
+        rows = agreements_of(session, number, batch_id=batch)
+        limits = read_limits(session, number)
+    read = [_Read(row, from_json(Weighed, unpack(row.pairs)).pairs) for row in rows]
+    states = [row.state for row in rows]
+    people = sorted({name for one in read for name in one.verdicts})
+    judged = [[one.verdicts.get(name) for name in people] for one in read]
+    pairs = [found for two in combinations(people, 2) if (found := _of_two(two, read)) is not None]
+    return Agreement(
+        states.count(AGREED),
+        states.count(OPEN),
+        states.count(DECIDED),
+        limits,
+        krippendorff_alpha(judged),
+        _of_all(people, read),
+        sorted(pairs, key=lambda one: (-one.groups, one.people)),
+        [_group(one) for one in read],
+    )
+
+
+def agreement_csv(found: Agreement) -> str:
+    """A row for each group, the worst first; text that would be a formula is none."""
+    names = [f"{name}_{end}" for name in MEASURES for end in ("median", "tail")]
+    head = (
+        "number",
+        "group",
+        "batch",
+        "state",
+        "status",
+        "people",
+        "verdicts",
+        "disagreements",
+        "worst",
+    )
+    tail = ("outcome", "taken", "decided", "decided_by")
+    lines = [csv_line((*head, *names, *tail))]
+    for one in found.groups:
+        numbers = [
+            value
+            for name in MEASURES
+            for value in (one.spreads[name].median, one.spreads[name].tail)
+        ]
+        values = (
+            *(one.number, one.group, one.batch, one.state, one.status),
+            *("; ".join(one.people), "; ".join(said or "none" for said in one.verdicts)),
+            *(one.disagreements, one.worst),
+            *numbers,
+            *(one.outcome, one.taken, one.decided, one.decided_by),
+        )
+        lines.append(csv_line(values))
+    return "".join(lines)
+
+
+def _of_two(two: tuple[str, str], read: Sequence[_Read]) -> PeopleAgreement | None:
+    found = [pair for one in read for pair in one.pairs if tuple(sorted(pair.people)) == two]
+    if not found:
+        return None
+    said = [dict(zip(pair.people, pair.verdicts, strict=True)) for pair in found]
+    both = [(one[two[0]], one[two[1]]) for one in said]
+    both = [(a, b) for a, b in both if a is not None and b is not None]
+    kappa = cohen_kappa([a for a, _ in both], [b for _, b in both])
+    return PeopleAgreement(two, len(found), kappa, spreads(pair.distance for pair in found))
+
+
+def _of_all(people: Sequence[str], read: Sequence[_Read]) -> PeopleAgreement:
+    said = [[value for value in one.verdicts.values() if value is not None] for one in read]
+    said = [values for values in said if len(values) > 1]
+    equal = len({len(values) for values in said}) == 1
+    kappa = fleiss_kappa(said) if equal else None
+    return PeopleAgreement(tuple(people), len(read), kappa, spreads(_distances(read)))
+
+
+def _distances(read: Sequence[_Read]) -> Iterator[GroupDistance]:
+    return (pair.distance for one in read for pair in one.pairs)
+
+
+def _group(one: _Read) -> GroupAgreement:
+    row = one.row
+    people: dict[int, str] = defaultdict(str)
+    for pair in one.pairs:
+        people |= {pair.a: pair.people[0], pair.b: pair.people[1]}
+    return GroupAgreement(
+        row.group_id,
+        row.number,
+        row.batch_id or None,
+        row.state,
+        row.status,
+        tuple(one.verdicts),
+        tuple(one.verdicts.values()),
+        row.worst,
+        row.disagreements,
+        spreads(pair.distance for pair in one.pairs),
+        row.outcome,
+        None if row.take_id is None else people[row.take_id],
+        row.decided,
+        row.decided_by,
+    )

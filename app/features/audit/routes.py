@@ -1,0 +1,134 @@
+"""The audit: who said and did what, for admins and for the leads of a dataset."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from datetime import UTC, datetime
+from typing import Annotated, Literal
+
+from fastapi import APIRouter, Depends, Query, Request
+from fastapi.responses import StreamingResponse
+from starlette.responses import Response
+
+from app.features.audit import service as audit
+from app.features.audit.queries import AuditQuery
+from app.features.audit.schemas import AuditDocument, AuditEntryDocument
+from app.features.audit.service import KINDS, AuditEntry, AuditPage, Family
+from app.features.datasets.service import dataset_id
+from app.features.people.visibility_queries import EVERYTHING, Sight
+from app.finite import MAX_ID
+from app.formats.csv_text import csv_line
+from app.http.access import login_of
+from app.http.cursor import Before, Cursor, first_below
+from app.http.deps import AppStore
+from app.http.problem import responses
+
+router = APIRouter(prefix="/audit", tags=["users"])
+COLUMNS = tuple(AuditEntryDocument.model_fields)
+
+
+async def get_led(request: Request) -> Sight:
+    """The datasets whose audit whoever asks may read."""
+    login = login_of(request.scope)
+    return EVERYTHING if login is None else login.roles.led()
+
+
+Led = Annotated[Sight, Depends(get_led)]
+
+
+def asked_for(
+    store: AppStore,
+    dataset: Annotated[
+        str | None, Query(max_length=200, description="Name or id of the dataset.")
+    ] = None,
+    group: Annotated[int | None, Query(ge=1, le=MAX_ID, description="Id of a group.")] = None,
+    person: Annotated[
+        str | None, Query(max_length=120, description="A person, with all of their tokens.")
+    ] = None,
+    family: Annotated[Family | None, Query(description="What it is about.")] = None,
+    since: Annotated[datetime | None, Query(description="From this time on.")] = None,
+    until: Annotated[datetime | None, Query(description="Before this time.")] = None,
+) -> AuditQuery:
+    """Of whom, of what and when."""
+    if group is not None:
+        audit.require_group(store, group)
+    return AuditQuery(
+        None if dataset is None else dataset_id(store, dataset),
+        group,
+        person or None,
+        None if family is None else KINDS[family],
+        _text(since),
+        _text(until),
+    )
+
+
+def _text(at: datetime | None) -> str | None:
+    if at is None:
+        return None
+    try:
+        whole = at if at.tzinfo is not None else at.replace(tzinfo=UTC)
+        return whole.astimezone(UTC).isoformat(timespec="microseconds")
+    except OverflowError:
+        return at.replace(tzinfo=UTC).isoformat(timespec="microseconds")
+
+
+Asked = Annotated[AuditQuery, Depends(asked_for)]
+Search = Annotated[
+    str,
+    Query(
+        alias="q",
+        max_length=200,
+        description="Words that all stand in an entry: its sentence, person, dataset or group.",
+    ),
+]
+
+
+@router.get("", operation_id="getAudit", response_model=AuditDocument, responses=responses(404))
+def get_audit(
+    store: AppStore,
+    led: Led,
+    asked: Asked,
+    search: Search = "",
+    limit: Annotated[int, Query(ge=1, le=500)] = 100,
+    cursor: Cursor = None,
+    before: Before = None,
+) -> AuditPage:
+    """Who said and did what, the newest first; of all datasets that one leads, or of one.
+
+    A search looks through 20,000 entries at a time: a page may hold fewer than asked for, or none,
+    and have a `next` all the same.
+    """
+    return audit.read_audit(
+        store, asked, led, search=search, before=first_below(cursor, before), limit=limit
+    )
+
+
+@router.get(
+    "/export.{ending}",
+    operation_id="exportAudit",
+    response_class=Response,
+    responses={
+        **responses(404),
+        200: {"content": {"text/csv": {}, "application/x-ndjson": {}}, "description": "The file."},
+    },
+)
+def export_audit(
+    ending: Literal["csv", "jsonl"], store: AppStore, led: Led, asked: Asked, search: Search = ""
+) -> StreamingResponse:
+    """The same, all of it, as a table (no cell of which is a formula) or as JSON Lines."""
+    found = audit.every_entry(store, asked, led, search)
+    lines = _csv(found) if ending == "csv" else _json_lines(found)
+    kind = "text/csv; charset=utf-8" if ending == "csv" else "application/x-ndjson"
+    saved = {"Content-Disposition": f'attachment; filename="touchline-audit.{ending}"'}
+    return StreamingResponse(lines, media_type=kind, headers=saved)
+
+
+def _csv(found: Iterator[AuditEntry]) -> Iterator[str]:
+    yield csv_line(COLUMNS)
+    for entry in found:
+        yield csv_line(getattr(entry, name) for name in COLUMNS)
+
+
+def _json_lines(found: Iterator[AuditEntry]) -> Iterator[str]:
+    for entry in found:
+        yield AuditEntryDocument.model_validate(entry).model_dump_json() + "\n"

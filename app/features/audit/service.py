@@ -1,0 +1,348 @@
+"""Audit: who said and did what, read from the log, for admins and for the leads of a dataset."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Any
+
+from app.db.log import single_edits
+from app.db.store import Store
+from app.errors import NotFoundError
+from app.features.audit.queries import AuditQuery as AuditQuery
+from app.features.audit.queries import AuditRow, audit_rows
+from app.features.comments.queries import find_group
+from app.features.people.visibility_queries import Sight
+from app.plural import plural
+
+MOST_LOOKED_AT = 20_000
+"""Entries that one page of a search looks through; the next page goes on from there."""
+_BATCH = 500
+
+
+class Family(StrEnum):
+    """What an entry of the log is about."""
+
+    EDIT = "edit"
+    VERDICT = "verdict"
+    COMMENT = "comment"
+    POLICY = "policy"
+    VERSION = "version"
+    IMPORT = "import"
+    PEOPLE = "people"
+    JOB = "job"
+    WORK = "work"
+    OTHER = "other"
+
+
+KINDS: Mapping[Family, tuple[str, ...]] = {
+    Family.EDIT: (
+        *("edit", "undo", "redo", "pitch", "position", "noise", "paint"),
+        *("station_edit", "station_undo", "station_redo"),
+    ),
+    Family.VERDICT: ("verdict", "verdict_batch", "verdict_batch_undo", "dismissal"),
+    Family.COMMENT: ("comment",),
+    Family.POLICY: ("policy",),
+    Family.VERSION: ("freeze",),
+    Family.IMPORT: ("dataset", "dataset_deleted", "import", "station", "camera", "spare"),
+    Family.PEOPLE: ("person",),
+    Family.JOB: ("job",),
+    Family.WORK: ("work", "take", "agreement", "gold", "guideline"),
+    Family.OTHER: ("deed",),
+}
+"""Kinds of the log's entries by what they are about."""
+_FAMILIES = {kind: family for family, kinds in KINDS.items() for kind in kinds}
+
+
+@dataclass(frozen=True)
+class AuditEntry:
+    """One thing that somebody said or did.
+
+    Attributes:
+        sentence: What, in words.
+        network: From which address, where that is known.
+        address: Of the page that it is about; None where there is none.
+        hash: Of the entry in the chain.
+    """
+
+    id: int
+    at: str
+    actor: str
+    family: Family
+    kind: str
+    sentence: str
+    dataset: str | None
+    group_id: int | None
+    group: str | None
+    network: str | None
+    address: str | None
+    hash: str
+
+
+@dataclass(frozen=True)
+class AuditPage:
+    """Entries, the newest first; ``next`` is where the page after this one begins, None at the end."""
+
+    items: list[AuditEntry]
+    next: int | None
+
+
+def read_audit(
+    store: Store,
+    asked: AuditQuery,
+    sight: Sight,
+    *,
+    search: str = "",
+    before: int | None = None,
+    limit: int = 100,
+) -> AuditPage:
+    """A page of what was said and done.
+
+    Args:
+        store: The database.
+        asked: Of whom, of what and when.
+        sight: The datasets whose audit somebody may read.
+        search: Words that all stand in an entry: its sentence, person, dataset or group.
+        before: ``next`` of the page before.
+        limit: Entries at most. A search looks through ``MOST_LOOKED_AT`` at a time, and may give fewer.
+    """
+    words = search.casefold().split()
+    batch = _BATCH if words else limit + 1
+    found: list[AuditEntry] = []
+    looked = 0
+    with store.read() as session:
+        while looked < MOST_LOOKED_AT:
+            rows = audit_rows(session, asked, sight, before, batch)
+            for row in rows:
+                entry = _entry(row)
+                if _holds(entry, words):
+                    if len(found) == limit:
+                        return AuditPage(found, before)
+                    found.append(entry)
+                before = row.id
+            looked += len(rows)
+            if len(rows) < batch:
+                return AuditPage(found, None)
+    return AuditPage(found, before)
+
+
+def require_group(store: Store, group_id: int) -> None:
+    """Raise NotFoundError where there is no such group."""
+    with store.read() as session:
+        if find_group(session, group_id) is None:
+            raise NotFoundError.group(group_id)
+
+
+def every_entry(
+    store: Store, asked: AuditQuery, sight: Sight, search: str = ""
+) -> Iterator[AuditEntry]:
+    """All of it, a page at a time, so that a long log fits into memory.
+
+    The first page is read at once: a question that cannot be asked is refused before anything is sent.
+    """
+
+    def page_after(before: int | None) -> AuditPage:
+        return read_audit(store, asked, sight, search=search, before=before, limit=_BATCH)
+
+    def entries(page: AuditPage) -> Iterator[AuditEntry]:
+        yield from page.items
+        while page.next is not None:
+            page = page_after(page.next)
+            yield from page.items
+
+    return entries(page_after(None))
+
+
+def _holds(entry: AuditEntry, words: list[str]) -> bool:
+    if not words:
+        return True
+    parts = (entry.actor, entry.kind, entry.sentence, entry.dataset, entry.group, entry.network)
+    text = " ".join(part for part in parts if part).casefold()
+    return all(word in text for word in words)
+
+
+def _entry(row: AuditRow) -> AuditEntry:
+    body = row.body if isinstance(row.body, dict) else {}
+    network = body.get("address") if row.kind == "person" else None
+    return AuditEntry(
+        id=row.id,
+        at=row.at,
+        actor=row.actor,
+        family=_FAMILIES.get(row.kind, Family.OTHER),
+        kind=row.kind,
+        sentence=_SENTENCES.get(row.kind, _plain)(row, body),
+        dataset=row.dataset,
+        group_id=row.group_id if row.label is not None else None,
+        group=row.label,
+        network=network or None,
+        address=_address(row, body),
+        hash=row.hash,
+    )
+
+
+def _address(row: AuditRow, body: Mapping[str, Any]) -> str | None:
+    if row.label is not None and row.group_id is not None:
+        if row.kind == "comment":
+            return f"/review/{row.group_id}?thread={body.get('thread')}"
+        return f"/review/{row.group_id}/history?entry={row.id}"
+    if row.kind == "person":
+        return "/people"
+    if row.kind == "job":
+        return "/jobs"
+    if row.dataset is None:
+        return None
+    pages = {"policy": "/policy", "freeze": "/versions", "deed": "/statistics"}
+    return f"/datasets/{row.dataset}{pages.get(row.kind, '')}"
+
+
+def _plain(row: AuditRow, _body: Mapping[str, Any]) -> str:
+    return row.kind.replace("_", " ")
+
+
+def _edit(row: AuditRow, body: Mapping[str, Any]) -> str:
+    edit = body.get("edit")
+    said = edit if isinstance(edit, dict) else body
+    verb = {"undo": "undid: ", "redo": "redid: "}.get(row.kind.removeprefix("station_"), "")
+    return verb + "; ".join(_one_edit(row, one) for one in single_edits(said))
+
+
+def _one_edit(row: AuditRow, said: Mapping[str, Any]) -> str:
+    name = str(said.get("edit", row.kind))
+    view = f" of view {said['view']}" if said.get("view") else ""
+    lines = said.get("lines")
+    names = f": {', '.join(lines)}" if isinstance(lines, dict) and lines else ""
+    if name == "include_view":
+        what = "use" if said.get("included") else "leaving out"
+    else:
+        what = name.removeprefix("set_").replace("_", " ")
+    return f"{what}{view}{names}"
+
+
+def _dismissal(_row: AuditRow, body: Mapping[str, Any]) -> str:
+    did = "dismissed the finding" if body.get("dismissed") else "opened the finding again"
+    kind = str(body.get("kind")).replace("_", " ")
+    place = f" in {body['view']}" if body.get("view") else ""
+    why = f": {body['note']}" if body.get("note") else ""
+    return f"{did} {kind}{place}{why}"
+
+
+def _verdict(_row: AuditRow, body: Mapping[str, Any]) -> str:
+    said = [str(body.get("state"))]
+    if body.get("reason"):
+        said.append(f"because of {str(body['reason']).replace('_', ' ')}")
+    if body.get("override"):
+        said.append(f"although {str(body['override']).replace('_', ' ')} fails")
+    return " ".join(said) + (f": {body['note']}" if body.get("note") else "")
+
+
+def _bulk(row: AuditRow, body: Mapping[str, Any]) -> str:
+    verb = "undid verdicts on" if row.kind.endswith("undo") else f"{body.get('state', 'changed')}"
+    count = body.get("changed", body.get("groups"))
+    return f"{verb} {plural(count, 'group') if isinstance(count, int) else 'many groups'} at once"
+
+
+def _comment(_row: AuditRow, body: Mapping[str, Any]) -> str:
+    did = {"said": "commented", "edited": "changed a comment", "deleted": "deleted a comment"}
+    did |= {"resolved": "resolved a thread", "reopened": "reopened a thread"}
+    said = did.get(str(body.get("did")), "commented")
+    return f"{said}: {body['text']}" if body.get("text") else said
+
+
+_WAYS = {"passkey": " by passkey", "sign_on": " by single sign-on"}
+
+
+def _person(_row: AuditRow, body: Mapping[str, Any]) -> str:
+    did = "password chosen" if body.get("did") == "password" else body.get("did")
+    token = f" “{body['token']}”" if isinstance(body.get("token"), str) else ""
+    way = _WAYS.get(str(body.get("way")), "")
+    role = f" ({body['role']})" if body.get("role") and "role" in str(body.get("did")) else ""
+    return f"{body.get('person')}: {did}{way}{token}{role}"
+
+
+def _job(_row: AuditRow, body: Mapping[str, Any]) -> str:
+    return f"requested: {body.get('title')}"
+
+
+def _deed(_row: AuditRow, body: Mapping[str, Any]) -> str:
+    more = [str(value) for name, value in body.items() if name != "did" and value is not None]
+    return f"{body.get('did')}: {', '.join(more)}" if more else str(body.get("did"))
+
+
+_BATCH_DEEDS = {"made": "assigned", "changed": "changed", "closed": "closed", "deleted": "deleted"}
+
+
+_STARTS = {
+    "imported": "the imported annotations",
+    "without_balls": "lines without balls",
+    "bare": "pictures only",
+}
+
+
+def _own(row: AuditRow, body: Mapping[str, Any]) -> str | None:
+    """What became of batches, of somebody's own annotation, of gold groups and of guidelines; None: none of these."""
+    did, person, group = (body.get(name) for name in ("did", "person", "group"))
+    why = f": {body['reason']}" if body.get("reason") else ""
+    verdict = f", {body['verdict']}" if body.get("verdict") else ""
+    said = {
+        ("take", "adopted"): f"took over {person}’s independent annotation",
+        ("take", "handed in"): f"submitted their independent annotation{verdict}",
+        ("take", "handed back"): f"returned to {person}{why}",
+        ("work", "handed back"): f"returned to {person}{why}",
+        ("work", "handed in"): f"submitted group {group} of batch {body.get('batch')}",
+        ("work", "taken back"): f"reopened group {group} of batch {body.get('batch')}",
+        ("agreement", "agreed"): f"annotations agree, {person}’s is used",
+        ("agreement", "decided"): f"decided for {person}’s annotation",
+        ("agreement", "limits"): "set the limits of agreement",
+        ("gold", "marked"): f"marked group {group} as gold",
+        (
+            "gold",
+            "changed",
+        ): f"lets annotators of gold group {group} begin with {_STARTS.get(str(body.get('start')))}",
+        ("gold", "unmarked"): f"unmarked gold group {group}",
+    }
+    if row.kind == "work" and did in _BATCH_DEEDS and "name" in body:
+        return f"{_BATCH_DEEDS[did]} the batch “{body['name']}”"
+    if row.kind == "gold" and "groups" in body:
+        return f"marked {plural(len(body['groups']), 'group')} of a {body['source']} as gold"
+    if row.kind == "guideline" and "number" in body:
+        return f"wrote version {body['number']} of the guidelines"
+    return said.get((row.kind, str(did)))
+
+
+def _work(row: AuditRow, body: Mapping[str, Any]) -> str:
+    said = _own(row, body)
+    if said is not None:
+        return said
+    parts = ("name", "batch", "group", "take", "person")
+    about = [f"{part} {body[part]}" for part in parts if isinstance(body.get(part), (int, str))]
+    return f"{row.kind} {body.get('did', 'written')}" + (f": {', '.join(about)}" if about else "")
+
+
+def _named(verb: str) -> Callable[[AuditRow, Mapping[str, Any]], str]:
+    def sentence(_row: AuditRow, body: Mapping[str, Any]) -> str:
+        return f"{verb} {body['name']}" if isinstance(body.get("name"), str) else verb
+
+    return sentence
+
+
+_SENTENCES: Mapping[str, Callable[[AuditRow, Mapping[str, Any]], str]] = {
+    **dict.fromkeys(KINDS[Family.EDIT], _edit),
+    **dict.fromkeys(KINDS[Family.WORK], _work),
+    "verdict": _verdict,
+    "dismissal": _dismissal,
+    "verdict_batch": _bulk,
+    "verdict_batch_undo": _bulk,
+    "comment": _comment,
+    "person": _person,
+    "job": _job,
+    "deed": _deed,
+    "policy": _named("set the policy"),
+    "freeze": _named("froze the version"),
+    "dataset": _named("made the dataset"),
+    "dataset_deleted": _named("deleted the dataset"),
+    "import": _named("imported"),
+    "station": _named("imported a static camera"),
+    "camera": _named("imported a camera"),
+    "spare": _named("imported frames without a ball"),
+}

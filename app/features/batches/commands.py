@@ -1,0 +1,202 @@
+"""Commands on work that is given out: list, give, show and close batches; in a home or on a server."""
+
+from __future__ import annotations
+
+from datetime import date
+from typing import Annotated, Any
+
+import typer
+
+from app.soccer.choices import GoldStart
+from app.terminal.opened import opened_store
+from app.terminal.options import Json, acting
+from app.terminal.remote import BATCH
+from app.terminal.server import connected, given_server
+from app.terminal.terminal import print_rows, print_values
+
+commands = typer.Typer(help="Groups that are assigned to people.", no_args_is_help=True)
+
+Dataset = Annotated[str, typer.Argument(help="Name or id of the dataset.")]
+Number = Annotated[int, typer.Argument(help="Number of the batch.", min=1)]
+
+
+@commands.command("list")
+def list_(dataset: Dataset, json_: Json = False) -> None:
+    """List the batches of a dataset: open ones and those that are due first come first."""
+    server = given_server()
+    if server is not None:
+        from app.terminal.remote import batch_values
+
+        with connected(server) as client:
+            found = batch_values(client, dataset)
+    else:
+        from app.features.batches.service import list_batches
+
+        with opened_store() as store:
+            found = [_values(batch) for batch in list_batches(store, dataset)]
+    print_rows(found, json_, lambda value: value, _line)
+
+
+@commands.command()
+def give(
+    dataset: Dataset,
+    name: Annotated[str, typer.Argument(help="What people call the batch.")],
+    query: Annotated[
+        str, typer.Option("--query", help="Which groups, and in which order; default: all.")
+    ] = "",
+    size: Annotated[int | None, typer.Option(min=1, help="Limit to the first N of them.")] = None,
+    annotator: Annotated[
+        list[str] | None, typer.Option(help="Who annotates; may be given several times.")
+    ] = None,
+    reviewer: Annotated[
+        list[str] | None, typer.Option(help="Who reviews; default: every reviewer.")
+    ] = None,
+    due: Annotated[str | None, typer.Option(metavar="DATE", help="By when: 2026-12-24.")] = None,
+    verdicts: Annotated[int, typer.Option(min=1, help="Annotators per group.")] = 1,
+    seen: Annotated[bool, typer.Option("--seen", help="Annotators see each other's work.")] = False,
+    gold_every: Annotated[int | None, typer.Option(min=1, help="One gold group in N.")] = None,
+    again: Annotated[
+        bool, typer.Option("--again", help="Also groups that wait in another open batch.")
+    ] = False,
+    json_: Json = False,
+) -> None:
+    """Give out the groups that a query finds now, in its order."""
+    day = _day(due)
+    asked: dict[str, Any] = {
+        "name": name,
+        "size": size,
+        "annotators": annotator or [],
+        "reviewers": reviewer or [],
+        "verdicts": verdicts,
+        "blind": not seen,
+        "gold_every": gold_every,
+        "skip_given": not again,
+    }
+    server = given_server()
+    if server is not None:
+        from app.terminal.remote import give_values
+
+        body = {**asked, "q": query, "due": None if day is None else day.isoformat()}
+        with connected(server) as client:
+            print_values(give_values(client, dataset, body), json_)
+        return
+    from app.features.batches.service import NewBatch, make_batch
+
+    with opened_store() as store:
+        new = NewBatch(query=query, due=day, **asked)
+        print_values(_values(make_batch(store, dataset, new, actor=acting())), json_)
+
+
+@commands.command()
+def show(batch: Number, json_: Json = False) -> None:
+    """Show how far a batch is."""
+    server = given_server()
+    if server is not None:
+        from app.terminal.remote import one_batch
+
+        with connected(server) as client:
+            print_values(one_batch(client, batch), json_)
+        return
+    from app.features.batches.service import get_batch
+
+    with opened_store() as store:
+        print_values(_values(get_batch(store, batch)), json_)
+
+
+@commands.command()
+def gold(
+    dataset: Dataset,
+    source: Annotated[
+        str, typer.Option("--from", help="Source of the truth: sample, or version.")
+    ] = "sample",
+    version: Annotated[str | None, typer.Option(help="Name or id of the version.")] = None,
+    query: Annotated[str, typer.Option("--query", help="Which groups; default: all.")] = "",
+    size: Annotated[
+        int, typer.Option(min=1, max=1000, help="Limit to the first N of them.")
+    ] = 1000,
+    start: Annotated[GoldStart, typer.Option(help="What annotators start with.")] = "imported",
+    json_: Json = False,
+) -> None:
+    """Make gold groups of those whose truth is known; batches mix them in."""
+    from app.features.independent_annotations.gold import TruthSource
+
+    if source not in (TruthSource.SAMPLE, TruthSource.VERSION):
+        raise typer.BadParameter("say sample or version", param_hint="--from")
+    server = given_server()
+    if server is not None:
+        from app.terminal.remote import choose_gold
+
+        asked = {"source": source, "version": version, "q": query, "size": size, "start": start}
+        with connected(server) as client:
+            print_values(choose_gold(client, dataset, asked), json_)
+        return
+    from app.features.independent_annotations.known_truth import GoldChoice, mark_known
+
+    choice = GoldChoice(TruthSource(source), version, query, size, start)
+    with opened_store() as store:
+        found = mark_known(store, dataset, choice, actor=acting())
+    print_values({"groups": [*found.groups], "left_out": found.left_out}, json_)
+
+
+@commands.command()
+def change(
+    batch: Number,
+    gold_every: Annotated[int | None, typer.Option(min=1, help="One gold group in N.")] = None,
+    no_gold: Annotated[bool, typer.Option("--no-gold", help="No gold groups any more.")] = False,
+    json_: Json = False,
+) -> None:
+    """Change how many gold groups a batch mixes in, also while people work on it."""
+    if (gold_every is None) != no_gold:
+        raise typer.BadParameter("say how many, or --no-gold", param_hint="--gold-every")
+    server = given_server()
+    if server is not None:
+        from app.terminal.remote import change_gold
+
+        with connected(server) as client:
+            print_values(change_gold(client, batch, gold_every), json_)
+        return
+    from app.features.batches.service import change_batch
+
+    with opened_store() as store:
+        found = change_batch(store, batch, actor=acting(), gold_every=gold_every, no_gold=no_gold)
+    print_values(_values(found), json_)
+
+
+@commands.command()
+def close(batch: Number, json_: Json = False) -> None:
+    """Give nothing more out of a batch; what was said of its groups stays."""
+    server = given_server()
+    if server is not None:
+        from app.terminal.remote import close_batch
+
+        with connected(server) as client:
+            print_values(close_batch(client, batch), json_)
+        return
+    from app.features.batches.queries import CLOSED
+    from app.features.batches.service import change_batch
+
+    with opened_store() as store:
+        print_values(_values(change_batch(store, batch, actor=acting(), state=CLOSED)), json_)
+
+
+def _values(batch: Any) -> dict[str, Any]:
+    return {name: getattr(batch, name) for name in BATCH}
+
+
+def _line(value: dict[str, Any]) -> str:
+    people = ", ".join([*value["annotators"], *value["reviewers"]]) or "everybody"
+    due = "" if value["due"] is None else f"   due {value['due']}"
+    return (
+        f"{value['id']:5} {value['name']:30} {value['state']:7}"
+        f"{value['settled']:6} of {value['groups']} settled, {value['handed_in']} to review"
+        f"   {people}{due}"
+    )
+
+
+def _day(said: str | None) -> date | None:
+    try:
+        return None if said is None else date.fromisoformat(said)
+    except ValueError:
+        raise typer.BadParameter(
+            f'"{said}" is no day; write it as 2026-12-24', param_hint="--due"
+        ) from None

@@ -1,0 +1,83 @@
+"""Settling: notes that work on groups is done or waits again, and which batches are done by that."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+
+from sqlalchemy import bindparam, delete, exists, select, update
+
+from app.db.dialects.statements import numbers_given
+from app.db.session import Session
+from app.features.batches.queries import OPEN
+from app.features.batches.tables import BatchGroupModel, BatchModel, LeaseModel
+from app.features.webhooks.queries import DONE, announce_batch
+from app.features.webhooks.tables import WebhookModel
+from app.finite import json_text
+
+_BATCH = BatchModel.__table__
+_IS_SINGLE = (_BATCH.c.state == OPEN, _BATCH.c.verdicts == 1)
+_TELLS = exists().where(WebhookModel.dataset_id == _BATCH.c.dataset_id, WebhookModel.off.is_(None))
+"""Somebody wants to know what becomes of a batch."""
+# What every verdict asks is put together once: that takes longer than to answer it.
+_GIVEN = BatchGroupModel.group_id.in_(numbers_given("ids"))
+_IN_BATCH = exists().where(BatchGroupModel.batch_id == _BATCH.c.id, _GIVEN)
+_TOUCHED = select(
+    _BATCH.c.id, (_TELLS & _IN_BATCH.where(BatchGroupModel.settled.is_(None))).label("is_near")
+).where(*_IS_SINGLE, _IN_BATCH)
+"""Open batches that ask for one verdict and have some of the groups; whether somebody is to be told if
+they are done by that."""
+_SINGLE = select(_BATCH.c.id).where(*_IS_SINGLE)
+_SETTLE = (
+    update(BatchGroupModel)
+    .where(_GIVEN, BatchGroupModel.batch_id.in_(_SINGLE))
+    .values(settled=bindparam("over"))
+)
+_CLOSE = delete(LeaseModel).where(
+    LeaseModel.group_id.in_(numbers_given("ids")), LeaseModel.batch_id.in_(_SINGLE)
+)
+
+
+def settle_judged(session: Session, states: Mapping[int, str], *, actor: str, at: str) -> None:
+    """Groups were judged: in open batches that ask for one verdict their work is over.
+
+    A group that is deferred, or not judged any more, waits again. Whoever has a settled group open
+    needs it no longer.
+
+    Args:
+        session: The write session that holds the verdicts.
+        states: The verdict on each group.
+        actor: Who gave them.
+        at: When they were given.
+    """
+    over = {group for group, state in states.items() if state in ("accepted", "rejected")}
+    for ids, settled in ((over, at), (set(states) - over, None)):
+        given = {"ids": json_text(sorted(ids))}
+        touched = session.execute(_TOUCHED, given).all() if ids else []
+        if not touched:
+            continue
+        session.execute(_SETTLE, {**given, "over": settled})
+        if settled is not None:
+            session.execute(_CLOSE, given)
+            near = [row.id for row in touched if row.is_near]
+            _tell_done(session, near, actor=actor, at=at)
+
+
+def settle_in_batch(session: Session, batch_id: int, group_id: int, *, actor: str, at: str) -> None:
+    """The work on a group of a batch is over."""
+    mine = (BatchGroupModel.batch_id == batch_id, BatchGroupModel.group_id == group_id)
+    waits = (*mine, BatchGroupModel.settled.is_(None))
+    told = select(_BATCH.c.id).where(_BATCH.c.id == batch_id, _TELLS, exists().where(*waits))
+    near = list(session.scalars(told))
+    session.execute(update(BatchGroupModel).where(*waits).values(settled=at))
+    _tell_done(session, near, actor=actor, at=at)
+
+
+def _tell_done(session: Session, batch_ids: Collection[int], *, actor: str, at: str) -> None:
+    """Tell of those of some batches in which no group waits any more."""
+    if not batch_ids:
+        return
+    waits = select(BatchGroupModel.batch_id).where(
+        BatchGroupModel.batch_id.in_(batch_ids), BatchGroupModel.settled.is_(None)
+    )
+    for batch_id in sorted(set(batch_ids) - set(session.scalars(waits.distinct()))):
+        announce_batch(session, batch_id, DONE, actor=actor, at=at)

@@ -1,0 +1,370 @@
+"""Leases: who has which group of a batch open, so that two people never meet by accident.
+
+A lease is a courtesy: what somebody says of a group is guarded by ``If-Match``, with or without one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from datetime import UTC, datetime, timedelta
+from typing import Any
+
+from app.db.log import Entry, append
+from app.db.session import Session, text_of
+from app.db.store import Store
+from app.errors import ConflictError, HeldGroupError, NotFoundError
+from app.features.batches.own import (
+    as_seen,
+    hand_in_own,
+    next_own,
+    own_of,
+    own_total,
+    returned_to,
+    takes_part,
+)
+from app.features.batches.queries import (
+    end_lease_of,
+    end_leases,
+    forget_ended,
+    group_in,
+    hand_in,
+    keep_lease,
+    leases_on,
+    waiting_group,
+)
+from app.features.batches.service import WORK, Batch, Here, Part, read_batch
+from app.features.independent_annotations.return_work import checked_reason, note_hand_back
+from app.features.independent_annotations.service import HandedBack, Take, read_handed_back
+from app.features.people.visibility_queries import is_blind
+
+LASTS = timedelta(minutes=3)
+"""A lease whose page says nothing ends after this."""
+
+
+@dataclass(frozen=True)
+class Worker:
+    """Who works on a batch.
+
+    Attributes:
+        name: As in the log.
+        may_annotate, may_review: What their role allows in the dataset.
+        alone: Nobody has an account here: they are everybody.
+    """
+
+    name: str
+    may_annotate: bool = True
+    may_review: bool = True
+    alone: bool = False
+
+    def parts(self, batch: Batch) -> set[Part]:
+        """What they do in a batch."""
+        parts = set()
+        if self.name in batch.annotators and self.may_annotate:
+            parts.add(Part.ANNOTATOR)
+        named = self.name in batch.reviewers or not batch.reviewers or self.alone
+        if named and self.may_review:
+            parts.add(Part.REVIEWER)
+        return parts
+
+
+@dataclass(frozen=True)
+class Lease:
+    """A group that somebody has open, and who else has.
+
+    Attributes:
+        group: Its id; None: there is none left for them now.
+        part: What they do with it.
+        until: When it ends unless it is kept.
+        here: Everybody who has the group open.
+        handed_in_by: Who has handed it in; None: nobody.
+        handed_back: Why it was handed back to its annotator; None: it was not, or is handed in again.
+        place: Of the groups that they annotate on their own: which this is, from 1; None otherwise.
+        of: How many these are as the batch stands; None where gold groups are among them, for a
+            count that stays would tell them.
+    """
+
+    batch: Batch
+    group: int | None
+    part: Part | None = None
+    until: str | None = None
+    here: tuple[Here, ...] = ()
+    handed_in_by: str | None = None
+    handed_back: HandedBack | None = None
+    place: int | None = None
+    of: int | None = None
+
+
+class Leases:
+    """Everything that is asked of leases.
+
+    Args:
+        store: Where they are.
+        clock: Says what time it is, in UTC.
+    """
+
+    def __init__(self, store: Store, clock: Callable[[], datetime] = lambda: datetime.now(UTC)):
+        self._store, self._clock = store, clock
+
+    def next(self, batch_id: int, worker: Worker, *, after: int | None = None) -> Lease:
+        """Take a lease on the next group that waits for somebody, and that nobody has open.
+
+        Args:
+            batch_id: The batch.
+            worker: Who asks.
+            after: Id of the group that they come from, which they do not get again.
+
+        Raises:
+            NotFoundError: There is no such batch.
+            ConflictError: It is given to others, or closed.
+        """
+        with self._store.write(lasting=False) as session:
+            batch = _open_batch(session, batch_id)
+            if not takes_part(batch, worker.parts(batch)):
+                return self._next(session, batch, worker, after)
+            back = returned_to(session, batch, worker.name)
+            mine = next((group for group in back if group != after), None)
+            if mine is not None:
+                row = _group(session, batch, mine)
+                return self._kept(session, batch, row, Part.ANNOTATOR, worker)
+        take = next_own(self._store, batch, worker.name)
+        if take is None:
+            return Lease(batch, None, Part.ANNOTATOR)
+        with self._store.read() as session:
+            return _own(session, batch, take, worker)
+
+    def _next(self, session: Session, batch: Batch, worker: Worker, after: int | None) -> Lease:
+        at = self._now()
+        forget_ended(session, at)
+        found = open_for(session, batch, worker, at, after=after)
+        if found is None:
+            return Lease(batch, None)
+        row, part = found
+        return self._kept(session, batch, row, part, worker)
+
+    def take(self, batch_id: int, group: int, worker: Worker, *, take_over: bool = False) -> Lease:
+        """Take a lease on a group, or let the one last on that they have.
+
+        Args:
+            batch_id: The batch.
+            group: The group.
+            worker: Who asks.
+            take_over: End the leases of others.
+
+        Raises:
+            NotFoundError: There is no such batch, or it has no such group.
+            HeldGroupError: Somebody else has the group open.
+            ConflictError: The batch is closed or given to others.
+        """
+        with self._store.write(lasting=False) as session:
+            batch = _open_batch(session, batch_id)
+            own = own_of(session, batch, group, worker.name)
+            if own is not None:
+                return _own(session, batch, own, worker)
+            _require_given(session, batch, group, worker)
+            parts, row = _need_parts(batch, worker), _group(session, batch, group)
+            others = _others(session, batch, group, worker, self._now())
+            if others and not take_over:
+                here = _here(session, batch, group, self._now())
+                raise HeldGroupError(f"{others[0].person} has this group open", here)
+            end_leases(session, [row.id for row in others])
+            return self._kept(session, batch, row, _part_in(parts, row), worker)
+
+    def give_back(self, batch_id: int, group: int, worker: Worker) -> Lease:
+        """End a lease; it does not matter whether there is one.
+
+        Raises:
+            NotFoundError: There is no such batch.
+        """
+        with self._store.write(lasting=False) as session:
+            batch = as_seen(session, read_batch(session, batch_id, with_here=False))
+            end_lease_of(session, batch_id, group, worker.name)
+            return Lease(batch, group, here=_here(session, batch, group, self._now()))
+
+    def hand_in(
+        self, batch_id: int, group: int, worker: Worker, *, actor: str, done: bool = True
+    ) -> Lease:
+        """Say that the annotation of a group is done, so that a reviewer gets it; or that it is not.
+
+        Raises:
+            NotFoundError: There is no such batch, or it has no such group.
+            ConflictError: They are not one of its annotators, somebody else has handed it in, or the
+                batch is closed.
+        """
+        with self._store.read() as session:
+            batch = _open_batch(session, batch_id)
+            own = own_of(session, batch, group, worker.name)
+        if own is not None:
+            lease = Lease(batch, group)
+            with self._store.write() as session:
+                hand_in_own(session, own, actor=actor, done=done)
+                session.respond(lease)
+            return lease
+        with self._store.write() as session:
+            batch = _open_batch(session, batch_id)
+            _require_given(session, batch, group, worker)
+            row = _group(session, batch, group)
+            if Part.ANNOTATOR not in worker.parts(batch):
+                raise ConflictError(f'you are no annotator of the batch "{batch.name}"')
+            others = row.handed_in is not None and row.handed_in_by != worker.name
+            if row.settled is not None or others:
+                by = row.handed_in_by or "somebody"
+                raise ConflictError(f"{by} has submitted this group", hint="Go on with the next.")
+            hand_in(session, batch_id, group, at=self._now() if done else None, by=worker.name)
+            did = "handed in" if done else "taken back"
+            body = {"batch": batch.id, "dataset": batch.dataset_id, "did": did, "group": group}
+            append(session, [Entry(WORK, actor, self._now(), body)])
+            return self._ended(session, batch_id, group, worker)
+
+    def hand_back(
+        self, batch_id: int, group: int, worker: Worker, reason: str = "", *, actor: str
+    ) -> Lease:
+        """Give a group that was handed in back to who did, and tell them why; they get it next.
+
+        Raises:
+            NotFoundError: There is no such batch, or it has no such group.
+            ConflictError: It is not handed in, its work is over, or the batch is closed.
+            InputError: The sentence is too long.
+        """
+        said = checked_reason(reason)
+        with self._store.write() as session:
+            batch = _open_batch(session, batch_id)
+            row = _group(session, batch, group)
+            if row.settled is not None:
+                raise ConflictError("this group was judged", hint="Take the verdict back first.")
+            if row.handed_in is None:
+                raise ConflictError("this group is not submitted")
+            person = row.handed_in_by
+            hand_in(session, batch_id, group, at=None, by=person, returned=True)
+            note_hand_back(session, WORK, group, person, said, actor=actor, batch=batch_id)
+            return self._ended(session, batch_id, group, worker)
+
+    def _ended(self, session: Session, batch_id: int, group: int, worker: Worker) -> Lease:
+        """The response once somebody's lease has ended with what they said of the group."""
+        end_lease_of(session, batch_id, group, worker.name)
+        batch = as_seen(session, read_batch(session, batch_id))
+        lease = Lease(batch, group, here=_here(session, batch, group, self._now()))
+        session.respond(lease)
+        return lease
+
+    def _kept(self, session: Session, batch: Batch, row: Any, part: Part, worker: Worker) -> Lease:
+        at, group = self._clock(), row.group_id
+        until = text_of(at + LASTS)
+        keep_lease(session, batch.id, group, worker.name, at=text_of(at), until=until)
+        here = _here(session, batch, group, text_of(at))
+        if row.handed_in_by is None:
+            return Lease(batch, group, part, until, here)
+        if row.handed_in is not None:
+            return Lease(batch, group, part, until, here, row.handed_in_by)
+        # Who handed it in has it back; their name stays with it.
+        back = read_handed_back(session, [group]).get(group)
+        return Lease(batch, group, part, until, here, handed_back=back)
+
+    def _now(self) -> str:
+        return text_of(self._clock())
+
+
+def open_for(
+    session: Session, batch: Batch, worker: Worker, at: str, *, after: int | None = None
+) -> tuple[Any, Part] | None:
+    """The row of the group that somebody gets next of a batch, and what they do with it.
+
+    The one function that decides it, where nobody works on copies of their own. It is called in a
+    write session, in which the lease on what it returns is taken, so that nobody else is given the
+    same meanwhile.
+
+    Args:
+        session: A write session.
+        batch: The batch, open.
+        worker: Who asks.
+        at: Now; leases that end before no longer count.
+        after: Id of the group that they come from: never that one, those behind it first, and what
+            else they have open last. None: where they have a group open, that one.
+
+    Returns:
+        None where there is none for them now.
+
+    Raises:
+        ConflictError: The batch is given to others.
+    """
+    parts = _need_parts(batch, worker)
+    row = None if after is None else group_in(session, batch.id, after)
+    place = 0 if row is None else int(row.place)
+    for part in (Part.ANNOTATOR, Part.REVIEWER):
+        if part not in parts:
+            continue
+        # Where nobody annotates, a reviewer gets everything that waits.
+        handed_in = (part is Part.REVIEWER) if batch.annotators else None
+        found = waiting_group(
+            session, batch.id, batch.dataset_id, worker.name, at, handed_in=handed_in, after=place
+        )
+        if found is not None:
+            return found, part
+    return None
+
+
+def _own(session: Session, batch: Batch, take: Take, worker: Worker) -> Lease:
+    """Of a copy, which nobody else can have open."""
+    of = own_total(session, batch, worker.name)
+    return Lease(batch, take.copy_id, Part.ANNOTATOR, place=take.place, of=of)
+
+
+def _others(session: Session, batch: Batch, group: int, worker: Worker, at: str) -> list[Any]:
+    """The leases of others that stand in somebody's way; none where each has a copy of their own."""
+    if batch.verdicts > 1:
+        return []
+    return [row for row in leases_on(session, group, at) if row.person != worker.name]
+
+
+def _here(session: Session, batch: Batch, group: int, at: str) -> tuple[Here, ...]:
+    return tuple(
+        Here(group, row.person, row.taken, row.seen)
+        for row in leases_on(session, group, at)
+        if row.batch_id == batch.id or batch.verdicts == 1
+    )
+
+
+def _open_batch(session: Session, batch_id: int) -> Batch:
+    batch = read_batch(session, batch_id, with_here=False)
+    if not batch.is_open:
+        raise ConflictError(f'the batch "{batch.name}" is closed')
+    return as_seen(session, batch)
+
+
+def _need_parts(batch: Batch, worker: Worker) -> set[Part]:
+    parts = worker.parts(batch)
+    if not parts:
+        raise ConflictError(
+            f'the batch "{batch.name}" is given to others', hint="A lead can give it to you."
+        )
+    return parts
+
+
+def _part_in(parts: set[Part], row: Any) -> Part:
+    """What somebody with these parts does with a group of a batch, as far as it is by now."""
+    if Part.ANNOTATOR in parts and (row.handed_in is None or Part.REVIEWER not in parts):
+        return Part.ANNOTATOR
+    return Part.REVIEWER
+
+
+def _require_given(session: Session, batch: Batch, group: int, worker: Worker) -> None:
+    """Who works on copies that tell nothing of their originals does not open these by the batch.
+
+    Raises:
+        NotFoundError: As of a group that is not in it.
+    """
+    if not is_blind(batch.dataset_id) or not takes_part(batch, worker.parts(batch)):
+        return
+    if group not in returned_to(session, batch, worker.name):
+        raise _no_group(batch, group)
+
+
+def _no_group(batch: Batch, group: int) -> NotFoundError:
+    return NotFoundError(f'the batch "{batch.name}" has no group {group}')
+
+
+def _group(session: Session, batch: Batch, group: int) -> Any:
+    row = group_in(session, batch.id, group)
+    if row is None:
+        raise _no_group(batch, group)
+    return row

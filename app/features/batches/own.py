@@ -1,0 +1,196 @@
+"""Own annotations in a batch: where several people annotate each group, or some groups are gold,
+everybody works on copies that nobody else sees.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import replace
+
+from app.db.session import Session, now
+from app.db.store import Store
+from app.errors import ConflictError
+from app.features.batches.queries import groups_of, groups_returned
+from app.features.batches.queries import hand_in as hand_in_group
+from app.features.batches.service import Batch, Part, get_batch, list_batches
+from app.features.independent_annotations.adopt import adopt_take
+from app.features.independent_annotations.known_truth import (
+    Terms,
+    begin_next,
+    count_gold_left,
+    fresh_outside,
+)
+from app.features.independent_annotations.queries import (
+    INDEPENDENT,
+    count_left,
+    take_of_copy,
+    takes_of_batch,
+)
+from app.features.independent_annotations.service import Take, read_take
+from app.features.independent_annotations.submission_queries import require_open, submit_copy
+from app.features.people.visibility_queries import READER, judges_in
+from app.features.queue.fields import asks_blind
+from app.soccer.actors import person_of
+
+OVER = ("accepted", "rejected")
+"""Verdicts after which a group waits for nobody."""
+
+
+def takes_part(batch: Batch, parts: Collection[Part]) -> bool:
+    """Whether somebody with these parts makes annotations of their own in a batch."""
+    if batch.verdicts == 1 and batch.gold_every is None:
+        return False
+    return Part.ANNOTATOR in parts or (Part.REVIEWER in parts and not batch.annotators)
+
+
+def next_own(store: Store, batch: Batch, person: str) -> Take | None:
+    """The own annotation that somebody shall work on now; None: there is nothing left for them.
+
+    Where one annotation a group is asked for, what they have handed in is taken over first.
+    """
+    take_over_handed_in(store, batch, person)
+    with store.read() as session:
+        groups = _waiting(session, batch)
+    terms = Terms(
+        batch.id,
+        batch.dataset_id,
+        groups,
+        batch.verdicts,
+        batch.blind,
+        batch.created,
+        batch.gold_every,
+    )
+    return begin_next(store, terms, person=person)
+
+
+def returned_to(session: Session, batch: Batch, person: str) -> list[int]:
+    """Groups whose annotation somebody handed in, was taken over, and was handed back to them."""
+    return [row.group_id for row in groups_returned(session, [batch.id], person_of(person))]
+
+
+def own_left(session: Session, batch: Batch, person: str) -> int:
+    """Of how many groups somebody may still make an annotation of their own, begun ones and those
+    that they have back included."""
+    name = person_of(person)
+    begun, free = count_left(session, batch.id, batch.dataset_id, name, batch.verdicts)
+    left = begun + free + len(returned_to(session, batch, person))
+    if batch.gold_every is None:
+        return left
+    takes = takes_of_batch(session, batch.id, batch.dataset_id)
+    kinds = [take.kind for take in takes if take.person == name]
+    fresh = len(fresh_outside(session, batch.dataset_id, name, _waiting(session, batch)))
+    return left + count_gold_left(kinds, batch.gold_every, free, fresh)
+
+
+def as_seen(session: Session, batch: Batch) -> Batch:
+    """A batch as whoever asks may see it.
+
+    Of one that they annotate blind they see their own part alone: counts of the groups change with
+    what is submitted of them, and not with what is submitted of a gold group.
+    """
+    if asks_blind(batch.query) and not judges_in(batch.dataset_id):
+        batch = replace(batch, query="")
+    reader = READER.get()
+    if reader is None or batch.id not in reader.batches.get(batch.dataset_id, ()):
+        return batch
+    return replace(own_part(session, batch, reader.person), query="")
+
+
+def own_part(session: Session, batch: Batch, person: str) -> Batch:
+    """A batch with the counts of somebody's own annotations: what they submitted is done."""
+    takes = takes_of_batch(session, batch.id, batch.dataset_id)
+    name = person_of(person)
+    back = set(returned_to(session, batch, person))
+    done = [
+        take.handed_in
+        for take in takes
+        if take.person == name and take.handed_in and take.group_id not in back
+    ]
+    return replace(
+        batch,
+        groups=len(done) + own_left(session, batch, person),
+        handed_in=0,
+        settled=len(done),
+        last=max(done, default=None),
+        here=[],
+    )
+
+
+def seen_batches(store: Store, dataset: str | int) -> list[Batch]:
+    """The batches of a dataset as whoever asks may see them."""
+    found = list_batches(store, dataset)
+    with store.read() as session:
+        return [as_seen(session, batch) for batch in found]
+
+
+def seen_batch(store: Store, batch_id: int) -> Batch:
+    """A batch as whoever asks may see it; raises NotFoundError where there is none."""
+    batch = get_batch(store, batch_id)
+    with store.read() as session:
+        return as_seen(session, batch)
+
+
+def _waiting(session: Session, batch: Batch) -> list[int]:
+    """The groups of a batch that wait; what was handed in otherwise waits for its reviewer."""
+    return [
+        row.group_id
+        for row in groups_of(session, batch.id)
+        if row.settled is None and row.handed_in is None
+    ]
+
+
+def own_total(session: Session, batch: Batch, person: str) -> int | None:
+    """How many groups of a batch somebody annotates on their own, those that are done included.
+
+    None where gold groups are mixed in: they add to what is done and not to what is left.
+    """
+    if batch.gold_every is not None:
+        return None
+    name = person_of(person)
+    takes = takes_of_batch(session, batch.id, batch.dataset_id)
+    done = len([row for row in takes if row.person == name and row.handed_in is not None])
+    return done + sum(count_left(session, batch.id, batch.dataset_id, name, batch.verdicts))
+
+
+def take_over_handed_in(store: Store, batch: Batch, person: str) -> None:
+    """Take over what somebody handed in, where nobody else annotates the same groups.
+
+    What an annotator has not judged waits for a reviewer then, as if they had handed the group in.
+    """
+    if batch.verdicts > 1:
+        return
+    with store.read() as session:
+        ready = [
+            row
+            for row in takes_of_batch(session, batch.id, batch.dataset_id)
+            if row.person == person_of(person)
+            and (row.kind, row.settled) == (INDEPENDENT, None)
+            and row.handed_in is not None
+        ]
+    for row in ready:
+        waits = batch.annotators and row.verdict not in OVER
+
+        def note(session: Session, group: int = row.group_id) -> None:
+            hand_in_group(session, batch.id, group, at=now(), by=person_of(person))
+
+        adopt_take(store, row.id, actor=person, also=note if waits else None)
+
+
+def own_of(session: Session, batch: Batch, group: int, person: str) -> Take | None:
+    """The own annotation of a person in a batch whose copy a group is; None: it is none."""
+    row = take_of_copy(session, group)
+    if row is None or (row.batch_id, row.person) != (batch.id, person_of(person)):
+        return None
+    return read_take(session, row.id)
+
+
+def hand_in_own(session: Session, take: Take, *, actor: str, done: bool) -> None:
+    """Submit an own annotation; ``done`` False: refused, only a lead lets its person go on with it.
+
+    Raises:
+        ConflictError: It was submitted before, or is not and shall be taken back.
+    """
+    if not done:
+        require_open(take)
+        raise ConflictError("this annotation is not submitted yet")
+    submit_copy(session, read_take(session, take.id), actor=actor, at=now())

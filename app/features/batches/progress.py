@@ -1,0 +1,268 @@
+"""How far work is, how fast a team gets on, and batches that stall."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from datetime import UTC, datetime, timedelta
+from enum import StrEnum
+from itertools import pairwise
+from typing import Any
+
+from app.db.session import Session, text_of
+from app.db.store import Store
+from app.features.batches.leases import Worker
+from app.features.batches.own import as_seen, own_left, own_part, takes_part
+from app.features.batches.queries import (
+    batches_that_wait,
+    datasets_with_batches,
+    entries_of_work,
+    groups_of,
+    groups_returned,
+    last_work,
+)
+from app.features.batches.service import Batch, Part, read_batch, read_batches
+from app.features.datasets.service import dataset_id
+from app.features.independent_annotations.queries import open_takes, takes_of_batch
+from app.features.independent_annotations.service import HandedBack, read_handed_back
+from app.features.people.visibility_queries import EVERYTHING, Sight
+from app.features.webhooks.queries import STALLED, announce, listeners, stamp, webhooks_on
+from app.soccer.actors import person_of
+
+BY_ITSELF = "script:batches"
+"""Who tells of it."""
+
+
+class Why(StrEnum):
+    """Why a batch has stalled."""
+
+    IDLE = "idle"
+    """Nobody did anything in it for as long as the setting ``stalled_hours`` says."""
+    OVERDUE = "overdue"
+    """Its due day is over, in UTC."""
+
+
+@dataclass(frozen=True)
+class Stall:
+    """Since when a batch stands still, and why."""
+
+    why: Why
+    since: str
+
+
+def last_of(session: Session, batch: Batch) -> str:
+    """When somebody did something in a batch last, opening a group included; else when it was made."""
+    times = [batch.created, batch.last, last_work(session, batch.id)]
+    times += [one.seen for one in batch.here]
+    return max(time for time in times if time is not None)
+
+
+def stall_of(batch: Batch, last: str, at: datetime, hours: float) -> Stall | None:
+    """Whether a batch has stalled at a time; None: it has not, is done, or is closed.
+
+    Args:
+        batch: The batch.
+        last: When somebody did something in it last.
+        at: Now, in UTC.
+        hours: So long may nobody do anything.
+    """
+    if not batch.is_open or batch.settled >= batch.groups:
+        return None
+    if at - datetime.fromisoformat(last) > timedelta(hours=hours):
+        return Stall(Why.IDLE, last)
+    if batch.due is not None and batch.due < at.date().isoformat():
+        return Stall(Why.OVERDUE, batch.due)
+    return None
+
+
+def tell_stalls(store: Store, at: datetime) -> int:
+    """Tell webhooks of the batches that have stalled, of each stall once; returns how many messages."""
+    with store.read() as session:
+        wanted = {row.dataset_id for row in webhooks_on(session)}
+        datasets = [one for one in sorted(wanted) if listeners(session, one, STALLED)]
+        found = _stalls(session, datasets, at, store.settings.stalled_hours)
+    if not found:
+        return 0
+    with store.write() as session:
+        return sum(_tell(session, batch, stall, at) for batch, stall in found)
+
+
+def _stalls(
+    session: Session, datasets: list[int], at: datetime, hours: float
+) -> list[tuple[Batch, Stall]]:
+    batches = [read_batch(session, one) for one in batches_that_wait(session, datasets)]
+    found = [(one, stall_of(one, last_of(session, one), at, hours)) for one in batches]
+    return [(batch, stall) for batch, stall in found if stall is not None]
+
+
+def _tell(session: Session, batch: Batch, stall: Stall, at: datetime) -> int:
+    event = f"batch{batch.id}_{stall.why}{stamp(stall.since)}"
+    told = {"why": str(stall.why), "since": stall.since}
+    return announce(
+        session,
+        batch.dataset_id,
+        STALLED,
+        event,
+        actor=BY_ITSELF,
+        at=text_of(at),
+        batch_id=batch.id,
+        also=told,
+    )
+
+
+PAUSE = timedelta(minutes=10)
+"""Who does nothing for longer is taken not to work meanwhile."""
+
+
+@dataclass(frozen=True)
+class MyBatch:
+    """A batch of somebody's: ``left`` groups wait for them or for others beside them, and
+    ``handed_back`` are those that they had handed in and have back."""
+
+    batch: Batch
+    parts: list[Part]
+    left: int
+    handed_back: list[HandedBack] = field(default_factory=list)
+
+
+@dataclass(frozen=True)
+class Pace:
+    """What somebody has done in a batch.
+
+    Attributes:
+        handed_in, judged: Groups.
+        minutes: How long they worked: the time between any two things that they did, pauses left out.
+    """
+
+    name: str
+    handed_in: int
+    judged: int
+    groups: int
+    minutes: float
+
+    @property
+    def minutes_a_group(self) -> float | None:
+        """None where it cannot be known: what they did took less than a minute."""
+        return self.minutes / self.groups if self.groups and self.minutes >= 1 else None
+
+    @property
+    def groups_an_hour(self) -> float | None:
+        """The same the other way round."""
+        return 60 * self.groups / self.minutes if self.groups and self.minutes >= 1 else None
+
+
+@dataclass(frozen=True)
+class TeamBatch:
+    """A batch and who has done what of it; ``stalled``: since when nobody does anything, or None."""
+
+    batch: Batch
+    stalled: str | None
+    people: list[Pace] = field(default_factory=list)
+
+
+def my_work(
+    store: Store, worker_in: Callable[[int], Worker], sight: Sight = EVERYTHING
+) -> list[MyBatch]:
+    """Open batches that are somebody's, those that are due first, first.
+
+    Args:
+        store: The database.
+        worker_in: What somebody is in a dataset, by its id.
+        sight: Which datasets they see.
+    """
+    with store.read() as session:
+        ids = [one for one in datasets_with_batches(session) if sight.sees(one)]
+        found = []
+        for batch in read_batches(session, ids):
+            worker = worker_in(batch.dataset_id)
+            parts = worker.parts(batch)
+            if batch.is_open and parts:
+                own = takes_part(batch, parts)
+                left = own_left(session, batch, worker.name) if own else _left(batch, parts)
+                back = _handed_back(session, batch, worker.name)
+                seen = own_part(session, batch, worker.name) if own else batch
+                found.append(MyBatch(as_seen(session, seen), sorted(parts), left, back))
+        return found
+
+
+def _handed_back(session: Session, batch: Batch, name: str) -> list[HandedBack]:
+    """What of a batch somebody has back, in its order."""
+    person = person_of(name)
+    rows = (*groups_returned(session, [batch.id], person), *open_takes(session, [batch.id], person))
+    waiting = [row.group_id for row in rows]
+    back = read_handed_back(session, waiting) if waiting else {}
+    return [back[group] for group in waiting if group in back]
+
+
+def team_work(store: Store, dataset: str | int, *, at: datetime | None = None) -> list[TeamBatch]:
+    """Every batch of a dataset with who has done what of it."""
+    moment = datetime.now(UTC) if at is None else at
+    with store.read() as session:
+        batches = read_batches(session, [dataset_id(store, dataset)])
+        hours = store.settings.stalled_hours
+        return [_team_batch(session, batch, moment, hours) for batch in batches]
+
+
+def _left(batch: Batch, parts: Iterable[Part]) -> int:
+    """Groups that somebody with these parts may still get."""
+    left = batch.waiting if Part.ANNOTATOR in parts or not batch.annotators else 0
+    return left + (batch.handed_in if Part.REVIEWER in parts else 0)
+
+
+def _team_batch(session: Session, batch: Batch, at: datetime, hours: float) -> TeamBatch:
+    stall = stall_of(batch, last_of(session, batch), at, hours)
+    since = stall.since if stall is not None and stall.why is Why.IDLE else None
+    entries = entries_of_work(session, batch.id, batch.created)
+    takes = takes_of_batch(session, batch.id, batch.dataset_id)
+    return TeamBatch(batch, since, _paces(entries, groups_of(session, batch.id), takes))
+
+
+def _paces(entries: Sequence[Any], groups: Sequence[Any], takes: Sequence[Any]) -> list[Pace]:
+    """What each person did, from the log and from what was handed in; of groups, and of own copies.
+
+    What stands in the original under the name of somebody who has a copy was taken over from it: it
+    says nothing of when they worked.
+    """
+    times: dict[str, list[str]] = defaultdict(list)
+    judged: dict[str, set[int]] = defaultdict(set)
+    handed_in: dict[str, set[int]] = defaultdict(set)
+    taken_over = {(take.person, take.group_id) for take in takes}
+    for row in entries:
+        name = person_of(row.actor)
+        if (name, row.group_id) in taken_over:
+            continue
+        times[name].append(row.at)
+        if row.kind == "verdict":
+            judged[name].add(row.group_id)
+    given = [(row.handed_in_by, row.group_id, row.handed_in) for row in groups]
+    given += [(take.person, take.copy_id, take.handed_in) for take in takes]
+    for name, group, at in given:
+        if at is not None:
+            handed_in[name].add(group)
+            times[name].append(at)
+    return [_pace(name, times[name], judged, handed_in) for name in sorted(times)]
+
+
+def _pace(
+    name: str,
+    times: Iterable[str],
+    judged: Mapping[str, set[int]],
+    handed_in: Mapping[str, set[int]],
+) -> Pace:
+    done, given = judged.get(name, set()), handed_in.get(name, set())
+    return Pace(name, len(given), len(done), len(done | given), worked(times).total_seconds() / 60)
+
+
+def worked(times: Iterable[str]) -> timedelta:
+    """How long somebody worked who did something at these times: the time between each two that
+    follow each other, where that is no longer than ``PAUSE``.
+
+    Example:
+        >>> day = "2026-11-20T"
+        >>> str(worked([day + "10:00", day + "10:04", day + "12:00", day + "12:06"]))
+        '0:10:00'
+    """
+    found = sorted(datetime.fromisoformat(one) for one in times)
+    gaps = (later - earlier for earlier, later in pairwise(found))
+    return sum((gap for gap in gaps if gap <= PAUSE), timedelta())

@@ -1,0 +1,341 @@
+"""Work that is given out, in the database: batches, their people and groups, and leases."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from functools import cache
+from typing import Any
+
+from sqlalchemy import (
+    BindParameter,
+    ColumnElement,
+    Integer,
+    Select,
+    bindparam,
+    case,
+    delete,
+    exists,
+    func,
+    insert,
+    select,
+    update,
+)
+
+from app.db.dialects.statements import insert as upsert
+from app.db.log import LogModel
+from app.db.session import Session
+from app.features.batches.tables import BatchGroupModel, BatchModel, BatchPersonModel, LeaseModel
+from app.features.datasets.tables import DatasetModel
+from app.features.independent_annotations.tables import TakeModel
+from app.features.people.tables import PersonModel
+from app.features.people.visibility_queries import seen_in
+from app.features.queue.tables import QueueModel
+from app.soccer.choices import BatchState
+
+OPEN: BatchState = "open"
+CLOSED: BatchState = "closed"
+_BATCHES = select(*BatchModel.__table__.columns, DatasetModel.name.label("dataset")).join(
+    DatasetModel, DatasetModel.id == BatchModel.dataset_id
+)
+_LEASES = select(*LeaseModel.__table__.columns).order_by(LeaseModel.id)
+_IDS: BindParameter[Any] = bindparam("ids", expanding=True)
+# What each "next" and each minute of an open page asks is put together once: that takes longer than
+# to answer it.
+_BATCH = _BATCHES.where(BatchModel.id == bindparam("id"))
+_GROUP = select(*BatchGroupModel.__table__.columns).where(
+    BatchGroupModel.batch_id == bindparam("batch"), BatchGroupModel.group_id == bindparam("group")
+)
+_LEASES_ON = _LEASES.where(
+    LeaseModel.group_id == bindparam("group"), LeaseModel.until > bindparam("at")
+)
+_LEASES_IN = _LEASES.where(LeaseModel.batch_id.in_(_IDS), LeaseModel.until > bindparam("at"))
+_TAKE = upsert(LeaseModel)
+_KEEP = _TAKE.on_conflict_do_update(
+    index_elements=["batch_id", "group_id", "person"],
+    set_={"seen": _TAKE.excluded.seen, "until": _TAKE.excluded.until},
+)
+_ENDED = delete(LeaseModel).where(LeaseModel.until <= bindparam("at"))
+_PEOPLE = (
+    select(BatchPersonModel.batch_id, BatchPersonModel.part, PersonModel.id, PersonModel.name)
+    .join(PersonModel, PersonModel.id == BatchPersonModel.person_id)
+    .where(BatchPersonModel.batch_id.in_(_IDS))
+    .order_by(PersonModel.name)
+)
+_WAITS = BatchGroupModel.handed_in.is_not(None) & BatchGroupModel.settled.is_(None)
+_COUNT = (
+    select(
+        BatchGroupModel.batch_id,
+        func.count().label("groups"),
+        func.sum(case((_WAITS, 1), else_=0)).label("handed_in"),
+        func.count(BatchGroupModel.settled).label("settled"),
+        func.max(func.coalesce(BatchGroupModel.settled, BatchGroupModel.handed_in)).label("last"),
+    )
+    .where(BatchGroupModel.batch_id.in_(_IDS))
+    .group_by(BatchGroupModel.batch_id)
+)
+_DONE_KINDS = ("edit", "undo", "redo", "verdict")
+"""Entries of the log that show that somebody works on a group."""
+
+
+def batch_of(session: Session, batch_id: int) -> Any | None:
+    """A batch by its id, with the name of its ``dataset``."""
+    return session.execute(_BATCH, {"id": batch_id}).one_or_none()
+
+
+def batches_of(session: Session, dataset_ids: Collection[int]) -> Sequence[Any]:
+    """The batches of datasets, with the names of those; open ones and those that are due first come first."""
+    order = (BatchModel.state.desc(), BatchModel.due.is_(None), BatchModel.due, BatchModel.id)
+    mine = BatchModel.dataset_id.in_(dataset_ids)
+    return session.execute(_BATCHES.where(mine).order_by(*order)).all()
+
+
+def datasets_with_batches(session: Session) -> list[int]:
+    """Ids of the datasets in which a batch is open."""
+    found = select(BatchModel.dataset_id).where(BatchModel.state == OPEN).distinct()
+    return list(session.scalars(found))
+
+
+def batches_that_wait(session: Session, dataset_ids: Collection[int]) -> list[int]:
+    """Ids of the open batches of datasets in which a group waits."""
+    waits = exists().where(
+        BatchGroupModel.batch_id == BatchModel.id, BatchGroupModel.settled.is_(None)
+    )
+    mine = (BatchModel.dataset_id.in_(dataset_ids), BatchModel.state == OPEN)
+    return list(session.scalars(select(BatchModel.id).where(*mine, waits).order_by(BatchModel.id)))
+
+
+def insert_batch(session: Session, values: Mapping[str, Any]) -> int:
+    """Insert a batch, from columns of ``BatchModel`` but its id; returns its id."""
+    done = session.execute(insert(BatchModel).returning(BatchModel.id), dict(values))
+    return int(done.scalar_one())
+
+
+def update_batch(session: Session, batch_id: int, values: Mapping[str, Any]) -> None:
+    """Change columns of a batch."""
+    session.execute(update(BatchModel).where(BatchModel.id == batch_id).values(**values))
+
+
+def delete_batch(session: Session, batch_id: int) -> None:
+    """Delete a batch with all that hangs on it; what was said of its groups stays."""
+    session.execute(delete(BatchModel).where(BatchModel.id == batch_id))
+
+
+def set_people(session: Session, batch_id: int, part: str, person_ids: Iterable[int]) -> None:
+    """Give a batch to people, and to nobody else in that part."""
+    table = BatchPersonModel
+    session.execute(delete(table).where(table.batch_id == batch_id, table.part == part))
+    rows = [{"batch_id": batch_id, "person_id": one, "part": part} for one in person_ids]
+    if rows:
+        session.execute(insert(table), rows)
+
+
+def people_of(session: Session, batch_ids: Collection[int]) -> Sequence[Any]:
+    """Rows (batch_id, part, id, name) of the people whom batches were given to, by name."""
+    return session.execute(_PEOPLE, {"ids": list(batch_ids)}).all()
+
+
+def insert_groups(session: Session, batch_id: int, group_ids: Sequence[int]) -> None:
+    """Put groups into a batch that has none, in this order."""
+    rows = [
+        {"batch_id": batch_id, "group_id": group, "place": place}
+        for place, group in enumerate(group_ids, start=1)
+    ]
+    if rows:
+        session.execute(insert(BatchGroupModel), rows)
+
+
+def groups_given(session: Session, dataset_id: int) -> set[int]:
+    """Ids of the groups that wait in an open batch of a dataset."""
+    statement = (
+        select(BatchGroupModel.group_id)
+        .join(BatchModel, BatchModel.id == BatchGroupModel.batch_id)
+        .where(
+            BatchModel.dataset_id == dataset_id,
+            BatchModel.state == OPEN,
+            BatchGroupModel.settled.is_(None),
+        )
+    )
+    return set(session.scalars(statement))
+
+
+def groups_of(session: Session, batch_id: int) -> Sequence[Any]:
+    """Every group of a batch in order, with its ``number``."""
+    statement = (
+        select(*BatchGroupModel.__table__.columns, QueueModel.number)
+        .join(QueueModel, QueueModel.group_id == BatchGroupModel.group_id)
+        .where(BatchGroupModel.batch_id == batch_id)
+        .order_by(BatchGroupModel.place)
+    )
+    return session.execute(statement).all()
+
+
+def group_in(session: Session, batch_id: int, group_id: int) -> Any | None:
+    """A group of a batch."""
+    return session.execute(_GROUP, {"batch": batch_id, "group": group_id}).one_or_none()
+
+
+def groups_returned(session: Session, batch_ids: Collection[int], person: str) -> Sequence[Any]:
+    """Rows (batch_id, group_id) of what was handed back to a person and waits for them, in order."""
+    table = BatchGroupModel
+    back = (table.handed_in_by == person, table.handed_in.is_(None), table.settled.is_(None))
+    statement = select(table.batch_id, table.group_id).where(table.batch_id.in_(batch_ids), *back)
+    return session.execute(statement.order_by(table.batch_id, table.place)).all()
+
+
+def count_work(session: Session, batch_ids: Collection[int]) -> dict[int, Any]:
+    """Of each batch ``groups``, ``handed_in`` (and not settled), ``settled``, and ``last``, when
+    something of it was done last."""
+    return {row.batch_id: row for row in session.execute(_COUNT, {"ids": list(batch_ids)})}
+
+
+def hand_in(
+    session: Session,
+    batch_id: int,
+    group_id: int,
+    *,
+    at: str | None,
+    by: str,
+    returned: bool = False,
+) -> None:
+    """A group of a batch is done by its annotator; ``at`` None: it is not, after all.
+
+    ``returned``: it goes back to them, so that their name stays with it.
+    """
+    where = (BatchGroupModel.batch_id == batch_id, BatchGroupModel.group_id == group_id)
+    values = {"handed_in": at, "handed_in_by": by if at is not None or returned else None}
+    session.execute(update(BatchGroupModel).where(*where).values(**values))
+
+
+def waiting_group(
+    session: Session,
+    batch_id: int,
+    dataset_id: int,
+    person: str,
+    at: str,
+    *,
+    handed_in: bool | None,
+    after: int,
+) -> Any | None:
+    """The group (group_id, handed_in, handed_in_by) that a person would take next, if there is one.
+
+    Args:
+        session: A write session, so that nobody else takes it meanwhile.
+        batch_id: The batch.
+        dataset_id: Its dataset.
+        person: Who asks. What others have open, in any batch, is left out, and what is hidden from
+            whoever asks.
+        at: Now.
+        handed_in: Whether it must have been handed in, or must not; None: either.
+        after: Place after which to look first, and which is never meant; what else the person has
+            open comes last then: they may have it in another window, or had it in one that is gone.
+            0: what they have open comes first.
+    """
+    given = {"batch": batch_id, "person": person, "at": at, "after": after}
+    waiting = _waiting(handed_in, bool(after))
+    if seen := seen_in(dataset_id, BatchGroupModel.group_id):
+        waiting = waiting.where(*seen)
+    return session.execute(waiting, given).one_or_none()
+
+
+@cache
+def _waiting(handed_in: bool | None, goes_on: bool) -> Select[*tuple[Any, ...]]:
+    """Made once for each case: it takes longer to put together than to answer."""
+    table = BatchGroupModel
+    person: BindParameter[str] = bindparam("person")
+    after = bindparam("after", type_=Integer())
+    lasts = LeaseModel.until > bindparam("at")
+    mine, others = _leased(LeaseModel.person == person, lasts), LeaseModel.person != person
+    where = [table.batch_id == bindparam("batch"), table.settled.is_(None), ~_leased(others, lasts)]
+    if handed_in is not None:
+        where.append(table.handed_in.is_not(None) if handed_in else table.handed_in.is_(None))
+    # What somebody handed in themselves, and what was handed back to others, comes last for them.
+    theirs = table.handed_in_by == person
+    back = case((theirs, -1), else_=1)
+    waits = case((table.handed_in.is_not(None), case((theirs, 1), else_=0)), else_=back)
+    order: list[ColumnElement[Any]] = [case((table.handed_in_by.is_(None), 0), else_=waits)]
+    if goes_on:
+        where.append(table.place != after)
+        order.append(case((table.place > after, 0), else_=1))
+    order.insert(0, case((mine, int(goes_on)), else_=int(not goes_on)))
+    row = (table.group_id, table.handed_in, table.handed_in_by)
+    return select(*row).where(*where).order_by(*order, table.place).limit(1)
+
+
+def _leased(*where: ColumnElement[bool]) -> ColumnElement[bool]:
+    return exists().where(LeaseModel.group_id == BatchGroupModel.group_id, *where)
+
+
+def leases_on(session: Session, group_id: int, at: str) -> Sequence[Any]:
+    """The leases on a group that last, the oldest first."""
+    return session.execute(_LEASES_ON, {"group": group_id, "at": at}).all()
+
+
+def leases_of(session: Session, batch_ids: Collection[int], at: str) -> Sequence[Any]:
+    """The leases in batches that last."""
+    return session.execute(_LEASES_IN, {"ids": list(batch_ids), "at": at}).all()
+
+
+def keep_lease(
+    session: Session, batch_id: int, group_id: int, person: str, *, at: str, until: str
+) -> None:
+    """Take a lease, or let the one last on that the person has."""
+    named = {"batch_id": batch_id, "group_id": group_id, "person": person, "taken": at}
+    session.execute(_KEEP, {**named, "seen": at, "until": until})
+
+
+def end_leases(session: Session, ids: Collection[int]) -> None:
+    """End leases."""
+    session.execute(delete(LeaseModel).where(LeaseModel.id.in_(ids)))
+
+
+def end_lease_of(session: Session, batch_id: int, group_id: int, person: str) -> bool:
+    """End a person's lease; whether there was one."""
+    where = (
+        LeaseModel.batch_id == batch_id,
+        LeaseModel.group_id == group_id,
+        LeaseModel.person == person,
+    )
+    done: Any = session.execute(delete(LeaseModel).where(*where))
+    return bool(done.rowcount)
+
+
+def forget_ended(session: Session, at: str) -> None:
+    """Delete the leases that have run out."""
+    session.execute(_ENDED, {"at": at})
+
+
+def entries_of_work(session: Session, batch_id: int, since: str) -> Sequence[Any]:
+    """Rows (actor, at, group_id, kind) of the log about a batch's groups, and people's own copies of
+    them, since some time, in order."""
+    columns = (LogModel.actor, LogModel.at, LogModel.group_id, LogModel.kind)
+    statement = select(*columns).where(*_worked_on(batch_id), LogModel.at >= since)
+    return session.execute(statement.order_by(LogModel.at)).all()
+
+
+def last_work(session: Session, batch_id: int) -> str | None:
+    """When somebody did something with a group of a batch last, or with a copy of one."""
+    last: str | None = session.scalar(select(func.max(LogModel.at)).where(*_worked_on(batch_id)))
+    return last
+
+
+def _worked_on(batch_id: int) -> tuple[ColumnElement[bool], ...]:
+    mine = select(BatchGroupModel.group_id).where(BatchGroupModel.batch_id == batch_id)
+    copies = select(TakeModel.copy_id).where(TakeModel.batch_id == batch_id)
+    return LogModel.group_id.in_(mine.union_all(copies)), LogModel.kind.in_(_DONE_KINDS)
+
+
+def groups_in_batches(batch_ids: Collection[int]) -> Select[int]:
+    """Ids of the groups of batches."""
+    return select(BatchGroupModel.group_id).where(BatchGroupModel.batch_id.in_(batch_ids))
+
+
+def place_in(batch_id: int) -> ColumnElement[Any]:
+    """The place of a row of the queue in a batch; NULL where it is in none of it."""
+    return (
+        select(BatchGroupModel.place)
+        .where(
+            BatchGroupModel.batch_id == batch_id, BatchGroupModel.group_id == QueueModel.group_id
+        )
+        .correlate(QueueModel)
+        .scalar_subquery()
+    )

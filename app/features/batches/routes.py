@@ -1,0 +1,253 @@
+"""Work that is given out: batches, the next group of one, and who has which group open."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated
+
+from fastapi import APIRouter, BackgroundTasks, Depends, Request, Response
+
+from app.db.store import Store
+from app.features.agreement.service import after_hand_in
+from app.features.batches import own, progress
+from app.features.batches import service as batches
+from app.features.batches.leases import Lease, Leases, Worker
+from app.features.batches.schemas import (
+    BatchEdit,
+    BatchGroupList,
+    LeaseDocument,
+    LeaseRequest,
+    MyWork,
+    NewBatchDocument,
+    NextGroup,
+    TeamWork,
+    WorkBatchDocument,
+    WorkBatchList,
+)
+from app.features.batches.service import Batch, NewBatch
+from app.features.independent_annotations.schemas import HandBack
+from app.features.people.logins import Login
+from app.features.people.roles import Action, may
+from app.http.access import login_of
+from app.http.cursor import paged
+from app.http.deps import Actor, AppServices, AppStore, DatasetPath, Id, Sees
+from app.http.problem import responses
+from app.http.respond import as_document, document, no_content, responds
+from app.http.services import Services
+from app.soccer.actors import LOCAL_USER
+
+router = APIRouter(tags=["work"])
+
+
+@dataclass(frozen=True)
+class Workers:
+    """Who asks, and what they may in a dataset; on a server without accounts there is no ``login``."""
+
+    login: Login | None
+
+    def here(self, dataset_id: int) -> Worker:
+        """Them, in a dataset."""
+        if self.login is None:
+            return Worker(LOCAL_USER, alone=True)
+        role = self.login.roles.role_in(dataset_id)
+        annotates, reviews = (may(role, one) for one in (Action.ANNOTATE, Action.REVIEW))
+        return Worker(self.login.name, annotates, reviews)
+
+    def of_batch(self, store: Store, batch: int) -> Worker:
+        """Them, in the dataset of a batch."""
+        return self.here(batches.dataset_of_batch(store, batch))
+
+
+async def _workers(request: Request) -> Workers:
+    return Workers(login_of(request.scope))
+
+
+Asks = Annotated[Workers, Depends(_workers)]
+
+
+def _told(services: Services, lease: Lease) -> Lease:
+    """A lease of which everybody has been told who looks."""
+    services.events.tell_lease(lease)
+    return lease
+
+
+@router.get("/work", operation_id="getMyWork", responses=responses())
+@paged()
+def my_work(store: AppStore, sight: Sees, asks: Asks) -> MyWork:
+    """Open batches of whoever asks; on a server without accounts all of them."""
+    return MyWork.model_validate({"items": progress.my_work(store, asks.here, sight)})
+
+
+@router.get("/datasets/{dataset}/batches", operation_id="listBatches", responses=responses(404))
+@paged()
+def list_batches(dataset: DatasetPath, store: AppStore) -> WorkBatchList:
+    """The batches of a dataset."""
+    return WorkBatchList.model_validate({"items": own.seen_batches(store, dataset)})
+
+
+def _made(batch: Batch) -> Response:
+    headers = {"Location": f"/api/v1/batches/{batch.id}"}
+    return document(WorkBatchDocument.model_validate(batch), 201, headers)
+
+
+@router.post(
+    "/datasets/{dataset}/batches",
+    operation_id="makeBatch",
+    response_model=WorkBatchDocument,
+    status_code=201,
+    responses={
+        **responses(404, 409, 413, 415),
+        201: {
+            "headers": {"Location": {"description": "Its address.", "schema": {"type": "string"}}},
+            "description": "The batch.",
+        },
+    },
+)
+@responds(_made)
+def make_batch(dataset: DatasetPath, new: NewBatchDocument, store: AppStore, actor: Actor) -> Batch:
+    """Give out the groups that a query finds now, in its order."""
+    wanted = NewBatch(query=new.q, **new.model_dump(exclude={"q"}))
+    return batches.make_batch(store, dataset, wanted, actor=actor)
+
+
+@router.get("/datasets/{dataset}/team-work", operation_id="getTeamWork", responses=responses(404))
+@paged()
+def team_work(dataset: DatasetPath, store: AppStore) -> TeamWork:
+    """Every batch of a dataset: who has done what, how fast, and which batch has stalled."""
+    items = [
+        {**vars(one), "here": one.batch.here, "gold_every": one.batch.gold_every}
+        for one in progress.team_work(store, dataset)
+    ]
+    return TeamWork.model_validate({"items": items})
+
+
+@router.get(
+    "/batches/{batch}",
+    operation_id="getBatch",
+    response_model=WorkBatchDocument,
+    responses=responses(404),
+)
+def get_batch(batch: Id, store: AppStore) -> Batch:
+    """One batch."""
+    return own.seen_batch(store, batch)
+
+
+@router.patch(
+    "/batches/{batch}",
+    operation_id="changeBatch",
+    response_model=WorkBatchDocument,
+    responses=responses(404, 409, 413, 415),
+)
+@responds(as_document(WorkBatchDocument.model_validate))
+def change_batch(batch: Id, change: BatchEdit, store: AppStore, actor: Actor) -> Batch:
+    """Give a batch on to others, close it, or name it otherwise."""
+    values = change.model_dump(exclude_unset=True)
+    never, none = ({name: None}.items() <= values.items() for name in ("due", "gold_every"))
+    return batches.change_batch(store, batch, actor=actor, never_due=never, no_gold=none, **values)
+
+
+@router.delete(
+    "/batches/{batch}", operation_id="deleteBatch", status_code=204, responses=responses(404)
+)
+@responds(no_content)
+def delete_batch(batch: Id, store: AppStore, actor: Actor) -> Batch:
+    """Delete a batch; what was said of its groups stays."""
+    return batches.remove_batch(store, batch, actor=actor)
+
+
+@router.get("/batches/{batch}/groups", operation_id="listBatchGroups", responses=responses(404))
+@paged()
+def list_batch_groups(batch: Id, store: AppStore) -> BatchGroupList:
+    """The groups of a batch in order, with who has them open."""
+    return BatchGroupList.model_validate({"items": batches.list_batch_groups(store, batch)})
+
+
+@router.post(
+    "/batches/{batch}/next",
+    operation_id="takeNextGroup",
+    response_model=LeaseDocument,
+    responses=responses(404, 409, 413, 415),
+)
+def take_next(batch: Id, come: NextGroup, services: AppServices, asks: Asks) -> Lease:
+    """Take the next group that waits for whoever asks, and that nobody else has open.
+
+    The lease lasts three minutes, and three more each time that it is taken again.
+    """
+    worker = asks.of_batch(services.store, batch)
+    return _told(services, Leases(services.store).next(batch, worker, after=come.after))
+
+
+@router.put(
+    "/batches/{batch}/groups/{group}/lease",
+    operation_id="takeGroup",
+    response_model=LeaseDocument,
+    responses=responses(404, 409, 413, 415),
+)
+def take_group(batch: Id, group: Id, how: LeaseRequest, services: AppServices, asks: Asks) -> Lease:
+    """Take a group, or keep it for another three minutes; 409 where somebody has it open."""
+    worker = asks.of_batch(services.store, batch)
+    taken = Leases(services.store).take(batch, group, worker, take_over=how.take_over)
+    return _told(services, taken)
+
+
+@router.delete(
+    "/batches/{batch}/groups/{group}/lease",
+    operation_id="giveGroupBack",
+    status_code=204,
+    responses=responses(404),
+)
+def give_back(batch: Id, group: Id, services: AppServices, asks: Asks) -> None:
+    """Leave a group to others."""
+    worker = asks.of_batch(services.store, batch)
+    _told(services, Leases(services.store).give_back(batch, group, worker))
+
+
+@router.put(
+    "/batches/{batch}/groups/{group}/hand-in",
+    operation_id="handInGroup",
+    response_model=LeaseDocument,
+    responses=responses(404, 409, 413, 415),
+)
+@responds(as_document(LeaseDocument.model_validate))
+def hand_in(
+    batch: Id,
+    group: Id,
+    services: AppServices,
+    actor: Actor,
+    asks: Asks,
+    background: BackgroundTasks,
+) -> Lease:
+    """Say that a group is annotated, so that a reviewer gets it."""
+    worker = asks.of_batch(services.store, batch)
+    background.add_task(after_hand_in, services.store, group, services.paint)
+    return _told(services, Leases(services.store).hand_in(batch, group, worker, actor=actor))
+
+
+@router.delete(
+    "/batches/{batch}/groups/{group}/hand-in",
+    operation_id="takeHandInBack",
+    response_model=LeaseDocument,
+    responses=responses(404, 409),
+)
+@responds(as_document(LeaseDocument.model_validate))
+def take_back(batch: Id, group: Id, services: AppServices, actor: Actor, asks: Asks) -> Lease:
+    """Say that a group is not annotated yet, after all; 409 for one's own copy that is submitted."""
+    worker = asks.of_batch(services.store, batch)
+    lease = Leases(services.store).hand_in(batch, group, worker, actor=actor, done=False)
+    return _told(services, lease)
+
+
+@router.post(
+    "/batches/{batch}/groups/{group}/hand-back",
+    operation_id="handBackGroup",
+    response_model=LeaseDocument,
+    responses=responses(404, 409, 413, 415),
+)
+@responds(as_document(LeaseDocument.model_validate))
+def hand_back(
+    batch: Id, group: Id, why: HandBack, services: AppServices, actor: Actor, asks: Asks
+) -> Lease:
+    """Give a group back to the annotator who handed it in, and tell them why."""
+    worker = asks.of_batch(services.store, batch)
+    lease = Leases(services.store).hand_back(batch, group, worker, why.reason, actor=actor)
+    return _told(services, lease)

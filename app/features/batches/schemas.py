@@ -1,0 +1,212 @@
+"""Work: batches that leads give out, who has which group open, and how it goes on."""
+
+from __future__ import annotations
+
+from datetime import date, datetime
+from typing import Annotated
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from app.features.batches.progress import Pace
+from app.features.batches.service import MOST_GROUPS, MOST_VERDICTS, RAREST_GOLD, Part
+from app.features.datasets.service import MAX_TITLE
+from app.features.independent_annotations.schemas import HandedBackDocument
+from app.features.queue.query import MAX_LISTED_LENGTH
+from app.finite import MAX_ID
+from app.http.documents import Document, ListDocument
+from app.http.event_schemas import PresenceDocument
+from app.soccer.choices import BatchState
+
+Name = Annotated[str, Field(min_length=1, max_length=MAX_TITLE)]
+People = Annotated[list[Annotated[str, Field(max_length=60)]], Field(max_length=200)]
+
+
+class NewBatchDocument(BaseModel):
+    """Groups that shall be given out."""
+
+    model_config = ConfigDict(
+        extra="forbid",
+        json_schema_extra={
+            "examples": [
+                {"name": "First forty", "q": "status:unreviewed sort:value", "size": 40},
+            ]
+        },
+    )
+
+    name: Name
+    q: Annotated[str, Field(max_length=MAX_LISTED_LENGTH)] = Field(
+        default="", description="Which groups, and in which order they are given out."
+    )
+    size: Annotated[int, Field(ge=1, le=MOST_GROUPS)] | None = Field(
+        default=None, description=f"The first so many; default: all, up to {MOST_GROUPS}."
+    )
+    annotators: People = []
+    reviewers: People = Field(
+        default=[], description="Nobody: whoever may review in the dataset may take part."
+    )
+    due: date | None = None
+    skip_given: bool = Field(
+        default=True, description="Leave out groups that wait in another open batch."
+    )
+    verdicts: Annotated[int, Field(ge=1, le=MOST_VERDICTS)] = Field(
+        default=1, description="How many people judge each group independently."
+    )
+    blind: bool = Field(
+        default=True, description="Where several judge, nobody sees what the others say."
+    )
+    gold_every: Annotated[int, Field(ge=1, le=RAREST_GOLD)] | None = Field(
+        default=None, description="One of so many groups is a gold one; null: none is."
+    )
+
+
+class BatchEdit(BaseModel):
+    """What changes of a batch; what is left out stays."""
+
+    model_config = ConfigDict(
+        extra="forbid", json_schema_extra={"examples": [{"name": "Second half"}]}
+    )
+
+    name: Name | None = None
+    due: date | None = Field(default=None, description="null: on no day.")
+    annotators: People | None = None
+    reviewers: People | None = None
+    state: BatchState | None = Field(
+        default=None, description="Nothing is given out of a closed one."
+    )
+    gold_every: Annotated[int, Field(ge=1, le=RAREST_GOLD)] | None = Field(
+        default=None,
+        description="From the next group on that somebody begins; null: no more gold groups.",
+    )
+
+
+class WorkBatchDocument(Document):
+    """A batch, and how far it is."""
+
+    id: int
+    dataset: str
+    name: str
+    q: str = Field(validation_alias="query")
+    sort: str
+    verdicts: int
+    blind: bool
+    due: date | None
+    state: BatchState
+    created: datetime
+    created_by: str
+    annotators: list[str]
+    reviewers: list[str]
+    groups: int
+    waiting: int = Field(description="Groups that nobody has handed in or judged.")
+    handed_in: int = Field(description="Groups that wait for a verdict.")
+    settled: int = Field(description="Groups whose work is over.")
+    last: datetime | None = Field(description="When one of them was handed in or settled last.")
+
+
+class WorkBatchList(ListDocument[WorkBatchDocument]):
+    """Batches; open ones and those that are due first come first."""
+
+
+class BatchGroupDocument(Document):
+    """A group of a batch."""
+
+    group: int
+    number: int = Field(description="Its place in the dataset.")
+    place: int = Field(description="Its place in the batch, from 1.")
+    handed_in: datetime | None
+    handed_in_by: str | None = Field(
+        description="Also after it was handed back to them: then `handed_in` is null."
+    )
+    settled: datetime | None
+    here: list[str] = Field(description="Who has it open.")
+
+
+class BatchGroupList(ListDocument[BatchGroupDocument]):
+    """The groups of a batch in the order in which they are given out."""
+
+
+class NextGroup(BaseModel):
+    """Where somebody comes from who asks for the next group."""
+
+    model_config = ConfigDict(extra="forbid", json_schema_extra={"examples": [{"after": 12}, {}]})
+
+    after: Annotated[int, Field(ge=1, le=MAX_ID)] | None = Field(
+        default=None,
+        description="The group that they come from; they get one behind it first, and not that "
+        "one. Without it they get the one again that they have open.",
+    )
+
+
+class LeaseRequest(BaseModel):
+    """How a group is opened."""
+
+    model_config = ConfigDict(
+        extra="forbid", json_schema_extra={"examples": [{"take_over": False}]}
+    )
+
+    take_over: bool = Field(default=False, description="Also where somebody else has it open.")
+
+
+class LeaseDocument(Document):
+    """A group that somebody has open."""
+
+    batch: WorkBatchDocument
+    group: int | None = Field(description="null: no group waits for them now.")
+    part: Part | None = Field(description="What they do with it.")
+    until: datetime | None = Field(description="When the lease ends unless it is taken again.")
+    here: list[PresenceDocument] = Field(description="Everybody who has the group open.")
+    handed_in_by: str | None = Field(description="Who has handed it in; null: nobody.")
+    handed_back: HandedBackDocument | None = Field(
+        description="Why its annotator has it back; null: they have not."
+    )
+    place: int | None = Field(
+        default=None,
+        description="Of the groups that they annotate on their own: which this is, from 1.",
+    )
+    of: int | None = Field(
+        default=None,
+        description="How many these are as the batch stands; null where gold groups are mixed in.",
+    )
+
+
+class MyBatchDocument(Document):
+    """A batch of one's own."""
+
+    batch: WorkBatchDocument
+    parts: list[Part]
+    left: int = Field(description="Groups that one may still get.")
+    handed_back: list[HandedBackDocument] = Field(
+        description="What one had handed in and has back, in the order of the batch."
+    )
+
+
+class MyWork(ListDocument[MyBatchDocument]):
+    """Open batches that are one's own, those that are due first, first."""
+
+
+class PaceDocument(Document, shows=Pace):
+    """What somebody has done in a batch."""
+
+    groups: int = Field(description="Handed in or judged, each counted once.")
+    minutes: float = Field(
+        description="How long they worked: the time between what they did, pauses of more than "
+        "ten minutes left out."
+    )
+    minutes_a_group: float | None
+    groups_an_hour: float | None
+
+
+class TeamBatchDocument(Document):
+    """A batch and who has done what of it."""
+
+    batch: WorkBatchDocument
+    gold_every: int | None = Field(description="One gold group in N.")
+    here: list[PresenceDocument]
+    stalled: datetime | None = Field(
+        description="Since when nobody does anything, where that is as long as the operator's setting "
+        "`stalled_hours`, a day by default; else null."
+    )
+    people: list[PaceDocument]
+
+
+class TeamWork(ListDocument[TeamBatchDocument]):
+    """Every batch of a dataset, and who has done what."""

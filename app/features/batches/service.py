@@ -1,0 +1,431 @@
+"""Batches: groups of a dataset that a lead gives to people, and what becomes of them."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Collection, Iterable, Sequence
+from dataclasses import dataclass, field
+from datetime import date
+from enum import StrEnum
+from typing import Any
+
+from app.db.log import Entry, append
+from app.db.session import Session, now
+from app.db.store import Store
+from app.errors import ConflictError, InputError, NotFoundError
+from app.features.batches.queries import (
+    CLOSED,
+    OPEN,
+    batch_of,
+    batches_of,
+    count_work,
+    delete_batch,
+    groups_given,
+    groups_of,
+    insert_batch,
+    insert_groups,
+    leases_of,
+    people_of,
+    set_people,
+    update_batch,
+)
+from app.features.datasets.service import checked_title, dataset_id
+from app.features.independent_annotations.gold_queries import gold_heads
+from app.features.notifications.service import RingKind, tell
+from app.features.people.members import list_members
+from app.features.people.roles import Action, may
+from app.features.queue.listing_queries import Listing
+from app.features.queue.query import MAX_LISTED_LENGTH, parse_query
+from app.features.webhooks.queries import GIVEN_OUT, HANDED_ON, announce_batch
+from app.plural import plural
+from app.soccer.actors import person_of
+
+MOST_GROUPS = 10_000
+"""Of one batch."""
+MOST_BATCHES = 500
+"""Of one dataset: a list that people read."""
+MOST_VERDICTS = 5
+"""So many independent verdicts can a batch ask for."""
+RAREST_GOLD = 1000
+"""One of so many groups of a batch is a gold one at least, where any are."""
+WORK = "work"
+"""Kind of the log's entries about batches; they change no group."""
+
+
+class Part(StrEnum):
+    """What somebody does in a batch."""
+
+    ANNOTATOR = "annotator"
+    REVIEWER = "reviewer"
+
+
+_NEEDS = {Part.ANNOTATOR: Action.ANNOTATE, Part.REVIEWER: Action.REVIEW}
+
+
+@dataclass(frozen=True)
+class NewBatch:
+    """What a lead asks for; people go by their names.
+
+    Attributes:
+        query: Which groups, as in the queue; with the order in which they are given out.
+        size: So many of them, the first ones; None: all.
+        skip_given: Skip groups that are in another open batch.
+        verdicts, blind, gold_every: As ``BatchModel`` has them.
+    """
+
+    name: str
+    query: str = ""
+    size: int | None = None
+    annotators: Sequence[str] = ()
+    reviewers: Sequence[str] = ()
+    due: date | None = None
+    skip_given: bool = True
+    verdicts: int = 1
+    blind: bool = True
+    gold_every: int | None = None
+
+
+@dataclass(frozen=True)
+class Here:
+    """Somebody who has a group open, and since when."""
+
+    group: int
+    person: str
+    since: str
+    seen: str
+
+
+@dataclass(frozen=True)
+class Batch:
+    """A batch as it is now.
+
+    Attributes:
+        annotators, reviewers: Names; nobody: every reviewer of the dataset may review, and nobody
+            is asked to annotate.
+        groups, handed_in, settled: How many there are, wait for a verdict, and are done.
+        last: When one of them was handed in or done last.
+        here: Who has which group open.
+    """
+
+    id: int
+    dataset_id: int
+    dataset: str
+    name: str
+    query: str
+    sort: str
+    verdicts: int
+    blind: bool
+    gold_every: int | None
+    due: str | None
+    state: str
+    created: str
+    created_by: str
+    annotators: list[str] = field(default_factory=list)
+    reviewers: list[str] = field(default_factory=list)
+    groups: int = 0
+    handed_in: int = 0
+    settled: int = 0
+    last: str | None = None
+    here: list[Here] = field(default_factory=list)
+
+    @property
+    def is_open(self) -> bool:
+        """Whether there is still work to be had from it."""
+        return self.state == OPEN
+
+    @property
+    def waiting(self) -> int:
+        """Groups that nobody has handed in or judged."""
+        return self.groups - self.handed_in - self.settled
+
+
+@dataclass(frozen=True)
+class BatchGroup:
+    """A group of a batch; ``here`` are the names of those who have it open."""
+
+    group: int
+    number: int
+    place: int
+    handed_in: str | None
+    handed_in_by: str | None
+    settled: str | None
+    here: list[str]
+
+
+def list_batches(store: Store, dataset: str | int) -> list[Batch]:
+    """The batches of a dataset: open ones and those that are due first come first."""
+    with store.read() as session:
+        return read_batches(session, [dataset_id(store, dataset)])
+
+
+def get_batch(store: Store, batch_id: int) -> Batch:
+    """A batch; raises NotFoundError when there is none."""
+    with store.read() as session:
+        return read_batch(session, batch_id)
+
+
+def dataset_of_batch(store: Store, batch_id: int) -> int:
+    """Id of the dataset of a batch; raises NotFoundError when there is no such batch."""
+    with store.glance() as session:
+        row = batch_of(session, batch_id)
+    if row is None:
+        raise NotFoundError(f"there is no batch {batch_id}")
+    return int(row.dataset_id)
+
+
+def list_batch_groups(store: Store, batch_id: int) -> list[BatchGroup]:
+    """The groups of a batch in the order in which they are given out."""
+    with store.read() as session:
+        batch = read_batch(session, batch_id)
+        here: dict[int, list[str]] = defaultdict(list)
+        for one in batch.here:
+            here[one.group].append(one.person)
+        return [
+            BatchGroup(
+                row.group_id, row.number, row.place, row.handed_in, row.handed_in_by,
+                row.settled, here[row.group_id],
+            )
+            for row in groups_of(session, batch_id)
+        ]  # fmt: skip
+
+
+def make_batch(store: Store, dataset: str | int, new: NewBatch, *, actor: str) -> Batch:
+    """Give out what a query finds now; what comes to match later is not part of it.
+
+    Raises:
+        InputError: The query cannot be understood or finds nothing, or somebody named may not.
+        ConflictError: The dataset has as many batches as it may, or no gold group to mix in.
+    """
+    query = parse_query(new.query, longest=MAX_LISTED_LENGTH)
+    _check(new)
+    number = dataset_id(store, dataset)
+    people = {
+        Part.ANNOTATOR: _ids(store, number, Part.ANNOTATOR, new.annotators),
+        Part.REVIEWER: _ids(store, number, Part.REVIEWER, new.reviewers),
+    }
+    with store.write() as session:
+        if len(batches_of(session, [number])) >= MOST_BATCHES:
+            raise ConflictError(
+                f"a dataset has at most {MOST_BATCHES} batches", hint="Delete one that is closed."
+            )
+        found = Listing(session, number, query.conditions).ids(query.order)
+        given = groups_given(session, number) if new.skip_given else set()
+        ids = [one for one in found if one not in given][: new.size or MOST_GROUPS]
+        if not ids:
+            raise _nothing(found)
+        if new.gold_every is not None:
+            _require_gold(session, number)
+        values = {
+            "dataset_id": number,
+            "name": new.name.strip(),
+            "query": new.query.strip(),
+            "sort": f"{query.sort}-desc" if query.descending else query.sort,
+            "verdicts": new.verdicts,
+            "blind": new.blind,
+            "gold_every": new.gold_every,
+            "due": None if new.due is None else new.due.isoformat(),
+            "state": OPEN,
+            "created": now(),
+            "created_by": actor,
+        }
+        made = insert_batch(session, values)
+        insert_groups(session, made, ids)
+        for part, chosen in people.items():
+            set_people(session, made, part, chosen)
+        batch = read_batch(session, made)
+        _note(session, batch, "made", actor)
+        _tell(session, batch, (*batch.annotators, *batch.reviewers), actor)
+        announce_batch(session, made, GIVEN_OUT, actor=actor, at=batch.created)
+        session.respond(batch)
+        return batch
+
+
+def change_batch(
+    store: Store,
+    batch_id: int,
+    *,
+    actor: str,
+    name: str | None = None,
+    due: date | None = None,
+    never_due: bool = False,
+    annotators: Sequence[str] | None = None,
+    reviewers: Sequence[str] | None = None,
+    state: str | None = None,
+    gold_every: int | None = None,
+    no_gold: bool = False,
+) -> Batch:
+    """Give a batch on to others, close or open it, or name it otherwise; None leaves as it is.
+
+    ``gold_every`` counts from the next group on that somebody begins, ``no_gold``: none is one.
+
+    Raises:
+        NotFoundError: There is none.
+        InputError: Somebody named may not do that part, or gold groups would be too rare.
+        ConflictError: The dataset has no gold group to mix in.
+    """
+    _check_gold(gold_every)
+    before = get_batch(store, batch_id)
+    values: dict[str, Any] = {}
+    if name is not None:
+        values["name"] = checked_title(name, "a batch")
+    if due is not None or never_due:
+        values["due"] = None if due is None else due.isoformat()
+    if state is not None:
+        values["state"] = state
+    if gold_every is not None or no_gold:
+        values["gold_every"] = gold_every
+    named = {Part.ANNOTATOR: annotators, Part.REVIEWER: reviewers}
+    people = {
+        part: _ids(store, before.dataset_id, part, names)
+        for part, names in named.items()
+        if names is not None
+    }
+    with store.write() as session:
+        read_batch(session, batch_id)
+        if gold_every not in (None, before.gold_every):
+            _require_gold(session, before.dataset_id)
+        if values:
+            update_batch(session, batch_id, values)
+        for part, chosen in people.items():
+            set_people(session, batch_id, part, chosen)
+        batch = read_batch(session, batch_id)
+        _note(session, batch, "closed" if state == CLOSED else "changed", actor)
+        known = (*before.annotators, *before.reviewers)
+        new = [name for name in (*batch.annotators, *batch.reviewers) if name not in known]
+        _tell(session, batch, new, actor)
+        if known != (*batch.annotators, *batch.reviewers):
+            announce_batch(session, batch_id, HANDED_ON, actor=actor, at=now())
+        session.respond(batch)
+        return batch
+
+
+def remove_batch(store: Store, batch_id: int, *, actor: str) -> Batch:
+    """Delete a batch; verdicts and edits of its groups stay. Returns what it was."""
+    with store.write() as session:
+        batch = read_batch(session, batch_id)
+        delete_batch(session, batch_id)
+        _note(session, batch, "deleted", actor)
+        session.respond(batch)
+        return batch
+
+
+def read_batch(session: Session, batch_id: int, *, with_here: bool = True) -> Batch:
+    """A batch within a session; raises NotFoundError when there is none.
+
+    ``with_here``: False: nobody asks who has which group open.
+    """
+    row = batch_of(session, batch_id)
+    if row is None:
+        raise NotFoundError(f"there is no batch {batch_id}")
+    return _batches(session, [row], with_here)[0]
+
+
+def read_batches(session: Session, dataset_ids: Collection[int]) -> list[Batch]:
+    """The batches of datasets within a session."""
+    return _batches(session, batches_of(session, dataset_ids))
+
+
+def _batches(session: Session, rows: Sequence[Any], with_here: bool = True) -> list[Batch]:
+    ids = [row.id for row in rows]
+    counts = count_work(session, ids)
+    names: dict[tuple[int, str], list[str]] = defaultdict(list)
+    for row in people_of(session, ids):
+        names[row.batch_id, row.part].append(row.name)
+    here: dict[int, list[Here]] = defaultdict(list)
+    for row in leases_of(session, ids, now()) if with_here else ():
+        here[row.batch_id].append(Here(row.group_id, row.person, row.taken, row.seen))
+    found = []
+    for row in rows:
+        count = counts.get(row.id)
+        found.append(
+            Batch(
+                **row._mapping,
+                annotators=names[row.id, Part.ANNOTATOR],
+                reviewers=names[row.id, Part.REVIEWER],
+                # A dataset that begins again leaves a batch without groups.
+                groups=count.groups if count else 0,
+                handed_in=count.handed_in if count else 0,
+                settled=count.settled if count else 0,
+                last=count.last if count else None,
+                here=here[row.id],
+            )
+        )
+    return found
+
+
+def _ids(store: Store, dataset: int, part: Part, names: Iterable[str]) -> list[int]:
+    """Ids of people who may do a part in a dataset."""
+    wanted = {name.strip().lower() for name in names}
+    if not wanted:
+        return []
+    able = {one.name: one.id for one in list_members(store, dataset) if may(one.role, _NEEDS[part])}
+    missing = sorted(wanted - set(able))
+    if missing:
+        raise InputError(
+            f"{missing[0]} cannot be {part} here",
+            hint=f"Give them the role {part} in this dataset first.",
+            pointer=f"/{part}s",
+        )
+    return [able[name] for name in sorted(wanted)]
+
+
+def _check(new: NewBatch) -> None:
+    checked_title(new.name, "a batch")
+    if not 1 <= new.verdicts <= MOST_VERDICTS:
+        raise InputError(
+            f"a batch asks for 1 to {MOST_VERDICTS} verdicts on each group", pointer="/verdicts"
+        )
+    _check_gold(new.gold_every)
+
+
+def _check_gold(every: int | None) -> None:
+    if every is not None and not 1 <= every <= RAREST_GOLD:
+        raise InputError(f"one of 1 to {RAREST_GOLD} groups is a gold one", pointer="/gold_every")
+
+
+def _require_gold(session: Session, dataset: int) -> None:
+    """Raise ConflictError where a dataset has no gold group to mix in."""
+    if not gold_heads(session, dataset):
+        raise ConflictError(
+            "no group of this dataset is a gold group",
+            hint="Mark gold groups first, take those of a sample or a frozen version, or assign "
+            "the batch without them.",
+        )
+
+
+def _nothing(found: Sequence[int]) -> InputError:
+    if not found:
+        return InputError("no group matches that query", pointer="/q")
+    return InputError(
+        "every group that matches is in an open batch already",
+        hint="Take them all the same, or ask for other groups.",
+        pointer="/q",
+    )
+
+
+def _tell(session: Session, batch: Batch, people: Iterable[str], actor: str) -> None:
+    """Tell people that work was given to them."""
+    by = person_of(actor)
+    due = "" if batch.due is None else f", due {batch.due}"
+    # Who is told how many groups it has counts how many gold ones are mixed in.
+    groups = "groups" if batch.gold_every is not None else plural(batch.groups, "group")
+    said = f"{by} assigned you work: {batch.name}, {groups} of {batch.dataset}{due}"
+    for name in dict.fromkeys(people):
+        tell(
+            session, name, RingKind.ASSIGNED, said,
+            actor=actor, address="/work", dataset_id=batch.dataset_id,
+        )  # fmt: skip
+
+
+def _note(session: Session, batch: Batch, did: str, actor: str) -> None:
+    """Write what became of a batch into the log."""
+    body = {
+        "batch": batch.id,
+        "dataset": batch.dataset_id,
+        "did": did,
+        "name": batch.name,
+        "groups": batch.groups,
+        "annotators": batch.annotators,
+        "reviewers": batch.reviewers,
+    }
+    append(session, [Entry(WORK, actor, now(), body)])

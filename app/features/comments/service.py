@@ -1,0 +1,293 @@
+"""Comments: what people say to each other about a group, in threads that are open until settled.
+
+Each word goes into the log, like everything that people say; the tables show how it stands.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from typing import Any
+
+from app.db.log import Entry, append
+from app.db.session import Session, now
+from app.db.store import Store
+from app.errors import ConflictError, ForbiddenError, InputError, NotFoundError
+from app.features.comments.queries import StoredComment as StoredComment
+from app.features.comments.queries import StoredThread as StoredThread
+from app.features.comments.queries import (
+    ThreadGroup,
+    change_comment,
+    delete_thread,
+    find_group,
+    insert_comment,
+    insert_thread,
+    read_threads,
+    set_mentions,
+    set_resolved,
+)
+from app.features.notifications.service import RingKind, tell
+from app.features.people.logins import read_roles
+from app.features.people.queries import members, person_by_name
+from app.features.people.roles import Role
+from app.soccer.actors import is_of, person_of
+
+COMMENT = "comment"
+"""Kind of the log's entries about comments."""
+LONGEST = 4000
+"""Characters of a comment."""
+MOST = 200
+"""Comments in one thread."""
+_MENTION = re.compile(r"(?<![\w@.-])@([a-z0-9](?:[a-z0-9._-]{0,38}[a-z0-9])?)", re.IGNORECASE)
+
+
+def names_in(text: str) -> list[str]:
+    """The names that a text mentions, each once.
+
+    Example:
+        >>> names_in("@anna, look at this; mail bob@club.org or @Carl.")
+        ['anna', 'carl']
+    """
+    return list(dict.fromkeys(name.lower() for name in _MENTION.findall(text)))
+
+
+def list_threads(store: Store, group_id: int) -> list[StoredThread]:
+    """Everything that people say to each other about a group, the oldest thread first.
+
+    Raises:
+        NotFoundError: There is no such group.
+    """
+    with store.read() as session:
+        _need_group(session, group_id)
+        return read_threads(session, group_id)
+
+
+def people_of(store: Store, group_id: int) -> list[str]:
+    """Names of everybody who sees a group, and can be mentioned there.
+
+    Raises:
+        NotFoundError: There is no such group.
+    """
+    with store.read() as session:
+        group = _need_group(session, group_id)
+        return [row.name for row in members(session, group.dataset_id) if _sees(row)]
+
+
+def begin_thread(
+    store: Store,
+    group_id: int,
+    text: str,
+    *,
+    actor: str,
+    view: str | None = None,
+    at: tuple[float, float] | None = None,
+) -> StoredThread:
+    """Say something about a group, a view of it, or a place there (pixels of its annotated size).
+
+    Raises:
+        NotFoundError: There is no such group.
+        InputError: It has no such view, there is no text, or it is too long.
+    """
+    text = _checked(text)
+    if at is not None and view is None:
+        raise InputError("a place in a picture needs the view that it is in", pointer="/view")
+    with store.write() as session:
+        group = _need_group(session, group_id)
+        if view is not None and view not in group.views:
+            raise InputError(f'the group has no view "{view}"', pointer="/view")
+        thread_id = insert_thread(session, group, view, at, now())
+        where = {"view": view, "at": None if at is None else [*at]}
+        _say(session, group, thread_id, text, actor, (), **where)
+        return _answered(session, group_id, thread_id)
+
+
+def reply(store: Store, group_id: int, thread_id: int, text: str, *, actor: str) -> StoredThread:
+    """Say something in a thread; who spoke there before is told.
+
+    Raises:
+        NotFoundError: There is no such thread of that group.
+        InputError: There is no text, or it is too long.
+        ConflictError: The thread is full.
+    """
+    text = _checked(text)
+    with store.write() as session:
+        group, thread = _need_group(session, group_id), _need_thread(session, group_id, thread_id)
+        if len(thread.comments) >= MOST:
+            raise ConflictError(
+                f"a thread has at most {MOST} comments", hint="Begin another one on this group."
+            )
+        before = {person_of(one.actor) for one in thread.comments if one.text is not None}
+        _say(session, group, thread_id, text, actor, sorted(before))
+        return _answered(session, group_id, thread_id)
+
+
+def resolve(
+    store: Store, group_id: int, thread_id: int, resolved: bool, *, actor: str
+) -> StoredThread:
+    """Settle a thread, or open it again.
+
+    Raises:
+        NotFoundError: There is no such thread of that group.
+    """
+    with store.write() as session:
+        group, thread = _need_group(session, group_id), _need_thread(session, group_id, thread_id)
+        if (thread.resolved is not None) != resolved:
+            time = now()
+            set_resolved(session, thread_id, *((time, actor) if resolved else (None, None)))
+            did = "resolved" if resolved else "reopened"
+            _log(session, group, actor, time, did=did, thread=thread_id)
+        return _answered(session, group_id, thread_id)
+
+
+def change(
+    store: Store, group_id: int, thread_id: int, comment_id: int, text: str, *, actor: str
+) -> StoredThread:
+    """Give a comment of one's own another text; it is marked as edited.
+
+    Whom it mentions now and did not before is told.
+
+    Raises:
+        NotFoundError: There is no such comment there.
+        ForbiddenError: It is somebody else's.
+        InputError: There is no text, or it is too long.
+    """
+    text = _checked(text)
+    with store.write() as session:
+        group = _need_group(session, group_id)
+        comment = _need_own(session, group_id, thread_id, comment_id, actor)
+        if text != comment.text:
+            time = now()
+            change_comment(session, comment_id, text, time)
+            people = _seeing(session, group, names_in(text))
+            set_mentions(session, comment_id, people.values())
+            said = {"comment": comment_id, "text": text}
+            _log(session, group, actor, time, did="edited", thread=thread_id, **said)
+            new = [name for name in people if name not in comment.mentions]
+            _ring(session, group, thread_id, actor, new, ())
+        return _answered(session, group_id, thread_id)
+
+
+def remove(store: Store, group_id: int, thread_id: int, comment_id: int, *, actor: str) -> None:
+    """Delete a comment of one's own; a thread in which nothing else is said goes with it.
+
+    Raises:
+        NotFoundError: There is no such comment there.
+        ForbiddenError: It is somebody else's.
+    """
+    with store.write() as session:
+        group = _need_group(session, group_id)
+        _need_own(session, group_id, thread_id, comment_id, actor)
+        time = now()
+        change_comment(session, comment_id, None, time)
+        _log(session, group, actor, time, did="deleted", thread=thread_id, comment=comment_id)
+        thread = _need_thread(session, group_id, thread_id)
+        if all(one.text is None for one in thread.comments):
+            delete_thread(session, thread_id)
+        session.respond(None)
+
+
+def _say(
+    session: Session,
+    group: ThreadGroup,
+    thread_id: int,
+    text: str,
+    actor: str,
+    before: Iterable[str],
+    **where: Any,
+) -> None:
+    time = now()
+    comment_id = insert_comment(session, thread_id, actor, text, time)
+    people = _seeing(session, group, names_in(text))
+    set_mentions(session, comment_id, people.values())
+    said = {"comment": comment_id, "text": text, **where}
+    _log(session, group, actor, time, did="said", thread=thread_id, **said)
+    _ring(session, group, thread_id, actor, people, before)
+
+
+def _ring(
+    session: Session,
+    group: ThreadGroup,
+    thread_id: int,
+    actor: str,
+    mentioned: Iterable[str],
+    spoke: Iterable[str],
+) -> None:
+    """Tell those whom a comment mentions, and of the others those who spoke in its thread."""
+    named = sorted(set(mentioned))
+    rings = [(name, RingKind.MENTION, "mentioned you") for name in named]
+    rings += [(name, RingKind.REPLY, "replied") for name in spoke if name not in named]
+    for name, kind, did in rings:
+        tell(
+            session,
+            name,
+            kind,
+            f"{actor} {did} in {group.label}",
+            actor=actor,
+            address=f"/review/{group.group_id}?thread={thread_id}",
+            dataset_id=group.dataset_id,
+            group_id=group.group_id,
+        )
+
+
+def _seeing(session: Session, group: ThreadGroup, names: Iterable[str]) -> dict[str, int]:
+    """Ids of those among some names who see a group's dataset; the others are not told apart."""
+    found: dict[str, int] = {}
+    for name in names:
+        row = person_by_name(session, name)
+        if row is not None and not row.disabled:
+            roles = read_roles(session, row.id, Role(row.role))
+            if roles.role_in(group.dataset_id) is not Role.NONE:
+                found[name] = row.id
+    return found
+
+
+def _sees(row: Any) -> bool:
+    here = row.everywhere if row.role is None or row.everywhere == Role.ADMIN else row.role
+    return bool(here != Role.NONE)
+
+
+def _log(session: Session, group: ThreadGroup, actor: str, time: str, **said: Any) -> None:
+    body = {name: value for name, value in said.items() if value is not None}
+    append(session, [Entry(COMMENT, actor, time, body, group.dataset_id, group.group_id)])
+
+
+def _checked(text: str) -> str:
+    text = text.strip()
+    if not text:
+        raise InputError("a comment says something", pointer="/text")
+    if len(text) > LONGEST:
+        raise InputError(f"a comment has at most {LONGEST} characters", pointer="/text")
+    return text
+
+
+def _need_group(session: Session, group_id: int) -> ThreadGroup:
+    group = find_group(session, group_id)
+    if group is None:
+        raise NotFoundError.group(group_id)
+    return group
+
+
+def _answered(session: Session, group_id: int, thread_id: int) -> StoredThread:
+    """Answer the request with a thread as it is by now."""
+    thread = _need_thread(session, group_id, thread_id)
+    session.respond(thread)
+    return thread
+
+
+def _need_thread(session: Session, group_id: int, thread_id: int) -> StoredThread:
+    found = read_threads(session, group_id, thread_id)
+    if not found:
+        raise NotFoundError(f"group {group_id} has no thread {thread_id}")
+    return found[0]
+
+
+def _need_own(
+    session: Session, group_id: int, thread_id: int, comment_id: int, actor: str
+) -> StoredComment:
+    thread = _need_thread(session, group_id, thread_id)
+    for comment in thread.comments:
+        if comment.id == comment_id and comment.text is not None:
+            if not is_of(comment.actor, person_of(actor)):
+                raise ForbiddenError("only its author can change a comment", hint="Reply to it.")
+            return comment
+    raise NotFoundError(f"thread {thread_id} has no comment {comment_id}")

@@ -1,0 +1,75 @@
+"""Commands on datasets: list them, and delete one with everything that belongs to it."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+import typer
+
+from app.terminal.opened import opened_store
+from app.terminal.options import Json, acting
+from app.terminal.remote import DATASET
+from app.terminal.server import ServerPlace, connected, given_server
+from app.terminal.terminal import print_json, print_values, say
+
+commands = typer.Typer(help="What datasets there are.", no_args_is_help=True)
+
+
+@commands.command("list")
+def list_(json_: Json = False) -> None:
+    """List every dataset with its progress."""
+    server = given_server()
+    values = _values() if server is None else _values_at(server)
+    if json_:
+        print_json(values)
+        return
+    for value in values:
+        say(
+            f"{value['name']:30} {value['groups']:7} groups {value['solved']:7} solved "
+            f"{value['accepted']:7} accepted   {value['policy']}"
+        )
+
+
+def _values() -> list[dict[str, Any]]:
+    from app.features.datasets.service import list_datasets
+
+    with opened_store() as store:
+        datasets = list_datasets(store)
+    return [
+        {**{name: getattr(item, name) for name in DATASET}, "policy": item.policy.name}
+        for item in datasets
+    ]
+
+
+def _values_at(server: ServerPlace) -> list[dict[str, Any]]:
+    from app.terminal.remote import dataset_values
+
+    with connected(server) as client:
+        return dataset_values(client)
+
+
+@commands.command()
+def delete(
+    name: Annotated[str, typer.Argument(help="Name of the dataset.")],
+    yes: Annotated[bool, typer.Option("--yes", help="Do not ask.")] = False,
+    json_: Json = False,
+) -> None:
+    """Delete a dataset with everything that belongs to it; cannot be undone.
+
+    Groups, annotations, verdicts, solutions, versions, predictions and evaluations go; the files
+    that it was imported from, exports and the log stay.
+    """
+    from app.features.datasets.service import delete_dataset, read_contents
+
+    with opened_store() as store:
+        contents = read_contents(store, name)
+        typed = contents.name if yes else _ask(contents.name, contents.counts)
+        contents = delete_dataset(store, contents.id, confirm=typed, actor=acting())
+    print_values({"deleted": contents.name, **contents.counts}, json_)
+
+
+def _ask(name: str, counts: dict[str, int]) -> str:
+    """The name, typed once more by somebody who has read what goes."""
+    there = ", ".join(f"{count} {word}" for word, count in counts.items() if count) or "nothing"
+    say_what = f'"{name}" holds {there.replace("_", " ")}. Type its name to delete it for good'
+    return str(typer.prompt(say_what, err=True))

@@ -1,0 +1,290 @@
+"""Datasets: names, policies, groups.
+
+The dataset that a named thing belongs to; and the removal of all that belongs to one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from functools import lru_cache
+from typing import Any
+
+from sqlalchemy import (
+    ColumnElement,
+    Select,
+    Table,
+    and_,
+    bindparam,
+    delete,
+    exists,
+    func,
+    insert,
+    or_,
+    select,
+    update,
+)
+
+from app.canonical import canonical
+from app.db.base import COPIES_USED, UsedIdModel
+from app.db.dialects.statements import DeferReferences, insert_or_replace
+from app.db.json_columns import as_written, parse
+from app.db.session import Session
+from app.features.batches.tables import BatchModel
+from app.features.datasets.tables import DatasetModel, GroupModel, StationModel, ViewModel
+from app.features.findings.tables import DismissalModel
+from app.features.groups.codecs import policy_from_json, policy_to_json
+from app.features.jobs.tables import JobModel
+from app.features.people.visibility_queries import COPIES
+from app.features.predictions.tables import EvaluationModel, PredictionSetModel
+from app.features.saved_views.tables import SavedViewModel
+from app.features.solutions.tables import SolutionModel
+from app.features.tables import Base
+from app.features.verdicts.tables import VerdictBatchModel, VerdictModel
+from app.features.versions.tables import VersionModel
+from app.finite import MAX_ID
+from app.soccer.policy import Policy
+
+_DIGITS = 19
+"""No id has more."""
+_ROWS = select(*DatasetModel.__table__.columns)
+
+
+@lru_cache(maxsize=64)
+def policy_of(text: str) -> Policy:
+    """The policy of a dataset's row; one value a text, however often it is asked for."""
+    with as_written():
+        return policy_from_json(parse(text))
+
+
+def dataset_rows(session: Session) -> Sequence[Any]:
+    """The rows of all datasets, those of copies too, by name."""
+    return session.execute(_ROWS.order_by(DatasetModel.name)).all()
+
+
+def find_dataset(session: Session, dataset: str | int) -> Any | None:
+    """The row of a dataset by name or id, or None."""
+    if isinstance(dataset, int) or (
+        len(dataset) <= _DIGITS and dataset.isascii() and dataset.isdigit()
+    ):
+        if int(dataset) > MAX_ID:
+            return None
+        statement = _ROWS.where(DatasetModel.id == int(dataset))
+    elif "\0" in dataset:
+        # PostgreSQL would refuse the question.
+        return None
+    else:
+        statement = _ROWS.where(DatasetModel.name == dataset)
+    return session.execute(statement).one_or_none()
+
+
+def next_dataset_id(session: Session, *, copies: bool = False) -> int:
+    """The id that the next dataset gets, or the next one of ``copies``."""
+    column = DatasetModel.id
+    mine = column > COPIES if copies else column <= COPIES
+    newest = session.scalar(select(func.max(column)).where(mine))
+    name = COPIES_USED if copies else DatasetModel.__tablename__
+    used = session.scalar(select(UsedIdModel.id).where(UsedIdModel.table == name))
+    return max(newest or 0, used or 0, COPIES if copies else 0) + 1
+
+
+def insert_dataset_row(
+    session: Session, name: str, policy: Policy, at: str, *, copies: bool = False
+) -> int:
+    """Insert a dataset, one of ``copies`` if so; returns its id."""
+    identity = next_dataset_id(session, copies=copies)
+    values = {"id": identity, "name": name, "created": at, **_policy_values(policy)}
+    session.execute(insert(DatasetModel), [values])
+    return identity
+
+
+def update_policy(session: Session, dataset_id: int, policy: Policy) -> None:
+    """Judge a dataset by another policy; the queue is the caller's to refresh."""
+    mine = DatasetModel.id == dataset_id
+    session.execute(update(DatasetModel).where(mine).values(_policy_values(policy)))
+
+
+def group_ids(
+    session: Session, dataset_id: int, matches: Collection[str] | None = None
+) -> list[int]:
+    """Ids of the groups of a dataset, of these matches where they are named, in order."""
+    statement = select(GroupModel.id).where(GroupModel.dataset_id == dataset_id)
+    if matches is not None:
+        statement = statement.where(GroupModel.match.in_(matches))
+    return list(session.scalars(statement.order_by(GroupModel.id)))
+
+
+def has_more_groups(session: Session, dataset_id: int, count: int) -> bool:
+    """Whether a dataset has more groups than that; no more are counted."""
+    statement = select(GroupModel.id).where(GroupModel.dataset_id == dataset_id)
+    return session.scalar(statement.offset(count).limit(1)) is not None
+
+
+def has_match(session: Session, dataset_id: int, match: str) -> bool:
+    """Whether a dataset has a group of a match; none is counted."""
+    group = GroupModel
+    found = exists().where(group.dataset_id == dataset_id, group.match == match)
+    return bool(session.scalar(select(found)))
+
+
+def dataset_name(session: Session, dataset_id: int) -> str:
+    """The name of a dataset that is there."""
+    return session.scalars(select(DatasetModel.name).where(DatasetModel.id == dataset_id)).one()
+
+
+def dataset_names(session: Session) -> dict[int, str]:
+    """The name of every dataset, by id."""
+    statement = select(DatasetModel.id, DatasetModel.name)
+    return {row.id: row.name for row in session.execute(statement)}
+
+
+def _policy_values(policy: Policy) -> dict[str, str]:
+    return {"policy": canonical(policy_to_json(policy)), "policy_hash": policy.hash}
+
+
+_ID: Any = bindparam("id")
+_DATASET_OF: Mapping[str, Select[Any]] = {
+    "group": select(GroupModel.dataset_id).where(GroupModel.id == _ID),
+    "view": select(GroupModel.dataset_id)
+    .join(ViewModel, ViewModel.group_id == GroupModel.id)
+    .where(ViewModel.id == _ID),
+    "station": select(StationModel.dataset_id).where(StationModel.id == _ID),
+    "predictions": select(PredictionSetModel.dataset_id).where(PredictionSetModel.id == _ID),
+    "evaluation": select(EvaluationModel.dataset_id).where(EvaluationModel.id == _ID),
+    "saved view": select(SavedViewModel.dataset_id).where(SavedViewModel.id == _ID),
+    "work": select(BatchModel.dataset_id).where(BatchModel.id == _ID),
+    "batch": select(VerdictBatchModel.dataset_id).where(VerdictBatchModel.id == _ID),
+}
+_GONE = and_(JobModel.dataset_id.is_not(None), JobModel.dataset_id.not_in(select(DatasetModel.id)))
+_JOB = select(JobModel.dataset_id, JobModel.actor, JobModel.kind).where(JobModel.id == _ID, ~_GONE)
+
+
+def dataset_of(session: Session, kind: str, identity: int) -> int | None:
+    """Id of the dataset of a group, view, station and so on; None where there is no such thing."""
+    found: int | None = session.scalar(_DATASET_OF[kind], {"id": identity})
+    return found
+
+
+def owner_of_job(session: Session, job_id: int) -> Any | None:
+    """``dataset_id`` (or None), ``actor`` and ``kind`` of a job; None where there is none.
+
+    A job whose dataset is gone is nobody's: admins alone, who ask for no owner, see it.
+    """
+    return session.execute(_JOB, {"id": job_id}).one_or_none()
+
+
+def versions_like(session: Session, text: str) -> Sequence[Any]:
+    """``id``, ``dataset_id``, ``name`` and ``hash`` of the versions that a text may name."""
+    if "\0" in text:
+        return []
+    fits = [VersionModel.name == text, VersionModel.hash.startswith(text, autoescape=True)]
+    if text.isascii() and text.isdigit() and len(text) < 19:
+        fits.append(VersionModel.id == int(text))
+    columns = (VersionModel.id, VersionModel.dataset_id, VersionModel.name, VersionModel.hash)
+    return session.execute(select(*columns).where(or_(*fits))).all()
+
+
+_TABLES = Base.metadata.tables
+_COUNTED = {
+    "groups": "groups",
+    "views": "view",
+    "verdicts": "verdict",
+    "saved_views": "saved_view",
+    "versions": "version",
+    "predictions": "prediction_set",
+    "evaluations": "evaluation",
+}
+"""What a person is told of, by the name of its table."""
+_ACCESS = ("dataset_role", "access_token", "webhook")
+"""Who may, or hears, what in a dataset; nothing that was said of its groups."""
+
+
+def count_contents(session: Session, dataset_id: int) -> dict[str, int]:
+    """How many groups, views, verdicts, versions and so on a dataset has."""
+    counts = {}
+    for word, name in _COUNTED.items():
+        table = _TABLES[name]
+        statement = select(func.count()).select_from(table).where(_belongs(table, dataset_id))
+        counts[word] = session.scalar(statement) or 0
+    return counts
+
+
+def solutions_of(session: Session, dataset_id: int) -> list[int]:
+    """Ids of the solutions of a dataset's groups."""
+    mine = SolutionModel.group_id.in_(_groups(dataset_id))
+    return list(session.scalars(select(SolutionModel.id).where(mine)))
+
+
+def delete_solutions(session: Session, ids: Sequence[int]) -> None:
+    """Delete solutions; the calibrations that they rested on may be spare then."""
+    session.execute(delete(SolutionModel).where(SolutionModel.id.in_(ids)))
+
+
+def keep_used_ids(session: Session) -> None:
+    """No id is ever given again: the log speaks of what had it."""
+    used = dict(session.execute(select(UsedIdModel.table, UsedIdModel.id)).all())
+    newest = {
+        table.name: session.scalar(select(func.max(table.c.id)))
+        for table in Base.metadata.sorted_tables
+        if list(table.primary_key.columns.keys()) == ["id"]
+    }
+    newest[DatasetModel.__tablename__] = next_dataset_id(session) - 1
+    copies = next_dataset_id(session, copies=True) - 1
+    newest[COPIES_USED] = copies if copies > COPIES else None
+    for name, identity in newest.items():
+        if identity and identity >= used.get(name, 0):
+            statement = insert_or_replace(UsedIdModel)
+            session.execute(statement, [{"table": name, "id": identity}])
+
+
+def move_access(session: Session, dataset_id: int) -> int:
+    """Let roles, tokens and webhooks of a dataset be those of the next that is made; returns its id.
+
+    It has to be made in the same transaction.
+    """
+    session.execute(DeferReferences())
+    heir_id = next_dataset_id(session)
+    for name in _ACCESS:
+        table = _TABLES[name]
+        mine = table.c.dataset_id == dataset_id
+        session.execute(update(table).where(mine).values(dataset_id=heir_id))
+    return heir_id
+
+
+def delete_rows(session: Session, dataset_id: int) -> None:
+    """Delete everything that was said, from the leaves to the dataset itself.
+
+    Tables that cascade (versions, predictions, evaluations) follow the rows that they hang on.
+    """
+    session.execute(DeferReferences())
+    dataset, groups = _TABLES[DatasetModel.__tablename__], _TABLES[GroupModel.__tablename__]
+    # The database lets verdicts and dismissals go while their group still tells whose they are.
+    judged = [_TABLES[model.__tablename__] for model in (VerdictModel, DismissalModel)]
+    for table in judged:
+        session.execute(delete(table).where(_belongs(table, dataset_id)))
+    for table in filter(_hangs_on, reversed(Base.metadata.sorted_tables)):
+        if table not in (dataset, groups, *judged):
+            session.execute(delete(table).where(_belongs(table, dataset_id)))
+    session.execute(delete(groups).where(_belongs(groups, dataset_id)))
+    session.execute(delete(dataset).where(dataset.c.id == dataset_id))
+
+
+def _belongs(table: Table, dataset_id: int) -> ColumnElement[bool]:
+    """Whether a row belongs to the dataset: by its own column, its group's or its station's."""
+    if "dataset_id" in table.c:
+        return table.c.dataset_id == dataset_id
+    stations = select(StationModel.id).where(StationModel.dataset_id == dataset_id)
+    owners = {"group_id": _groups(dataset_id), "station_id": stations}
+    return or_(*(table.c[name].in_(ids) for name, ids in owners.items() if name in table.c))
+
+
+def _groups(dataset_id: int) -> Select[int]:
+    return select(GroupModel.id).where(GroupModel.dataset_id == dataset_id)
+
+
+def _hangs_on(table: Table) -> bool:
+    """Whether rows refer to a dataset or a group and do not go with it by themselves."""
+    return any(
+        key.column.table.name in (DatasetModel.__tablename__, GroupModel.__tablename__)
+        and key.ondelete is None
+        for key in table.foreign_keys
+    )

@@ -1,0 +1,375 @@
+"""Datasets: made, named, listed, judged by a policy, deleted, with the licence of their sources."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Callable, Collection, Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from app.db.idempotency import without_response
+from app.db.log import Entry, append
+from app.db.session import Session, now
+from app.db.store import Store
+from app.errors import ConflictError, InputError, NotFoundError
+from app.features.datasets import queries as removal
+from app.features.datasets.match_choice import no_match
+from app.features.datasets.orphan_queries import delete_calibrations, spare_calibrations
+from app.features.datasets.queries import (
+    dataset_names,
+    dataset_rows,
+    find_dataset,
+    group_ids,
+    has_match,
+    insert_dataset_row,
+    policy_of,
+    update_policy,
+)
+from app.features.groups.codecs import policy_to_json
+from app.features.independent_annotations.queries import (
+    CopiesOf,
+    copies_of,
+    copy_dataset_ids,
+    insert_copy_dataset,
+)
+from app.features.people.visibility_queries import COPIES, EVERYTHING, Sight, is_blind
+from app.features.queue.listing_queries import count_states
+from app.features.queue.queries import refresh_queue
+from app.finite import quoted
+from app.formats.issia import MATCH as ISSIA
+from app.formats.manifest import LICENCES, UNKNOWN_LICENCE
+from app.sample.fixture import LEAGUES
+from app.soccer.policy import Policy
+
+MAX_TITLE = 80
+"""Characters of what only people read."""
+_NAME = re.compile(r"[A-Za-z0-9](?:[A-Za-z0-9._ -]{0,98}[A-Za-z0-9._-])?")
+
+
+def require_name(
+    name: str, what: str, *, digits: bool = False, pointer: str | None = "/name"
+) -> None:
+    """Raise unless something that addresses and files name can be called so.
+
+    Args:
+        name: The name.
+        what: What is called so, such as ``a dataset``.
+        digits: Whether digits alone are a name, too, and not taken for an id.
+        pointer: Where the name stands in a request.
+
+    Raises:
+        InputError: It cannot.
+    """
+    if not _NAME.fullmatch(name) or (name.isdigit() and not digits):
+        alone = "" if digits else ", not digits alone"
+        raise InputError(
+            f"{quoted(name)} cannot be the name of {what}",
+            hint=f"Use letters, digits, spaces and . _ -, up to 100, with no space at either end{alone}.",
+            pointer=pointer,
+        )
+
+
+def checked_title(text: str, what: str) -> str:
+    """What people read as the name of something, without white space around it.
+
+    Args:
+        text: As it was typed.
+        what: What is called so, such as ``a batch``.
+
+    Raises:
+        InputError: It is empty, too long, or holds what cannot be printed.
+    """
+    text = text.strip()
+    if not text or len(text) > MAX_TITLE or not text.isprintable():
+        raise InputError(f"{what} has a name of 1 to {MAX_TITLE} letters", pointer="/name")
+    return text
+
+
+@dataclass(frozen=True)
+class Dataset:
+    """A dataset and how far it is; the four states add up to ``groups``.
+
+    ``hides_groups``: whether groups of it are hidden from whoever asks, who annotates blind; which, and
+    how many, they are not told.
+    """
+
+    id: int
+    name: str
+    groups: int
+    solved: int
+    accepted: int
+    rejected: int
+    deferred: int
+    unreviewed: int
+    policy: Policy
+    created: str
+    hides_groups: bool
+
+
+@dataclass(frozen=True)
+class DatasetHead:
+    """A dataset without how far it is, for which all its groups would be counted."""
+
+    id: int
+    name: str
+    created: str
+    policy: Policy
+
+
+def insert_dataset(
+    session: Session,
+    name: str,
+    policy: Policy,
+    actor: str,
+    copies: CopiesOf | None = None,
+    *,
+    hidden: bool = False,
+) -> int:
+    """Insert a dataset and its log entry; returns its id.
+
+    Args:
+        session: A transaction that writes.
+        name: What it is called.
+        policy: Its thresholds.
+        actor: Who makes it.
+        copies: Of what it holds copies.
+        hidden: Only people with a role in it see it, as with copies; not who has one everywhere.
+    """
+    require_name(name, "a dataset")
+    at = now()
+    hidden = hidden or copies is not None
+    identity = insert_dataset_row(session, name, policy, at, copies=hidden)
+    body = {"name": name, "policy": policy_to_json(policy)}
+    if copies is not None:
+        insert_copy_dataset(session, identity, copies)
+        body["copies"] = vars(copies)
+    append(session, [Entry("dataset", actor, at, body, dataset_id=identity)])
+    return identity
+
+
+def list_datasets(
+    store: Store, sight: Sight = EVERYTHING, own: Collection[int] = ()
+) -> list[Dataset]:
+    """The datasets that somebody sees, by name; those of copies are in no list.
+
+    ``own`` are the ids of datasets in which they have a role: of those that are hidden from
+    others (their practice) the list has theirs.
+    """
+    with store.read() as session:
+        hidden = frozenset(own) - copy_dataset_ids(session) if own else frozenset[int]()
+        rows = [row for row in dataset_rows(session) if row.id <= COPIES or row.id in hidden]
+        return _datasets(session, [row for row in rows if sight.sees(row.id)])
+
+
+def get_dataset(store: Store, dataset: str | int) -> Dataset:
+    """A dataset by its name or its id, and how far it is.
+
+    Raises:
+        NotFoundError: There is none.
+    """
+    with store.read() as session:
+        return _datasets(session, [_need(session, dataset)])[0]
+
+
+def get_dataset_head(store: Store, dataset: str | int) -> DatasetHead:
+    """A dataset by its name or its id, uncounted; raises NotFoundError when there is none."""
+    with store.read() as session:
+        return read_dataset_head(session, dataset)
+
+
+def dataset_id(store: Store, dataset: str | int) -> int:
+    """The id of a dataset; raises NotFoundError when there is none."""
+    with store.read() as session:
+        return need_dataset(session, dataset)
+
+
+def need_dataset(session: Session, dataset: str | int) -> int:
+    """``dataset_id`` within a session."""
+    return int(_need(session, dataset).id)
+
+
+def read_dataset_head(session: Session, dataset: str | int) -> DatasetHead:
+    """A dataset within a session, uncounted; raises NotFoundError when there is none."""
+    row = _need(session, dataset)
+    return DatasetHead(row.id, row.name, row.created, policy_of(row.policy))
+
+
+def require_matches(
+    session: Session, dataset: str | int, matches: Collection[str] | None = None
+) -> DatasetHead:
+    """The head of a dataset that has all of these matches.
+
+    Raises:
+        NotFoundError: There is no such dataset or match.
+    """
+    found = read_dataset_head(session, dataset)
+    for match in matches or ():
+        if not has_match(session, found.id, match):
+            raise no_match(found.name, match)
+    return found
+
+
+def save_policy(session: Session, dataset_id: int, policy: Policy, actor: str) -> None:
+    """Judge a dataset by another policy; what that leaves without a solution is stale."""
+    update_policy(session, dataset_id, policy)
+    body = {"policy": policy_to_json(policy)}
+    append(session, [Entry("policy", actor, now(), body, dataset_id=dataset_id)])
+    refresh_queue(session, group_ids(session, dataset_id))
+
+
+def _need(session: Session, dataset: str | int) -> Any:
+    row = find_dataset(session, dataset)
+    if row is None:
+        raise NotFoundError.dataset(dataset, dataset_names(session))
+    return row
+
+
+def _datasets(session: Session, rows: Sequence[Any]) -> list[Dataset]:
+    states: dict[int, Counter[str]] = {}
+    for row in count_states(session, [row.id for row in rows]):
+        counts = states.setdefault(row.dataset_id, Counter())
+        counts.update({row.status: row.groups, "groups": row.groups, "solved": int(row.solved)})
+    return [_dataset(row, states.get(row.id, Counter())) for row in rows]
+
+
+def _dataset(row: Any, counts: Counter[str]) -> Dataset:
+    return Dataset(
+        id=row.id,
+        name=row.name,
+        created=row.created,
+        policy=policy_of(row.policy),
+        groups=counts["groups"],
+        solved=counts["solved"],
+        accepted=counts["accepted"],
+        rejected=counts["rejected"],
+        deferred=counts["deferred"],
+        unreviewed=counts["unreviewed"],
+        hides_groups=is_blind(row.id),
+    )
+
+
+def licence_of(match: str) -> str:
+    """The terms of the source that a match is from."""
+    return LICENCES.get(_origin(match), UNKNOWN_LICENCE)
+
+
+def licence_text(matches: Iterable[str]) -> str:
+    """The terms of all sources, one after another."""
+    return " ".join(sorted({licence_of(match) for match in matches})) or UNKNOWN_LICENCE
+
+
+def _origin(match: str) -> str:
+    parts = match.split("/")
+    if parts[0] in LEAGUES:
+        return "sample"
+    if match == ISSIA:
+        return "issia"
+    return "soccernet" if len(parts) == 3 else ""
+
+
+CALIBRATIONS_AT_ONCE = 2000
+"""Calibrations a transaction: nobody who saves waits long for it."""
+
+
+def delete_spare_calibrations(store: Store, wanted: Callable[[], bool] = lambda: True) -> int:
+    """Delete them in short transactions; returns how many there were.
+
+    While a group waits to be solved they stay: its solver may have read them already. The rest is
+    left once it is no longer ``wanted``.
+    """
+    with store.read() as session:
+        keys = spare_calibrations(session)
+    gone = 0
+    for start in range(0, len(keys), CALIBRATIONS_AT_ONCE):
+        if not wanted():
+            break
+        with store.write() as session:
+            gone += delete_calibrations(session, keys[start : start + CALIBRATIONS_AT_ONCE])
+    return gone
+
+
+KIND = "dataset_deleted"
+CHUNK = 500
+"""Solutions a transaction."""
+
+
+@dataclass(frozen=True)
+class DatasetContents:
+    """What belongs to a dataset; ``counts`` by groups, views, verdicts, versions and so on."""
+
+    id: int
+    name: str
+    counts: dict[str, int]
+
+
+def read_contents(store: Store, dataset: str | int) -> DatasetContents:
+    """What deleting a dataset would take away.
+
+    Raises:
+        NotFoundError: There is no such dataset.
+    """
+    with store.read() as session:
+        return _contents(session, read_dataset_head(session, dataset).id)
+
+
+def delete_dataset(
+    store: Store, dataset: str | int, *, confirm: str, actor: str, afresh: Policy | None = None
+) -> DatasetContents:
+    """Delete a dataset with everything that belongs to it; returns what that was.
+
+    What was computed goes first, in short transactions: killed in between, it is computed again.
+    What was said goes at the end, all at once. The log keeps every entry and gains one.
+
+    Args:
+        store: The database.
+        dataset: Name or id.
+        confirm: The name, once more.
+        actor: Who wants it.
+        afresh: Policy of an empty dataset of the same name, which is made in its place with its
+            roles, tokens and webhooks; None: none is.
+
+    Raises:
+        NotFoundError: There is no such dataset.
+        ConflictError: ``confirm`` is another name; nothing is deleted.
+    """
+    found = read_contents(store, dataset)
+    if confirm != found.name:
+        raise ConflictError(
+            f'the dataset is called "{found.name}"',
+            hint="Send its name as confirm: deleting cannot be undone.",
+            pointer="/confirm",
+        )
+    identity = dataset_id(store, found.id)
+    with store.read() as session:
+        copies = copies_of(session, identity)
+    with without_response():
+        for row in copies:
+            delete_dataset(store, row.dataset_id, confirm=row.name, actor=actor)
+    _delete_solutions(store, identity)
+    with store.write() as session:
+        contents = _contents(session, identity)
+        removal.keep_used_ids(session)
+        heir = None if afresh is None else removal.move_access(session, identity)
+        body = {"name": contents.name, "counts": contents.counts, "heir": heir}
+        append(session, [Entry(KIND, actor, now(), body, identity)])
+        removal.delete_rows(session, identity)
+        if afresh is not None:
+            assert insert_dataset(session, contents.name, afresh, actor) == heir
+        session.respond(contents)
+    delete_spare_calibrations(store)
+    return contents
+
+
+def _contents(session: Session, identity: int) -> DatasetContents:
+    name = read_dataset_head(session, identity).name
+    return DatasetContents(identity, name, removal.count_contents(session, identity))
+
+
+def _delete_solutions(store: Store, identity: int) -> None:
+    """Delete what was computed."""
+    with store.read() as session:
+        solutions = removal.solutions_of(session, identity)
+    for start in range(0, len(solutions), CHUNK):
+        with store.write() as session:
+            removal.delete_solutions(session, solutions[start : start + CHUNK])

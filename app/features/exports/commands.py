@@ -1,0 +1,225 @@
+"""Commands that read files into a dataset and write them from it: import and export."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from app.features.policies.commands import read_policy_option
+from app.formats.format_names import ExportFormat, ImportFormat
+from app.object_store.address import is_address
+from app.object_store.path import StoredPath, find_path, target_path
+from app.soccer.choices import BoxKind, CalibrationChoice, PicturesWritten, TrainingViews
+from app.soccer.frames import ImageSize
+from app.terminal.opened import opened_store
+from app.terminal.options import (
+    POLICY_OR_FILE,
+    Dataset,
+    Json,
+    acting,
+    parse_cameras,
+    parse_frame_offset,
+    parse_place,
+    parse_size,
+    read_settings,
+)
+from app.terminal.server import connected, given_server
+from app.terminal.terminal import complain, print_export, print_import, show_progress
+
+if TYPE_CHECKING:
+    from app.config import Settings
+
+commands = typer.Typer()
+
+
+@commands.command("import")
+def import_(
+    format_: Annotated[ImportFormat, typer.Argument(metavar="FORMAT")],
+    path: Annotated[
+        str,
+        typer.Argument(
+            parser=parse_place, metavar="PATH", help="A folder, a file or s3://NAME/..."
+        ),
+    ],
+    dataset: Dataset,
+    lines: Annotated[
+        Path | None, typer.Option(exists=True, help="ISSIA: line files of the static cameras.")
+    ] = None,
+    calibration: Annotated[
+        CalibrationChoice | None,
+        typer.Option(
+            help="Which one counts; said of ISSIA, given leaves the lines of given cameras aside.",
+            show_default="given",
+        ),
+    ] = None,
+    frame_offset: Annotated[
+        str, typer.Option(help="ISSIA: XGTF frame minus video frame; 8, or 1=8,2=9 by camera.")
+    ] = "8",
+    flip: Annotated[
+        str, typer.Option(metavar="2,6", help="ISSIA: cameras whose videos are mirrored.")
+    ] = "",
+    size: Annotated[
+        ImageSize | None,
+        typer.Option(
+            "--size",
+            parser=parse_size,
+            metavar="WxH",
+            help="Size of the annotated images: default 960x540, ISSIA as its files say, else "
+            "1920x1080; of cameras the size that they were made for, default that of each view.",
+        ),
+    ] = None,
+    ball_category: Annotated[
+        str,
+        typer.Option(metavar="NAME", help="COCO: the category that is the ball; default: by name."),
+    ] = "",
+    group_by: Annotated[
+        str,
+        typer.Option(
+            metavar="folder|PATTERN",
+            help="frames: which pictures are one group, by folder or by a pattern of their names, "
+            "{instant}_{camera}.jpg; default: each is one.",
+        ),
+    ] = "",
+    policy: Annotated[
+        str | None,
+        typer.Option(
+            metavar=POLICY_OR_FILE,
+            help="Judges the dataset where this import makes it.",
+            show_default="paper",
+        ),
+    ] = None,
+    frames: Annotated[
+        str | None,
+        typer.Option(
+            parser=parse_place, metavar="LIST", help="JSON list of where frames lie in stores."
+        ),
+    ] = None,
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="Dry run: report what would happen, change nothing.")
+    ] = False,
+    json_: Json = False,
+) -> None:
+    """Read files into a dataset; doing it again changes nothing.
+
+    FORMAT is soccernet-v3, soccernet-v3d, issia, issia-3d, sn-calibration, cameras, gamestate,
+    coco, parquet, frames (pictures alone) or touchline; docs/formats.md says what each of them holds.
+    """
+    server = given_server()
+    if server is not None:
+        from app.terminal import remote_files
+
+        options: dict[str, Any] = {
+            **({} if calibration is None else {"calibration": calibration}),
+            "frame_offset": parse_frame_offset(frame_offset),
+            "flipped": sorted(parse_cameras(flip)),
+            "size": None if size is None else [size.width, size.height],
+            **({"ball_category": ball_category} if ball_category else {}),
+            **({"grouping": group_by} if group_by else {}),
+        }
+        with connected(server) as client, show_progress("Importing") as progress:
+            values, nothing = remote_files.import_values(
+                client, dataset, format_, path if is_address(path) else Path(path), options,
+                lines=lines, frames=frames, policy=policy or _usual_policy(format_),
+                dry_run=dry_run, progress=progress,
+            )  # fmt: skip
+        print_import(values, json_)
+        if nothing is not None:
+            complain(*nothing)
+            raise typer.Exit(1)
+        return
+    from app.features.imports.sources import Source, import_source
+
+    settings = read_settings()
+    root = _root(settings, path)
+    source = Source(
+        format_,
+        root,
+        size=size,
+        lines=None if lines is None else lines.resolve(),
+        calibration=calibration,
+        frame_offset=parse_frame_offset(frame_offset),
+        flipped=parse_cameras(flip),
+        frames=None if frames is None else _root(settings, frames),
+        ball_category=ball_category,
+        grouping=group_by,
+    )
+    source.check(policy=policy is not None)
+    chosen = read_policy_option(policy or "paper")
+    with opened_store(settings) as store, show_progress("Importing") as progress:
+        imported = import_source(
+            store, dataset, source, settings, progress,
+            actor=acting(), dry_run=dry_run, policy=chosen,
+        )  # fmt: skip
+    print_import(imported.values(), json_)
+    if not imported.something:
+        complain(*imported.nothing_read())
+        raise typer.Exit(1)
+
+
+def _usual_policy(format_: str) -> str | None:
+    """The policy of a dataset that an import makes; None where the format brings none into being."""
+    return None if format_ in ("cameras", "touchline") else "paper"
+
+
+def _root(settings: Settings, text: str) -> Path | StoredPath:
+    return find_path(settings, text) if is_address(text) else Path(text).resolve()
+
+
+@commands.command()
+def export(
+    out: Annotated[
+        str, typer.Argument(help="A folder, or a zip by its ending; s3://NAME/... in a store.")
+    ],
+    dataset: Dataset,
+    format_: Annotated[ExportFormat, typer.Option("--format", help="Which format to write.")],
+    everything: Annotated[
+        bool, typer.Option("--all", help="Every group, failed and rejected too.")
+    ] = False,
+    boxes: Annotated[
+        BoxKind,
+        typer.Option(help="coco, parquet, soccernet-v3d and yolo: which ball box is written."),
+    ] = "optimized",
+    images: Annotated[
+        PicturesWritten, typer.Option(help="What happens to frames; touchline holds none.")
+    ] = "none",
+    views: Annotated[
+        TrainingViews, typer.Option(help="coco and yolo: balls that no other view confirms, too?")
+    ] = "valid",
+    version: Annotated[
+        str | None, typer.Option(help="A frozen version (name, id or hash): always the same bytes.")
+    ] = None,
+    json_: Json = False,
+) -> None:
+    """Write accepted groups, all of them, or a frozen version, with a manifest."""
+    asked: dict[str, Any] = {
+        "boxes": boxes,
+        "images": images,
+        "views": views,
+        "version": version,
+    }
+    server = given_server()
+    if server is not None:
+        from app.terminal import remote_files
+
+        if images == "link":
+            raise typer.BadParameter("a server cannot link to frames here; choose copy or none")
+        request = {"dataset": dataset, "format": format_, "all": everything, **asked}
+        with connected(server) as client, show_progress("Exporting") as progress:
+            sent_to = out if is_address(out) else Path(out)
+            values = remote_files.export_values(client, sent_to, request, progress)
+        print_export(values, json_)
+        return
+    from app.features.exports.service import export as run_export
+    from app.features.exports.service import require_possible
+
+    with opened_store() as store, show_progress("Exporting") as progress:
+        require_possible(store, dataset, format_, everything=everything, **asked)
+        target = target_path(store.settings, out) if is_address(out) else Path(out)
+        report = run_export(
+            store, dataset, format_, target, everything=everything, **asked, progress=progress
+        )
+    # How many groups were to be written is a matter of progress; what was is in the counts.
+    values = {name: value for name, value in vars(report).items() if name != "groups"}
+    print_export({**values, "out": str(report.out)}, json_)

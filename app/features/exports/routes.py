@@ -1,0 +1,231 @@
+"""Exports: written by a job, fetched as a zip."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from typing import Annotated
+
+from fastapi import APIRouter, Depends, Path, Query, Request, Response
+from starlette.responses import FileResponse
+
+from app.errors import ConflictError, NotFoundError
+from app.features.audit.audit_events import record_deed
+from app.features.datasets.service import dataset_id
+from app.features.exports.jobs import KIND, request_export
+from app.features.exports.schemas import (
+    ExportDocument,
+    ExportJobDocument,
+    ExportPage,
+    ExportRequest,
+    FormatDocument,
+    FormatList,
+)
+from app.features.exports.service import possible_formats
+from app.features.jobs.queries import Job
+from app.features.jobs.routes import Cursor, DatasetFilter, Limit
+from app.features.jobs.schemas import JobDocument
+from app.formats.export_formats import used_options
+from app.http.cursor import paged, parse_cursor
+from app.http.deps import Actor, AppServices, AppStore, DatasetPath, SeesWhole
+from app.http.job_responses import ACCEPTED, job_address
+from app.http.problem import Responses, responses
+from app.http.respond import document, no_content, responds
+from app.http.services import Services
+from app.http.stored_file import stored_file
+
+router = APIRouter(tags=["exports"])
+
+PATIENCE = 20.0
+"""Seconds that a request for the zip waits for it to be written."""
+ExportId = Annotated[str, Path(max_length=64)]
+ZIP: Responses = {
+    200: {
+        "description": "The zip.",
+        "content": {"application/zip": {"schema": {"type": "string", "format": "binary"}}},
+    }
+}
+
+
+@router.get(
+    "/datasets/{dataset}/export-formats",
+    operation_id="listExportFormats",
+    responses=responses(400, 404),
+)
+@paged()
+def list_formats(
+    dataset: DatasetPath,
+    store: AppStore,
+    version: Annotated[
+        str | None, Query(max_length=200, description="Of a frozen version: id, name or hash.")
+    ] = None,
+) -> FormatList:
+    """In which formats a dataset, or a version of it, can be exported, and why not in the others."""
+    found = dataset_id(store, dataset)
+    answers = possible_formats(store, found, version)
+    return FormatList(
+        items=[
+            FormatDocument(
+                **vars(one), possible=one.reason is None, options=used_options(one.format)
+            )
+            for one in answers
+        ]
+    )
+
+
+def _export_answer(job: Job) -> Response:
+    started = ExportJobDocument.of_export(JobDocument.model_validate(job))
+    return document(started, 202, job_address(job))
+
+
+@router.post(
+    "/exports",
+    operation_id="makeExport",
+    status_code=202,
+    response_model=ExportJobDocument,
+    responses={**responses(404, 409, 413, 415, 507), **ACCEPTED},
+)
+@responds(_export_answer)
+def make_export(request: ExportRequest, services: AppServices, actor: Actor) -> Job:
+    """Write accepted groups, or all of them, to a zip; 400 when there is nothing to write."""
+    return request_export(
+        services.jobs,
+        services.store,
+        services.exports,
+        services.frames,
+        request.model_dump(),
+        actor=actor,
+    )
+
+
+@router.get("/exports", operation_id="listExports", responses=responses(404))
+def list_exports(
+    services: AppServices,
+    sight: SeesWhole,
+    dataset: DatasetFilter = None,
+    limit: Limit = 50,
+    cursor: Cursor = None,
+) -> ExportPage:
+    """Exports, the newest first, those under way and those that failed too."""
+    found = None if dataset is None else dataset_id(services.store, dataset)
+    jobs = services.jobs.find(
+        dataset_id=found,
+        kinds=[KIND],
+        before=parse_cursor(cursor),
+        limit=limit + 1,
+        sight=sight,
+    )
+    more = str(jobs[limit - 1].id) if len(jobs) > limit else None
+    days, find = services.settings.export_days, services.exports.find
+    items = [ExportDocument.of_job(job, find(str(job.id)), days) for job in jobs[:limit]]
+    return ExportPage(items=items, next=more)
+
+
+@router.get("/exports/{export}", operation_id="getExport", responses=responses(404))
+def get_export(export: ExportId, services: AppServices) -> ExportDocument:
+    """What was asked for, how far it is, and what came of it."""
+    return _document(services, export)
+
+
+@router.delete(
+    "/exports/{export}",
+    operation_id="deleteExport",
+    status_code=204,
+    response_class=Response,
+    responses={**responses(404, 409), 204: {"description": "It is gone."}},
+)
+@responds(no_content)
+def delete_export(export: ExportId, services: AppServices, actor: Actor) -> None:
+    """Delete the file of an export, or one that failed altogether; 409 while it is being written."""
+    document = _document(services, export)
+    if document.state in ("waiting", "running"):
+        raise _not_ready(document)
+    if document.state == "gone":
+        raise NotFoundError("there is no such export")
+    if document.state in ("failed", "cancelled"):
+        services.jobs.forget(int(export))
+    services.exports.forget(export)
+    record_deed(services.store, actor, "export deleted", None, export=export)
+
+
+async def written(export: ExportId, services: AppServices) -> str:
+    """The id of an export, once that is no longer under way or patience is at its end."""
+    end = time.monotonic() + PATIENCE
+    number = int(export) if _is_id(export) else 0
+    while services.jobs.is_open(number, KIND) and time.monotonic() < end:
+        await asyncio.sleep(0.05)
+    return export
+
+
+@router.get(
+    "/exports/{export}/content",
+    operation_id="getExportContent",
+    response_class=FileResponse,
+    responses={**responses(404, 409, 503), **ZIP},
+)
+def get_content(
+    export: Annotated[str, Depends(written)], services: AppServices, request: Request
+) -> Response:
+    """The zip itself; waits a while for one that is still being written.
+
+    409 when it is not ready by then, or its writing failed. One that lies in an object store comes
+    through this server, or from an address of the store that is good for a minute.
+    """
+    document = _document(services, export)
+    entry = services.exports.find(export)
+    if entry is not None and entry.stored is not None:
+        return stored_file(services.settings, entry.stored, _file_name(document), request)
+    if document.state == "expired":
+        days = services.settings.export_days
+        raise NotFoundError(
+            "the file of this export has expired",
+            hint=f"Files of exports are kept for {days} days here. Make the export again."
+            if days
+            else "Make the export again.",
+        )
+    path = services.exports.content(document.id)
+    if document.state == "gone" or (document.state == "done" and not path.is_file()):
+        raise NotFoundError("the file of this export is gone", hint="Make the export again.")
+    if document.state != "done":
+        raise _not_ready(document)
+    return FileResponse(
+        path,
+        media_type="application/zip",
+        filename=_file_name(document),
+        headers={"Cache-Control": "private, no-cache"},
+    )
+
+
+def _file_name(document: ExportDocument) -> str:
+    return f"touchline-{document.request.format}-{document.id[:8]}.zip"
+
+
+def _document(services: Services, export: str) -> ExportDocument:
+    """The document of an export that is ready or under way.
+
+    Raises:
+        NotFoundError: There is none of that id.
+    """
+    entry, days = services.exports.find(export), services.settings.export_days
+    if entry is not None:
+        return ExportDocument.of(entry, days)
+    if _is_id(export):
+        job = services.jobs.get(int(export))
+        if job.kind == KIND:
+            return ExportDocument.of_job(job, None, days)
+    raise NotFoundError("there is no such export")
+
+
+def _is_id(export: str) -> bool:
+    """Whether it may be the id of a job; those of exports that were made before there were jobs are none."""
+    return export.isascii() and export.isdigit() and len(export) < 19
+
+
+def _not_ready(document: ExportDocument) -> ConflictError:
+    if document.state in ("waiting", "running"):
+        return ConflictError(
+            "the export is still being written",
+            hint=f"GET /api/v1/jobs/{document.id} says how far it is.",
+        )
+    reason = f": {document.error}" if document.error else ""
+    return ConflictError(f"the export was not written{reason}", hint="Make the export again.")

@@ -1,0 +1,445 @@
+"""Export: what people accepted (or everything), as a folder or zip with a manifest."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from itertools import islice
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import get_args
+
+from app.db.session import Session
+from app.db.store import Store
+from app.errors import InputError
+from app.features.datasets.service import licence_of, read_dataset_head
+from app.features.exports.images import ExportImages, ReadPicture
+from app.features.exports.source import ExportSource, Item, LiveSource, VersionSource
+from app.features.groups.view_queries import frame_files
+from app.features.imports.edits_export import FORMAT as CARRY
+from app.features.imports.edits_export import carry_out
+from app.features.imports.spare import spare_persons
+from app.features.versions.service import find_version
+from app.formats.export_formats import (
+    CONTENT,
+    FORMATS,
+    USERS,
+    WriteOptions,
+    box_settings,
+    export_names,
+    frame_layout,
+    missing_sentence,
+    view_settings,
+    write_format,
+)
+from app.formats.export_names import ExportNames, Outline
+from app.formats.export_record import ExportRecord
+from app.formats.file_tree import Root
+from app.formats.issia import FramePersons
+from app.formats.manifest import UNKNOWN_LICENCE, Manifest, write_manifest
+from app.formats.store_output import output_anywhere
+from app.formats.view_files import PutText, ViewFiles
+from app.media.frames import make_picture
+from app.object_store.address import is_address
+from app.object_store.path import StoredPath
+from app.progress import TellProgress
+from app.soccer.ball_boxes import BOX_KINDS
+from app.soccer.choices import PicturesWritten, TrainingViews
+
+IMAGES: tuple[str, ...] = get_args(PicturesWritten)
+VIEWS: tuple[str, ...] = get_args(TrainingViews)
+TRIED = 100
+"""Groups that are tried before an export is promised."""
+
+
+@dataclass(frozen=True)
+class ExportReport:
+    """What was written.
+
+    Attributes:
+        groups: How many groups were to be written.
+        counts: As the format counts: groups, views, balls, cameras ...; with images also
+            ``pictures``, the files of frames that are there.
+        left_out: Accepted groups that are not in it, by reason: ``stale`` (changed after the
+            verdict), ``failing`` (a gate, and nobody overrode it), ``unsolved``.
+        missing_images: Frames that could not be copied, with the reason.
+    """
+
+    out: Root
+    format: str
+    groups: int
+    counts: Mapping[str, int]
+    left_out: Mapping[str, int] = field(default_factory=dict)
+    missing_images: tuple[str, ...] = ()
+
+
+class _NoRoomError(InputError):
+    """A format has no place for what the groups hold."""
+
+
+@dataclass(frozen=True)
+class FormatAnswer:
+    """Whether a dataset can be written in a format; ``reason`` and ``hint`` where it cannot."""
+
+    format: str
+    reason: str | None = None
+    hint: str | None = None
+
+
+@dataclass(frozen=True)
+class _Options:
+    format: str
+    everything: bool
+    boxes: str = "optimized"
+    images: str = "none"
+    views: str = "valid"
+
+    @property
+    def every_view(self) -> bool:
+        """Whether training data hold every view."""
+        return self.everything or self.views == "all"
+
+    def require_used(self) -> None:
+        """Raises InputError where an option is given that the format does not use."""
+        usual = _Options(self.format, self.everything)
+        for name, formats in USERS.items():
+            if self.format not in formats and getattr(self, name) != getattr(usual, name):
+                raise InputError(
+                    f"{self.format} does not use --{name}",
+                    hint=f"Leave it out. It is for {', '.join(sorted(formats))}.",
+                    pointer=f"/{name}",
+                )
+
+    def check(self, out: Root) -> None:
+        for name, value, choices in (
+            ("format", self.format, FORMATS),
+            ("boxes", self.boxes, BOX_KINDS),
+            ("images", self.images, IMAGES),
+            ("views", self.views, VIEWS),
+        ):
+            if value not in choices:
+                raise InputError(
+                    f'"{value}" is not possible for {name}; choose one of {", ".join(choices)}',
+                    pointer=f"/{name}",
+                )
+        self.require_used()
+        if self.images == "link" and isinstance(out, StoredPath):
+            raise InputError("a store cannot hold links; copy the images")
+        if self.images == "link" and out.suffix.lower() == ".zip":
+            raise InputError("a zip cannot hold links; export a folder or copy the images")
+
+
+def export(
+    store: Store,
+    dataset: str | int,
+    format: str,  # noqa: A002
+    out: Root,
+    *,
+    everything: bool = False,
+    boxes: str = "optimized",
+    images: str = "none",
+    views: str = "valid",
+    version: str | None = None,
+    progress: TellProgress | None = None,
+    read: ReadPicture | None = None,
+    beside: Path | None = None,
+) -> ExportReport:
+    """Write a dataset's accepted groups, or all groups, in a format that consumers read.
+
+    Accepted means: the newest verdict accepts the group as it is now, and the policy passes it
+    or a person overrode the gate with a reason. All is read from one snapshot of the database.
+
+    Args:
+        store: The database.
+        dataset: Name or id.
+        format: One of ``FORMATS``.
+        out: Folder, or file that ends in .zip, on a disk or in an object store; appears whole or
+            not at all.
+        everything: Every group, whatever its verdict.
+        boxes: ``optimized``, ``annotated`` or ``exact``: which ball box Labels-v3D.json, COCO,
+            YOLO and Parquet hold. Other formats have no place for a chosen box.
+        images: ``none``, ``copy`` or ``link`` (folders only); ``touchline`` holds none.
+        views: ``valid`` or ``all``: whether COCO and YOLO, from which detectors learn, hold the
+            views that annotate a ball and are in no valid pair. ``everything`` says all.
+        version: Name, id or hash of a frozen version to export instead of the dataset as it is:
+            the same bytes every time.
+        progress: Called as groups are written, and as their files are packed.
+        read: Reads frames; in this process by default.
+        beside: After which its half written files are called, see ``output_anywhere``.
+
+    Raises:
+        InputError: Nothing to export, the format does not use an option, or the groups do not fit it.
+        StorageError: The disk refuses.
+    """
+    options = _Options(format, everything, boxes, images, views)
+    options.check(out)
+    _require_plain(format, everything, version)
+    if format == CARRY:
+        counts = carry_out(store, dataset, out, progress, beside)
+        return ExportReport(out, CARRY, counts["groups"], counts)
+    with store.read() as session:
+        source = _source(session, store, dataset, everything, version)
+        with output_anywhere(out, store.settings.exports, beside, progress) as root:
+            frames = ExportImages(root, images, read or _here(store), frame_layout(format))
+            names = export_names(format, source.outlines())
+            run = _Run(source, options, frames, names, progress)
+            # A version is the same every time; spare frames are the dataset's as it is.
+            if format == "issia" and isinstance(source, LiveSource):
+                run.spare = spare_persons(session, dataset)
+            with _view_files(root, out) as put:
+                counts = run.write(root, put)
+            _require_content(source.dataset, format, counts)
+            if images != "none" and "images_missing" not in counts:
+                counts["pictures"] = frames.present
+            write_manifest(root, run.manifest(counts), progress)
+    left_out = source.left_out if isinstance(source, LiveSource) else {}
+    return ExportReport(out, format, source.count, counts, left_out, tuple(frames.missing))
+
+
+@contextmanager
+def _view_files(root: Path, out: Root) -> Iterator[PutText | None]:
+    """Where the files of single views go: on their way into a zip they wait together."""
+    if out.suffix.lower() != ".zip":
+        yield None
+        return
+    with ViewFiles(root) as files:
+        yield files.put
+
+
+def require_possible(
+    store: Store,
+    dataset: str | int,
+    format: str,  # noqa: A002
+    *,
+    everything: bool = False,
+    boxes: str = "optimized",
+    images: str = "none",
+    views: str = "valid",
+    version: str | None = None,
+) -> None:
+    """Refuse, before anything is written, an export that cannot succeed.
+
+    Its first groups are written to a folder that is thrown away, so that whatever a format has no
+    place for is found by the writer itself.
+
+    Raises:
+        NotFoundError: There is no such dataset or version.
+        InputError: Nothing to export, none of the images that are wanted is there, the format does
+            not use an option, or the groups do not fit it; then the hint names those that they fit.
+    """
+    asked = _Options(format, everything, boxes, images, views)
+    asked.require_used()
+    try:
+        _try(store, dataset, asked, version)
+    except _NoRoomError as error:
+        answers = possible_formats(store, dataset, version)
+        fitting = [answer.format for answer in answers if answer.reason is None]
+        hint = f"These formats have room for it: {', '.join(fitting)}." if fitting else error.hint
+        raise InputError(error.message, hint=hint) from error
+
+
+def possible_formats(
+    store: Store, dataset: str | int, version: str | None = None
+) -> list[FormatAnswer]:
+    """Every format, and why a dataset, or a version of it, cannot be written in it.
+
+    All groups are asked about, whatever their verdicts are: another verdict opens no format.
+
+    Raises:
+        NotFoundError: There is no such dataset or version.
+    """
+    answers = []
+    for format in FORMATS:  # noqa: A001
+        options = _Options(format, version is None, "optimized", "none", "all")
+        try:
+            _try(store, dataset, options, version)
+        except InputError as error:
+            answers.append(FormatAnswer(format, error.message, error.hint))
+        else:
+            answers.append(FormatAnswer(format))
+    return answers
+
+
+def _try(store: Store, dataset: str | int, options: _Options, version: str | None) -> None:
+    """``require_possible`` of one format."""
+    format, everything = options.format, options.everything  # noqa: A001
+    _require_plain(format, everything, version)
+    with store.read() as session, TemporaryDirectory(prefix="touchline-") as folder:
+        whole = _source(session, store, dataset, everything or format == CARRY, version)
+        if format == CARRY:
+            return
+        source = _First(whole)
+        frames = ExportImages(Path(folder), "none", _here(store), frame_layout(format))
+        with ViewFiles(Path(folder)) as small:
+            try:
+                names = export_names(format, source.outlines())
+                counts = _Run(source, options, frames, names, None).write(Path(folder), small.put)
+            except InputError as error:
+                raise _NoRoomError(error.message, hint=error.hint) from error
+        if options.images != "none" and not frames.media:
+            files = [] if source.is_all else frame_files(session, whole.dataset_id)
+            _require_frames(whole.dataset, files)
+    if source.is_all:
+        _require_content(whole.dataset, format, counts)
+
+
+def _require_frames(dataset: str, files: Iterable[str]) -> None:
+    """Raises InputError where images are wanted and no file of them is there."""
+    if not any(is_address(file) or Path(file).exists() for file in files):
+        raise InputError(
+            f'none of the images of "{dataset}" is there, so none can go with it',
+            hint="Export without images, or import the dataset again with its frames.",
+            pointer="/images",
+        )
+
+
+def _require_plain(format: str, everything: bool, version: str | None) -> None:  # noqa: A002
+    """Raises InputError where a version is asked for together with what it cannot be."""
+    if version is None:
+        return
+    if format == CARRY:
+        raise InputError(
+            "the format touchline carries the whole dataset; choose another format to export a frozen version",
+            pointer="/version",
+        )
+    if everything:
+        raise InputError(
+            "a frozen version always exports exactly its own groups; leave out all, or export the dataset itself",
+            pointer="/all",
+        )
+
+
+class _First:
+    """The first groups of a source."""
+
+    def __init__(self, source: LiveSource | VersionSource):
+        self._source = source
+        self.dataset, self.version, self.licence = source.dataset, source.version, source.licence
+        self.count, self.date = min(source.count, TRIED), source.date
+        self.settings, self.stamp = source.settings, source.stamp
+
+    @property
+    def is_all(self) -> bool:
+        """Whether there are no more."""
+        return self.count == self._source.count
+
+    def items(self) -> Iterator[Item]:
+        """As many as are tried."""
+        return islice(self._source.items(), self.count)
+
+    def outlines(self) -> Iterator[Outline]:
+        """The same groups with what names their files."""
+        return islice(self._source.outlines(), self.count)
+
+
+def _here(store: Store) -> ReadPicture:
+    return lambda media, width, flipped: make_picture(media, width, flipped, store.settings)
+
+
+def _source(
+    session: Session, store: Store, dataset: str | int, everything: bool, version: str | None
+) -> LiveSource | VersionSource:
+    found = read_dataset_head(session, dataset)
+    if version is not None:
+        frozen = find_version(store, found.id, version)
+        return VersionSource(session, frozen)
+    source = LiveSource(session, found, everything)
+    source.require_some()
+    return source
+
+
+class _Run:
+    """One export under way: streams records to a writer and notes what the manifest says."""
+
+    def __init__(
+        self,
+        source: ExportSource,
+        options: _Options,
+        images: ExportImages,
+        names: ExportNames,
+        progress: TellProgress | None,
+    ):
+        self._source, self._options = source, options
+        self._images, self._names, self._progress = images, names, progress
+        self._licences: set[str] = set()
+        self._verdicts: Counter[str] = Counter()
+        self._overrides: list[dict[str, str | None]] = []
+        self.spare: Iterable[FramePersons] = ()
+
+    def write(self, root: Path, put: PutText | None) -> dict[str, int]:
+        """Write the format's files; returns its counts."""
+        source, options = self._source, self._options
+        policy = source.settings()
+        provenance = {
+            "dataset": source.dataset,
+            "version": source.version,
+            "policy": policy["policy"]["name"],
+            "policy_hash": policy["policy_hash"],
+            "date": source.date,
+        }
+        wanted = WriteOptions(
+            options.format,
+            options.everything,
+            options.boxes,
+            options.every_view,
+            provenance,
+            self.spare,
+        )
+        return write_format(root, self._records(), wanted, put)
+
+    def manifest(self, counts: Mapping[str, int]) -> Manifest:
+        """What the manifest says of this export."""
+        source = self._source
+        terms = " ".join(sorted(self._licences)) or UNKNOWN_LICENCE
+        return Manifest(
+            dataset=source.dataset,
+            format=self._options.format,
+            date=source.date,
+            counts=counts,
+            settings={
+                **source.settings(),
+                "images": self._options.images,
+                **box_settings(self._options.format, self._options.boxes),
+                **view_settings(self._options.format, self._options.every_view),
+                **missing_sentence(self._options.format, counts),
+            },
+            licence=source.licence or terms,
+            version=source.version,
+            media=tuple(self._images.media),
+            verdicts=dict(sorted(self._verdicts.items())),
+            overrides=tuple(self._overrides),
+            stamp=source.stamp(),
+        )
+
+    def _records(self) -> Iterator[ExportRecord]:
+        # A frame without its label would teach that it shows no ball: it stays out as well.
+        chosen = self._options.format == "yolo" and not self._options.every_view
+        for place, (found, facts) in enumerate(self._source.items(), 1):
+            record = found.for_training() if chosen else found
+            if record.group.views:
+                self._licences.add(licence_of(record.group.match))
+                names = self._names.of(record.group, record.splits)
+                self._images.add(record.group, facts, record.splits, names)
+                self._note(record)
+                yield replace(record, frames=self._images.placed, names=names)
+            if self._progress is not None:
+                self._progress(place, self._source.count)
+
+    def _note(self, record: ExportRecord) -> None:
+        """What the manifest says of a verdict."""
+        self._verdicts[record.verdict] += 1
+        if record.override is not None and record.verdict == "accepted":
+            group, gate = record.group.key, record.override
+            self._overrides.append({"group": group, "gate": gate, "reason": record.reason})
+
+
+def _require_content(dataset: str, format: str, counts: Mapping[str, int]) -> None:  # noqa: A002
+    """Raises InputError where a format has no place for anything that the groups hold."""
+    count, what = CONTENT.get(format, ("groups", "group"))
+    if not counts[count]:
+        raise InputError(
+            f'no group of "{dataset}" has a {what} for {format}, so there is nothing to export',
+            hint="Ask for every view (views: all)." if format == "yolo" else None,
+        )

@@ -1,0 +1,305 @@
+"""Line files to camera files, without a database."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from concurrent.futures import Executor, Future
+from dataclasses import asdict, dataclass, replace
+from itertools import chain
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from app.durable import replace_file
+from app.errors import InputError
+from app.features.file_tools.matches import (
+    MatchShare,
+    as_taken,
+    picture_for,
+    read_matches,
+    shares_of,
+)
+from app.finite import json_text
+from app.formats.cameras_writer import camera_name, camera_text
+from app.formats.report import Report
+from app.formats.sn_calibration import LineFile
+from app.formats.sn_calibration_reader import read_line_files
+from app.progress import TellProgress
+from app.soccer.finding import Finding
+from app.soccer.frames import ImageSize
+from app.soccer.picture import PictureGeometry
+from app.soccer.pitch import Pitch
+from app.soccer.policy import CLICKED, CalibrationPolicy
+from app.soccer.solution import Calibration
+from app.solving.calibrate import as_lone, calibrate, look_alone
+from app.solving.calibration_findings import calibration_findings, lone_findings
+from app.solving.leave_one_out import leave_one_out
+from app.solving.lone_frame import LoneFrame
+from app.solving.match_model import FramePlace
+from app.solving.match_position import Places, place_of, share_position
+from app.solving.warm import warm_up
+
+CHUNK = 16
+"""Frames that one process takes at a time."""
+
+
+@dataclass(frozen=True)
+class CalibratedFrame:
+    """What became of one line file.
+
+    ``camera`` is the text of its file, ``left_out`` (marking, pixels) of ``leave_one_out``,
+    ``lone`` what nobody says of its pitch and picture, where no match shares anything with it.
+    """
+
+    stem: str
+    camera: str | None
+    reason: str | None
+    findings: tuple[Finding, ...]
+    left_out: tuple[tuple[str, float | None], ...]
+    milliseconds: float
+    alone: Calibration
+    place: FramePlace | None
+    lone: LoneFrame | None
+
+
+def calibrate_files(
+    source: Path,
+    out: Path,
+    *,
+    size: ImageSize,
+    labels: str = "checked",
+    with_leave_one_out: bool = False,
+    matches: Path | None = None,
+    guess: bool = False,
+    picture: Path | None = None,
+    guess_picture: bool = False,
+    executor: Executor,
+    progress: TellProgress | None = None,
+) -> dict[str, Any]:
+    """Write a camera file for each line file, and what was noticed on the way.
+
+    Args:
+        source: Folder or zip of sn-calibration line files.
+        out: Folder that gets ``camera_<stem>.json``, ``findings.json``, ``calibrate.json`` and,
+            if asked, ``leave_one_out.json``. What an earlier run left there is replaced.
+        size: Size of the annotated images.
+        labels: ``checked`` leaves out markings found mislabelled, ``given`` trusts all.
+        with_leave_one_out: Also drop each marking in turn.
+        matches: File that names the match of each frame (``read_matches``): frames of a match
+            share what they say of the main camera's position.
+        guess: Without such a file: guess the matches from names and positions.
+        picture: File that says how all pictures were stretched or cropped (``read_picture``).
+        guess_picture: Without such a file: estimate that from all frames together.
+        executor: Where the frames are calibrated.
+        progress: Called with frames done and in all.
+
+    Returns:
+        What ``calibrate.json`` holds.
+
+    Raises:
+        InputError: There is no line file, or ``out`` cannot hold the result.
+    """
+    began = time.perf_counter()
+    report = Report()
+    files = list(read_line_files(source, size, report))
+    if not files:
+        raise report.refusal(f"{source} holds no line files")
+    geometry: PictureGeometry | None = None
+    told: dict[str, Any] | None = None
+    if picture is not None or guess_picture:
+        geometry, told = picture_for(files, size, picture)
+        files = as_taken(files, geometry)
+    named = None if matches is None else read_matches(matches)
+    sharing = guess or named is not None
+    policy = replace(CLICKED, check_labels=labels == "checked", lone_frames="any")
+    chunks = [files[start : start + CHUNK] for start in range(0, len(files), CHUNK)]
+    rounds = 2 if sharing else 1
+
+    def gather(jobs: Sequence[Future[list[CalibratedFrame]]], done: int) -> list[CalibratedFrame]:
+        frames: list[CalibratedFrame] = []
+        for job in jobs:
+            frames.extend(job.result())
+            if progress is not None:
+                progress((done + len(frames)) // rounds, len(files))
+        return frames
+
+    alone = with_leave_one_out and not sharing
+    frames = gather([executor.submit(calibrate_chunk, it, size, policy, alone) for it in chunks], 0)
+    groups = 0
+    if sharing:
+        shares = shares_of(files, [frame.place for frame in frames], named)
+        groups = len({share.match for share in shares})
+        jobs = []
+        for start in range(0, len(files), CHUNK):
+            piece = slice(start, start + CHUNK)
+            jobs.append(
+                executor.submit(
+                    share_chunk, files[piece], frames[piece], shares[piece], size, policy,
+                    with_leave_one_out,
+                )
+            )  # fmt: skip
+        frames = gather(jobs, len(files))
+    frames = [_in_picture(frame, geometry, size) for frame in frames]
+    summary = _summary(frames, report, time.perf_counter() - began)
+    if sharing:
+        summary["matches"] = groups
+    if told is not None:
+        summary["picture"] = told
+    _write(out, frames, summary, with_leave_one_out)
+    return summary
+
+
+def calibrate_chunk(
+    files: list[LineFile], size: ImageSize, policy: CalibrationPolicy, with_leave_one_out: bool
+) -> list[CalibratedFrame]:
+    """Calibrate some frames in this process, one after the other on one thread."""
+    warm_up()
+    return [_calibrate_file(file, size, policy, with_leave_one_out) for file in files]
+
+
+def share_chunk(
+    files: Sequence[LineFile],
+    frames: Sequence[CalibratedFrame],
+    shares: Sequence[MatchShare],
+    size: ImageSize,
+    policy: CalibrationPolicy,
+    with_leave_one_out: bool,
+) -> list[CalibratedFrame]:
+    """The same frames once more, each with what the others of its match say."""
+    warm_up()
+    return [
+        _share_file(file, frame, share.others, size, policy, with_leave_one_out)
+        for file, frame, share in zip(files, frames, shares, strict=True)
+    ]
+
+
+def _calibrate_file(
+    file: LineFile, size: ImageSize, policy: CalibrationPolicy, with_leave_one_out: bool
+) -> CalibratedFrame:
+    began = time.thread_time()
+    calibration = calibrate(file.lines, Pitch(), size, policy)
+    milliseconds = 1000 * (time.thread_time() - began)
+    began = time.thread_time()
+    lone = look_alone(calibration, file.lines, Pitch(), size, policy)
+    milliseconds += 1000 * (time.thread_time() - began)
+    left_out = leave_one_out(file.lines, Pitch(), size, policy) if with_leave_one_out else ()
+    return _frame(file.stem, calibration, size, milliseconds, tuple(left_out), lone)
+
+
+def _share_file(
+    file: LineFile,
+    frame: CalibratedFrame,
+    others: Places,
+    size: ImageSize,
+    policy: CalibrationPolicy,
+    with_leave_one_out: bool,
+) -> CalibratedFrame:
+    pitch = Pitch()
+    began = time.thread_time()
+    calibration = share_position(frame.alone, others, file.lines, pitch, size, policy)
+    milliseconds = frame.milliseconds + 1000 * (time.thread_time() - began)
+    left_out = leave_one_out(file.lines, pitch, size, policy, others) if with_leave_one_out else ()
+    if calibration is frame.alone:
+        return replace(frame, milliseconds=milliseconds, left_out=tuple(left_out))
+    return _frame(file.stem, calibration, size, milliseconds, tuple(left_out))
+
+
+def _frame(
+    stem: str,
+    calibration: Calibration,
+    size: ImageSize,
+    milliseconds: float,
+    left_out: tuple[tuple[str, float | None], ...],
+    lone: LoneFrame | None = None,
+) -> CalibratedFrame:
+    camera = calibration.camera
+    findings = [*calibration_findings(calibration, size), *lone_findings(lone, Pitch())]
+    # What is drawn travels no further: it is most of a calibration.
+    alone = replace(calibration, markings=())
+    return CalibratedFrame(
+        stem=stem,
+        camera=None
+        if camera is None
+        else camera_text(camera, as_lone(calibration, lone).known_covariance, size),
+        reason=calibration.reason,
+        findings=tuple(findings),
+        left_out=left_out,
+        milliseconds=milliseconds,
+        alone=alone,
+        place=place_of(calibration, size),
+        lone=lone,
+    )
+
+
+def _in_picture(
+    frame: CalibratedFrame, picture: PictureGeometry | None, size: ImageSize
+) -> CalibratedFrame:
+    """The frame with the camera of the picture as it is; it was found in the one that was taken."""
+    camera = frame.alone.camera
+    if picture is None or camera is None:
+        return frame
+    known = as_lone(frame.alone, frame.lone).known_covariance
+    return replace(frame, camera=camera_text(picture.done(camera, size), known, size))
+
+
+def _summary(frames: list[CalibratedFrame], report: Report, seconds: float) -> dict[str, Any]:
+    times = [frame.milliseconds for frame in frames]
+    failed = [
+        {"frame": frame.stem, "reason": frame.reason} for frame in frames if frame.camera is None
+    ]
+    failed += [
+        {"frame": Path(problem.path).stem, "reason": problem.message}
+        for problem in report.problems
+        if Path(problem.path).stem not in {frame.stem for frame in frames}
+    ]
+    return {
+        "frames": report.read,
+        "calibrated": len(frames) - sum(frame.camera is None for frame in frames),
+        "failed": failed,
+        "ms_median": float(np.median(times)),
+        "ms_p95": float(np.percentile(times, 95)),
+        "seconds": seconds,
+        "problems": [problem.message for problem in report.problems],
+    }
+
+
+def _write(
+    out: Path, frames: list[CalibratedFrame], summary: dict[str, Any], with_leave_one_out: bool
+) -> None:
+    texts = {camera_name(frame.stem): frame.camera for frame in frames if frame.camera}
+    findings = [
+        {"frame": frame.stem, **asdict(finding)} for frame in frames for finding in frame.findings
+    ]
+    texts["findings.json"] = _text(findings)
+    if with_leave_one_out:
+        rows = [
+            {"frame": frame.stem, "marking": marking, "error_px": error}
+            for frame in frames
+            for marking, error in frame.left_out
+        ]
+        texts["leave_one_out.json"] = _text(rows)
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        for stale in _own_files(out) - set(texts):
+            (out / stale).unlink()
+        # calibrate.json says what the folder holds, so it comes last.
+        for name, text in chain(texts.items(), [("calibrate.json", _text(summary))]):
+            file = out / name
+            file.parent.mkdir(parents=True, exist_ok=True)
+            replace_file(file, text.encode(), durable=False, private=False)
+    except OSError as error:
+        raise InputError(f"{out} cannot hold the cameras ({error.strerror})") from error
+
+
+def _own_files(out: Path) -> set[str]:
+    """Files of an earlier run; none where no run ended, so nothing foreign is removed."""
+    if not (out / "calibrate.json").is_file():
+        return set()
+    names = {str(path.relative_to(out)) for path in out.rglob("camera_*.json")}
+    return names | ({"leave_one_out.json"} if (out / "leave_one_out.json").is_file() else set())
+
+
+def _text(value: Any) -> str:
+    return json_text(value, indent=1) + "\n"

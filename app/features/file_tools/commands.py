@@ -1,0 +1,132 @@
+"""Commands on line files: calibrate, score; they need no dataset."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from app.plural import plural
+from app.terminal.options import Json, Size, Workers, read_settings
+from app.terminal.terminal import complain, print_values, show_progress
+
+commands = typer.Typer()
+
+LineFiles = Annotated[
+    Path, typer.Argument(metavar="IN", exists=True, help="Folder or zip of line files.")
+]
+
+
+PROBLEMS = 10
+"""Problems that are printed one by one."""
+
+
+class Labels(StrEnum):
+    """Whether calibration doubts the names of markings."""
+
+    CHECKED = "checked"
+    GIVEN = "given"
+
+
+@commands.command()
+def calibrate(
+    source: LineFiles,
+    out: Annotated[Path, typer.Argument(metavar="OUT", help="Folder for camera files.")],
+    size: Size,
+    labels: Annotated[Labels, typer.Option(help="checked leaves out wrong labels.")] = (
+        Labels.CHECKED
+    ),
+    leave_one_out: Annotated[
+        bool, typer.Option("--leave-one-out", help="Also calibrate without each marking in turn.")
+    ] = False,
+    matches: Annotated[
+        str | None,
+        typer.Option(
+            metavar="auto|FILE",
+            help="Share the main camera's position among the frames of a match: FILE (.json or "
+            ".csv) names the match of each frame, auto guesses it from names and positions.",
+        ),
+    ] = None,
+    picture: Annotated[
+        str | None,
+        typer.Option(
+            metavar="auto|FILE",
+            help="The frames are of one match or shot whose pictures were stretched or cropped: "
+            "FILE (of touchline picture --json) says how, auto estimates it.",
+        ),
+    ] = None,
+    workers: Workers = None,
+    json_: Json = False,
+) -> None:
+    """Calibrate line files (folder or zip) to camera files; needs no dataset."""
+    from app.features.file_tools.calibrate import calibrate_files
+    from app.workers.executors import process_pool
+
+    named, shape = _file(matches, "--matches"), _file(picture, "--picture")
+    pool = process_pool(workers or read_settings().workers)
+    with pool as executor, show_progress("Calibrating") as progress:
+        result = calibrate_files(
+            source,
+            out,
+            size=size,
+            labels=labels.value,
+            with_leave_one_out=leave_one_out,
+            matches=named,
+            guess=matches == "auto",
+            picture=shape,
+            guess_picture=picture == "auto",
+            executor=executor,
+            progress=progress,
+        )
+    print_values(result, json_)
+    _tell_problems(result["problems"])
+    if not result["calibrated"]:
+        first = result["failed"][0]
+        complain(
+            f"none of {plural(result['frames'], 'frame')} could be calibrated: {first['frame']}: {first['reason']}"
+        )
+        raise typer.Exit(1)
+
+
+def _tell_problems(problems: list[str]) -> None:
+    """What could not be read, on stderr; ``--json`` has all of it."""
+    for problem in problems[:PROBLEMS]:
+        complain(problem)
+    if len(problems) > PROBLEMS:
+        complain(f"... and {len(problems) - PROBLEMS} more problems; --json names all")
+
+
+def _file(text: str | None, option: str) -> Path | None:
+    """The file that an option names; None without the option and for ``auto``."""
+    if text in (None, "auto"):
+        return None
+    path = Path(str(text))
+    if not path.is_file():
+        raise typer.BadParameter(f'"{text}" is neither auto nor a file', param_hint=option)
+    return path
+
+
+@commands.command()
+def score(
+    lines: Annotated[
+        Path, typer.Argument(metavar="LINES", exists=True, help="Folder or zip of line files.")
+    ],
+    cameras: Annotated[
+        Path, typer.Argument(metavar="CAMERAS", exists=True, help="Folder or zip of camera files.")
+    ],
+    size: Size,
+    without: Annotated[
+        Path | None,
+        typer.Option(exists=True, dir_okay=False, help="findings.json: leave those markings out."),
+    ] = None,
+    json_: Json = False,
+) -> None:
+    """Measure camera files against line files: JaC, completeness, errors."""
+    from app.features.file_tools.score import score_files
+
+    with show_progress("Scoring") as progress:
+        result = score_files(lines, cameras, size=size, without=without, progress=progress)
+    print_values(result, json_)
+    _tell_problems(result["problems"])

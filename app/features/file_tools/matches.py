@@ -1,0 +1,189 @@
+"""Matches of line files.
+
+Which frames are of one match, its pitch, and how its pictures were stretched.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from app.errors import DatasetFormatError, GeometryError
+from app.formats.csv_text import read_rows
+from app.formats.file_tree import Limits
+from app.formats.json_text import read_json
+from app.formats.plain_file import read_plain
+from app.formats.report import Report
+from app.formats.sn_calibration import LineFile
+from app.formats.sn_calibration_reader import read_line_files
+from app.soccer.frames import ImageSize
+from app.soccer.picture import PictureGeometry
+from app.soccer.policy import CLICKED
+from app.solving.match_model import FramePlace
+from app.solving.match_picture import PictureEstimate, PictureFrame, estimate_match_picture
+from app.solving.match_position import NO_PLACES, Places
+from app.solving.match_runs import guess_matches
+from app.solving.pitch_size import PitchFrame, estimate_pitch
+
+
+@dataclass(frozen=True)
+class MatchShare:
+    """What a frame gets from the others of its match: their places. ``match`` is its name."""
+
+    match: str
+    others: Places
+
+
+def read_matches(path: Path) -> dict[str, str]:
+    """The match of each frame: a JSON object, or a CSV file with columns ``frame`` and ``match``.
+
+    A frame is the stem of its line file, ``00002`` or ``folder/00002``.
+
+    Raises:
+        DatasetFormatError: The file is neither.
+    """
+    content = path.read_bytes()
+    if path.suffix.lower() == ".json":
+        value = read_json(content, str(path))
+        if not isinstance(value, dict) or not all(isinstance(it, str) for it in value.values()):
+            raise DatasetFormatError(str(path), None, None, "is not an object of frame: match")
+        return dict(value)
+    rows = read_rows(content, str(path), ("frame", "match"), Limits())
+    return {row["frame"].strip(): row["match"].strip() for _, row in rows if "match" in row}
+
+
+def shares_of(
+    files: Sequence[LineFile], places: Sequence[FramePlace | None], named: Mapping[str, str] | None
+) -> list[MatchShare]:
+    """What each frame gets from the others of its match.
+
+    Args:
+        files: The frames.
+        places: Where each alone puts its camera.
+        named: Match by frame; a frame that is missing is alone. None: matches are guessed.
+    """
+    if named is None:
+        order = sorted(range(len(files)), key=lambda index: files[index].stem)
+        guessed = guess_matches([places[index] for index in order])
+        match = {files[index].stem: str(run) for index, run in zip(order, guessed, strict=True)}
+    else:
+        match = {file.stem: named.get(file.stem, "") for file in files}
+    members = defaultdict(list)
+    for index, file in enumerate(files):
+        members[match[file.stem]].append(index)
+    shares = [MatchShare(match[file.stem], NO_PLACES) for file in files]
+    for name, indices in members.items():
+        if not name:
+            continue
+        known = {index: place for index in indices if (place := places[index]) is not None}
+        all_ = Places(list(known.values()))
+        row = {index: at for at, index in enumerate(known)}
+        for index in indices:
+            others = all_.without(row[index]) if index in row else all_
+            shares[index] = MatchShare(name, others)
+    return shares
+
+
+def estimate_pitch_of_files(source: Path, *, size: ImageSize) -> dict[str, Any]:
+    """Length and width of the pitch that the line files of one match show; null: not shown.
+
+    Raises:
+        InputError: There is no line file.
+        DegenerateGeometryError: Too few show enough markings.
+    """
+    report = Report()
+    frames = [PitchFrame(file.lines, size) for file in read_line_files(source, size, report)]
+    if not frames:
+        raise report.refusal(f"{source} holds no line files")
+    found = estimate_pitch(frames, CLICKED)
+    return {
+        "length_m": found.length,
+        "width_m": found.width,
+        "length_sigma_m": found.length_sigma_m,
+        "width_sigma_m": found.width_sigma_m,
+        "frames": found.frames,
+        "problems": [problem.message for problem in report.problems],
+    }
+
+
+def estimate_picture_of_files(source: Path, *, size: ImageSize) -> dict[str, Any]:
+    """How the pictures of line files were stretched or cropped, as ``read_picture`` reads it.
+
+    Raises:
+        InputError: There is no line file.
+        DegenerateGeometryError: Too few show enough markings.
+    """
+    report = Report()
+    files = list(read_line_files(source, size, report))
+    if not files:
+        raise report.refusal(f"{source} holds no line files")
+    found = _estimated(files, size)
+    values = _values(found)
+    return {**values, "problems": [problem.message for problem in report.problems]}
+
+
+def picture_for(
+    files: Sequence[LineFile], size: ImageSize, given: Path | None
+) -> tuple[PictureGeometry | None, dict[str, Any]]:
+    """The picture to calibrate line files with, and what ``calibrate.json`` says of it.
+
+    Args:
+        files: Of one match or shot.
+        size: Of their images.
+        given: File that ``touchline picture --json`` wrote; None: estimated here, and used only
+            where something certainly happened to the pictures.
+    """
+    if given is not None:
+        picture = read_picture(given)
+        return picture, {"aspect": picture.aspect, "shift": [*picture.shift]}
+    try:
+        found = _estimated(files, size)
+    except GeometryError as error:
+        return None, {"problem": error.message}
+    return found.proposal, _values(found)
+
+
+def read_picture(path: Path) -> PictureGeometry:
+    """A picture as ``touchline picture --json`` writes it; numbers that are absent are nothing.
+
+    Raises:
+        DatasetFormatError: The file holds something else.
+    """
+    value = read_json(read_plain(path), str(path))
+    try:
+        assert isinstance(value, dict)
+        right, down = value.get("shift", (0.0, 0.0))
+        aspect, x, y = value.get("sigma", (0.0, 0.0, 0.0))
+        return PictureGeometry(
+            float(value.get("aspect", 1.0)),
+            (float(right), float(down)),
+            (float(aspect), float(x), float(y)),
+        )
+    except (AssertionError, TypeError, ValueError) as error:
+        problem = "is not what touchline picture --json writes"
+        raise DatasetFormatError(str(path), None, None, problem) from error
+
+
+def as_taken(files: Sequence[LineFile], picture: PictureGeometry | None) -> list[LineFile]:
+    """Line files with their points where the pictures as they were taken show them."""
+    if picture is None:
+        return list(files)
+    return [replace(file, lines=picture.undone(file.lines, file.size)) for file in files]
+
+
+def _estimated(files: Sequence[LineFile], size: ImageSize) -> PictureEstimate:
+    frames = [PictureFrame(file.lines, size) for file in files]
+    return estimate_match_picture(frames, CLICKED)
+
+
+def _values(found: PictureEstimate) -> dict[str, Any]:
+    return {
+        "aspect": found.picture.aspect,
+        "shift": [*found.picture.shift],
+        "sigma": [*found.picture.sigma],
+        "frames": found.frames,
+        "changed": found.proposal is not None,
+    }

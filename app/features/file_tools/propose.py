@@ -1,0 +1,208 @@
+"""Propose: frames alone to camera files, without a database."""
+
+from __future__ import annotations
+
+import time
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from app.config import Settings
+from app.durable import replace_file
+from app.errors import GeometryError, InputError
+from app.features.file_tools.paint import PictureFile, UniqueNames, read_pictures
+from app.finite import json_text
+from app.formats.cameras_reader import read_cameras
+from app.formats.cameras_writer import camera_name, camera_text
+from app.formats.report import Report
+from app.formats.safe_path import resolve_inside
+from app.geometry.arrays import row_by_row
+from app.geometry.camera import Camera
+from app.paint.frame_pitch import films, pitch_frame, pitch_of
+from app.paint.propose import FrameProposal, propose
+from app.progress import TellProgress
+from app.soccer.frames import ImageSize
+from app.soccer.paint_evidence import PROPOSAL_OUTCOMES
+from app.soccer.pitch import Pitch
+from app.solving.pitch_size import PitchFrame
+
+RESULT = "propose.json"
+LIKELY = 0.6
+"""Share of the markings that have paint, of an unsure camera that is asked for the size of its pitch."""
+
+
+def propose_files(
+    sources: Sequence[Path],
+    out: Path,
+    settings: Settings,
+    *,
+    size: ImageSize | None = None,
+    known: Sequence[Path] = (),
+    progress: TellProgress | None = None,
+) -> list[dict[str, Any]]:
+    """Write a camera file for each picture whose camera is certain, and what became of each.
+
+    Args:
+        sources: Folders, zips and files with pictures.
+        out: Folder that gets ``camera_<frame>.json`` and ``propose.json``. Camera files that an
+            earlier run left there for the same frames are replaced or taken away.
+        settings: Limits on what is read.
+        size: Size for which the cameras are written; None: each picture's own.
+        known: Camera files of other frames of the match.
+        progress: Called with frames done.
+
+    Returns:
+        What ``propose.json`` holds.
+
+    Raises:
+        InputError: There is no picture, no known camera, or ``out`` cannot hold the result.
+    """
+    report = Report()
+    cameras = _known(known)
+    rows: list[dict[str, Any]] = []
+    names = UniqueNames()
+    seen: list[_Proposed | None] = []
+    for picture in read_pictures(sources, settings, report):
+        frame = names.name(picture.stem)
+        row, proposed = _propose_one(picture, frame, out, cameras, size, Pitch())
+        rows.append(row)
+        seen.append(proposed)
+        if progress is not None:
+            progress(len(rows))
+    if not rows:
+        why = f": {report.problems[0].message}" if report.problems else ""
+        raise InputError(f"there are no pictures (jpg, png or webp) to read{why}")
+    pitches = _other_pitches(seen)
+    if pitches:
+        for at, picture in enumerate(read_pictures(sources, settings, Report())):
+            if at in pitches:
+                _propose_again(picture, rows, at, out, pitches[at], seen[at], size)
+    _write(out / RESULT, json_text(rows, indent=1) + "\n")
+    return rows
+
+
+@dataclass(frozen=True)
+class _Proposed:
+    """A camera, proposed or nearly so, and the paint beside it; an unsure one agrees by nothing."""
+
+    camera: Camera
+    agreement: float
+    frame: PitchFrame
+
+
+def _other_pitches(seen: Sequence[_Proposed | None]) -> dict[int, Pitch]:
+    """The pitch of each frame whose film certainly shows another size, by its index."""
+    cameras = [None if one is None else one.camera for one in seen]
+    sizes = [None if one is None else one.frame.size for one in seen]
+    found = {}
+    for film in films(cameras, sizes):
+        frames = [one.frame for index in film if (one := seen[index]) is not None]
+        pitch = pitch_of(frames, Pitch())
+        if pitch is not None:
+            found.update(dict.fromkeys(film, pitch))
+    return found
+
+
+def _propose_again(
+    picture: PictureFile,
+    rows: list[dict[str, Any]],
+    at: int,
+    out: Path,
+    pitch: Pitch,
+    before: _Proposed | None,
+    size: ImageSize | None,
+) -> None:
+    """A frame once more on the pitch that its film shows; kept where the paint agrees no less."""
+    frame = rows[at]["frame"]
+    if picture.image is None or before is None:
+        return
+    row, again = _propose_one(picture, frame, out, [before.camera], size, pitch, before.agreement)
+    if again is not None:
+        rows[at] = row | {"ms": row["ms"] + rows[at]["ms"]}
+
+
+def counts_of(rows: Sequence[dict[str, Any]]) -> dict[str, int]:
+    """How many frames had which outcome."""
+    counts = Counter(row["outcome"] for row in rows)
+    return {name: counts[name] for name in PROPOSAL_OUTCOMES}
+
+
+def _propose_one(
+    picture: PictureFile,
+    frame: str,
+    out: Path,
+    known: Sequence[Camera],
+    size: ImageSize | None,
+    pitch: Pitch,
+    least: float | None = None,
+) -> tuple[dict[str, Any], _Proposed | None]:
+    """Propose and write the camera of one frame; below a least agreement nothing is changed."""
+    began = time.perf_counter()
+    if picture.image is None:
+        found = FrameProposal("nothing", picture.problem)
+    else:
+        try:
+            found = propose(picture.image, pitch, known)
+        except (GeometryError, np.linalg.LinAlgError) as error:
+            found = FrameProposal("nothing", f"the picture cannot be solved ({error})")
+    milliseconds = 1000 * (time.perf_counter() - began)
+    file, row = resolve_inside(out, camera_name(frame)), _row(frame, found, milliseconds)
+    if pitch != Pitch():
+        row["pitch"] = {"length": pitch.length, "width": pitch.width}
+    agrees = 0.0 if found.agreement is None else found.agreement.product
+    if least is not None and (found.outcome != "proposed" or agrees < least):
+        return row, None
+    if found.outcome == "proposed" and found.camera is not None and picture.image is not None:
+        camera = found.camera
+        height, width = picture.image.shape[:2]
+        if size is not None:
+            camera = camera.scaled(size.width / width, size.height / height)
+        spread = None if found.snapped is None else found.snapped.covariance
+        covariance = None if spread is None else row_by_row(spread)
+        _write(file, camera_text(camera, covariance, size or ImageSize(width, height)))
+        return row, _Proposed(found.camera, agrees, pitch_frame(picture.image, found.camera, pitch))
+    file.unlink(missing_ok=True)
+    if found.camera is None or picture.image is None or not _is_likely(found):
+        return row, None
+    return row, _Proposed(found.camera, 0.0, pitch_frame(picture.image, found.camera, pitch))
+
+
+def _is_likely(found: FrameProposal) -> bool:
+    """Whether an unsure camera may lie on its paint but for markings of another pitch."""
+    return found.agreement is not None and found.agreement.supported >= LIKELY
+
+
+def _row(frame: str, found: FrameProposal, milliseconds: float) -> dict[str, Any]:
+    agreement, snapped = found.agreement, found.snapped
+    return {
+        "frame": frame,
+        "outcome": found.outcome,
+        "supported": None if agreement is None else agreement.supported,
+        "explained": None if agreement is None else agreement.explained,
+        "points": 0 if snapped is None else snapped.points,
+        "error_px": None if snapped is None else snapped.error_px,
+        "runner_up": found.runner_up,
+        "ms": milliseconds,
+        "reason": found.reason,
+    }
+
+
+def _known(paths: Sequence[Path]) -> list[Camera]:
+    report = Report()
+    cameras = [camera for path in paths for camera in read_cameras(path, report).values()]
+    if paths and not cameras:
+        why = f": {report.problems[0].message}" if report.problems else ""
+        raise InputError(f"there is no known camera to read{why}")
+    return cameras
+
+
+def _write(file: Path, text: str) -> None:
+    try:
+        file.parent.mkdir(parents=True, exist_ok=True)
+        replace_file(file, text.encode(), durable=False, private=False)
+    except OSError as error:
+        raise InputError(f"{file.parent} cannot be written ({error.strerror})") from error

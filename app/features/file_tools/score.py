@@ -1,0 +1,167 @@
+"""Camera files measured against line files, without a database."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
+from itertools import takewhile
+from pathlib import Path
+from typing import Any, TypeVar
+
+from app.errors import DatasetFormatError, InputError
+from app.formats.cameras_reader import read_cameras
+from app.formats.json_text import read_json
+from app.formats.plain_file import read_plain
+from app.formats.report import Report
+from app.formats.sn_calibration_reader import read_line_files
+from app.geometry.camera import Camera
+from app.progress import TellProgress
+from app.soccer.annotation import lines_without
+from app.soccer.frames import ImageSize
+from app.soccer.pitch import Pitch
+from app.solving.score import score, score_frame
+
+
+def score_files(
+    lines: Path,
+    cameras: Path,
+    *,
+    size: ImageSize,
+    without: Path | None = None,
+    progress: TellProgress | None = None,
+) -> dict[str, Any]:
+    """Measure camera files against line files.
+
+    Args:
+        lines: Folder or zip of line files.
+        cameras: Folder or zip of ``camera_<stem>.json``.
+        size: Size of the annotated images where no folder of an export says it.
+        without: ``findings.json``; markings that it calls mislabelled are left out.
+        progress: Called with frames done.
+
+    Raises:
+        InputError: There is no line file, or no camera at all.
+    """
+    report, camera_report = Report(), Report()
+    found = _by_frame(read_cameras(cameras, camera_report))
+    if not found:
+        raise camera_report.refusal(f"{cameras} holds no camera files")
+    dropped = _wrong_labels(without) if without is not None else set()
+    pitch = Pitch()
+    scores = []
+    frames: set[str] = set()
+    for file in read_line_files(lines, size, report, by_folder=True):
+        kept = lines_without(
+            file.lines, {marking for stem, marking in dropped if stem == file.stem}
+        )
+        camera = found.get(file.stem)
+        frames.add(file.stem)
+        scores.append(None if camera is None else score_frame(camera, kept, pitch, file.size))
+        if progress is not None:
+            progress(len(scores))
+    if not scores:
+        raise report.refusal(f"{lines} holds no line files")
+    if all(score is None for score in scores):
+        frame, other = sorted(frames)[0], sorted(found)[0]
+        raise InputError(
+            f'no camera belongs to a line file: cameras are called "{other}", frames "{frame}"',
+            hint="A camera of the frame 00002 lies in camera_00002.json.",
+        )
+    # A line file that cannot be read is a frame without a camera.
+    scores.extend([None] * (report.read - len(scores)))
+    total = score(scores)
+    return {
+        "frames": total.frames,
+        "calibrated": total.calibrated,
+        "completeness": total.completeness,
+        "jac_0.5": total.jac[0],
+        "jac_1": total.jac[1],
+        "jac_2": total.jac[2],
+        "share": total.share,
+        "fs5": total.challenge,
+        "error_median_px": total.error_median_px,
+        "error_p95_px": total.error_p95_px,
+        **_times(cameras),
+        "problems": [item.message for item in (*report.problems, *camera_report.problems)],
+    }
+
+
+def _by_frame(cameras: Mapping[str, Camera]) -> dict[str, Camera]:
+    """Cameras by key, and by the bare name of the frame where only one has it."""
+    names = Counter(key.rsplit("/", 1)[-1] for key in cameras)
+    bare = {key.rsplit("/", 1)[-1]: camera for key, camera in cameras.items()}
+    return {**{name: bare[name] for name in bare if names[name] == 1}, **cameras}
+
+
+def _wrong_labels(findings: Path) -> set[tuple[str, str]]:
+    """Frame and marking of each finding ``wrong_label``."""
+    value = read_json(read_plain(findings), str(findings))
+    if not isinstance(value, list):
+        raise DatasetFormatError(str(findings), None, None, "is not a list of findings")
+    rows = [item for item in value if isinstance(item, dict) and item.get("kind") == "wrong_label"]
+    return {(str(item.get("frame")), str(item.get("marking"))) for item in rows}
+
+
+def _times(cameras: Path) -> dict[str, Any]:
+    """Milliseconds a frame from the ``calibrate.json`` beside the cameras, or null."""
+    beside = cameras / "calibrate.json"
+    value = read_json(beside.read_bytes(), str(beside)) if beside.is_file() else {}
+    times = {"ms_median": None, "ms_p95": None}
+    if isinstance(value, dict):
+        times |= {name: value.get(name) for name in times}
+    return {name: time if isinstance(time, int | float) else None for name, time in times.items()}
+
+
+AHEAD = 8
+"""Tasks under way, so that memory stays flat however many there are; an executor of more workers
+says its own number (``ahead``)."""
+
+T = TypeVar("T")
+R = TypeVar("R")
+
+
+LOOK_S = 0.2
+"""Seconds between two looks whether to stop."""
+
+
+def _never() -> bool:
+    return False
+
+
+def fan_out(
+    work: Callable[[T], R],
+    tasks: Iterable[T],
+    executor: Executor | None,
+    stop: Callable[[], bool] = _never,
+) -> Iterator[R]:
+    """Results as they come; without an executor here, one after the other.
+
+    Args:
+        work: A function of a module, so that it travels.
+        tasks: Made one by one, as workers become free.
+        executor: Where they run; None: in this thread.
+        stop: Asked every now and then; once it says so, what is done is still given, and no more.
+    """
+    if executor is None:
+        yield from map(work, takewhile(lambda _: not stop(), tasks))
+        return
+    running: set[Future[R]] = set()
+    ahead = getattr(executor, "ahead", AHEAD)
+    try:
+        for task in tasks:
+            running.add(executor.submit(work, task))
+            while len(running) >= ahead and not stop():
+                done, running = wait(running, LOOK_S, FIRST_COMPLETED)
+                yield from (future.result() for future in done)
+            if stop():
+                break
+        while running and not stop():
+            done, running = wait(running, LOOK_S, FIRST_COMPLETED)
+            yield from (future.result() for future in done)
+        # A process that was stopped, too, has no result.
+        arrived = [future for future in running if future.done() and not future.exception()]
+        yield from (future.result() for future in arrived)
+    finally:
+        for future in running:
+            future.cancel()

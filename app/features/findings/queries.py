@@ -1,0 +1,211 @@
+"""Findings of imports, and findings that a person has checked."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any, cast
+
+from sqlalchemy import Table, delete, insert, select
+
+from app.db.log import Entry, append
+from app.db.session import Session
+from app.features.datasets.tables import GroupModel, ImportFindingModel
+from app.features.findings.tables import DismissalModel
+from app.features.groups.insert_queries import next_id
+from app.features.people.alias_queries import shown_actor
+from app.soccer.finding import PICTURE_GEOMETRY, PITCH_SIZE, Dismissal, Finding
+
+SEEN = (PITCH_SIZE, PICTURE_GEOMETRY)
+"""Kinds that stand beside what imports noticed and are in no log: computed, or seen of pictures."""
+Noticed = tuple[str | None, str]
+"""Key of a view, or None where the whole group is meant; and the sentence."""
+
+
+def group_findings(session: Session, group_id: int) -> list[Noticed]:
+    """What is noticed about a group, in the order in which it was."""
+    model = ImportFindingModel
+    statement = select(model.view, model.sentence).where(
+        model.group_id == group_id, model.kind.not_in(SEEN)
+    )
+    return [(row.view, row.sentence) for row in session.execute(statement.order_by(model.id))]
+
+
+def groups_told(session: Session, ids: Collection[int], sentence: str) -> set[int]:
+    """The groups among them that have a finding about the whole group."""
+    model = ImportFindingModel
+    statement = select(model.group_id).where(
+        model.group_id.in_(list(ids)), model.view.is_(None), model.sentence == sentence
+    )
+    return {number for number in session.scalars(statement) if number is not None}
+
+
+def add_group_findings(
+    session: Session, kind: str, noticed: Iterable[tuple[int, str | None, str]]
+) -> None:
+    """Insert findings: group, view and sentence of each."""
+    rows = [
+        {"group_id": group, "view": view, "kind": kind, "sentence": sentence}
+        for group, view, sentence in noticed
+    ]
+    if rows:
+        session.execute(insert(ImportFindingModel), rows)
+
+
+def replace_group_findings(
+    session: Session, group_id: int, kind: str, noticed: Iterable[Noticed]
+) -> None:
+    """Put findings in the place of all that imports noticed about a group."""
+    model = ImportFindingModel
+    session.execute(delete(model).where(model.group_id == group_id, model.kind.not_in(SEEN)))
+    add_group_findings(session, kind, ((group_id, view, text) for view, text in noticed))
+
+
+def station_finding(session: Session, station_id: int) -> str | None:
+    """What is noticed about a static camera."""
+    model = ImportFindingModel
+    return session.scalar(select(model.sentence).where(model.station_id == station_id))
+
+
+def replace_station_finding(
+    session: Session, station_id: int, kind: str, sentence: str | None
+) -> None:
+    """Put a finding (or none) in the place of the one that a static camera has."""
+    model = ImportFindingModel
+    session.execute(delete(model).where(model.station_id == station_id))
+    if sentence is not None:
+        values = {"station_id": station_id, "kind": kind, "sentence": sentence}
+        session.execute(insert(model), [values])
+
+
+def replace_shape_findings(
+    session: Session, dataset_id: int, keys: Collection[str], found: Iterable[tuple[str, str, str]]
+) -> list[int]:
+    """Put findings about the shapes of pictures in the place of those that groups have.
+
+    Args:
+        session: Of a write.
+        dataset_id: The dataset.
+        keys: Of the groups whose pictures were looked at; other groups keep theirs.
+        found: Key of the group, key of the view and sentence of each.
+
+    Returns:
+        Ids of the groups concerned.
+    """
+    model, wanted = ImportFindingModel, set(found)
+    mine = select(GroupModel.id, GroupModel.key).where(GroupModel.dataset_id == dataset_id)
+    has = select(model.id, model.group_id, model.view, model.sentence, GroupModel.key)
+    has = has.join(GroupModel, GroupModel.id == model.group_id).where(
+        GroupModel.dataset_id == dataset_id, model.kind == PICTURE_GEOMETRY
+    )
+    looked = set(keys)
+    present = {
+        (row.key, row.view, row.sentence): row for row in session.execute(has) if row.key in looked
+    }
+    gone = [row for said, row in present.items() if said not in wanted]
+    fresh = sorted(wanted - present.keys())
+    ids = {row.key: row.id for row in session.execute(mine)} if fresh else {}
+    if gone:
+        session.execute(delete(model).where(model.id.in_([row.id for row in gone])))
+    rows = [(ids[group], view, text) for group, view, text in fresh if group in ids]
+    add_group_findings(session, PICTURE_GEOMETRY, rows)
+    return sorted({row.group_id for row in gone} | {row[0] for row in rows})
+
+
+DISMISSAL = "dismissal"
+"""Kind of the log's entries."""
+_TABLE = cast(Table, DismissalModel.__table__)
+SHOWN = (
+    *(_TABLE.c[name] for name in ("marking", "suggested", "number", "at", "dismissed", "note")),
+    shown_actor(_TABLE.c.actor, _TABLE.c.at).label("actor"),
+)
+"""What ``standing`` asks of a row besides ``group``, ``id``, ``kind``, ``view`` and ``sentence``."""
+
+
+@dataclass(frozen=True)
+class GroupDismissals:
+    """What people dismissed in a group.
+
+    Attributes:
+        last: Id of the newest row; 0: nobody dismissed anything, ever.
+        standing: The dismissals that were not taken back.
+    """
+
+    last: int = 0
+    standing: tuple[Dismissal, ...] = ()
+
+    def of(self, findings: Sequence[Finding]) -> tuple[Dismissal | None, ...]:
+        """The dismissal of each finding; None: it is open."""
+        return tuple(
+            next((item for item in self.standing if item.covers(finding)), None)
+            for finding in findings
+        )
+
+
+NOTHING_DISMISSED = GroupDismissals()
+"""Of a group in which nobody ever dismissed anything."""
+
+
+def standing(rows: Iterable[Any]) -> dict[int, GroupDismissals]:
+    """What people dismissed, by group id; groups in which nobody ever did are left out.
+
+    ``rows`` are those of the table, the oldest first (``features.queue.queries.read_noticed`` reads them).
+    """
+    found: dict[int, GroupDismissals] = {}
+    for row in rows:
+        names = (row.kind, row.view, row.marking, row.suggested)
+        said = Dismissal(*names, row.number, row.sentence, row.actor, row.at, row.note)
+        before = found.get(row.group, NOTHING_DISMISSED).standing
+        others = tuple(item for item in before if not item.covers(said))
+        found[row.group] = GroupDismissals(row.id, (*others, said) if row.dismissed else others)
+    return found
+
+
+CARRIED = tuple(column.name for column in _TABLE.columns if column.name not in ("id", "group_id"))
+"""What is carried of a row to another installation."""
+
+
+def carried_dismissals(session: Session, ids: Iterable[int]) -> dict[int, list[dict[str, Any]]]:
+    """What is carried of the dismissals of groups, by group, oldest first."""
+    columns = [_TABLE.c[name] for name in CARRIED]
+    statement = select(_TABLE.c.group_id, *columns).where(_TABLE.c.group_id.in_(list(ids)))
+    found: dict[int, list[dict[str, Any]]] = {}
+    for group_id, *values in session.execute(statement.order_by(_TABLE.c.id)):
+        found.setdefault(group_id, []).append(dict(zip(CARRIED, values, strict=True)))
+    return found
+
+
+def insert_dismissal(
+    session: Session,
+    dataset_id: int,
+    group_id: int,
+    said: Dismissal,
+    *,
+    dismissed: bool,
+    brought: tuple[str, str] | None = None,
+) -> int:
+    """Insert that a finding was dismissed, or opened again, and log it; returns the row's id.
+
+    ``brought`` is who brought it from another installation, and when; the log has it under them.
+    """
+    identity = next_id(session, DismissalModel)
+    body = {name: value for name, value in vars(said).items() if name not in ("actor", "at")}
+    body |= {"dismissed": dismissed}
+    row = {"id": identity, "group_id": group_id, "actor": said.actor, "at": said.at, **body}
+    session.execute(insert(_TABLE), [row])
+    actor, at = brought or (said.actor, said.at)
+    if brought is not None:
+        body |= {"actor": said.actor, "at": said.at}
+    append(session, [Entry(DISMISSAL, actor, at, body, dataset_id, group_id)])
+    return identity
+
+
+def dismissed_kinds(
+    findings: Sequence[Finding], dismissals: GroupDismissals
+) -> tuple[list[str], list[str]]:
+    """Kinds of findings that are open, and of those that are dismissed; a kind may be both."""
+    found = dismissals.of(findings)
+    pairs = list(zip(findings, found, strict=True))
+    opened = dict.fromkeys(finding.kind for finding, said in pairs if said is None)
+    closed = dict.fromkeys(finding.kind for finding, said in pairs if said is not None)
+    return list(opened), list(closed)

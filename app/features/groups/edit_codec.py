@@ -1,0 +1,233 @@
+"""Edits to JSON and back, for the log; and how many points an edit may have."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from app.db.json_columns import Json
+from app.errors import TooManyPointsError
+from app.features.groups.codecs import (
+    ball_from_json,
+    ball_to_json,
+    camera_from_json,
+    camera_to_json,
+    covariance_from_json,
+    covariance_to_json,
+    paint_to_json,
+    picture_from_json,
+    picture_to_json,
+    positions_from_json,
+    positions_to_json,
+)
+from app.features.groups.edit import (
+    Edit,
+    IncludeView,
+    LineChanges,
+    SetBall,
+    SetBalls,
+    SetCalibrationSource,
+    SetLines,
+    SetNoise,
+    SetPaint,
+    SetPicture,
+    SetPitch,
+    SetPositions,
+    SetStationCalibration,
+    SetStationCamera,
+    SetStationLines,
+    Several,
+    StationEdit,
+)
+from app.soccer.annotation import Lines
+from app.soccer.frames import ImagePoint
+from app.soccer.group import Group
+
+
+def step_to_json(edit: Edit | StationEdit, inverse: Edit | StationEdit) -> Json:
+    """An edit with the one that takes it back, as entries of the log have them."""
+    return {"edit": edit_to_json(edit), "inverse": edit_to_json(inverse)}
+
+
+def edit_to_json(edit: Edit | StationEdit) -> Json:
+    """An edit with its name under ``edit``."""
+    match edit:
+        case SetLines(view, lines, proposed, not_visible):
+            said = {"lines": _lines_to_json(lines), **_source(proposed, not_visible)}
+            return {"edit": "set_lines", "view": view, **said}
+        case SetBalls(view, balls, noise):
+            said = {"balls": [*map(ball_to_json, balls)], **_noise(noise)}
+            return {"edit": "set_balls", "view": view, **said}
+        case SetBall(view, ball, noise):
+            said = {"balls": [] if ball is None else [ball_to_json(ball)], **_noise(noise)}
+            return {"edit": "set_balls", "view": view, **said}
+        case IncludeView(view, included, reason, note):
+            why = {} if reason is None else {"reason": reason, "note": note}
+            return {"edit": "include_view", "view": view, "included": included, **why}
+        case SetCalibrationSource(view, calibration):
+            return {"edit": "set_calibration", "view": view, "calibration": calibration}
+        case SetPicture(view, picture):
+            return {"edit": "set_picture", "view": view, "picture": picture_to_json(picture)}
+        case SetPitch(length, width):
+            return {"edit": "set_pitch", "length": float(length), "width": float(width)}
+        case SetPositions(positions):
+            return {"edit": "set_positions", "positions": positions_to_json(positions)}
+        case SetNoise(noise):
+            return {"edit": "set_noise", "noise": {view: float(of) for view, of in noise.items()}}
+        case Several(edits):
+            return {"edit": "several", "edits": [*map(edit_to_json, edits)]}
+        case SetPaint(paint):
+            return {"edit": "set_paint", "paint": paint_to_json(paint)}
+        case SetStationLines(lines, proposed, not_visible):
+            said = {"lines": _lines_to_json(lines), **_source(proposed, not_visible)}
+            return {"edit": "set_station_lines", **said}
+        case SetStationCalibration(calibration):
+            return {"edit": "set_station_calibration", "calibration": calibration}
+        case SetStationCamera(given, covariance, calibration):
+            return {
+                "edit": "set_station_camera",
+                "given": None if given is None else camera_to_json(given),
+                "covariance": covariance_to_json(covariance),
+                "calibration": calibration,
+            }
+    raise TypeError(f"no codec for {type(edit).__name__}")
+
+
+def edit_from_json(value: Mapping[str, Any]) -> Edit:
+    """Back from ``edit_to_json``, for edits of a group."""
+    match value["edit"]:
+        case "set_lines":
+            return SetLines(value["view"], _lines_from_json(value["lines"]), *_sources(value))
+        case "set_balls":
+            balls = tuple(map(ball_from_json, value["balls"]))
+            return SetBalls(value["view"], balls, float(value.get("noise", 1.0)))
+        case "include_view":
+            why = value.get("reason"), value.get("note")
+            return IncludeView(value["view"], value["included"], *why)
+        case "set_calibration":
+            return SetCalibrationSource(value["view"], value["calibration"])
+        case "set_picture":
+            return SetPicture(value["view"], picture_from_json(value["picture"]))
+        case "set_pitch":
+            return SetPitch(value["length"], value["width"])
+        case "set_positions":
+            return SetPositions(positions_from_json(value["positions"]))
+        case "set_noise":
+            return SetNoise(value["noise"])
+        case "several":
+            return Several(tuple(map(edit_from_json, value["edits"])))
+    raise ValueError(f"the log holds an unknown edit: {value['edit']}")
+
+
+def station_edit_from_json(value: Mapping[str, Any]) -> StationEdit:
+    """Back from ``edit_to_json``, for edits of a station."""
+    match value["edit"]:
+        case "set_station_lines":
+            return SetStationLines(_lines_from_json(value["lines"]), *_sources(value))
+        case "set_station_calibration":
+            return SetStationCalibration(value["calibration"])
+        case "set_station_camera":
+            given = value["given"]
+            return SetStationCamera(
+                None if given is None else camera_from_json(given),
+                covariance_from_json(value["covariance"]),
+                value["calibration"],
+            )
+    raise ValueError(f"the log holds an unknown edit: {value['edit']}")
+
+
+def _noise(noise: float) -> Json:
+    """Only where there is something to say, as of ``_source``."""
+    return {} if noise == 1 else {"noise": float(noise)}
+
+
+def _source(proposed: tuple[str, ...], not_visible: tuple[str, ...]) -> Json:
+    """Where lines come from, or why there are none, only where there is something to say: all other
+    entries are as ever."""
+    said = dict.fromkeys(proposed, "proposed") | dict.fromkeys(not_visible, "not_visible")
+    return {"source": said} if said else {}
+
+
+def _sources(value: Mapping[str, Any]) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """The markings that were proposed, and those that are not visible."""
+    said = value.get("source", {})
+    proposed, not_visible = (
+        tuple(name for name, source in said.items() if source == wanted)
+        for wanted in ("proposed", "not_visible")
+    )
+    return proposed, not_visible
+
+
+def _lines_to_json(lines: LineChanges) -> Json:
+    return {
+        marking: None if points is None else [[float(x), float(y)] for x, y in points]
+        for marking, points in lines.items()
+    }
+
+
+def _lines_from_json(value: Mapping[str, Any]) -> LineChanges:
+    return {
+        marking: None if points is None else tuple(ImagePoint(x, y) for x, y in points)
+        for marking, points in value.items()
+    }
+
+
+MARKING_POINTS = 100
+"""Of one marking in one view; the densest of the public datasets has 38."""
+VIEW_POINTS = 500
+"""Of all markings in one view; the public datasets have at most 85."""
+REQUEST_POINTS = 2000
+"""Of all lines that one request brings."""
+
+
+def require_few_points(view: str, lines: Lines, changes: LineChanges) -> None:
+    """Refuse new points where a view or a marking of it would have too many.
+
+    Args:
+        view: What people call the view or camera.
+        lines: As they are.
+        changes: What is to become of them.
+
+    Raises:
+        TooManyPointsError: With view, marking, count and limit.
+    """
+    counts = {marking: len(points) for marking, points in lines.items()}
+    before = sum(counts.values())
+    for marking, points in changes.items():
+        count = len(points or ())
+        if count > max(MARKING_POINTS, counts.get(marking, 0)):
+            raise _too_many(f"{view}: {marking} has {count} points", "a marking", MARKING_POINTS)
+        counts[marking] = count
+    after = sum(counts.values())
+    if after > max(VIEW_POINTS, before):
+        names = ", ".join(changes)
+        raise _too_many(
+            f"{view}: with {names} its lines have {after} points", "a view", VIEW_POINTS
+        )
+
+
+def require_few_points_in_all(group: Group, edits: Sequence[Edit]) -> None:
+    """``require_few_points`` for every edit of one request, and for the request as a whole."""
+    drawn = [edit for edit in edits if isinstance(edit, SetLines)]
+    for edit in drawn:
+        view = group.view(edit.view)
+        if view is not None:
+            require_few_points(f"view {edit.view}", view.station.lines, edit.lines)
+    counts = {
+        (edit.view, marking): len(points or ())
+        for edit in drawn
+        for marking, points in edit.lines.items()
+    }
+    if sum(counts.values()) > REQUEST_POINTS:
+        (view_key, marking), count = max(counts.items(), key=lambda item: item[1])
+        raise _too_many(
+            f"view {view_key}: {marking} brings {count} of {sum(counts.values())} points",
+            "a request",
+            REQUEST_POINTS,
+        )
+
+
+def _too_many(found: str, what: str, most: int) -> TooManyPointsError:
+    return TooManyPointsError(
+        f"{found}, {what} may have {most}", hint="Leave points out: a few on each line suffice."
+    )

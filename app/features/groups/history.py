@@ -1,0 +1,138 @@
+"""Past: a group's entries in the log, with those of its static cameras, and what each has changed."""
+
+from __future__ import annotations
+
+import heapq
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+
+from app.db.log import LogEntry as LogEntry
+from app.db.log import group_entries, station_entries
+from app.db.session import Session
+from app.db.store import Store
+from app.errors import NotFoundError
+from app.features.groups.queries import StoredGroup
+from app.features.groups.replay import apply_entry
+from app.features.groups.state import need_group
+from app.features.groups.state_snapshot import Ledger, StationRecord
+from app.features.people.alias_queries import shown_entries
+from app.features.people.visibility_queries import reads_blind
+from app.soccer.group import Group, View
+from app.soccer.pitch import Pitch
+
+STATION_EDITS = ("station_edit", "station_undo", "station_redo")
+"""Kinds of entries in which somebody changed a static camera, and with it all its groups."""
+
+
+@dataclass(frozen=True)
+class ChangedView:
+    """A view before an entry and after it; None where it was not there.
+
+    Attributes:
+        id: Of the view as it is now; None where it is gone.
+        index: Its place among the views, from 0.
+    """
+
+    key: str
+    id: int | None
+    index: int
+    before: View | None
+    after: View | None
+
+
+@dataclass(frozen=True)
+class Step:
+    """What an entry has changed of a group: the views that differ, and the pitch.
+
+    ``first`` says that there was nothing before it.
+    """
+
+    entry: LogEntry
+    views: tuple[ChangedView, ...]
+    pitch_before: Pitch | None
+    pitch_after: Pitch
+    first: bool
+
+
+def history(store: Store, group_id: int) -> list[LogEntry]:
+    """Everything that was said about a group and changed of its static cameras, oldest first.
+
+    Whoever annotates blind is told the places of entries in it instead of their ids.
+
+    Raises:
+        NotFoundError: There is no such group.
+    """
+    with store.read() as session:
+        stored = need_group(session, group_id)
+        told = shown_entries(session, _told(session, stored))
+        if not reads_blind():
+            return told
+        return [replace(entry, id=place) for place, entry in enumerate(told, start=1)]
+
+
+def read_step(store: Store, group_id: int, entry_id: int) -> Step:
+    """What one entry has changed of a group, found by saying everything again up to it.
+
+    Raises:
+        NotFoundError: There is no such group, or no such entry of it.
+    """
+    with store.read() as session:
+        stored = need_group(session, group_id)
+        if reads_blind():
+            place, told = entry_id - 1, _told(session, stored)
+            entry_id = told[place].id if place < len(told) else 0
+        ledger = _static_cameras(stored)
+        before: Group | None = None
+        for entry in _entries(session, stored):
+            known = group_id in ledger.groups
+            if entry.id == entry_id:
+                before = ledger.group(group_id) if known else None
+            apply_entry(ledger, entry)
+            if entry.id == entry_id and group_id in ledger.groups:
+                (shown,) = shown_entries(session, [entry])
+                return _step(shown, before, ledger.group(group_id), stored.view_ids)
+    raise NotFoundError(f"group {group_id} has no entry {entry_id}")
+
+
+def _told(session: Session, stored: StoredGroup) -> list[LogEntry]:
+    """The entries of a group's history."""
+    entries = list(_entries(session, stored))
+    first = next(entry.id for entry in entries if entry.group_id is not None)
+    return [
+        entry
+        for entry in entries
+        if entry.group_id is not None or (entry.kind in STATION_EDITS and entry.id > first)
+    ]
+
+
+def _entries(session: Session, stored: StoredGroup) -> Iterator[LogEntry]:
+    shared = [
+        station_entries(session, item.id)
+        for item in stored.stations.values()
+        if item.station.shared
+    ]
+    return heapq.merge(group_entries(session, stored.id), *shared, key=lambda entry: entry.id)
+
+
+def _static_cameras(stored: StoredGroup) -> Ledger:
+    """A ledger of the static cameras alone, as they are now; their own entries tell what they were."""
+    ledger = Ledger()
+    for item in stored.stations.values():
+        if item.station.shared:
+            ledger.stations[item.id] = StationRecord(
+                stored.dataset_id, item.station, item.revision, item.source_digest
+            )
+    return ledger
+
+
+def _step(entry: LogEntry, before: Group | None, after: Group, view_ids: Mapping[str, int]) -> Step:
+    old = {} if before is None else {view.key: view for view in before.views}
+    new = {view.key: view for view in after.views}
+    keys = list(dict.fromkeys([*new, *old]))
+    changed = tuple(
+        ChangedView(key, view_ids.get(key), index, old.get(key), new.get(key))
+        for index, key in enumerate(keys)
+        if old.get(key) != new.get(key)
+    )
+    pitch = None if before is None else before.pitch
+    return Step(entry, changed, pitch, after.pitch, before is None)

@@ -1,0 +1,243 @@
+"""What becomes of a stored group or station when its dataset is imported again."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+from app.db.log import Entry, append, station_entries
+from app.db.session import Session, now
+from app.features.findings.queries import replace_station_finding, station_finding
+from app.features.groups.codecs import logged_camera, station_from_json, station_to_json
+from app.features.groups.digest import station_digest, view_digest
+from app.features.groups.insert_queries import NewRows
+from app.features.groups.queries import StoredGroup
+from app.features.groups.revision_queries import keeps_station, refresh_inputs_hashes
+from app.features.groups.view_queries import StoredStation, groups_of_station, save_station
+from app.features.imports.queries import shared_stations
+from app.features.queue.queries import refresh_queue
+from app.soccer.group import Group, Station, View
+
+KIND = "upstream_changed"
+
+
+@dataclass(frozen=True)
+class KeptEdit:
+    """Something a person edited and the dataset changed too: the person's version stayed."""
+
+    view: str | None
+    sentence: str
+
+
+@dataclass(frozen=True)
+class Followed:
+    """A group after its dataset changed.
+
+    ``base`` is the group as it would be had nobody edited it.
+    """
+
+    group: Group
+    base: Group
+    kept: tuple[KeptEdit, ...]
+
+
+@dataclass(frozen=True)
+class FollowedStation:
+    """A station after its dataset changed; ``base`` as in ``Followed``."""
+
+    station: Station
+    base: Station
+    kept: KeptEdit | None
+
+
+def follow_group(stored: StoredGroup, incoming: Group) -> Followed:
+    """The stored group brought up to the incoming one, but for what a person edited.
+
+    Shared stations are the incoming group's own; they are followed once, elsewhere.
+    """
+    views: list[View] = []
+    bases: list[View] = []
+    kept: list[KeptEdit] = []
+    for view in incoming.views:
+        result, base, noticed = _follow_view(stored, view)
+        views.append(result)
+        bases.append(base)
+        kept.extend(noticed)
+    for view in stored.group.views:
+        if incoming.view(view.key) is None and stored.is_edited(view.key):
+            views.append(view)
+            bases.append(view)
+            sentence = f"{view.key} is gone from the dataset; a person had edited it, so it stays"
+            kept.append(KeptEdit(view.key, sentence))
+    return Followed(
+        replace(incoming, views=tuple(views)), replace(incoming, views=tuple(bases)), tuple(kept)
+    )
+
+
+def follow_station(
+    stored: StoredStation,
+    incoming: Station,
+    source: Station | None = None,
+    *,
+    lines_left: bool = False,
+) -> FollowedStation:
+    """The stored station brought up to the incoming one, unless a person edited it.
+
+    A calibration that was imported on its own stays when the dataset brings none. So do the
+    lines of a shared station, and which calibration counts: they come from files of their own,
+    which an import may leave out.
+
+    Args:
+        stored: The station as it is.
+        incoming: The station as the dataset brings it now.
+        source: The station as the dataset brought it before, where that is known.
+        lines_left: Whether its lines were left aside on purpose.
+    """
+    if (
+        not lines_left
+        and incoming.shared
+        and not incoming.lines
+        and source is not None
+        and source.lines
+    ):
+        incoming = replace(incoming, lines=source.lines, calibration=source.calibration)
+    # Under an edit the stored camera may be a person's; that of the dataset is the source's.
+    brought = stored.station if source is None else source
+    if incoming.given is None and brought.given is not None:
+        incoming = incoming.with_given(brought.given, brought.given_covariance)
+    if not stored.edited:
+        return FollowedStation(incoming, incoming, None)
+    kept = None
+    if station_digest(incoming) not in (stored.digest, stored.source_digest):
+        sentence = f"the dataset has new lines or a new camera for {incoming.key}; edits stay"
+        kept = KeptEdit(None, sentence)
+    # What no edit can touch follows all the same.
+    station = incoming.with_said(stored.station)
+    return FollowedStation(station, incoming, kept)
+
+
+def _follow_view(stored: StoredGroup, view: View) -> tuple[View, View, list[KeptEdit]]:
+    old = stored.group.view(view.key)
+    if old is None or not keeps_station(stored, view):
+        return view, view, []
+    kept: list[KeptEdit] = []
+    result = base = view
+    if not view.included and not old.included:
+        # Saying why is no edit of what is solved; the dataset's word counts where it has one.
+        result = replace(view, left_out=view.left_out or old.left_out)
+    if view.key in stored.edited_views:
+        result = replace(view, balls=old.balls, included=old.included, left_out=old.left_out)
+        # Neither what it said before nor what the person says.
+        if view_digest(view) not in stored.view_digests[view.key]:
+            sentence = f"the dataset has another ball in {view.key}; the edited one stays"
+            kept.append(KeptEdit(view.key, sentence))
+    if result.balls == old.balls:
+        # How noisy they are is no word of the dataset's.
+        result = replace(result, noise=old.noise)
+    if not view.station.shared:
+        followed = follow_station(stored.stations[view.key], view.station)
+        result = replace(result, station=followed.station)
+        base = replace(base, station=followed.base)
+        if followed.kept is not None:
+            kept.append(KeptEdit(view.key, followed.kept.sentence))
+    return result, base, kept
+
+
+class SharedStations:
+    """The shared stations of a dataset within one write transaction.
+
+    ``changed`` names those that were there and changed, ``kept`` those with edits that stayed.
+    ``lines_left``: what comes without lines has none, and does not keep those of before.
+    """
+
+    def __init__(
+        self,
+        session: Session,
+        dataset_id: int,
+        source: str,
+        actor: str,
+        *,
+        lines_left: bool = False,
+    ):
+        self.changed: list[str] = []
+        self.kept: list[str] = []
+        self.ids: dict[str, int] = {}
+        """By key."""
+        self._session, self._dataset_id = session, dataset_id
+        self._source, self._actor, self._lines_left = source, actor, lines_left
+        self._stored: dict[str, StoredStation] = {}
+        self._seen: dict[str, Station] = {}
+        for stored in shared_stations(session, dataset_id):
+            self._stored[stored.station.key] = stored
+            self.ids[stored.station.key] = stored.id
+
+    def follow(self, stations: Iterable[Station]) -> None:
+        """Insert the shared ones among stations, or bring them up to what they are now."""
+        for station in stations:
+            if not station.shared or self._seen.get(station.key) is station:
+                continue
+            if station.key not in self._seen:
+                self._follow(station)
+            self._seen[station.key] = station
+
+    def _follow(self, incoming: Station) -> None:
+        stored = self._stored.get(incoming.key)
+        if stored is None:
+            self._insert(incoming)
+            return
+        source = self._source_of(stored)
+        followed = follow_station(stored, incoming, source, lines_left=self._lines_left)
+        changed = followed.station != stored.station
+        if changed or station_digest(followed.base) != stored.source_digest:
+            self._save(stored, followed)
+            self.changed.append(incoming.key)
+
+    def _source_of(self, stored: StoredStation) -> Station | None:
+        """A station as its dataset last brought it; under an edit only the log remembers."""
+        if not stored.edited:
+            return stored.station
+        found = said = None
+        for entry in station_entries(self._session, stored.id):
+            if entry.kind == "station":
+                said = station_from_json(entry.body["base"] or entry.body["station"])
+            elif entry.kind == "camera" and said is not None:
+                said = said.with_given(*logged_camera(entry.body))
+            if said is not None and station_digest(said) == stored.source_digest:
+                found = said
+        return found
+
+    def _insert(self, station: Station) -> None:
+        rows = NewRows(self._session, self._dataset_id)
+        self.ids[station.key] = rows.add_station(station)
+        rows.insert()
+        self._log(self.ids[station.key], FollowedStation(station, station, None), None)
+
+    def _save(self, stored: StoredStation, followed: FollowedStation) -> None:
+        save_station(self._session, stored, followed.station, source=followed.base)
+        self._log(stored.id, followed, self._note(stored.id, followed))
+        groups = groups_of_station(self._session, stored.id)
+        refresh_inputs_hashes(self._session, groups)
+        refresh_queue(self._session, groups)
+
+    def _note(self, station_id: int, followed: FollowedStation) -> str | None:
+        """Save what imports noticed about the station: this one, or earlier ones while it holds."""
+        if followed.kept is not None:
+            sentence: str | None = followed.kept.sentence
+            self.kept.append(followed.station.key)
+        elif station_digest(followed.station) != station_digest(followed.base):
+            sentence = station_finding(self._session, station_id)
+        else:
+            sentence = None
+        replace_station_finding(self._session, station_id, KIND, sentence)
+        return sentence
+
+    def _log(self, station_id: int, followed: FollowedStation, kept: str | None) -> None:
+        same = followed.base == followed.station
+        body = {
+            "source": self._source,
+            "station": station_to_json(followed.station),
+            "base": None if same else station_to_json(followed.base),
+            "kept": kept,
+        }
+        entry = Entry("station", self._actor, now(), body, self._dataset_id, station_id=station_id)
+        append(self._session, [entry])

@@ -1,0 +1,359 @@
+"""Replay: everything that was said, rebuilt from the log alone, and the tables from that."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from typing import Any
+
+from app.db.json_columns import pack
+from app.db.log import LogEntry, read_log, verify_chain
+from app.db.session import Session
+from app.db.store import Store
+from app.features.findings.queries import DISMISSAL
+from app.features.groups.codecs import (
+    extras_from_json,
+    logged_camera,
+    policy_from_json,
+    positions_from_json,
+    station_from_json,
+    view_from_json,
+)
+from app.features.groups.digest import station_digest, view_digest
+from app.features.groups.edit_codec import edit_from_json, station_edit_from_json
+from app.features.groups.insert_queries import head_values, station_values, view_values
+from app.features.groups.projection_queries import rewrite
+from app.features.groups.reimport import KIND
+from app.features.groups.state_snapshot import (
+    GroupRecord,
+    Ledger,
+    StationRecord,
+    ViewRecord,
+    without_station,
+)
+from app.features.match_estimates.noise_queries import NOISE
+from app.features.match_estimates.picture_queries import POSITION
+from app.features.paint.queries import PAINT
+from app.features.pitches.queries import PITCH
+from app.features.queue.queries import refresh_queue
+from app.soccer.group import Group, Station
+from app.soccer.pitch import Pitch
+
+
+def replay(session: Session) -> Ledger:
+    """The ledger that follows from the log, whose chain is verified first.
+
+    Raises:
+        StorageError: The log is not what was written.
+    """
+    verify_chain(session)
+    ledger, numbers = Ledger(), Counter[int]()
+    for entry in read_log(session):
+        assert entry.kind != "import" or entry.dataset_id is not None
+        if entry.kind == "import" and entry.group_id not in ledger.groups:
+            numbers[entry.dataset_id or 0] += 1
+        apply_entry(ledger, entry, numbers[entry.dataset_id or 0])
+    return ledger
+
+
+def apply_entry(ledger: Ledger, entry: LogEntry, number: int = 0) -> None:
+    """Bring one entry of the log into the ledger; ``number`` is that of a group that is new."""
+    if entry.kind == "import" and entry.group_id not in ledger.groups:
+        _new_group(ledger, entry, number)
+    else:
+        _STEPS[entry.kind](ledger, entry)
+
+
+def rebuild(store: Store) -> int:
+    """Write groups, views, stations and what belongs to them anew from the log.
+
+    Datasets, verdicts, dismissals, solutions and the log itself stay, and so do predictions and proposals as
+    far as their views do. Returns the number of groups.
+    """
+    with store.write() as session:
+        ledger = replay(session)
+        rewrite(session, **_rows(ledger))
+        refresh_queue(session, list(ledger.groups))
+    return len(ledger.groups)
+
+
+def _dataset(ledger: Ledger, entry: LogEntry) -> None:
+    assert entry.dataset_id is not None
+    policy = policy_from_json(entry.body["policy"])
+    ledger.datasets[entry.dataset_id] = (entry.body["name"], policy)
+
+
+def _policy(ledger: Ledger, entry: LogEntry) -> None:
+    assert entry.dataset_id is not None
+    name, _ = ledger.datasets[entry.dataset_id]
+    ledger.datasets[entry.dataset_id] = (name, policy_from_json(entry.body["policy"]))
+
+
+def _station(ledger: Ledger, entry: LogEntry) -> None:
+    assert entry.station_id is not None and entry.dataset_id is not None
+    station, base = entry.body["station"], entry.body["base"]
+    _save_station(
+        ledger,
+        entry.dataset_id,
+        entry.station_id,
+        station_from_json(station),
+        station_from_json(station if base is None else base),
+    )
+    _notice(ledger, None, entry.station_id, [[None, entry.body["kept"]]])
+
+
+def _save_station(
+    ledger: Ledger, dataset_id: int, station_id: int, station: Station, base: Station | None
+) -> None:
+    old = ledger.stations.get(station_id)
+    digest = station_digest(base) if base is not None else (old.source_digest if old else "")
+    revision = old.revision + 1 if old else 1
+    ledger.stations[station_id] = StationRecord(dataset_id, station, revision, digest)
+
+
+def _new_group(ledger: Ledger, entry: LogEntry, number: int) -> None:
+    assert entry.group_id is not None and entry.dataset_id is not None
+    ledger.groups[entry.group_id] = GroupRecord(
+        entry.dataset_id, number, 0, "", "", Group("", ()), []
+    )
+    _import(ledger, entry)
+
+
+def _import(ledger: Ledger, entry: LogEntry) -> None:
+    assert entry.group_id is not None
+    record, body = ledger.groups[entry.group_id], entry.body
+    base = {view["key"]: view for view in (body["base"] or body["group"])["views"]}
+    gone = {item.station_id for item in record.views}
+    record.views = []
+    for value in body["group"]["views"]:
+        view_id, station_id = body["ids"][value["key"]]
+        gone.discard(station_id)
+        item = _import_view(ledger, record, value, base[value["key"]], station_id)
+        record.views.append(replace(item, id=view_id))
+    for station_id in gone:
+        if not ledger.stations[station_id].station.shared:
+            del ledger.stations[station_id]
+    record.head, record.paint = _head(body["group"]), dict(body["group"].get("paint", {}))
+    record.source_hash = body["source_hash"]
+    record.revision, record.changed = record.revision + 1, entry.at
+    _notice(ledger, entry.group_id, None, body.get("kept", []))
+
+
+def _import_view(
+    ledger: Ledger,
+    record: GroupRecord,
+    value: Mapping[str, Any],
+    base: Mapping[str, Any],
+    station_id: int,
+) -> ViewRecord:
+    shared = isinstance(value["station"], str)
+    if not shared:
+        own, source = station_from_json(value["station"]), station_from_json(base["station"])
+        _save_station(ledger, record.dataset_id, station_id, own, source)
+    station = ledger.stations[station_id].station
+    source_digest = view_digest(view_from_json(base, station))
+    return ViewRecord(0, station_id, without_station(view_from_json(value, station)), source_digest)
+
+
+def _head(value: Mapping[str, Any]) -> Group:
+    return Group(
+        key=value["key"],
+        views=(),
+        match=value["match"],
+        pitch=Pitch(*value["pitch"]),
+        split=value["split"],
+        label=value["label"],
+        positions=positions_from_json(value.get("positions")),
+    )
+
+
+def _edit(ledger: Ledger, entry: LogEntry) -> None:
+    assert entry.group_id is not None
+    record, group = ledger.groups[entry.group_id], ledger.group(entry.group_id)
+    changed = edit_from_json(entry.body["edit"]).apply(group)
+    for item, before, after in zip(record.views, group.views, changed.views, strict=True):
+        item.view = without_station(after)
+        if after.station != before.station:
+            _save_station(ledger, record.dataset_id, item.station_id, after.station, None)
+    record.head = replace(record.head, pitch=changed.pitch, positions=changed.positions)
+    record.revision, record.changed = record.revision + 1, entry.at
+
+
+def _noise(ledger: Ledger, entry: LogEntry) -> None:
+    # What is accepted for a dataset changes none of its groups by itself.
+    if entry.group_id is not None:
+        _edit(ledger, entry)
+
+
+def _paint(ledger: Ledger, entry: LogEntry) -> None:
+    assert entry.group_id is not None
+    record = ledger.groups[entry.group_id]
+    record.paint = dict(entry.body["edit"]["paint"])
+    record.revision, record.changed = record.revision + 1, entry.at
+
+
+def _station_edit(ledger: Ledger, entry: LogEntry) -> None:
+    assert entry.station_id is not None
+    record = ledger.stations[entry.station_id]
+    station = station_edit_from_json(entry.body["edit"]).apply(record.station)
+    _save_station(ledger, record.dataset_id, entry.station_id, station, None)
+
+
+def _camera(ledger: Ledger, entry: LogEntry) -> None:
+    assert entry.station_id is not None
+    record = ledger.stations[entry.station_id]
+    edited = station_digest(record.station) != record.source_digest
+    station = record.station.with_given(*logged_camera(entry.body))
+    base = None if edited else station
+    _save_station(ledger, record.dataset_id, entry.station_id, station, base)
+    if entry.group_id is not None:
+        group = ledger.groups[entry.group_id]
+        group.revision, group.changed = group.revision + 1, entry.at
+
+
+def _verdict(ledger: Ledger, entry: LogEntry) -> None:
+    assert entry.group_id is not None
+    ledger.verdicts.setdefault(entry.group_id, []).append(dict(entry.body))
+
+
+def _dismissal(ledger: Ledger, entry: LogEntry) -> None:
+    assert entry.group_id is not None
+    # One that was brought from elsewhere says itself whose it is.
+    said = {"actor": entry.actor, "at": entry.at, **entry.body}
+    ledger.dismissals.setdefault(entry.group_id, []).append(said)
+
+
+def _dataset_deleted(ledger: Ledger, entry: LogEntry) -> None:
+    """Everything of the dataset goes; its entries before this one still tell what it was."""
+    gone = entry.dataset_id
+    assert gone is not None
+    del ledger.datasets[gone]
+    groups = {key for key, record in ledger.groups.items() if record.dataset_id == gone}
+    stations = {key for key, record in ledger.stations.items() if record.dataset_id == gone}
+    for key in groups:
+        del ledger.groups[key]
+        ledger.verdicts.pop(key, None)
+        ledger.dismissals.pop(key, None)
+    for key in stations:
+        del ledger.stations[key]
+    for place in [place for place in ledger.spare if place[0] == gone]:
+        del ledger.spare[place]
+    ledger.noticed = {
+        item for item in ledger.noticed if item[0] not in groups and item[1] not in stations
+    }
+
+
+def _spare(ledger: Ledger, entry: LogEntry) -> None:
+    assert entry.dataset_id is not None
+    for camera, frame, extras in entry.body["frames"]:
+        ledger.spare[entry.dataset_id, camera, frame] = extras_from_json(extras)
+
+
+def _notice(
+    ledger: Ledger, group_id: int | None, station_id: int | None, kept: list[list[str | None]]
+) -> None:
+    """Each import replaces what the ones before it noticed in the same place."""
+    place = (group_id, station_id)
+    ledger.noticed = {item for item in ledger.noticed if item[:2] != place}
+    for view, sentence in kept:
+        if sentence is not None:
+            ledger.noticed.add((*place, view, sentence))
+
+
+def _rows(ledger: Ledger) -> dict[str, list[dict[str, Any]]]:
+    """Rows of the tables, as ``rewrite`` takes them."""
+    stations = [
+        {
+            **station_values(item.station),
+            "id": key,
+            "dataset_id": item.dataset_id,
+            "revision": item.revision,
+            "source_digest": item.source_digest,
+        }
+        for key, item in ledger.stations.items()
+    ]
+    views = [
+        {
+            **view_values(item.view, place),
+            "id": item.id,
+            "group_id": key,
+            "station_id": item.station_id,
+            "source_digest": item.source_digest,
+        }
+        for key, record in ledger.groups.items()
+        for place, item in enumerate(record.views)
+    ]
+    noticed = [
+        {"group_id": group, "station_id": station, "view": view, "kind": KIND, "sentence": said}
+        for group, station, view, said in sorted(ledger.noticed, key=repr)
+    ]
+    spare = [
+        {"dataset_id": key[0], "camera": key[1], "frame": key[2], "extras": _packed(extras)}
+        for key, extras in ledger.spare.items()
+    ]
+    groups = [_group_row(ledger, key) for key in ledger.groups]
+    return {
+        "stations": stations,
+        "groups": groups,
+        "views": views,
+        "noticed": noticed,
+        "spare": spare,
+    }
+
+
+def _group_row(ledger: Ledger, group_id: int) -> dict[str, Any]:
+    record = ledger.groups[group_id]
+    return {
+        **head_values(ledger.group(group_id), record.paint),
+        "id": group_id,
+        "dataset_id": record.dataset_id,
+        "number": record.number,
+        "revision": record.revision,
+        "changed": record.changed,
+        "source_hash": record.source_hash,
+    }
+
+
+def _packed(extras: Any) -> bytes:
+    return pack(extras.values())
+
+
+_STEPS: dict[str, Callable[[Ledger, LogEntry], None]] = {
+    "dataset": _dataset,
+    "dataset_deleted": _dataset_deleted,
+    "policy": _policy,
+    "station": _station,
+    "import": _import,
+    "edit": _edit,
+    "undo": _edit,
+    "redo": _edit,
+    PITCH: _edit,
+    POSITION: _edit,
+    NOISE: _noise,
+    PAINT: _paint,
+    "station_edit": _station_edit,
+    "station_undo": _station_edit,
+    "station_redo": _station_edit,
+    "camera": _camera,
+    "verdict": _verdict,
+    DISMISSAL: _dismissal,
+    "spare": _spare,
+    # What a batch did stands in the verdicts themselves.
+    "verdict_batch": lambda _ledger, _entry: None,
+    "verdict_batch_undo": lambda _ledger, _entry: None,
+    # Versions have tables of their own, which nothing rebuilds and nothing changes.
+    "freeze": lambda _ledger, _entry: None,
+    # What was taken over from a person's own annotation stands in the edits and the verdict.
+    "take": lambda _ledger, _entry: None,
+    "agreement": lambda _ledger, _entry: None,
+    # Gold groups, guidelines, comments, accounts and work that is given out have tables of their own.
+    "gold": lambda _ledger, _entry: None,
+    "guideline": lambda _ledger, _entry: None,
+    "comment": lambda _ledger, _entry: None,
+    # Jobs and other deeds change nothing that was said.
+    "job": lambda _ledger, _entry: None,
+    "deed": lambda _ledger, _entry: None,
+    "person": lambda _ledger, _entry: None,
+    "work": lambda _ledger, _entry: None,
+}

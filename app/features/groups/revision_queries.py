@@ -1,0 +1,337 @@
+"""Revisions of groups, and which groups have changed since some row of the log or the solutions."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cache
+from typing import Any
+
+from sqlalchemy import bindparam, delete, func, select, update
+
+from app.db.log import DEEDS, LogModel
+from app.db.session import Session
+from app.features.datasets.tables import (
+    DatasetModel,
+    GroupChangeModel,
+    GroupModel,
+    ImportFindingModel,
+    StationModel,
+    ViewModel,
+)
+from app.features.groups import codecs
+from app.features.groups.digest import inputs_hash, station_digest, view_digest
+from app.features.groups.insert_queries import (
+    NewRows,
+    head_values,
+    paint_text,
+    positions_text,
+    station_values,
+    view_values,
+)
+from app.features.groups.queries import StoredGroup, positions_of
+from app.features.groups.view_queries import save_station
+from app.features.paint.queries import paint_digests
+from app.features.solutions.queries import is_current
+from app.features.solutions.tables import SolutionModel
+from app.soccer.group import Group, View
+from app.soccer.pitch import Pitch
+
+
+def next_revision(stored: StoredGroup, group: Group, at: str) -> StoredGroup:
+    """A stored group as it is once an edit has made it into ``group``, the same views otherwise.
+
+    Shared stations are the stored ones; only what differs is digested again.
+    """
+    stations, digests = dict(stored.stations), dict(stored.view_digests)
+    for view, old in zip(group.views, stored.group.views, strict=True):
+        own = stations[view.key]
+        if view.station != old.station and not own.station.shared:
+            stations[view.key] = replace(
+                own,
+                revision=own.revision + 1,
+                station=view.station,
+                digest=station_digest(view.station),
+            )
+        if _differs(view, old):
+            digests[view.key] = (view_digest(view), digests[view.key][1])
+    pairs = [(digests[view.key][0], stations[view.key].digest) for view in group.views]
+    return replace(
+        stored,
+        revision=stored.revision + 1,
+        changed=at,
+        inputs_hash=inputs_hash(
+            group.pitch, pairs, group.positions, codecs.paint_to_json(group.paint), group.noise
+        ),
+        group=group,
+        stations=stations,
+        view_digests=digests,
+    )
+
+
+def save_revision(session: Session, stored: StoredGroup, after: StoredGroup) -> None:
+    """Write what ``next_revision`` changed; solutions and queue are the caller's to refresh."""
+    for position, (view, old) in enumerate(zip(after.group.views, stored.group.views, strict=True)):
+        if _differs(view, old):
+            _update(
+                session, ViewModel.__table__, after.view_ids[view.key], view_values(view, position)
+            )
+        own = after.stations[view.key]
+        if own != stored.stations[view.key]:
+            values = {**station_values(own.station), "revision": own.revision}
+            _update(session, StationModel.__table__, own.id, values)
+    names = ("revision", "changed", "inputs_hash")
+    values = {name: getattr(after, name) for name in names}
+    pitch = after.group.pitch
+    values |= {"pitch_length": pitch.length, "pitch_width": pitch.width}
+    values["positions"] = positions_text(after.group)
+    values["paint"] = paint_text(codecs.paint_to_json(after.group.paint))
+    _update(session, GroupModel.__table__, after.id, values)
+
+
+def _differs(view: View, old: View) -> bool:
+    """Whether the view's own row is another; its station has one of its own."""
+    return replace(view, station=old.station) != old
+
+
+def _update(session: Session, table: Any, identity: int, values: Mapping[str, Any]) -> None:
+    session.execute(_update_of(table), {"row": identity, **values})
+
+
+@cache
+def _update_of(table: Any) -> Any:
+    return update(table).where(table.c.id == bindparam("row"))
+
+
+def save_group(
+    session: Session,
+    stored: StoredGroup,
+    group: Group,
+    *,
+    at: str,
+    source: Group,
+    digest: str | None = None,
+    shared: Mapping[str, int] | None = None,
+) -> None:
+    """Write the next revision of a group whose dataset has changed: head, views, own stations.
+
+    Shared stations are left alone; ``save_station`` writes those. Views that are gone are
+    deleted, new ones inserted.
+
+    Args:
+        session: A write session.
+        stored: The group as it is.
+        group: The group as it shall be.
+        at: Time of the change.
+        source: The group as it would be had nobody edited it.
+    """
+    kept = {view.key for view in group.views if keeps_station(stored, view)}
+    _delete_views(session, stored, set(stored.view_ids) - kept)
+    for position, view in enumerate(group.views):
+        if view.key in kept:
+            _save_view(session, stored, view, position, source.view(view.key))
+    if len(kept) < len(group.views):
+        rows = NewRows(session, stored.dataset_id)
+        for position, view in enumerate(group.views):
+            if view.key not in kept:
+                rows.add_view(stored.id, view, position, shared or {})
+        rows.insert()
+    values = {**head_values(group), "revision": stored.revision + 1, "changed": at}
+    if digest is not None:
+        values["source_hash"] = digest
+    session.execute(update(GroupModel).where(GroupModel.id == stored.id).values(values))
+
+
+def keeps_station(stored: StoredGroup, view: View) -> bool:
+    """Whether a view is stored and still has its own station, or still shares the same one."""
+    if view.key not in stored.stations:
+        return False
+    old, new = stored.stations[view.key].station, view.station
+    return old.shared == new.shared and (not new.shared or old.key == new.key)
+
+
+def _save_view(
+    session: Session, stored: StoredGroup, view: View, position: int, source: View | None
+) -> None:
+    old = stored.group.view(view.key)
+    if source is None and view == old and stored.group.views.index(old) == position:
+        return
+    values = view_values(view, position)
+    if source is not None:
+        values["source_digest"] = view_digest(source)
+    identity = stored.view_ids[view.key]
+    session.execute(update(ViewModel).where(ViewModel.id == identity).values(values))
+    own = stored.stations[view.key]
+    base = None if source is None else source.station
+    if not own.station.shared and (view.station != own.station or base is not None):
+        save_station(session, own, view.station, source=base)
+
+
+def _delete_views(session: Session, stored: StoredGroup, keys: set[str]) -> None:
+    for key in keys:
+        session.execute(delete(ViewModel).where(ViewModel.id == stored.view_ids[key]))
+        own = stored.stations[key]
+        if not own.station.shared:
+            session.execute(
+                delete(ImportFindingModel).where(ImportFindingModel.station_id == own.id)
+            )
+            session.execute(delete(StationModel).where(StationModel.id == own.id))
+
+
+def refresh_inputs_hashes(session: Session, group_ids: Sequence[int]) -> None:
+    """Bring the inputs hashes of groups in step after a station of theirs changed."""
+    statement = (
+        select(
+            GroupModel.id,
+            GroupModel.pitch_length,
+            GroupModel.pitch_width,
+            GroupModel.positions,
+            GroupModel.paint,
+            ViewModel.key.label("view"),
+            ViewModel.noise,
+            ViewModel.digest,
+            StationModel.digest.label("station_digest"),
+        )
+        .join(ViewModel, ViewModel.group_id == GroupModel.id)
+        .join(StationModel, StationModel.id == ViewModel.station_id)
+        .where(GroupModel.id.in_(group_ids))
+        .order_by(GroupModel.id, ViewModel.position)
+    )
+    heads: dict[int, Any] = {}
+    pairs: dict[int, list[tuple[str, str]]] = {}
+    noise: dict[int, dict[str, float]] = {}
+    for row in session.execute(statement):
+        heads.setdefault(row.id, row)
+        pairs.setdefault(row.id, []).append((row.digest, row.station_digest))
+        if row.noise is not None:
+            noise.setdefault(row.id, {})[row.view] = row.noise
+    rows = []
+    for key, row in heads.items():
+        positions = positions_of(row.positions)
+        pitch = Pitch(row.pitch_length, row.pitch_width)
+        paint = paint_digests(row.paint)
+        digest = inputs_hash(pitch, pairs[key], positions, paint, noise.get(key, {}))
+        rows.append({"of": key, "inputs_hash": digest})
+    if rows:
+        session.execute(update(GroupModel).where(GroupModel.id == bindparam("of")), rows)
+
+
+def bump_groups(session: Session, group_ids: Sequence[int], at: str) -> None:
+    """Count a revision of groups that a change of something of theirs made."""
+    session.execute(
+        update(GroupModel)
+        .where(GroupModel.id.in_(group_ids))
+        .values(revision=GroupModel.revision + 1, changed=at)
+    )
+
+
+def newest_change(session: Session) -> int:
+    """Number of the last change of any group; 0 where there is none."""
+    return session.scalar(select(func.max(GroupChangeModel.id))) or 0
+
+
+def count_groups(session: Session, dataset_id: int) -> int:
+    """How many groups a dataset has."""
+    mine = GroupModel.dataset_id == dataset_id
+    return session.scalar(select(func.count()).select_from(GroupModel).where(mine)) or 0
+
+
+def count_changes(session: Session, dataset_id: int, after: int) -> int:
+    """How many groups of a dataset have changed after a change."""
+    statement = select(func.count()).select_from(GroupChangeModel)
+    return session.scalar(statement.where(*_since(dataset_id, after))) or 0
+
+
+def changed_ids(session: Session, dataset_id: int, after: int) -> list[int]:
+    """Ids of the groups of a dataset that have changed after a change."""
+    statement = select(GroupChangeModel.group_id).where(*_since(dataset_id, after))
+    return list(session.scalars(statement))
+
+
+def changed_groups(session: Session, dataset_id: int, after: int, limit: int) -> Sequence[Any]:
+    """Groups of a dataset that have changed after a change, in the order of their last ones.
+
+    Returns:
+        Rows as of ``groups_from``, with ``change_id``.
+    """
+    statement = (
+        _groups()
+        .add_columns(GroupChangeModel.id.label("change_id"))
+        .join(GroupChangeModel, GroupChangeModel.group_id == GroupModel.id)
+        .where(*_since(dataset_id, after))
+        .order_by(GroupChangeModel.id)
+        .limit(limit)
+    )
+    return session.execute(statement).all()
+
+
+def groups_from(session: Session, dataset_id: int, after: int, limit: int) -> Sequence[Any]:
+    """Groups of a dataset in order, from the one after a number on.
+
+    Returns:
+        Rows (group_id, number, inputs_hash, solution_id or None, split, match, pitch_length,
+        pitch_width); the solution is the one that fits the group as it is.
+    """
+    mine = (GroupModel.dataset_id == dataset_id, GroupModel.number > after)
+    statement = _groups().where(*mine).order_by(GroupModel.number).limit(limit)
+    return session.execute(statement).all()
+
+
+def _groups() -> Any:
+    group = GroupModel
+    return (
+        select(
+            group.id.label("group_id"), group.number, group.inputs_hash,
+            SolutionModel.id.label("solution_id"), group.split, group.match,
+            group.pitch_length, group.pitch_width,
+        )
+        .join(DatasetModel, DatasetModel.id == group.dataset_id)
+        .outerjoin(SolutionModel, is_current())
+    )  # fmt: skip
+
+
+def _since(dataset_id: int, after: int) -> tuple[Any, ...]:
+    return GroupChangeModel.id > after, GroupChangeModel.dataset_id == dataset_id
+
+
+@dataclass(frozen=True)
+class StoredChange:
+    """Something that happened to a dataset, or to one of its groups; ``id`` is its log entry's."""
+
+    id: int | None
+    dataset_id: int
+    kind: str
+    actor: str | None
+    group_id: int | None
+
+
+def logged_changes(session: Session, after: int) -> Iterator[StoredChange]:
+    """What the log tells after an entry, in order; a static camera's stand once for each group."""
+    columns = (LogModel.id, LogModel.dataset_id, LogModel.kind, LogModel.actor)
+    new = (
+        LogModel.id > after,
+        LogModel.dataset_id.is_not(None),
+        LogModel.kind.not_in(DEEDS),
+    )
+    plain = select(*columns, LogModel.group_id).where(*new)
+    of_station = (
+        select(*columns, ViewModel.group_id)
+        .join(ViewModel, ViewModel.station_id == LogModel.station_id)
+        .where(*new, LogModel.group_id.is_(None))
+        .distinct()
+    )
+    rows = [*session.execute(plain), *session.execute(of_station)]
+    for row in sorted(rows, key=lambda row: int(row.id)):
+        yield StoredChange(*row)
+
+
+def solved_groups(session: Session, after: int) -> list[tuple[int, int]]:
+    """Dataset and id of each group that got a solution after another one."""
+    statement = (
+        select(GroupModel.dataset_id, GroupModel.id)
+        .join(SolutionModel, SolutionModel.group_id == GroupModel.id)
+        .where(SolutionModel.id > after)
+        .distinct()
+        .order_by(GroupModel.dataset_id, GroupModel.id)
+    )
+    return [(row.dataset_id, row.id) for row in session.execute(statement)]

@@ -1,0 +1,214 @@
+"""Groups: lists, the whole document, what-if, undo and history."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from fastapi import APIRouter, Query, Request, Response
+
+from app.db.store import Store
+from app.errors import NotFoundError
+from app.features.datasets.service import dataset_id
+from app.features.groups import submit
+from app.features.groups import undo as undoing
+from app.features.groups.history import history, read_step
+from app.features.groups.history_schemas import PreviewDocument, PreviewRequest, StepDocument
+from app.features.groups.schemas import GroupDocument
+from app.features.groups.solution_schemas import SolutionDocument
+from app.features.groups.state import GroupState
+from app.features.people.roles import Action, may
+from app.features.queue import service as queue
+from app.features.queue.schemas import (
+    GroupIds,
+    GroupPage,
+    GroupRow,
+    History,
+    LogEntryDocument,
+    Neighbours,
+)
+from app.finite import MAX_ID
+from app.http.access import login_of
+from app.http.conflicts import current_state
+from app.http.cursor import foreign_cursor, paged
+from app.http.deps import (
+    Actor,
+    AppServices,
+    AppStore,
+    DatasetQuery,
+    Id,
+    IfMatch,
+    QueryText,
+    etag_matches,
+)
+from app.http.problem import Responses, responses
+from app.http.respond import document, responds
+
+router = APIRouter(prefix="/groups", tags=["groups"])
+
+MAX_LIMIT = 500
+ETAG = {"ETag": {"description": "The group's state.", "schema": {"type": "string"}}}
+CHANGED: Responses = {200: {"headers": ETAG, "description": "The whole group as it is now."}}
+CONFLICTS = (404, 409, 412, 413, 415, 428)
+
+
+def group_answer(state: GroupState) -> Response:
+    """The document of a group, its ETag in the header."""
+    headers = {"ETag": state.etag, "Cache-Control": "private, no-cache"}
+    return document(GroupDocument.of(state), headers=headers)
+
+
+def load_document(store: Store, group_id: int) -> GroupDocument:
+    """The document of a group as it is now."""
+    return GroupDocument.of(submit.load_solved(store, group_id))
+
+
+def load_document_of_view(store: Store, view_id: int) -> GroupDocument:
+    """The document of the group of a view as it is now."""
+    return GroupDocument.of(submit.load_solved_of_view(store, view_id))
+
+
+@router.get("", operation_id="listGroups", responses=responses(404))
+def list_groups(
+    store: AppStore,
+    request: Request,
+    dataset: DatasetQuery,
+    query: QueryText = "",
+    limit: Annotated[int, Query(ge=1, le=MAX_LIMIT)] = 50,
+    cursor: Annotated[
+        str | None, Query(max_length=500, description="`next` of the page before.")
+    ] = None,
+    start: Annotated[
+        int | None,
+        Query(
+            alias="from",
+            ge=0,
+            le=MAX_ID,
+            description="Position of the first group, from 0, instead of a cursor.",
+        ),
+    ] = None,
+) -> GroupPage:
+    """Groups that match a query, a page at a time.
+
+    To read all of them follow `next`: while others edit, a cursor neither skips a group nor gives
+    it twice. To look at any place of the list say `from`: page 90 costs what page 2 costs, but
+    positions are those of this moment and move when groups come to match or cease to. Such a
+    page has a `next` too.
+    """
+    found = dataset_id(store, dataset)
+    try:
+        page = queue.list_groups(store, found, query, limit, cursor, start)
+    except (OverflowError, UnicodeEncodeError) as error:
+        # A forged cursor can hold what the database cannot.
+        raise foreign_cursor() from error
+    login = login_of(request.scope)
+    judges = login is None or may(login.roles.role_in(found), Action.REVIEW)
+    items = [GroupRow.of(row, judges) for row in page.items]
+    return GroupPage(items=items, next=page.next, total=page.total)
+
+
+@router.get("/ids", operation_id="listGroupIds", responses=responses(404))
+def list_group_ids(
+    store: AppStore,
+    dataset: DatasetQuery,
+    query: QueryText = "",
+    limit: Annotated[int, Query(ge=1, le=queue.MAX_IDS)] = queue.MAX_IDS,
+    start: Annotated[
+        int, Query(alias="from", ge=0, le=MAX_ID, description="Position of the first, from 0.")
+    ] = 0,
+) -> GroupIds:
+    """The ids alone of the groups that match, in the order of the list.
+
+    What `id:12,15,19` in a query takes, and what a loop over a whole dataset needs.
+    """
+    found = queue.list_ids(store, dataset_id(store, dataset), query, limit, start)
+    return GroupIds(ids=list(found.ids), total=found.total)
+
+
+@router.get(
+    "/{group}",
+    operation_id="getGroup",
+    response_model=GroupDocument,
+    responses={**responses(404), 200: {"headers": ETAG}, 304: {"description": "Not changed."}},
+)
+def get_group(group: Id, store: AppStore, request: Request) -> Response:
+    """One group, complete: annotations, solution, verdict."""
+    if "if-none-match" in request.headers:
+        etag = submit.current_etag(store, group)
+        if etag_matches(request, etag):
+            return Response(status_code=304, headers={"ETag": etag})
+    return group_answer(submit.load_solved(store, group))
+
+
+@router.get("/{group}/solution", operation_id="getSolution", responses=responses(404))
+def get_solution(group: Id, store: AppStore) -> SolutionDocument:
+    """The solution of a group."""
+    state = submit.load_solved(store, group)
+    if state.solution is None:
+        raise NotFoundError(f"group {group} has no solution")
+    return SolutionDocument.of(state.solution, state.group, state.dismissed)
+
+
+@router.get(
+    "/{group}/neighbours",
+    operation_id="getNeighbours",
+    response_model=Neighbours,
+    responses=responses(404),
+)
+def get_neighbours(group: Id, store: AppStore, query: QueryText = "") -> queue.Neighbours:
+    """Where the group stands among those that match, and up to five before and after."""
+    return queue.neighbours(store, group, query)
+
+
+@router.get("/{group}/history", operation_id="getHistory", responses=responses(404))
+@paged()
+def get_history(group: Id, store: AppStore) -> History:
+    """Everything that was said about the group and changed of its static cameras, oldest first."""
+    return History(items=[LogEntryDocument.of(entry) for entry in history(store, group)])
+
+
+@router.get("/{group}/history/{entry}", operation_id="getHistoryStep", responses=responses(404))
+def get_step(group: Id, entry: Id, store: AppStore) -> StepDocument:
+    """What one entry of the history has changed: the views that differ, before and after."""
+    return StepDocument.of(read_step(store, group, entry))
+
+
+@router.post(
+    "/{group}/preview",
+    operation_id="previewGroup",
+    response_model=PreviewDocument,
+    responses=responses(404, 409, 413, 415),
+)
+async def preview_group(
+    group: Id, changes: PreviewRequest, services: AppServices, request: Request
+) -> Response:
+    """What the solution would be; nothing is saved."""
+    found = await services.previews.answer(request, group, changes)
+    return Response(found, media_type="application/json")
+
+
+@router.post(
+    "/{group}/undo",
+    operation_id="undoGroup",
+    response_model=GroupDocument,
+    responses={**responses(*CONFLICTS), **CHANGED},
+)
+@responds(group_answer)
+def undo(group: Id, services: AppServices, actor: Actor, if_match: IfMatch) -> GroupState:
+    """Take the last edit back; 409 when there is none."""
+    store = services.store
+    with current_state(lambda: load_document(store, group)):
+        return undoing.undo(store, group, if_match=if_match, actor=actor, paint=services.paint)
+
+
+@router.post(
+    "/{group}/redo",
+    operation_id="redoGroup",
+    response_model=GroupDocument,
+    responses={**responses(*CONFLICTS), **CHANGED},
+)
+@responds(group_answer)
+def redo(group: Id, services: AppServices, actor: Actor, if_match: IfMatch) -> GroupState:
+    """Do again what was undone last; 409 when there is nothing."""
+    store = services.store
+    with current_state(lambda: load_document(store, group)):
+        return undoing.redo(store, group, if_match=if_match, actor=actor, paint=services.paint)

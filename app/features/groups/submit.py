@@ -1,0 +1,402 @@
+"""An edit of one group, from the state that its author saw to the state that is stored."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import NotRequired, TypedDict, Unpack
+
+from app.db.json_columns import Json
+from app.db.log import Entry, append
+from app.db.session import Session, now
+from app.db.store import Store
+from app.errors import NotFoundError, SharedStationError
+from app.features.groups import view_queries as views
+from app.features.groups.ball_noise import keeping_noise, with_noise
+from app.features.groups.edit import STATION_EDITS, Edit, SetPaint, SetPicture, Several, need_view
+from app.features.groups.edit_codec import require_few_points_in_all, step_to_json
+from app.features.groups.queries import StoredGroup, group_of_view
+from app.features.groups.revision_queries import next_revision, save_revision
+from app.features.groups.state import (
+    GroupState,
+    Record,
+    need_group,
+    read_etags,
+    read_record,
+    read_state,
+    require_said,
+    require_unchanged,
+)
+from app.features.groups.view_paint import PaintFollower
+from app.features.independent_annotations import submission_queries as submissions
+from app.features.independent_annotations.queries import take_of_copy
+from app.features.paint.queries import FOLLOWS, PAINT, insert_readings
+from app.features.people.visibility_queries import COPIES
+from app.features.queue.queries import refresh_queue, update_row
+from app.features.solutions.queries import EncodedSolution, insert_solutions, read_solutions
+from app.features.solutions.service import Solve, known_calibrations, solve_encoded
+from app.soccer.group import Group
+from app.soccer.media import Media
+from app.soccer.policy import Policy
+from app.soccer.solution import Calibration, Solution
+from app.solving.solve import solve
+
+
+@dataclass(frozen=True)
+class FoundView:
+    """Where a view belongs and where its frame lies."""
+
+    group_id: int
+    key: str
+    media: Media | None
+    flipped: bool
+    width: int
+    group_key: str
+    static: bool
+    """Whether the camera stands still for all views that share it."""
+
+
+def find_view(store: Store, view_id: int) -> FoundView:
+    """The view of that id.
+
+    Raises:
+        NotFoundError: There is none.
+    """
+    with store.read() as session:
+        found = views.find_view(session, view_id)
+    if found is None:
+        raise NotFoundError(f"there is no view {view_id}")
+    return FoundView(
+        found.group_id,
+        found.key,
+        found.media,
+        found.flipped,
+        found.width,
+        found.group,
+        found.shared,
+    )
+
+
+def require_open(session: Session, dataset_id: int, group_id: int) -> None:
+    """Raise ConflictError where a group is an independent annotation that was submitted."""
+    if dataset_id > COPIES:
+        submissions.require_open(take_of_copy(session, group_id))
+
+
+@dataclass(frozen=True)
+class GroupChange:
+    """One step of a group: its kind and body in the log, and the group that it makes."""
+
+    kind: str
+    body: Json
+    group: Group
+
+
+@dataclass(frozen=True)
+class _Outcome:
+    """A change with all that is saved of it; ``painted`` is its group as it is afterwards."""
+
+    change: GroupChange
+    painted: Group
+    before: Record
+    after: Record
+    solution: Solution
+    encoded: EncodedSolution
+
+
+class How(TypedDict):
+    """How a step is taken.
+
+    Attributes:
+        if_match: ETag of the state that it builds on.
+        actor: Who says so.
+        then: Ends the transaction; default: the request is answered with the group.
+        paint: Reads the paint of edited lines again, as part of it; None: it stays as it is.
+        solve: Solves the group that comes of it.
+    """
+
+    if_match: str
+    actor: str
+    then: NotRequired[Then]
+    paint: NotRequired[PaintFollower | None]
+    solve: NotRequired[Solve]
+
+
+Solver = Callable[[Group, Policy, Mapping[str, Calibration]], Solution]
+Then = Callable[[Session, GroupState], None]
+Find = Callable[[Session], int]
+Plan = Callable[[Session, Record, str], GroupChange]
+
+
+def load(store: Store, group_id: int) -> GroupState:
+    """A group as it is now.
+
+    Raises:
+        NotFoundError: There is no such group.
+    """
+    with store.read() as session:
+        return read_state(session, group_id)
+
+
+def current_etag(store: Store, group_id: int) -> str:
+    """The ETag of a group as it is now; nothing else of it is decoded.
+
+    Raises:
+        NotFoundError: There is no such group.
+    """
+    with store.read() as session:
+        found = read_etags(session, [group_id])
+    if group_id not in found:
+        raise NotFoundError.group(group_id)
+    return found[group_id]
+
+
+def submit(
+    store: Store,
+    group_id: int,
+    edit: Edit,
+    **how: Unpack[How],
+) -> GroupState:
+    """Save an edit and answer with the group as it is then, solved.
+
+    Args:
+        store: The database.
+        group_id: The group.
+        edit: What to change.
+        how: See ``How``.
+
+    Raises:
+        StaleRevisionError: Somebody else was faster.
+        SharedStationError: The edit belongs to a static camera.
+        InputError, NotFoundError: The edit does not fit the group.
+        StorageError: Nothing was saved.
+    """
+    return take_step(store, lambda _session: group_id, _plan_edits(lambda _stored: [edit]), **how)
+
+
+def submit_all(
+    store: Store,
+    group_id: int,
+    edits: Sequence[Edit],
+    **how: Unpack[How],
+) -> GroupState:
+    """``submit`` for several edits of a group, which are one edit: undo takes them back together."""
+    return take_step(store, lambda _session: group_id, _plan_edits(lambda _stored: edits), **how)
+
+
+def submit_view(
+    store: Store,
+    view_id: int,
+    edit_of: Callable[[str], Edit],
+    **how: Unpack[How],
+) -> GroupState:
+    """``submit`` for a view's id: ``edit_of`` makes the edit from the view's key."""
+
+    def edits(stored: StoredGroup) -> list[Edit]:
+        return [edit_of(next(key for key, item in stored.view_ids.items() if item == view_id))]
+
+    def find(session: Session) -> int:
+        return group_of_view(session, view_id)
+
+    return take_step(store, find, _plan_edits(edits), **how)
+
+
+def preview(
+    store: Store,
+    group_id: int,
+    edits_of: Callable[[Group], Sequence[Edit]],
+    paint: PaintFollower | None = None,
+    solve: Solver = solve,
+) -> tuple[Group, Solution]:
+    """The group and its solution as they would be after the edits that ``edits_of`` makes for it.
+
+    Saves nothing, and lines of shared stations may move.
+
+    Raises:
+        NotFoundError: There is no such group.
+        SharedStationError: The picture of a static camera is said to be cropped or stretched.
+    """
+    with store.read() as session:
+        stored = need_group(session, group_id)
+        group = stored.group
+        edits = edits_of(group)
+        require_few_points_in_all(group, edits)
+        for edit in edits:
+            if isinstance(edit, SetPicture):
+                refuse_shared(stored, edit)
+        for edit in edits:
+            group = keeping_noise(group, edit).apply(group)
+        known = known_calibrations(session, [group], stored.policy)
+    if paint is not None:
+        group = paint.follow(group, stored.policy.calibration, known)
+    return group, solve(group, stored.policy, known)
+
+
+def load_solved(store: Store, group_id: int) -> GroupState:
+    """A group as it is now, its solution computed if that was still to do; saves nothing."""
+    state = load(store, group_id)
+    if state.solution is not None:
+        return state
+    _, solution = preview(store, group_id, lambda _group: [])
+    return replace(state, solution=solution)
+
+
+def load_solved_of_view(store: Store, view_id: int) -> GroupState:
+    """``load_solved`` for the group of a view."""
+    with store.read() as session:
+        group_id = group_of_view(session, view_id)
+    return load_solved(store, group_id)
+
+
+def solved(store: Store, group_id: int) -> GroupState:
+    """A group as it is now, its solution computed and kept if that was still to do."""
+    record, solution = read_solved(store, group_id)
+    return record.state(solution)
+
+
+def solved_in(session: Session, group_id: int) -> GroupState:
+    """A group as a session sees it, its solution computed if that was still to do; saves nothing."""
+    record = read_record(session, group_id)
+    solution = read_solutions(session, [record.solution_key]).get(group_id)
+    if solution is None:
+        group, policy = record.stored.group, record.stored.policy
+        solution = solve(group, policy, known_calibrations(session, [group], policy))
+    return record.state(solution)
+
+
+def read_solved(
+    store: Store, group_id: int, *, needed: bool = True
+) -> tuple[Record, Solution | None]:
+    """A group's record and its solution, which is computed and kept where it is needed."""
+    with store.read() as session:
+        record = read_record(session, group_id)
+        stored = record.stored
+        solution = read_solutions(session, [record.solution_key]).get(group_id)
+        if solution is not None or not needed:
+            return record, solution
+        known = known_calibrations(session, [stored.group], stored.policy)
+    solution, encoded = solve_encoded(stored.group, stored.policy, known)
+    with store.write() as session:
+        insert_solutions(session, [(record.solution_key, encoded)])
+        refresh_queue(session, [group_id])
+    return record, solution
+
+
+def refuse_shared(stored: StoredGroup, edit: Edit) -> None:
+    """Refuse an edit that belongs to the station when many views share that."""
+    if not isinstance(edit, STATION_EDITS):
+        return
+    station = need_view(stored.group, edit.view).station
+    if station.shared:
+        what = "picture" if isinstance(edit, SetPicture) else "lines"
+        raise SharedStationError(edit.view, stored.stations[edit.view].id, station.key, what)
+
+
+def take_step(
+    store: Store,
+    find: Find,
+    plan: Plan,
+    *,
+    if_match: str,
+    actor: str,
+    then: Then = Session.respond,
+    paint: PaintFollower | None = None,
+    solve: Solve = solve_encoded,
+) -> GroupState:
+    """Save a step of a group (an edit, an undo, a redo) and answer with the group as it is then.
+
+    Args:
+        store: The database.
+        find: Finds the group.
+        plan: Makes the step for the state that it builds on.
+        if_match, actor, then, paint, solve: See ``How``.
+
+    Raises:
+        StaleRevisionError: Somebody else was faster.
+        ReviewError: As ``find`` and ``plan`` raise it.
+        StorageError: Nothing was saved.
+    """
+    while True:
+        with store.read() as session:
+            before = read_record(session, find(session))
+            what = f"group {before.stored.group.key}"
+            require_said(session, before.stored.id, before.said, if_match, what)
+            change = plan(session, before, actor)
+            if change.group == before.stored.group:
+                found = read_solutions(session, [before.solution_key])
+                return before.state(found.get(before.stored.id))
+            known = known_calibrations(session, [change.group], before.stored.policy)
+        painted = change.group
+        if paint is not None:
+            painted = paint.follow(painted, before.stored.policy.calibration, known)
+        outcome = _outcome(before, change, painted, solve(painted, before.stored.policy, known))
+        state = outcome.after.state(outcome.solution)
+        with store.write() as session:
+            judge = require_unchanged(session, state.id, if_match, what)
+            require_open(session, state.dataset_id, state.id)
+            if judge == before.stored.policy.hash:
+                _save(session, outcome, actor)
+                then(session, state)
+                return state
+        # Another policy judges the dataset by now, so another solution belongs to the edit.
+
+
+def _outcome(
+    before: Record, change: GroupChange, painted: Group, result: tuple[Solution, EncodedSolution]
+) -> _Outcome:
+    at = now()
+    stored = next_revision(before.stored, change.group, at)
+    if painted is not change.group:
+        stored = next_revision(stored, painted, at)
+    after = replace(before, stored=stored, stacks=before.stacks.then(change.kind))
+    return _Outcome(change, painted, before, after, *result)
+
+
+def _save(session: Session, outcome: _Outcome, actor: str) -> None:
+    change, after = outcome.change, outcome.after
+    stored = after.stored
+    save_revision(session, outcome.before.stored, stored)
+    where = stored.dataset_id, stored.id
+    entries = [Entry(change.kind, actor, stored.changed, change.body, *where)]
+    if outcome.painted is not change.group:
+        insert_readings(session, stored.dataset_id, outcome.painted.paint.values())
+        entries.append(Entry(PAINT, actor, stored.changed, _read_beside(outcome), *where))
+    append(session, entries)
+    insert_solutions(session, [(after.solution_key, outcome.encoded)])
+    if after.dismissals.last:
+        refresh_queue(session, [stored.id])
+        return
+    noticed = [item.kind for item in after.noticed]
+    update_row(session, stored, after.newest_verdict, noticed, outcome.encoded.summary)
+
+
+def _read_beside(outcome: _Outcome) -> Json:
+    """Body of the entry that says what was read of the paint with a change."""
+    before = outcome.change.group
+    edit = SetPaint(outcome.painted.paint)
+    body = step_to_json(edit, edit.inverse(before))
+    return {FOLLOWS: outcome.change.kind, **body}
+
+
+def checked_edit(stored: StoredGroup, edits: Sequence[Edit], actor: str) -> Edit:
+    """Some edits of a group as the one edit that is saved, with the noise of who makes them.
+
+    Raises:
+        SharedStationError: One of them belongs to a static camera.
+        TooManyPointsError: They draw too many points.
+    """
+    made = [with_noise(stored.factors, stored.group, edit, actor) for edit in edits]
+    for edit in made:
+        refuse_shared(stored, edit)
+    require_few_points_in_all(stored.group, made)
+    return made[0] if len(made) == 1 else Several(tuple(made))
+
+
+def _plan_edits(edits_of: Callable[[StoredGroup], Sequence[Edit]]) -> Plan:
+    def plan(_session: Session, record: Record, actor: str) -> GroupChange:
+        group = record.stored.group
+        edit = checked_edit(record.stored, edits_of(record.stored), actor)
+        body = step_to_json(edit, edit.inverse(group))
+        return GroupChange("edit", body, edit.apply(group))
+
+    return plan

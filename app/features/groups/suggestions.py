@@ -1,0 +1,295 @@
+"""Remedies: the small edits with which a group would pass, each tried out by the solver itself."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from app.features.groups.edit import Edit, SetLines
+from app.features.groups.suggested_edits import (
+    Guide,
+    Offer,
+    ball_at,
+    edit_of_fix,
+    guide,
+    offers,
+    rank,
+    sentence,
+)
+from app.geometry.arrays import FloatArray
+from app.soccer.finding import Fix
+from app.soccer.frames import ImagePoint
+from app.soccer.group import Group, View, view_letter
+from app.soccer.policy import Policy
+from app.soccer.solution import Calibration, Gate, MarkingFit, Solution, ViewSolution
+from app.solving.jaccard import project_markings
+from app.solving.numbers import pixels
+from app.solving.resect import REFERENCE_DIAGONAL
+from app.solving.solve import solve
+
+MOST_TRIALS = 24
+"""A person waits for the answer; what helps is nearly always among the first."""
+MARKINGS_PER_VIEW = 4
+_CLICKS = 8
+"""As many points a person would put on a marking."""
+STUB_PX = 5.0
+"""At 960 x 540: shorter stubs of markings are not drawn by people."""
+MIN_POINTS_LEFT = 2
+MAX_HEIGHT_M = 30.0
+MAX_POINT_SLIP_PERCENT = 7.0
+MAX_BALL_SLIP_PERCENT = 3.0
+"""How far a click can plausibly be off, in per cent of the diagonal; beyond it something else is
+wrong, or the ball is another one."""
+BETTER_CAUSES = frozenset(
+    {
+        "sides_swapped",
+        "wrong_label",
+        "several_balls",
+        "under_constrained",
+        "picture_geometry",
+        "camera_size",
+        "paint_disagrees",
+        "implausible_camera",
+    }
+)
+"""Findings that explain why rays do not meet: then no ball is moved to make them meet."""
+RAY_DEPTHS_M = np.geomspace(1.0, 400.0, 2000)
+"""Where balls are looked for along a ray; a step is a third of a per cent of the distance."""
+
+
+@dataclass(frozen=True)
+class Remedy:
+    """What would make a group pass, or bring the gate that fails nearer to passing.
+
+    Attributes:
+        gate: The gate that fails now.
+        view: View that is edited.
+        sentence: The condition under which the group passes, to be read after "would pass if".
+        fix: The edit, or (``draw_marking``, ``look_ball``) where a person should look and draw.
+        point: Where ``move_point`` puts its point and ``look_ball`` would see the ball, pixels;
+            None for other actions.
+        offers: The edits that carry it out; none where only a person can.
+        guide: Where that person is led.
+        value: What the gate would measure.
+        passes: Whether the whole group would pass.
+    """
+
+    gate: str
+    view: str | None
+    sentence: str
+    fix: Fix
+    point: ImagePoint | None
+    offers: tuple[Offer, ...]
+    guide: Guide | None
+    value: float | None
+    passes: bool
+
+
+@dataclass(frozen=True)
+class _Idea:
+    """A remedy before it is tried."""
+
+    sentence: str
+    fix: Fix
+    point: ImagePoint | None = None
+    trial: Edit | None = None
+    """What a person would draw; None: the fix itself is the edit."""
+
+
+def find_remedies(group: Group, policy: Policy, solution: Solution) -> list[Remedy]:
+    """What would make a group pass, the gentlest first; nothing for a group that passes.
+
+    Args:
+        group: The group as it is.
+        policy: The thresholds.
+        solution: Its solution under that policy.
+    """
+    failing = solution.first_failing
+    if failing is None:
+        return []
+    known = {view.calibration_key: view.calibration for view in solution.views}
+    found = []
+    for idea in _distinct(group, solution, failing)[:MOST_TRIALS]:
+        remedy = _try(group, policy, solution, failing, idea, known)
+        if remedy is not None:
+            found.append((not remedy.passes, rank(idea.fix), remedy))
+    return [remedy for *_, remedy in sorted(found, key=lambda item: item[:2])]
+
+
+def _try(
+    group: Group,
+    policy: Policy,
+    solution: Solution,
+    failing: Gate,
+    idea: _Idea,
+    known: dict[str, Calibration],
+) -> Remedy | None:
+    """The remedy, or None where the edit changes nothing for the better."""
+    edit = idea.trial or edit_of_fix(group, idea.fix, idea.point)
+    if edit is None:
+        return None
+    then = solve(edit.apply(group), policy, known)
+    gate = next(gate for gate in then.gates if gate.name == failing.name)
+    if not then.passes and not _is_nearer(failing, gate, solution, then, idea.fix.view):
+        return None
+    return Remedy(
+        gate=failing.name,
+        view=idea.fix.view,
+        sentence=idea.sentence,
+        fix=idea.fix,
+        point=idea.point,
+        offers=offers(group, idea.fix, idea.point),
+        guide=guide(idea.fix, idea.point),
+        value=gate.value,
+        passes=then.passes,
+    )
+
+
+def _is_nearer(before: Gate, after: Gate, now: Solution, then: Solution, view: str | None) -> bool:
+    """Whether the failing gate passes, or the edited view's JaC rises."""
+    if after.passed and not before.passed:
+        return True
+    if before.name != "jac" or view is None:
+        return False
+    old, new = now.view(view), then.view(view)
+    if old is None or new is None or not old.calibration.jac or not new.calibration.jac:
+        return False
+    return new.calibration.jac[0] > old.calibration.jac[0]
+
+
+def _distinct(group: Group, solution: Solution, failing: Gate) -> list[_Idea]:
+    """All ideas once, the gentlest first."""
+    ideas: dict[Fix, _Idea] = {}
+    for idea in (*_of_findings(group, solution), *_of_gate(group, solution, failing)):
+        ideas.setdefault(idea.fix, idea)
+    return sorted(ideas.values(), key=lambda idea: rank(idea.fix))
+
+
+def _of_findings(group: Group, solution: Solution) -> Iterator[_Idea]:
+    for finding in solution.findings:
+        fix = finding.fix
+        view = None if fix is None or fix.view is None else group.view(fix.view)
+        if fix is not None and view is not None:
+            yield _Idea(sentence(group, fix), fix)
+
+
+def _of_gate(group: Group, solution: Solution, failing: Gate) -> Iterator[_Idea]:
+    for view in group.views:
+        solved = solution.view(view.key)
+        if solved is None:
+            continue
+        if not view.included:
+            fix = Fix("include_view", view.key)
+            yield _Idea(sentence(group, fix), fix)
+        elif solved.failed == "jac":
+            yield from _of_undrawn(group, view, solved)
+            yield from _of_lines(group, view, solved)
+    explained = any(finding.kind in BETTER_CAUSES for finding in solution.findings)
+    if failing.name == "reprojection" and not explained:
+        yield from _of_balls(group, solution)
+
+
+def _of_undrawn(group: Group, view: View, solved: ViewSolution) -> Iterator[_Idea]:
+    """Draw what the camera sees and nobody has drawn: all of it, the longest first; stubs that
+    nobody can see are said not to be visible, for two clicks anywhere would do as well."""
+    # What stands there under a wrong name is relabelled, not drawn again.
+    named = {suspect.suggested for suspect in solved.calibration.suspects}
+    undrawn = sorted(
+        (
+            fit
+            for fit in solved.calibration.markings
+            if _is_undrawn(fit) and fit.marking not in named
+        ),
+        key=lambda fit: fit.length_px,
+        reverse=True,
+    )
+    camera = solved.calibration.camera
+    shortest = STUB_PX * view.size.diagonal / REFERENCE_DIAGONAL
+    for fit in undrawn:
+        if fit.length_px < shortest:
+            hide = Fix("hide_marking", view.key, fit.marking)
+            yield _Idea(sentence(group, hide, max(fit.length_px, 1.0)), hide)
+    if not undrawn or undrawn[0].length_px < shortest or camera is None:
+        return
+    letter = view_letter(group.views.index(view))
+    names = [f"{fit.marking} (visible over {pixels(max(fit.length_px, 1))})" for fit in undrawn]
+    verb = "were" if len(names) > 1 else "was"
+    said = f"{' and '.join(names)} {verb} drawn in {letter}"
+    fitted = group.pitch.with_goal(solved.calibration.goal)
+    seen = project_markings(camera, fitted, view.size)
+    drawn = {fit.marking: _clicks_on(seen[fit.marking]) for fit in undrawn}
+    fix = Fix("draw_marking", view.key, undrawn[0].marking)
+    yield _Idea(said, fix, trial=SetLines(view.key, drawn))
+
+
+def _is_undrawn(fit: MarkingFit) -> bool:
+    return fit.outcome == "fp" and not fit.distances_px
+
+
+def _clicks_on(polyline: FloatArray) -> tuple[ImagePoint, ...]:
+    return tuple(map(ImagePoint._make, polyline[:: len(polyline) // _CLICKS + 1].tolist()))
+
+
+def _of_lines(group: Group, view: View, solved: ViewSolution) -> Iterator[_Idea]:
+    """Move or drop the worst point, or drop the marking, for each marking that does not count."""
+    off = [fit for fit in solved.calibration.markings if fit.outcome != "tp" and _largest(fit)]
+    for fit in sorted(off, key=_largest, reverse=True)[:MARKINGS_PER_VIEW]:
+        index = max(range(len(fit.distances_px)), key=fit.distances_px.__getitem__)
+        for action in ("move_point", "drop_point", "drop_marking"):
+            if action == "drop_point" and len(fit.distances_px) <= MIN_POINTS_LEFT:
+                continue
+            fix = Fix(
+                action, view.key, fit.marking, index=None if action == "drop_marking" else index
+            )
+            slip = MAX_POINT_SLIP_PERCENT / 100 * view.size.diagonal
+            if action == "move_point" and fit.distances_px[index] > slip:
+                continue
+            point = fit.nearest[index] if action == "move_point" else None
+            yield _Idea(sentence(group, fix, fit.distances_px[index]), fix, point)
+
+
+def _of_balls(group: Group, solution: Solution) -> Iterator[_Idea]:
+    """Look for the ball where the other view's ray passes, in either view of a pair.
+
+    Nobody moves it there by a key: a ball that is put onto a ray meets it, right or wrong.
+    """
+    for pair in solution.pairs:
+        for moved, other in ((pair.a, pair.b), (pair.b, pair.a)):
+            view = group.view(moved)
+            point = _beside_ray(group, solution, moved, other)
+            if view is None or point is None or view.ball is None or view.ball.center is None:
+                continue
+            apart = math.dist(point, view.ball.center)
+            if apart > MAX_BALL_SLIP_PERCENT / 100 * view.size.diagonal:
+                continue
+            fix = Fix("look_ball", moved, to=other)
+            trial = ball_at(moved, view.ball, point)
+            yield _Idea(sentence(group, fix, apart), fix, point, trial)
+
+
+def _beside_ray(group: Group, solution: Solution, moved: str, other: str) -> ImagePoint | None:
+    """The place nearest to a view's ball where a ball on the other view's ray would be seen."""
+    views = [group.view(key) for key in (moved, other)]
+    solved = [solution.view(key) for key in (moved, other)]
+    cameras = [None if one is None else one.calibration.camera for one in solved]
+    centers = [None if one is None or one.ball is None else one.ball.center for one in views]
+    camera, ray_camera = cameras
+    center, ray_center = centers
+    if camera is None or ray_camera is None or center is None or ray_center is None:
+        return None
+    ray = ray_camera.rays(np.array([ray_center]))[0]
+    places = ray_camera.position + RAY_DEPTHS_M[:, None] * ray
+    over_pitch = (places[:, 2] <= 0) & (places[:, 2] >= -MAX_HEIGHT_M)
+    pixels = camera.project(places[over_pitch])
+    pixels = pixels[np.isfinite(pixels).all(axis=1)]
+    if not len(pixels):
+        return None
+    nearest = pixels[np.argmin(np.hypot(*(pixels - np.array(center)).T))]
+    return ImagePoint(float(nearest[0]), float(nearest[1]))
+
+
+def _largest(fit: MarkingFit) -> float:
+    return max(fit.distances_px, default=0.0)

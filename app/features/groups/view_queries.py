@@ -1,0 +1,303 @@
+"""Views and stations: rows to values and back."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+from sqlalchemy import ColumnElement, select, update
+
+from app.db.json_columns import as_written, parse
+from app.db.session import Session
+from app.features.datasets.tables import GroupModel, StationModel, ViewModel
+from app.features.groups import codecs
+from app.features.groups.codecs import ball_from_json
+from app.features.groups.digest import station_digest
+from app.features.groups.insert_queries import station_values
+from app.features.queue.listing_queries import Condition
+from app.features.queue.tables import QueueModel
+from app.geometry.camera import Camera
+from app.soccer.annotation import BallAnnotation, Lines
+from app.soccer.frames import ImageSize
+from app.soccer.group import Station
+from app.soccer.media import Media
+from app.soccer.picture import PictureGeometry
+from app.soccer.pitch import Pitch
+
+
+class _Framed:
+    """A row with the place of a frame."""
+
+    media_path: str | None
+    media_member: str | None
+    media_frame: int | None
+
+    @property
+    def media(self) -> Media | None:
+        """Its frame, where it has one."""
+        if self.media_path is None:
+            return None
+        return Media(self.media_path, self.media_member, self.media_frame)
+
+
+@dataclass(frozen=True)
+class StoredView(_Framed):
+    """A view with its annotated size in pixels, its frame, and its balls as they are stored.
+
+    Attributes:
+        group: Key; ``station`` that of its camera, which is ``shared`` where it stands still.
+    """
+
+    id: int
+    key: str
+    group_id: int
+    group: str
+    match: str
+    station_id: int
+    station: str
+    shared: bool
+    width: int
+    height: int
+    flipped: bool
+    media_path: str | None
+    media_member: str | None
+    media_frame: int | None
+    said: str
+
+    @property
+    def balls(self) -> list[BallAnnotation]:
+        """The balls that were annotated in it."""
+        with as_written():
+            return [ball_from_json(value) for value in parse(self.said)]
+
+
+def dataset_views(
+    session: Session,
+    dataset_id: int,
+    conditions: Iterable[Condition] = (),
+    *,
+    ids: Collection[int] | None = None,
+    without_ball: bool = False,
+) -> list[StoredView]:
+    """The views of a dataset in its order.
+
+    Args:
+        session: Any session.
+        dataset_id: The dataset.
+        conditions: Of a query, on the group's row in the queue.
+        ids: Only these views; None: all.
+        without_ball: Only those in which nobody annotated a ball.
+    """
+    asked = list(conditions)
+    if asked:
+        asked.append(QueueModel.group_id == GroupModel.id)
+    where = [GroupModel.dataset_id == dataset_id, *asked]
+    if ids is not None:
+        where.append(ViewModel.id.in_(ids))
+    if without_ball:
+        where.append(ViewModel.balls == "[]")
+    return _views(session, *where)
+
+
+@dataclass(frozen=True)
+class NamedView(_Framed):
+    """What names the files of a view in an export."""
+
+    group_id: int
+    group: str
+    match: str
+    split: str
+    key: str
+    station: str
+    shared: bool
+    width: int
+    height: int
+    flipped: bool
+    media_path: str | None
+    media_member: str | None
+    media_frame: int | None
+
+
+def named_views(session: Session, group_ids: Sequence[int]) -> list[NamedView]:
+    """The views of a few hundred groups in the order of their dataset."""
+    view, group, station = ViewModel, GroupModel, StationModel
+    statement = (
+        select(
+            group.id, group.key, group.match, group.split, view.key, station.key,
+            station.shared, station.width, station.height, station.flipped, view.media_path,
+            view.media_member, view.media_frame,
+        )
+        .join(group, group.id == view.group_id)
+        .join(station, station.id == view.station_id)
+        .where(group.id.in_(group_ids))
+        .order_by(group.number, view.position)
+    )  # fmt: skip
+    rows: Iterable[Any] = session.execute(statement)
+    return [NamedView(*row) for row in rows]
+
+
+def frame_files(session: Session, dataset_id: int) -> list[str]:
+    """The files that the frames of a dataset lie in, each once."""
+    statement = select(ViewModel.media_path).where(ViewModel.media_path.is_not(None)).distinct()
+    statement = statement.join(GroupModel, GroupModel.id == ViewModel.group_id)
+    found = session.scalars(statement.where(GroupModel.dataset_id == dataset_id))
+    return [path for path in found if path is not None]
+
+
+def group_views(session: Session, group_id: int) -> list[StoredView]:
+    """The views of a group in their order."""
+    return _views(session, ViewModel.group_id == group_id)
+
+
+def find_view(session: Session, view_id: int) -> StoredView | None:
+    """One view by its id."""
+    return next(iter(_views(session, ViewModel.id == view_id)), None)
+
+
+def group_dataset(session: Session, group_id: int) -> int | None:
+    """Id of the dataset of a group."""
+    return session.scalar(select(GroupModel.dataset_id).where(GroupModel.id == group_id))
+
+
+def present_ids(
+    session: Session, dataset_id: int, keys: Collection[str]
+) -> dict[str, tuple[int, dict[str, int]]]:
+    """Id of each group and of its views, by their keys."""
+    statement = (
+        select(GroupModel.key, GroupModel.id, ViewModel.key, ViewModel.id)
+        .join(ViewModel, ViewModel.group_id == GroupModel.id)
+        .where(GroupModel.dataset_id == dataset_id, GroupModel.key.in_(keys))
+    )
+    found: dict[str, tuple[int, dict[str, int]]] = {}
+    for group, group_id, view, view_id in session.execute(statement):
+        found.setdefault(group, (group_id, {}))[1][view] = view_id
+    return found
+
+
+def _views(session: Session, *where: ColumnElement[bool]) -> list[StoredView]:
+    view, group, station = ViewModel, GroupModel, StationModel
+    statement = (
+        select(
+            view.id, view.key, group.id, group.key, group.match, station.id, station.key,
+            station.shared, station.width, station.height, station.flipped, view.media_path,
+            view.media_member, view.media_frame, view.balls,
+        )
+        .join(group, group.id == view.group_id)
+        .join(station, station.id == view.station_id)
+        .where(*where)
+        .order_by(group.number, view.position)
+    )  # fmt: skip
+    rows: Iterable[Any] = session.execute(statement)
+    return [StoredView(*row) for row in rows]
+
+
+@dataclass(frozen=True)
+class StoredStation:
+    """A station with its row's keeping; ``edited`` says that a person changed it."""
+
+    id: int
+    dataset_id: int
+    revision: int
+    station: Station
+    digest: str
+    source_digest: str
+
+    @property
+    def edited(self) -> bool:
+        """Whether it differs from what its dataset brought."""
+        return self.digest != self.source_digest
+
+
+def read_stations(session: Session, ids: Iterable[int]) -> dict[int, StoredStation]:
+    """Stations by id."""
+    statement = select(*StationModel.__table__.columns).where(StationModel.id.in_(list(ids)))
+    return {row.id: stored_station(row) for row in session.execute(statement)}
+
+
+def stored_station(row: Any) -> StoredStation:
+    """A station from all columns of its row."""
+    station = Station(
+        key=row.key,
+        size=ImageSize(row.width, row.height),
+        shared=row.shared,
+        lines=_lines(row.lines),
+        given=None if row.given is None else _camera(row.given),
+        calibration=row.calibration,
+        flipped=row.flipped,
+        given_covariance=None if row.given is None else _covariance(row.given),
+        picture=None if row.picture is None else _picture(row.picture),
+        proposed=() if row.proposed is None else _proposed(row.proposed),
+        not_visible=_not_visible(row.lines),
+    )
+    return StoredStation(
+        row.id, row.dataset_id, row.revision, station, row.digest, row.source_digest
+    )
+
+
+def save_station(
+    session: Session, stored: StoredStation, station: Station, *, source: Station | None = None
+) -> None:
+    """Write the next revision of a station; its groups' hashes are the caller's to refresh.
+
+    ``source`` is the station as it would be had nobody edited it, where the dataset changed.
+    """
+    values = {**station_values(station), "revision": stored.revision + 1}
+    if source is not None:
+        values["source_digest"] = station_digest(source)
+    session.execute(update(StationModel).where(StationModel.id == stored.id).values(values))
+
+
+def groups_of_station(session: Session, station_id: int) -> list[int]:
+    """Ids of the groups that a station's views belong to."""
+    statement = select(ViewModel.group_id).where(ViewModel.station_id == station_id).distinct()
+    return list(session.scalars(statement.order_by(ViewModel.group_id)))
+
+
+def station_pitches(session: Session, dataset_id: int) -> list[tuple[int, Pitch]]:
+    """Ids of a dataset's static cameras with each size of pitch that their groups have."""
+    statement = (
+        select(StationModel.id, GroupModel.pitch_length, GroupModel.pitch_width)
+        .join(ViewModel, ViewModel.station_id == StationModel.id)
+        .join(GroupModel, GroupModel.id == ViewModel.group_id)
+        .where(StationModel.dataset_id == dataset_id, StationModel.shared)
+        .distinct()
+    )
+    return [(station, Pitch(*size)) for station, *size in session.execute(statement)]
+
+
+@lru_cache(maxsize=1024)
+def _lines(text: str) -> Lines:
+    with as_written():
+        return codecs.lines_from_json(parse(text))
+
+
+@lru_cache(maxsize=1024)
+def _not_visible(text: str) -> tuple[str, ...]:
+    with as_written():
+        return codecs.not_visible_from_json(parse(text))
+
+
+@lru_cache(maxsize=1024)
+def _camera(text: str) -> Camera:
+    with as_written():
+        return codecs.camera_from_json(parse(text))
+
+
+@lru_cache(maxsize=1024)
+def _covariance(text: str) -> tuple[float, ...] | None:
+    with as_written():
+        return codecs.covariance_from_json(parse(text).get("covariance"))
+
+
+@lru_cache(maxsize=256)
+def _proposed(text: str) -> tuple[str, ...]:
+    with as_written():
+        return tuple(map(str, parse(text)))
+
+
+@lru_cache(maxsize=256)
+def _picture(text: str) -> PictureGeometry | None:
+    with as_written():
+        return codecs.picture_from_json(parse(text))

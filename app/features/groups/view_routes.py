@@ -1,0 +1,279 @@
+"""Views: their lines, their ball, whether they take part, and their frame."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from functools import partial
+from typing import Annotated
+
+from anyio import to_thread
+from fastapi import APIRouter, Body, Query, Request, Response
+
+from app.errors import ImageError, NotFoundError, StorageError, TooLargeError
+from app.features.groups.edit import (
+    Edit,
+    IncludeView,
+    SetBall,
+    SetCalibrationSource,
+    SetLines,
+    SetPicture,
+)
+from app.features.groups.routes import CHANGED, CONFLICTS, group_answer, load_document_of_view
+from app.features.groups.schemas import (
+    BallEdit,
+    GroupDocument,
+    LinesEdit,
+    NeighbourList,
+    ViewEdit,
+    frames_away,
+)
+from app.features.groups.state import GroupState
+from app.features.groups.submit import FoundView, find_view, submit_view
+from app.features.groups.view_paint import NO_FRAME_HINT
+from app.features.solutions.service import Solve, solve_encoded
+from app.http.conflicts import current_state
+from app.http.cursor import paged
+from app.http.deps import Actor, AppServices, Id, IfMatch, etag_matches
+from app.http.problem import Responses, responses
+from app.http.request_limits import is_large
+from app.http.respond import responds
+from app.http.services import Services
+from app.media.frames import Frames, SentPicture
+from app.soccer.media import FARTHEST, Media
+from app.worker_process import WorkerEnded
+
+router = APIRouter(prefix="/views", tags=["views"])
+
+WIDTH_STEP = 16
+"""Asked widths are rounded up to a multiple, so that few sizes fill the cache."""
+MIN_WIDTH, MAX_WIDTH = 16, 4096
+SECONDS = 3600
+CLIENT_GONE = 499
+"""What the log calls the answer that nobody reads."""
+NO_NEIGHBOURS = "This dataset has no frames before or after this one."
+IMAGES: Responses = {
+    200: {
+        "description": "The frame as JPEG, PNG or WebP.",
+        "content": {
+            kind: {"schema": {"type": "string", "format": "binary"}}
+            for kind in ("image/jpeg", "image/png", "image/webp")
+        },
+        "headers": {"ETag": {"description": "Of these bytes.", "schema": {"type": "string"}}},
+    },
+    304: {"description": "Not changed."},
+}
+
+
+@router.patch(
+    "/{view}/lines",
+    operation_id="setViewLines",
+    response_model=GroupDocument,
+    responses={**responses(*CONFLICTS), **CHANGED},
+)
+@responds(group_answer)
+def patch_lines(
+    view: Id,
+    lines: LinesEdit,
+    services: AppServices,
+    actor: Actor,
+    if_match: IfMatch,
+    request: Request,
+) -> GroupState:
+    """Draw, move or delete markings; 409 names the station when the camera is static."""
+    said = (lines.points(), tuple(lines.proposed), tuple(lines.not_visible))
+
+    def edit(key: str) -> Edit:
+        return SetLines(key, *said)
+
+    apart = partial(services.large.run, solve_encoded)
+    solve = apart if is_large(request.scope) else solve_encoded
+    return _submit(services, view, edit, if_match, actor, solve)
+
+
+@router.patch(
+    "/{view}/ball",
+    operation_id="setViewBall",
+    response_model=GroupDocument,
+    responses={**responses(*CONFLICTS), **CHANGED},
+)
+@responds(group_answer)
+def patch_ball(
+    view: Id,
+    ball: Annotated[BallEdit | None, Body(description="null: no ball is annotated.")],
+    services: AppServices,
+    actor: Actor,
+    if_match: IfMatch,
+) -> GroupState:
+    """Say where the ball is in this view, that it is out of view, or that there is none."""
+    said = None if ball is None else ball.ball()
+    return _submit(services, view, lambda key: SetBall(key, said), if_match, actor)
+
+
+@router.patch(
+    "/{view}",
+    operation_id="changeView",
+    response_model=GroupDocument,
+    responses={**responses(*CONFLICTS), **CHANGED},
+)
+@responds(group_answer)
+def patch_view(
+    view: Id, change: ViewEdit, services: AppServices, actor: Actor, if_match: IfMatch
+) -> GroupState:
+    """Leave the view out and say why, take it in again, choose its calibration, say its picture."""
+
+    def edit(key: str) -> Edit:
+        if "calibration" in change.model_fields_set:
+            return SetCalibrationSource(key, change.calibration)
+        if "picture" in change.model_fields_set:
+            picture = change.picture
+            return SetPicture(key, None if picture is None else picture.picture())
+        return IncludeView(key, change.included, change.reason, change.note)
+
+    return _submit(services, view, edit, if_match, actor)
+
+
+def _submit(
+    services: Services,
+    view: int,
+    edit_of: Callable[[str], Edit],
+    if_match: str,
+    actor: str,
+    solve: Solve = solve_encoded,
+) -> GroupState:
+    store, paint = services.store, services.paint
+    with current_state(lambda: load_document_of_view(store, view)):
+        return submit_view(
+            store, view, edit_of, if_match=if_match, actor=actor, paint=paint, solve=solve
+        )
+
+
+@router.get(
+    "/{view}/image",
+    operation_id="getImage",
+    response_class=Response,
+    responses={**responses(404, 413, 503), **IMAGES},
+)
+async def get_image(
+    view: Id,
+    services: AppServices,
+    request: Request,
+    width: Annotated[
+        int | None,
+        Query(ge=1, le=100_000, description="Wanted width in pixels; never enlarged."),
+    ] = None,
+    offset: Annotated[
+        int,
+        Query(
+            ge=-FARTHEST,
+            le=FARTHEST,
+            description="So many frames later of the same camera; `neighbours` lists which exist.",
+        ),
+    ] = 0,
+) -> Response:
+    """The frame of a view, or one just before or after it, scaled down when a width is given."""
+    found = await to_thread.run_sync(find_view, services.store, view)
+    if offset:
+        around = await _neighbours(request, services.frames, found)
+        if around is None:
+            return Response(status_code=CLIENT_GONE)
+        found = replace(found, media=_so_far_away(found, around, offset))
+    picture = await _picture(request, services.frames, found, clamp_width(width))
+    if picture is None:
+        return Response(status_code=CLIENT_GONE)
+    etag = f'"{picture.digest}"'
+    headers = {"ETag": etag, "Cache-Control": f"private, max-age={SECONDS}"}
+    if etag_matches(request, etag):
+        return Response(status_code=304, headers=headers)
+    return Response(picture.data, media_type=picture.kind, headers=headers)
+
+
+@router.get(
+    "/{view}/neighbours",
+    operation_id="getFramesAround",
+    response_model=NeighbourList,
+    responses=responses(404, 503),
+)
+@paged()
+async def get_neighbours(
+    view: Id, services: AppServices, request: Request
+) -> NeighbourList | Response:
+    """The frames of the same camera just before and after a view's, where they are on disk.
+
+    Only videos and folders of frames that are numbered by time have them: the files of most
+    datasets are numbered by action.
+    """
+    found = await to_thread.run_sync(find_view, services.store, view)
+    around = await _neighbours(request, services.frames, found)
+    if around is None:
+        return Response(status_code=CLIENT_GONE)
+    return NeighbourList.of(view, sorted(around), NO_NEIGHBOURS)
+
+
+async def _neighbours(request: Request, frames: Frames, view: FoundView) -> dict[int, Media] | None:
+    """Where the frames before and after a view's lie, by how many frames later.
+
+    None where nobody waits for it any more.
+    """
+    if view.media is None:
+        return {}
+    try:
+        if view.media.frame is not None:
+            indexing = await to_thread.run_sync(frames.ask_fetch, view.media)
+            if indexing is not None and not await indexing.result_unless(request.is_disconnected):
+                return None
+        task = frames.ask_neighbours(view.media, view.group_key, view.static)
+        found: dict[int, Media] | None = await task.result_unless(request.is_disconnected)
+    except (WorkerEnded, NotFoundError, ImageError, TooLargeError, StorageError):
+        return {}
+    return found
+
+
+def _so_far_away(view: FoundView, around: dict[int, Media], offset: int) -> Media:
+    """The frame so many frames later."""
+    if not around:
+        raise NotFoundError(f"view {view.key}: {NO_NEIGHBOURS}")
+    if offset not in around:
+        raise NotFoundError(f"view {view.key}: there is no frame {frames_away(offset)}")
+    return around[offset]
+
+
+async def _picture(
+    request: Request, frames: Frames, view: FoundView, width: int | None
+) -> SentPicture | None:
+    """The frame, or None where nobody waits for it any more.
+
+    What is wrong with it is said with the view that it belongs to.
+    """
+    if view.media is None:
+        raise NotFoundError("this view has no frame that could be read", hint=NO_FRAME_HINT)
+    with told_with_view(view.key):
+        found = await to_thread.run_sync(frames.cached, view.media, width, view.flipped)
+        if found is not None:
+            return found
+        fetching = await to_thread.run_sync(frames.ask_fetch, view.media)
+        if fetching is not None and not await fetching.result_unless(request.is_disconnected):
+            return None
+        task = frames.ask(view.media, width, view.flipped)
+        made: SentPicture | None = await task.result_unless(request.is_disconnected)
+        return made
+
+
+@contextmanager
+def told_with_view(key: str) -> Iterator[None]:
+    """Say what is wrong with a frame with the view that it belongs to."""
+    try:
+        yield
+    except (NotFoundError, ImageError, TooLargeError, StorageError) as error:
+        # The cause decides between a full disk and one that fails.
+        cause = error.__cause__ or error
+        raise type(error)(f"view {key}: {error.message}", hint=error.hint) from cause
+
+
+def clamp_width(width: int | None) -> int | None:
+    """The width that is made for a width that is asked for."""
+    if width is None:
+        return None
+    stepped = -(-width // WIDTH_STEP) * WIDTH_STEP
+    return min(max(stepped, MIN_WIDTH), MAX_WIDTH)

@@ -1,0 +1,97 @@
+"""Guidelines of a dataset: what its annotators are told."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from fastapi import APIRouter, Path, Query, Request, Response
+
+from app.features.guidelines import service as guidelines
+from app.features.independent_annotations.schemas import (
+    GuidelinePictureDocument,
+    GuidelinesDocument,
+    GuidelinesEdit,
+    NewGuidelinePicture,
+)
+from app.http.deps import Actor, AppServices, AppStore, DatasetPath, etag_matches
+from app.http.problem import responses
+from app.http.respond import as_document, responds
+
+router = APIRouter(prefix="/datasets/{dataset}/guidelines", tags=["takes"])
+
+Digest = Annotated[str, Path(pattern=r"^[0-9a-f]{64}$", description="SHA-256 of its bytes.")]
+
+
+@router.get(
+    "",
+    operation_id="getGuidelines",
+    response_model=GuidelinesDocument,
+    responses=responses(404),
+)
+def get_guidelines(
+    dataset: DatasetPath,
+    store: AppStore,
+    number: Annotated[
+        int | None, Query(ge=1, le=2**31, description="Of a version; else the newest.")
+    ] = None,
+) -> guidelines.Guidelines:
+    """What annotators are told, and who wrote which version."""
+    return guidelines.read_guidelines(store, dataset, number)
+
+
+@router.put(
+    "",
+    operation_id="writeGuidelines",
+    response_model=GuidelinesDocument,
+    responses=responses(404, 409, 413, 415),
+)
+@responds(as_document(GuidelinesDocument.model_validate))
+def write_guidelines(
+    dataset: DatasetPath, edit: GuidelinesEdit, store: AppStore, actor: Actor
+) -> guidelines.Guidelines:
+    """Write another version; 409 where somebody wrote one meanwhile."""
+    return guidelines.write_guidelines(
+        store, dataset, edit.text, based_on=edit.based_on, actor=actor
+    )
+
+
+@router.post(
+    "/pictures",
+    operation_id="addGuidelinePicture",
+    response_model=GuidelinePictureDocument,
+    status_code=201,
+    responses=responses(404, 409, 413, 415, 503),
+)
+@responds(as_document(GuidelinePictureDocument.model_validate, 201))
+def add_picture(
+    dataset: DatasetPath, new: NewGuidelinePicture, services: AppServices
+) -> guidelines.GuidelinePicture:
+    """Keep an uploaded picture; the text shows it by its digest."""
+    return guidelines.add_picture(services.store, dataset, new.upload, services.frames)
+
+
+@router.get(
+    "/pictures/{digest}",
+    operation_id="getGuidelinePicture",
+    response_class=Response,
+    responses={
+        **responses(404),
+        200: {
+            "description": "The picture.",
+            "content": {
+                kind: {"schema": {"type": "string", "format": "binary"}}
+                for kind in ("image/jpeg", "image/png", "image/webp")
+            },
+        },
+        304: {"description": "Not changed."},
+    },
+)
+def get_picture(
+    dataset: DatasetPath, digest: Digest, store: AppStore, request: Request
+) -> Response:
+    """A picture of the guidelines."""
+    picture = guidelines.read_picture(store, dataset, digest)
+    headers = {"ETag": f'"{digest[:16]}"', "Cache-Control": "private, max-age=86400"}
+    if etag_matches(request, headers["ETag"]):
+        return Response(status_code=304, headers=headers)
+    return Response(picture.body, media_type=picture.type, headers=headers)

@@ -1,0 +1,171 @@
+"""Guidelines: what annotators of a dataset are told, written by its leads, every version kept."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass
+
+from app.db.log import Entry, append
+from app.db.session import Session, now
+from app.db.store import Store
+from app.errors import ConflictError, InputError, NotFoundError, TooLargeError
+from app.features.datasets.service import need_dataset
+from app.features.guidelines.queries import (
+    GUIDELINE,
+    count_pictures,
+    find_picture,
+    guideline_heads,
+    guideline_text,
+    insert_guideline,
+    insert_picture,
+    told_dataset,
+)
+from app.features.imports.upload_queries import upload_path
+from app.media.frames import Frames
+from app.soccer.media import Media
+
+MAX_LETTERS = 100_000
+MAX_PICTURE = 4_000_000
+"""Bytes of a picture."""
+MAX_PICTURES = 100
+"""Of a dataset."""
+
+
+@dataclass(frozen=True)
+class GuidelineVersion:
+    """One version: its number from 1, and who wrote it when."""
+
+    number: int
+    written: str
+    written_by: str
+
+
+@dataclass(frozen=True)
+class Guidelines:
+    """What annotators are told.
+
+    Attributes:
+        dataset: Id of the dataset whose guidelines they are.
+        number: Of this version; 0: nobody has written any.
+        text: In Markdown; ``![words](DIGEST)`` shows a picture.
+        versions: All of them, the newest first.
+    """
+
+    dataset: int
+    number: int
+    text: str
+    versions: tuple[GuidelineVersion, ...]
+
+
+@dataclass(frozen=True)
+class GuidelinePicture:
+    """A picture: SHA-256 of its bytes, media type and the bytes."""
+
+    digest: str
+    type: str
+    body: bytes
+
+
+def read_guidelines(store: Store, dataset: str | int, number: int | None = None) -> Guidelines:
+    """The guidelines of a dataset; copies have those of what they are of.
+
+    Args:
+        store: The database.
+        dataset: Name or id.
+        number: Of a version; None: the newest.
+
+    Raises:
+        NotFoundError: There is no such dataset or version.
+    """
+    with store.read() as session:
+        return _read(session, told_dataset(session, need_dataset(session, dataset)), number)
+
+
+def write_guidelines(
+    store: Store, dataset: str | int, text: str, *, based_on: int, actor: str
+) -> Guidelines:
+    """Write another version of a dataset's guidelines, which counts from now on.
+
+    Args:
+        store: The database.
+        dataset: Name or id.
+        text: Markdown.
+        based_on: Number of the version that was changed; 0: there was none.
+        actor: Who writes.
+
+    Raises:
+        NotFoundError: There is no such dataset.
+        InputError: It is too long.
+        ConflictError: Somebody wrote another version meanwhile.
+    """
+    if len(text) > MAX_LETTERS:
+        raise InputError(f"guidelines have at most {MAX_LETTERS:,} letters", pointer="/text")
+    with store.write() as session:
+        told = told_dataset(session, need_dataset(session, dataset))
+        heads = guideline_heads(session, told)
+        newest = heads[0].number if heads else 0
+        if newest != based_on:
+            raise ConflictError(
+                f"{heads[0].written_by if heads else 'nobody'} wrote version {newest} meanwhile",
+                hint="Read it, and write yours on top of it.",
+                pointer="/based_on",
+            )
+        if text != (guideline_text(session, told, newest) or ""):
+            insert_guideline(session, told, newest + 1, text, actor)
+            digest = hashlib.sha256(text.encode()).hexdigest()
+            body = {"number": newest + 1, "digest": digest}
+            append(session, [Entry(GUIDELINE, actor, now(), body, told)])
+        written = _read(session, told)
+        session.respond(written)
+        return written
+
+
+def add_picture(store: Store, dataset: str | int, upload: str, frames: Frames) -> GuidelinePicture:
+    """Keep an uploaded picture for a dataset's guidelines, under the digest of its bytes.
+
+    ``frames`` decodes it where it can take nobody down.
+
+    Raises:
+        NotFoundError: There is no such dataset or upload.
+        ImageError: It is no picture, or damaged.
+        TooLargeError: It is too large.
+        OverloadedError: Too many pictures wait to be decoded.
+        ConflictError: There are too many.
+    """
+    path = upload_path(store.settings, upload)
+    if path.stat().st_size > MAX_PICTURE:
+        raise TooLargeError(f"a picture of guidelines has at most {MAX_PICTURE:,} bytes")
+    found = frames.ask(Media(str(path)), None, False).future.result()
+    picture = GuidelinePicture(hashlib.sha256(found.data).hexdigest(), found.kind, found.data)
+    with store.write() as session:
+        told = told_dataset(session, need_dataset(session, dataset))
+        if count_pictures(session, told) >= MAX_PICTURES:
+            raise ConflictError(f"guidelines have at most {MAX_PICTURES} pictures")
+        insert_picture(session, told, picture.digest, picture.type, picture.body)
+        session.respond(picture)
+    return picture
+
+
+def read_picture(store: Store, dataset: str | int, digest: str) -> GuidelinePicture:
+    """A picture of a dataset's guidelines.
+
+    Raises:
+        NotFoundError: There is no such dataset or picture.
+    """
+    with store.read() as session:
+        told = told_dataset(session, need_dataset(session, dataset))
+        row = find_picture(session, told, digest)
+    if row is None:
+        raise NotFoundError("these guidelines have no such picture")
+    return GuidelinePicture(digest, row.type, row.body)
+
+
+def _read(session: Session, told: int, number: int | None = None) -> Guidelines:
+    """A version of the guidelines of the dataset whose they are; None: the newest."""
+    versions = tuple(GuidelineVersion(**row._mapping) for row in guideline_heads(session, told))
+    if number is None:
+        number = versions[0].number if versions else 0
+    text = "" if number == 0 else guideline_text(session, told, number)
+    if text is None:
+        raise NotFoundError(f"there is no version {number} of these guidelines")
+    return Guidelines(told, number, text, versions)

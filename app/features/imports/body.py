@@ -1,0 +1,181 @@
+"""What the log keeps of an import of a group, groups that are not brought any more.
+
+How large a group may be.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Iterator, Sequence
+from dataclasses import replace
+
+from app.db.json_columns import Json
+from app.db.log import Entry, append
+from app.db.session import Session, now
+from app.features.findings.queries import add_group_findings, group_findings, groups_told
+from app.features.groups.codecs import group_head_to_json, view_to_json
+from app.features.groups.queries import StoredGroup, read_groups
+from app.features.groups.reimport import KIND
+from app.features.groups.revision_queries import save_group
+from app.features.groups.undo_stacks import Lineages
+from app.features.imports.queries import known_groups
+from app.features.queue.queries import refresh_queue
+from app.formats.report import Report
+from app.soccer.annotation import Lines
+from app.soccer.group import Group, View
+
+
+def places_of(stored: StoredGroup) -> dict[str, tuple[int, int]]:
+    """Ids of each view and its station, by the view's key."""
+    return {key: (stored.view_ids[key], stored.stations[key].id) for key in stored.view_ids}
+
+
+def import_body(
+    group: Group,
+    base: Group | None,
+    source: str,
+    digest: str,
+    places: dict[str, tuple[int, int]],
+) -> dict[str, Json]:
+    """What the log keeps of an import: the group whole, with the ids of its rows.
+
+    ``base`` is left out where it is the group itself.
+    """
+    return {
+        "source": source,
+        "source_hash": digest,
+        "group": _logged(group),
+        "base": None if base is None or base == group else _logged(base),
+        "ids": {key: list(pair) for key, pair in places.items()},
+    }
+
+
+def _logged(group: Group) -> Json:
+    """A group in which a shared station is its key: the log has it in an entry of its own."""
+    views = [
+        view_to_json(view, view.station.key if view.station.shared else None)
+        for view in group.views
+    ]
+    return {**group_head_to_json(group), "views": views}
+
+
+GONE = "this group is gone from the dataset; it stays until a person rejects it"
+
+
+def of_read_matches(
+    session: Session, dataset_id: int, seen: Collection[str], missing: Collection[int]
+) -> list[int]:
+    """Those of the missing groups whose match came all the same: they are truly gone.
+
+    A source may bring a part of what it brought last, a match at a time.
+
+    Args:
+        session: Any session.
+        dataset_id: The dataset.
+        seen: Keys of the groups that came.
+        missing: Ids of groups that the same source brought last and that did not come.
+    """
+    if not missing:
+        return []
+    groups = known_groups(session, dataset_id)
+    matches = {group.match for group in groups if group.key in seen}
+    return [group.id for group in groups if group.id in missing and group.match in matches]
+
+
+def note_gone(
+    session: Session, dataset_id: int, ids: Sequence[int], *, source: str, actor: str
+) -> int:
+    """Save a finding for each group that has none of the kind yet; returns how many."""
+    fresh = sorted(set(ids) - groups_told(session, ids, GONE))
+    stored = read_groups(session, fresh)
+    lineages = Lineages(session, dataset_id).of(stored.values())
+    at, entries = now(), []
+    for number, item in stored.items():
+        base = lineages[number].base
+        save_group(session, item, item.group, at=at, source=base)
+        body = _body(item, base, source, group_findings(session, number))
+        entries.append(Entry("import", actor, at, body, dataset_id, number))
+    if entries:
+        append(session, entries)
+        add_group_findings(session, KIND, ((number, None, GONE) for number in stored))
+        refresh_queue(session, list(stored))
+    return len(entries)
+
+
+def _body(
+    stored: StoredGroup,
+    base: Group,
+    source: str,
+    noticed: Iterable[tuple[str | None, str]],
+) -> dict[str, Json]:
+    body = import_body(stored.group, base, source, stored.source_hash, places_of(stored))
+    body["kept"] = [[view, sentence] for view, sentence in [*noticed, (None, GONE)]]
+    return body
+
+
+MAX_VIEWS = 100
+"""Of a group: solving it grows with their square, and 100 take a second."""
+MAX_POINTS = 1000
+"""Of all lines of a view: calibrating takes about a millisecond for each, and the public datasets have
+at most 85."""
+
+
+class GroupLimits:
+    """Holds the groups of one import to what a group may have, and tells what it leaves out.
+
+    Args:
+        source: Where they come from.
+        report: Hears of each group and each marking that is left out.
+    """
+
+    def __init__(self, source: str, report: Report):
+        self._source, self._report = source, report
+        self._told: set[str] = set()
+        """Static cameras whose markings are told already: every group brings them again."""
+
+    def held(self, group: Group) -> Group | None:
+        """The group with no more points than its views may have; None where it has too many views."""
+        count = len(group.views)
+        if count > MAX_VIEWS:
+            problem = f"has {count:,} views, a group may have {MAX_VIEWS}; it is left out"
+            self._report.note(self._source, group.key, None, problem)
+            return None
+        return replace(group, views=tuple(self._thinned(group, view) for view in group.views))
+
+    def _thinned(self, group: Group, view: View) -> View:
+        station = view.station
+        dense = list(_too_dense(station.lines))
+        if not dense:
+            return view
+        if station.key not in self._told:
+            for marking in dense:
+                self._tell(group, view, marking)
+        if station.shared:
+            self._told.add(station.key)
+        lines = {name: points for name, points in station.lines.items() if name not in dense}
+        proposed = tuple(name for name in station.proposed if name in lines)
+        return replace(view, station=replace(station, lines=lines, proposed=proposed))
+
+    def _tell(self, group: Group, view: View, marking: str) -> None:
+        station = view.station
+        what = f"camera {station.key}" if station.shared else f"view {view.key}"
+        count, total = len(station.lines[marking]), points_of(station.lines)
+        problem = (
+            f"has {count:,} of {total:,} points, and a view may have {MAX_POINTS:,}; "
+            "this marking is left out"
+        )
+        self._report.note(self._source, group.key, f"{what}, {marking}", problem)
+
+
+def points_of(lines: Lines) -> int:
+    """How many points lines have in all."""
+    return sum(map(len, lines.values()))
+
+
+def _too_dense(lines: Lines) -> Iterator[str]:
+    """The densest markings, as many as have to go until the others may stay."""
+    total = points_of(lines)
+    for marking in sorted(lines, key=lambda name: len(lines[name]), reverse=True):
+        if total <= MAX_POINTS:
+            return
+        total -= len(lines[marking])
+        yield marking

@@ -1,0 +1,213 @@
+"""Cameras on their own: calibrations that are attached to the views and stations they name."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import PurePosixPath
+from typing import Any, NamedTuple
+
+from app.db.log import Entry, append
+from app.db.session import Session, now
+from app.db.store import Store
+from app.features.datasets.service import get_dataset_head
+from app.features.groups.codecs import camera_to_json, covariance_to_json
+from app.features.groups.revision_queries import bump_groups, refresh_inputs_hashes
+from app.features.groups.view_queries import (
+    dataset_views,
+    groups_of_station,
+    read_stations,
+    save_station,
+)
+from app.features.imports.ingest import IngestReport, attempt
+from app.features.queue.queries import refresh_queue
+from app.formats.camera_json import COVARIANCE, covariance_from_json
+from app.geometry.camera import Camera
+from app.soccer.camera_size import other_size
+from app.soccer.frames import ImageSize
+
+BATCH = 50
+"""Cameras a transaction."""
+EXAMPLES = 3
+"""Names of views that are shown where a camera has none of them."""
+
+
+@dataclass(frozen=True)
+class _Place:
+    """A station that a name means; ``group`` is that of its only view, None when shared."""
+
+    station: int
+    group: int | None
+    match: str
+    size: ImageSize
+
+
+class _Given(NamedTuple):
+    """A camera for a station, and its covariance where that is known."""
+
+    camera: Camera
+    covariance: tuple[float, ...] | None
+
+
+def ingest_cameras(
+    store: Store,
+    dataset: str,
+    cameras: Mapping[str, Camera],
+    *,
+    source: str,
+    actor: str,
+    size: ImageSize | None = None,
+    sizes: Mapping[str, ImageSize] | None = None,
+    covariances: Mapping[str, Any] | None = None,
+    dry_run: bool = False,
+) -> IngestReport:
+    """Attach given calibrations to what they name; attaching them again changes nothing.
+
+    A name is the key of a static camera (``cam3``), the stem of a view (``7_1``, ``00002``), or
+    ``<match>/<stem>`` or ``<group>/<stem>`` where a stem alone means views of several matches. Views
+    of one match that are called alike are one camera of a rig, and all of them get it.
+
+    Args:
+        store: The database.
+        dataset: Name of an existing dataset.
+        cameras: By name, as ``datasets.cameras_reader.read_cameras`` reads them.
+        source: Where they come from, for the log.
+        actor: Who imports.
+        size: Size of the images that the cameras were made for; None: that of each view.
+        sizes: The same by name, where their files state it: they count before ``size``.
+        covariances: How well they are known, by name, as ``read_cameras`` read it.
+        dry_run: Dry run: report what would happen, change nothing.
+
+    Returns:
+        ``changed`` and ``unchanged`` count views and static cameras that a camera was attached to;
+        ``problems`` name cameras that fit nothing, several views, or pictures of another size.
+
+    Raises:
+        NotFoundError: There is no such dataset.
+    """
+    report, found = IngestReport(), get_dataset_head(store, dataset)
+    with store.read() as session:
+        places = _places(session, found.id)
+    known: list[tuple[_Place, _Given]] = []
+    for name in sorted(cameras):
+        fitting = _fitting(places, name)
+        matches = {place.match for place in fitting}
+        if not fitting:
+            report.problems.append(f'camera "{name}": no view has this name{_examples(places)}')
+            continue
+        if len(matches) > 1:
+            report.problems.append(
+                f'camera "{name}": views of {len(matches)} matches have this name; call it '
+                f'"{sorted(matches)[0]}/{name}", or like the other match'
+            )
+            continue
+        if len(fitting) > 1:
+            report.problems.append(f'camera "{name}" is that of {len(fitting)} views of this name')
+        stated = (sizes or {}).get(name)
+        if stated is not None and size not in (None, stated):
+            report.problems.append(
+                f'camera "{name}": its file says {stated.width} x {stated.height}, and --size is '
+                f"{size.width}x{size.height}; that of the file counts"
+            )
+        made_for = stated or size
+        report.problems.extend(_of_other_size(name, cameras[name], fitting, made_for))
+        told = {COVARIANCE: (covariances or {}).get(name)}
+        for place in fitting:
+            covariance = covariance_from_json(told, cameras[name], made_for or place.size)
+            camera = _sized(cameras[name], made_for, place.size)
+            known.append((place, _Given(camera, covariance)))
+    for start in range(0, len(known), BATCH):
+        with attempt(store, keep=not dry_run) as session:
+            batch = known[start : start + BATCH]
+            _attach_batch(session, found.id, batch, source, actor, report)
+    return report
+
+
+def _places(session: Session, dataset_id: int) -> dict[str, list[_Place]]:
+    places: dict[str, list[_Place]] = {}
+    for row in dataset_views(session, dataset_id):
+        stem = str(PurePosixPath(row.key).with_suffix(""))
+        own = row.group.removeprefix(f"{row.match}/") if row.match else row.group
+        names = (
+            {row.station}
+            if row.shared
+            # An export of views that several groups have puts the group before each.
+            else {stem, f"{row.match}/{stem}", f"{row.group}/{stem}", f"{row.match}/{own}/{stem}"}
+        )
+        size = ImageSize(row.width, row.height)
+        place = _Place(row.station_id, None if row.shared else row.group_id, row.match, size)
+        for name in names:
+            known = places.setdefault(name, [])
+            if place not in known:
+                known.append(place)
+    return places
+
+
+def _fitting(places: Mapping[str, list[_Place]], name: str) -> list[_Place]:
+    """What a name means; folders before it do not matter where no match could be one of them."""
+    parts = name.split("/")
+    for start in range(len(parts)):
+        found = places.get("/".join(parts[start:]), [])
+        if found and (start == 0 or not any(place.match for place in found)):
+            return found
+    return []
+
+
+def _examples(places: Mapping[str, list[_Place]]) -> str:
+    names = [f'"{name}"' for name in sorted(places) if "/" not in name]
+    more = " and more" if len(names) > EXAMPLES else ""
+    return f"; views are called {', '.join(names[:EXAMPLES])}{more}" if names else ""
+
+
+def _sized(camera: Camera, made_for: ImageSize | None, size: ImageSize) -> Camera:
+    if made_for is None or made_for == size:
+        return camera
+    return camera.scaled(size.width / made_for.width, size.height / made_for.height)
+
+
+def _of_other_size(
+    name: str, camera: Camera, fitting: Sequence[_Place], made_for: ImageSize | None
+) -> Iterator[str]:
+    """What to say of a camera whose principal point is the middle of another size than was said."""
+    for size in sorted({made_for or place.size for place in fitting}, key=lambda it: it.width):
+        other = other_size(camera, size)
+        if other is not None:
+            x, y = camera.principal_point
+            yield (
+                f'camera "{name}": its principal point ({x:g}, {y:g}) is the middle of '
+                f"{other.width} x {other.height}, not of {size.width} x {size.height}; import it again "
+                f"with --size {other.width}x{other.height}"
+            )
+
+
+def _attach_batch(
+    session: Session,
+    dataset_id: int,
+    batch: Sequence[tuple[_Place, _Given]],
+    source: str,
+    actor: str,
+    report: IngestReport,
+) -> None:
+    stations = read_stations(session, [place.station for place, _ in batch])
+    touched: set[int] = set()
+    entries, at = [], now()
+    for place, given in batch:
+        stored = stations[place.station]
+        # A file that says nothing of its camera takes nothing of what is known of it.
+        known = given.covariance in (None, stored.station.given_covariance)
+        if stored.station.given == given.camera and known:
+            report.unchanged += 1
+            continue
+        station = stored.station.with_given(*given)
+        save_station(session, stored, station, source=None if stored.edited else station)
+        body = {"source": source, "given": camera_to_json(given.camera)}
+        if given.covariance is not None:
+            body["covariance"] = covariance_to_json(given.covariance)
+        entries.append(Entry("camera", actor, at, body, dataset_id, place.group, place.station))
+        if place.group is not None:
+            bump_groups(session, [place.group], at)
+        touched.update(groups_of_station(session, place.station))
+        report.changed += 1
+    append(session, entries)
+    refresh_inputs_hashes(session, sorted(touched))
+    refresh_queue(session, sorted(touched))

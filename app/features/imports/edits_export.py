@@ -1,0 +1,186 @@
+"""Carry: a dataset with its edits and verdicts as JSON lines, for another installation.
+
+``touchline.json`` says what it is; ``stations.jsonl``, ``groups.jsonl`` and ``spare.jsonl`` hold a
+line each for a static camera, a group, a frame with persons only. Each line has what is said now,
+what the dataset brought, the digests of all states in between, and who said what and when. Media
+are not carried: they lie elsewhere on each machine.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import replace
+from pathlib import Path
+
+from app.canonical import canonical
+from app.db.json_columns import Json, unpack
+from app.db.log import LogEntry, group_entries, station_entries
+from app.db.session import Session
+from app.db.store import Store
+from app.features.datasets.service import DatasetHead, licence_text, read_dataset_head
+from app.features.exports.queries import newest_word
+from app.features.findings.queries import carried_dismissals
+from app.features.groups.codecs import (
+    group_head_to_json,
+    policy_to_json,
+    station_to_json,
+    view_to_json,
+)
+from app.features.groups.queries import StoredGroup, read_groups, sorted_spare_rows
+from app.features.groups.undo_stacks import Lineage, Lineages, station_lineage
+from app.features.imports.queries import group_verdicts, known_groups, shared_stations
+from app.finite import json_text
+from app.formats.file_tree import Root
+from app.formats.manifest import Manifest, write_manifest
+from app.formats.store_output import output_anywhere
+from app.progress import TellProgress
+from app.soccer.group import Group
+from app.soccer.solution import SOLVER_VERSION
+
+FORMAT = "touchline"
+FORMAT_VERSION = 1
+HEAD, STATIONS, GROUPS, SPARE = "touchline.json", "stations.jsonl", "groups.jsonl", "spare.jsonl"
+EDIT_KINDS = (
+    "edit", "undo", "redo", "pitch", "station_edit", "station_undo", "station_redo",
+)  # fmt: skip
+_BATCH = 200
+
+
+def carry_out(
+    store: Store,
+    dataset: str | int,
+    out: Root,
+    progress: TellProgress | None = None,
+    beside: Path | None = None,
+) -> dict[str, int]:
+    """Write everything that was said about a dataset, from one snapshot; returns counts.
+
+    Args:
+        store: The database.
+        dataset: Name or id.
+        out: Folder, or file that ends in .zip; appears whole or not at all.
+        progress: Called as groups are written, and as their files are packed.
+        beside: After which its half written files are called, see ``output_anywhere``.
+    """
+    output = output_anywhere(out, store.settings.exports, beside, progress)
+    with store.read() as session, output as root:
+        found = read_dataset_head(session, dataset)
+        counts = {
+            "stations": _write_lines(root / STATIONS, _stations(session, found.id)),
+            "groups": _write_lines(root / GROUPS, _groups(session, found, progress)),
+            "spare": _write_lines(root / SPARE, _spare(session, found.id)),
+        }
+        head = {
+            "format": FORMAT,
+            "version": FORMAT_VERSION,
+            "dataset": found.name,
+            "policy": policy_to_json(found.policy),
+        }
+        (root / HEAD).write_text(json_text(head, indent=1, ascii_=True) + "\n", encoding="utf-8")
+        write_manifest(root, _manifest(session, found, counts), progress)
+    return counts
+
+
+def carried_group(group: Group) -> dict[str, Json]:
+    """A group without media; a shared station is its key."""
+    views = []
+    for view in group.views:
+        value = view_to_json(view, view.station.key if view.station.shared else None)
+        del value["media"]
+        value.pop("noise", None)
+        views.append(value)
+    # Where a match puts its cameras follows from its lines, how noisy balls are from the balls, and
+    # paint is read in pictures, there as here.
+    return {**group_head_to_json(replace(group, positions={}, paint={})), "views": views}
+
+
+def _write_lines(path: Path, items: Iterator[Json]) -> int:
+    count = 0
+    with path.open("w", encoding="utf-8", newline="\n") as file:
+        for item in items:
+            file.write(canonical(item) + "\n")
+            count += 1
+    return count
+
+
+def _stations(session: Session, dataset_id: int) -> Iterator[Json]:
+    for stored in shared_stations(session, dataset_id):
+        lineage = station_lineage(session, stored)
+        station, base = station_to_json(stored.station), station_to_json(lineage.base)
+        yield {
+            "key": stored.station.key,
+            "station": station,
+            "base": None if base == station else base,
+            "states": list(lineage.states),
+            "log": _log(station_entries(session, stored.id)),
+        }
+
+
+def _groups(
+    session: Session, dataset: DatasetHead, progress: TellProgress | None
+) -> Iterator[Json]:
+    lineages = Lineages(session, dataset.id)
+    ids = [group.id for group in known_groups(session, dataset.id)]
+    for start in range(0, len(ids), _BATCH):
+        stored = read_groups(session, ids[start : start + _BATCH])
+        known, verdicts = lineages.of(stored.values()), group_verdicts(session, stored)
+        checked = carried_dismissals(session, stored)
+        for item in stored.values():
+            carried = _group(session, item, known[item.id], verdicts.get(item.id, []))
+            # Earlier releases know no such key: it is there where it says something.
+            yield carried | ({"dismissals": checked[item.id]} if item.id in checked else {})
+        if progress is not None:
+            progress(start + len(stored), len(ids))
+
+
+def _group(session: Session, stored: StoredGroup, lineage: Lineage, verdicts: Json) -> Json:
+    group, base = carried_group(stored.group), carried_group(lineage.base)
+    walked = len(lineage.bases) > 1 or base != group or _has_past(lineage)
+    return {
+        "group": group,
+        "base": None if base == group else base,
+        "bases": list(lineage.bases),
+        "views": {key: list(states) for key, states in lineage.views.items()},
+        "stations": {key: list(states) for key, states in lineage.stations.items()},
+        "pitches": list(lineage.pitches),
+        "log": _log(group_entries(session, stored.id)) if walked else [],
+        "verdicts": verdicts,
+    }
+
+
+def _has_past(lineage: Lineage) -> bool:
+    states = [*lineage.views.values(), *lineage.stations.values()]
+    return any(len(item) > 1 for item in states)
+
+
+def _log(said: Iterable[LogEntry]) -> list[Json]:
+    """Who edited what and when; carried edits of a third installation too."""
+    entries: list[Json] = []
+    for entry in said:
+        if entry.kind in EDIT_KINDS:
+            body = {"kind": entry.kind, "actor": entry.actor, "at": entry.at}
+            entries.append({**body, "edit": entry.body["edit"]})
+        elif entry.kind in ("import", "station"):
+            entries += entry.body.get("carried", [])
+    return entries
+
+
+def _spare(session: Session, dataset_id: int) -> Iterator[Json]:
+    for row in sorted_spare_rows(session, dataset_id):
+        yield {"camera": row.camera, "frame": row.frame, "extras": unpack(row.extras)}
+
+
+def _manifest(session: Session, dataset: DatasetHead, counts: Mapping[str, int]) -> Manifest:
+    matches = {group.match for group in known_groups(session, dataset.id)}
+    return Manifest(
+        dataset=dataset.name,
+        format=FORMAT,
+        date=newest_word(session, dataset.id) or dataset.created,
+        counts=counts,
+        settings={
+            "policy": policy_to_json(dataset.policy),
+            "policy_hash": dataset.policy.hash,
+            "solver_version": SOLVER_VERSION,
+        },
+        licence=licence_text(matches),
+    )

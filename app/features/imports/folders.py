@@ -1,0 +1,242 @@
+"""Folders that the operator allows imports to read, and files that people send."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from dataclasses import dataclass
+from itertools import islice
+from pathlib import Path
+
+from app.config import Settings
+from app.db.idempotency import has_key, read_progress, save_progress
+from app.db.json_columns import Json
+from app.db.store import Store
+from app.errors import InputError, NotFoundError
+from app.features.imports.upload_queries import Upload as Upload
+from app.features.imports.upload_queries import UploadWriter as UploadWriter
+from app.features.imports.upload_queries import (
+    delete_upload,
+    get_upload,
+    list_uploads,
+    require_size,
+    require_unread,
+)
+from app.features.imports.upload_quota import quota_of as quota_of
+from app.features.imports.upload_quota import used_bytes as used_bytes
+from app.features.people.visibility_queries import Sight
+from app.formats.file_tree import Root
+from app.formats.guess_format import guess_format, guess_of_names
+from app.formats.safe_path import MAX_PART, check_name, resolve_inside
+from app.object_store.address import SCHEME, is_address
+from app.object_store.path import StoredPath, find_path
+
+MAX_ITEMS = 1000
+"""Entries of a folder that are listed."""
+
+
+@dataclass(frozen=True)
+class FolderItem:
+    """A folder or file that an import could read; ``path`` starts with an allowed folder's name."""
+
+    path: str
+    name: str
+    folder: bool
+
+
+@dataclass(frozen=True)
+class FolderListing:
+    """What is in a folder.
+
+    Attributes:
+        path: Empty for the list of allowed folders.
+        format: What it most likely holds, or None.
+        more: Whether there is more than is listed.
+    """
+
+    path: str
+    format: str | None
+    items: tuple[FolderItem, ...]
+    more: bool
+
+
+def allowed_folders(settings: Settings) -> dict[str, Path]:
+    """The operator's folders by the names that requests use for them."""
+    found: dict[str, Path] = {}
+    for folder in settings.import_folders:
+        name = folder.name or "root"
+        number = 2
+        while name in found:
+            name, number = f"{folder.name}-{number}", number + 1
+        found[name] = folder
+    return found
+
+
+def resolve_folder(settings: Settings, path: str) -> Root:
+    """The folder or file that a request means by ``<allowed folder>/<inside>`` or an address.
+
+    Raises:
+        UnsafePathError: The path would leave the allowed folder.
+        NotFoundError: Nothing is there.
+        InputError: The operator allows no folders.
+    """
+    if is_address(path):
+        return _resolve_address(settings, path)
+    folders = allowed_folders(settings)
+    if not folders:
+        raise InputError(
+            "no folders may be imported from",
+            hint="The operator names them in TOUCHLINE_IMPORT_FOLDERS; or upload the data.",
+        )
+    if any(len(part.encode(errors="replace")) > MAX_PART for part in path.split("/")):
+        raise NotFoundError("there is no folder of so long a name to import from")
+    root, _, inside = check_name(path.rstrip("/")).partition("/")
+    if root not in folders:
+        names = ", ".join(sorted(folders))
+        raise NotFoundError(
+            f'there is no folder "{root}" to import from', hint=f"There are: {names}."
+        )
+    found = resolve_inside(folders[root], inside) if inside else folders[root]
+    if not os.path.exists(found):  # noqa: PTH110 - a path that is too long is not there either
+        raise NotFoundError(f'there is no "{path}" to import from')
+    return found
+
+
+def _resolve_address(settings: Settings, address: str) -> StoredPath:
+    check_name(address.removeprefix(SCHEME).strip("/"))
+    return find_path(settings, address)
+
+
+def list_folder(settings: Settings, path: str = "") -> FolderListing:
+    """The allowed folders and stores, or what is in one of them."""
+    if not path:
+        roots = [FolderItem(name, name, True) for name in sorted(allowed_folders(settings))]
+        stores = (f"{SCHEME}{name}" for name in sorted(settings.stores))
+        roots += [FolderItem(address, address, True) for address in stores]
+        return FolderListing("", None, tuple(roots), False)
+    found = resolve_folder(settings, path)
+    if isinstance(found, StoredPath):
+        return _list_stored(found)
+    if not found.is_dir():
+        return FolderListing(path, guess_format(found), (), False)
+    items = list(islice(_items(found, path.rstrip("/")), MAX_ITEMS + 1))
+    items.sort(key=lambda item: (not item.folder, item.name))
+    more = len(items) > MAX_ITEMS
+    return FolderListing(path, guess_format(found), tuple(items[:MAX_ITEMS]), more)
+
+
+def _list_stored(found: StoredPath) -> FolderListing:
+    """What is in a folder of a store; one request, so that the format is guessed of this level."""
+    if not found.is_dir():
+        return FolderListing(str(found), guess_of_names([found.name]), (), False)
+    folders, objects = found.store.folder(found.key)
+    at = str(found).rstrip("/")
+    items = [FolderItem(f"{at}/{name}", name, True) for name in folders]
+    names = [stored.key.rpartition("/")[2] for stored in objects]
+    items += [FolderItem(f"{at}/{name}", name, False) for name in names]
+    items = [item for item in items if not item.name.startswith(".") and _is_name(item.name)]
+    items.sort(key=lambda item: (not item.folder, item.name))
+    shown, more = tuple(items[:MAX_ITEMS]), len(items) > MAX_ITEMS
+    return FolderListing(at, guess_of_names(names), shown, more)
+
+
+def _items(folder: Path, path: str) -> Iterator[FolderItem]:
+    with os.scandir(folder) as entries:
+        for entry in entries:
+            hidden = entry.name.startswith(".")
+            # A link may lead out; what it leads to is reached by its own name, if it may be.
+            if hidden or entry.is_symlink() or not _is_name(entry.name):
+                continue
+            if entry.is_dir() or entry.is_file():
+                yield FolderItem(f"{path}/{entry.name}", entry.name, entry.is_dir())
+
+
+def _is_name(name: str) -> bool:
+    try:
+        return bool(check_name(name))
+    except InputError:
+        return False
+
+
+def begin_upload(settings: Settings, name: str, declared: int, actor: str) -> UploadWriter:
+    """Begin to take a file of which its sender says how many bytes it has; 0: it says nothing.
+
+    Raises:
+        TooLargeError: It is longer than the settings, or the quota of its sender, allow.
+        InputError: The name is none that a file can have.
+        StorageError: The disk refuses.
+    """
+    require_size(settings, declared)
+    return UploadWriter(settings, name, by=actor, declared=declared)
+
+
+def finish_upload(writer: UploadWriter) -> Upload:
+    """Make what was taken an upload of its sender's, and see what it most likely holds.
+
+    Raises:
+        InputError: Nothing was sent.
+        StorageError: The disk refuses.
+    """
+    return writer.finish(guess_format)
+
+
+def find_upload(settings: Settings, upload_id: str) -> Upload:
+    """An upload by its id.
+
+    Raises:
+        NotFoundError: There is none of that id, or it has expired.
+    """
+    return get_upload(settings, upload_id)
+
+
+def own_uploads(settings: Settings, sight: Sight) -> list[Upload]:
+    """The uploads that somebody sent, the newest first; of an admin everybody's."""
+    return [
+        item
+        for item in list_uploads(settings)
+        if sight.sees(None) or any(sight.sees(None, name) for name in item.by)
+    ]
+
+
+def delete_sent(store: Store, upload_id: str, mine: Callable[[str], bool]) -> None:
+    """Delete an upload, or no longer be among those who sent it while others have sent it, too.
+
+    What goes is a file, which no transaction holds. Under a key, that it is to go is written down
+    before, and the response stored afterwards: sent again, a request that was stopped in between
+    does the rest.
+
+    Args:
+        store: Of the home.
+        upload_id: Which.
+        mine: Whether whoever asks is that sender.
+
+    Raises:
+        NotFoundError: There is none of that id.
+        InputError: A dataset reads frames from it.
+    """
+    if not has_key():
+        delete_upload(store.settings, upload_id, mine)
+        return
+    begun = _begun(store) or _begin(store, upload_id)
+    with suppress(NotFoundError):
+        # One that was sent once more meanwhile is another.
+        if get_upload(store.settings, begun["upload"]).created == begun["created"]:
+            delete_upload(store.settings, begun["upload"], mine)
+    with store.write() as session:
+        session.respond(None)
+
+
+def _begun(store: Store) -> Json | None:
+    """Which upload the same request was deleting when it was stopped; None: it was not."""
+    with store.read() as session:
+        return read_progress(session)
+
+
+def _begin(store: Store, upload_id: str) -> Json:
+    upload = get_upload(store.settings, upload_id)
+    require_unread(upload)
+    begun = {"upload": upload.id, "created": upload.created}
+    with store.write() as session:
+        save_progress(session, begun)
+    return begun

@@ -1,0 +1,350 @@
+"""Ingest: groups from an importer into a dataset; again and again without doing anything twice."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from itertools import islice
+from pathlib import Path
+
+from app.db.log import Entry, append
+from app.db.session import Session, now
+from app.db.store import Store
+from app.errors import ConflictError
+from app.features.datasets.queries import find_dataset
+from app.features.datasets.service import insert_dataset
+from app.features.findings.queries import group_findings, groups_told, replace_group_findings
+from app.features.groups.digest import source_hash
+from app.features.groups.edit import SetPaint, SetPositions
+from app.features.groups.insert_queries import NewRows
+from app.features.groups.pictures import outdated_where_people_moved
+from app.features.groups.queries import StoredGroup, read_groups
+from app.features.groups.reimport import KIND, KeptEdit, SharedStations, follow_group
+from app.features.groups.revision_queries import save_group
+from app.features.imports.body import (
+    GONE,
+    MAX_VIEWS,
+    GroupLimits,
+    import_body,
+    note_gone,
+    of_read_matches,
+    places_of,
+)
+from app.features.imports.queries import known_groups, newest_imports
+from app.features.independent_annotations.queries import is_copy
+from app.features.paint.queries import insert_readings
+from app.features.pitches.queries import edited_pitches, is_pitch_edited
+from app.features.pitches.service import give_pitch
+from app.features.policies.service import first_policy
+from app.features.queue.queries import refresh_queue
+from app.formats.report import Report
+from app.object_store.address import is_address
+from app.plural import plural
+from app.progress import TellProgress
+from app.soccer.group import Group, View
+from app.soccer.pitch import Pitch
+from app.soccer.policy import PAPER, Policy
+
+BATCH = 20
+"""Groups a transaction: one import holds the writers up for a fraction of a second at a time."""
+
+
+@dataclass
+class IngestReport:
+    """What became of the groups.
+
+    Attributes:
+        changed: Groups, and static cameras that many groups share.
+        findings: Edits that a changed source met, and pictures of another shape than declared.
+        without_picture: Groups of which no view has a picture.
+        missing: Groups that this source brought before and does not bring any more; they stay.
+        problems: What to tell about single groups, or about the missing ones.
+    """
+
+    new: int = 0
+    changed: int = 0
+    unchanged: int = 0
+    findings: int = 0
+    missing: int = 0
+    without_picture: int = 0
+    problems: list[str] = field(default_factory=list)
+
+
+@dataclass(frozen=True)
+class Origin:
+    """Into which dataset, from where, and who brings it."""
+
+    dataset_id: int
+    source: str
+    actor: str
+    lines_left: bool = False
+
+
+def ingest(
+    store: Store,
+    dataset: str,
+    groups: Iterable[Group],
+    *,
+    source: str,
+    actor: str,
+    progress: TellProgress | None = None,
+    dry_run: bool = False,
+    policy: Policy | None = PAPER,
+    told: Report | None = None,
+    lines_left: bool = False,
+) -> IngestReport:
+    """Bring groups into a dataset, which the first of them makes when there is none of that name.
+
+    Killed anywhere and started again, it ends in the same state. What nobody edited follows a
+    changed source; what a person edited stays and becomes a finding.
+
+    Args:
+        store: The database.
+        dataset: Name.
+        groups: As an importer yields them; read as they come, so any number fits.
+        source: Where they come from, for the log.
+        actor: Who imports.
+        progress: Called after each batch.
+        dry_run: Dry run: report what would happen, change nothing.
+        policy: Of a dataset that is made; None: as its first pictures suggest.
+        lines_left: Whether lines of static cameras that do not come were left aside, so that those of
+            an earlier import go.
+        told: What the files hold; hears what of a group is left out, beyond its ``GroupLimits``.
+    """
+    report, seen, done = IngestReport(), set[str](), 0
+    limits = GroupLimits(source, Report() if told is None else told)
+    sound, stations = _sound(groups, seen, report, limits), set[str]()
+    while batch := list(islice(sound, BATCH)):
+        with attempt(store, keep=not dry_run) as session:
+            identity = _ensure_dataset(session, dataset, actor, policy or first_policy(batch))
+            origin = Origin(identity, source, actor, lines_left)
+            ingest_batch(session, origin, batch, report, stations)
+        done += len(batch)
+        if progress is not None:
+            progress(done)
+    if done:
+        with store.read() as session:
+            missing = _note_missing(session, origin, seen, report)
+            gone = of_read_matches(session, origin.dataset_id, seen, missing)
+        for start in range(0, 0 if dry_run else len(gone), BATCH):
+            with store.write() as session:
+                ids = gone[start : start + BATCH]
+                report.findings += note_gone(
+                    session, origin.dataset_id, ids, source=origin.source, actor=actor
+                )
+    return report
+
+
+class _TakenBack(Exception):  # noqa: N818
+    """Ends a transaction that shall leave nothing."""
+
+
+@contextmanager
+def attempt(store: Store, *, keep: bool) -> Iterator[Session]:
+    """A write session; where nothing shall be kept, what it did is taken back at its end."""
+    try:
+        with store.write() as session:
+            yield session
+            if not keep:
+                raise _TakenBack
+    except _TakenBack:
+        pass
+
+
+def ensure_dataset(store: Store, dataset: str, actor: str) -> int:
+    """Id of the dataset of that name, made with the policy ``paper`` when there is none."""
+    with store.write() as session:
+        return _ensure_dataset(session, dataset, actor, PAPER)
+
+
+def _ensure_dataset(session: Session, dataset: str, actor: str, policy: Policy) -> int:
+    row = find_dataset(session, dataset)
+    return insert_dataset(session, dataset, policy, actor) if row is None else int(row.id)
+
+
+def _note_missing(
+    session: Session, origin: Origin, seen: Collection[str], report: IngestReport
+) -> set[int]:
+    """Count the groups that the same source brought last and that did not come this time."""
+    missing: set[int] = set()
+    known = known_groups(session, origin.dataset_id)
+    absent = [group.id for group in known if group.key not in seen]
+    for start in range(0, len(absent), BATCH):
+        entries = newest_imports(session, absent[start : start + BATCH])
+        missing |= {
+            entry.group_id or 0 for entry in entries if entry.body["source"] == origin.source
+        }
+    report.missing = len(missing)
+    if report.missing:
+        groups = plural(report.missing, "group")
+        report.problems.append(f"{groups} of an earlier import did not come again; all stay")
+    return missing
+
+
+def _sound(
+    groups: Iterable[Group], seen: set[str], report: IngestReport, limits: GroupLimits
+) -> Iterator[Group]:
+    """Groups that can be stored, their media by absolute path."""
+    for group in groups:
+        keys = [view.key for view in group.views]
+        if group.key in seen:
+            report.problems.append(f"group {group.key} appears twice; the first one counts")
+        elif len(set(keys)) < len(keys):
+            report.problems.append(f"group {group.key} has two views of one name")
+        else:
+            # One that is left out is not missing: the source brought it.
+            seen.add(group.key)
+            held = limits.held(group)
+            if held is not None:
+                report.without_picture += all(view.media is None for view in held.views)
+                yield replace(held, views=tuple(map(_absolute, held.views)))
+
+
+def _absolute(view: View) -> View:
+    if view.media is None or is_address(view.media.path):
+        return view
+    path = Path(view.media.path).absolute()
+    # The reader saw where a link leads; one that comes later is not followed.
+    path = path.resolve() if path.is_symlink() else path
+    return replace(view, media=replace(view.media, path=str(path)))
+
+
+def ingest_batch(
+    session: Session,
+    origin: Origin,
+    batch: Sequence[Group],
+    report: IngestReport,
+    stations: set[str],
+) -> None:
+    """Bring a batch of groups, inside the caller's write transaction.
+
+    ``stations`` are shared ones that are counted already: a dry run meets them again.
+
+    Raises:
+        ConflictError: The dataset holds somebody's own annotations, which they alone change.
+    """
+    if is_copy(session, origin.dataset_id):
+        raise ConflictError(
+            "this dataset holds one person's own annotations; nothing is imported into it",
+            hint="Import into the dataset that they are of.",
+        )
+    shared = SharedStations(
+        session, origin.dataset_id, origin.source, origin.actor, lines_left=origin.lines_left
+    )
+    for group in batch:
+        shared.follow(view.station for view in group.views)
+    report.changed += len(set(shared.changed) - stations)
+    report.findings += len(set(shared.kept) - stations)
+    stations.update(shared.changed)
+    keys = [group.key for group in batch]
+    known = {item.key: item for item in known_groups(session, origin.dataset_id, keys)}
+    gone = groups_told(session, [item.id for item in known.values()], GONE)
+    fresh: list[tuple[Group, str]] = []
+    for group in batch:
+        digest = source_hash(group)
+        if group.key not in known:
+            fresh.append((group, digest))
+        elif known[group.key].source_hash == digest and known[group.key].id not in gone:
+            report.unchanged += 1
+        else:
+            _follow(session, origin, known[group.key].id, group, digest, shared.ids, report)
+    insert_fresh(session, origin, fresh, shared.ids)
+    report.new += len(fresh)
+
+
+def insert_fresh(
+    session: Session, origin: Origin, fresh: Sequence[tuple[Group, str]], shared: dict[str, int]
+) -> list[int]:
+    """Insert groups that a dataset has not yet, with their source hashes; returns their ids.
+
+    ``shared`` has the ids of its shared stations by key.
+    """
+    if not fresh:
+        return []
+    at, rows = now(), NewRows(session, origin.dataset_id)
+    ids, entries = [], []
+    for group, digest in fresh:
+        first = len(rows.views)
+        identity = rows.add_group(group, digest, at, shared)
+        places = {row["key"]: (row["id"], row["station_id"]) for row in rows.views[first:]}
+        body = import_body(group, None, origin.source, digest, places)
+        entries.append(Entry("import", origin.actor, at, body, origin.dataset_id, identity))
+        ids.append(identity)
+    rows.insert()
+    append(session, entries)
+    pitches = edited_pitches(session, origin.dataset_id, {group.match for group, _ in fresh})
+    for identity, (group, _) in zip(ids, fresh, strict=True):
+        if (pitch := pitches.get(group.match)) is not None:
+            give_pitch(session, origin.dataset_id, [identity], pitch, origin.actor)
+    refresh_queue(session, ids)
+    return ids
+
+
+def _follow(
+    session: Session,
+    origin: Origin,
+    group_id: int,
+    incoming: Group,
+    digest: str,
+    shared: dict[str, int],
+    report: IngestReport,
+) -> None:
+    stored, at = read_groups(session, [group_id])[group_id], now()
+    followed = follow_group(stored, incoming)
+    if (count := len(followed.group.views)) > MAX_VIEWS:
+        report.problems.append(
+            f"group {incoming.key} would have {count} views with those that people edited, a group "
+            f"may have {MAX_VIEWS}; it stays as it is"
+        )
+        return
+    if (pitch := _edited_pitch(session, stored, incoming)) is not None:
+        followed = replace(followed, group=replace(followed.group, pitch=pitch))
+    if incoming.match == stored.group.match:
+        # What the match shares comes from its other pictures.
+        shared_here = SetPositions(stored.group.positions).apply(followed.group)
+        followed = replace(followed, group=shared_here)
+    # What was read of a picture says of which, and is read again where that is another.
+    paint = outdated_where_people_moved(stored.group, followed.group)
+    followed = replace(followed, group=SetPaint(paint).apply(followed.group))
+    insert_readings(session, origin.dataset_id, followed.group.paint.values())
+    save_group(
+        session, stored, followed.group, at=at, source=followed.base, digest=digest, shared=shared
+    )
+    after = read_groups(session, [group_id])[group_id]
+    kept = note_kept(session, after, followed.kept)
+    body = import_body(followed.group, followed.base, origin.source, digest, places_of(after))
+    body["kept"] = [[item.view, item.sentence] for item in kept]
+    append(session, [Entry("import", origin.actor, at, body, origin.dataset_id, group_id)])
+    refresh_queue(session, [group_id])
+    report.changed += 1
+    report.findings += len(followed.kept)
+
+
+def _edited_pitch(session: Session, stored: StoredGroup, incoming: Group) -> Pitch | None:
+    """The size that a person gave to a group's match, or to the group itself that has none."""
+    if incoming.match:
+        pitches = edited_pitches(session, stored.dataset_id, {incoming.match})
+        return pitches.get(incoming.match)
+    is_own = not stored.group.match and is_pitch_edited(session, stored.id)
+    return stored.group.pitch if is_own else None
+
+
+def note_kept(session: Session, stored: StoredGroup, kept: Sequence[KeptEdit]) -> list[KeptEdit]:
+    """Save what imports noticed about a group: this one, and earlier ones as far as it holds.
+
+    A finding goes when its view is as the dataset has it now. Returns what is noticed then.
+    """
+    fresh = {item.view for item in kept}
+    noticed = [
+        KeptEdit(view, sentence)
+        for view, sentence in group_findings(session, stored.id)
+        if view is not None
+        and view not in fresh
+        and view in stored.view_ids
+        and stored.is_edited(view)
+    ]
+    noticed.extend(kept)
+    told = ((item.view, item.sentence) for item in noticed)
+    replace_group_findings(session, stored.id, KIND, told)
+    return noticed

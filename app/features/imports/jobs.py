@@ -1,0 +1,306 @@
+"""Imports as jobs: asked for, carried out beside the requests, taken up again after a restart."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from app.config import Settings
+from app.db.database_worker import SILENCE, run_in_worker
+from app.db.json_columns import Json
+from app.db.store import Store
+from app.errors import InputError, TooLargeError
+from app.features.datasets.queries import find_dataset
+from app.features.datasets.service import get_dataset_head, require_name
+from app.features.imports.folders import resolve_folder
+from app.features.imports.sources import FORMATS, Source, import_source
+from app.features.imports.upload_queries import get_upload, keep_upload, upload_path
+from app.features.jobs.queries import Job
+from app.features.jobs.run import FailedWithReportError, JobProgress, Work, left_to_next_server
+from app.features.jobs.service import Jobs
+from app.features.paint.jobs import PAINT, PROPOSALS
+from app.features.paint.service import has_pictures
+from app.features.solve.jobs import request_solve
+from app.formats.file_tree import Root
+from app.plural import plural
+from app.progress import TellProgress
+from app.soccer.frames import ImageSize
+from app.soccer.policy import POLICIES, Policy
+from app.worker_process import WorkerEnded, WorkerLimits
+
+KIND = "import"
+SHOWN = 500
+"""Left-out records that a job's result names; all are counted."""
+LIMITS_HINT = (
+    "Import it in parts, or have the operator raise TOUCHLINE_IMPORT_MEMORY or "
+    "TOUCHLINE_IMPORT_SECONDS. What was imported before it ended stays, and is not brought twice."
+)
+
+
+@dataclass(frozen=True)
+class ImportRequest:
+    """What somebody wants imported.
+
+    Attributes:
+        source: ``{"upload": id}`` or ``{"folder": path}``.
+        lines: The same for ISSIA's line files, or None.
+        frames: The same for a list of frames, or None.
+        options: ``calibration``, ``frame_offset``, ``flipped``, ``size`` ([width, height]),
+            ``ball_category``, ``grouping``.
+        policy: Name of a shipped one for a dataset that is made; None: as its pictures suggest.
+    """
+
+    dataset: str
+    format: str
+    source: Mapping[str, str]
+    lines: Mapping[str, str] | None = None
+    options: Mapping[str, Any] = field(default_factory=dict)
+    dry_run: bool = False
+    policy: str | None = None
+    frames: Mapping[str, str] | None = None
+
+    def values(self) -> dict[str, Json]:
+        """As a job keeps it."""
+        return {
+            "dataset": self.dataset,
+            "format": self.format,
+            "source": dict(self.source),
+            "lines": None if self.lines is None else dict(self.lines),
+            "frames": None if self.frames is None else dict(self.frames),
+            "options": dict(self.options),
+            "dry_run": self.dry_run,
+            "policy": self.policy,
+        }
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """The result of an import.
+
+    Attributes:
+        values: The report, as plain values.
+        fresh: Whether there is something new to solve.
+        nothing: Why nothing was read, with what to do about it; None where something was.
+    """
+
+    values: dict[str, Any]
+    fresh: bool
+    nothing: tuple[str, str] | None
+
+
+def request_import(
+    jobs: Jobs, store: Store, settings: Settings, request: ImportRequest, *, actor: str
+) -> Job:
+    """Import, soon; what can be refused is refused at once.
+
+    Args:
+        jobs: Carries it out.
+        store: The database.
+        settings: Where uploads lie, and which folders may be read.
+        request: What to import.
+        actor: Who imports.
+
+    Raises:
+        InputError: Format, name or path cannot be used.
+        NotFoundError: There is no such upload or folder.
+    """
+    source = source_of(settings, request)
+    with store.read() as session:
+        row = find_dataset(session, request.dataset)
+    if row is None:
+        require_name(request.dataset, "a dataset", pointer="/dataset")
+    would = "Dry run of" if request.dry_run else "Import"
+    return jobs.submit(
+        KIND,
+        f"{would} {source.name} ({request.format}) for {request.dataset}",
+        import_work(jobs, store, settings, request, actor),
+        dataset_id=None if row is None else int(row.id),
+        actor=actor,
+        request=request.values(),
+    )
+
+
+def resume_imports(jobs: Jobs, store: Store, settings: Settings) -> None:
+    """Let imports that an earlier server was at go on; what is there already stays as it is."""
+
+    def work_of(job: Job) -> Work:
+        return import_work(jobs, store, settings, ImportRequest(**job.request), job.actor)
+
+    jobs.resumes(KIND, work_of)
+
+
+def import_work(
+    jobs: Jobs, store: Store, settings: Settings, request: ImportRequest, actor: str
+) -> Work:
+    """The work itself; its result is the report, also where it fails because it read nothing."""
+
+    def work(progress: JobProgress) -> Json:
+        source = source_of(settings, request)
+        sentence = f"{'Reading' if request.dry_run else 'Importing'} {source.name}."
+        progress(0, None, sentence)
+        if not request.dry_run and "upload" in request.source:
+            # Frames are read where they are, so the file must stay from the first group on.
+            keep_upload(settings, request.source["upload"])
+        with left_to_next_server(progress):
+            outcome = import_in_worker(
+                store,
+                request.dataset,
+                source,
+                actor=actor,
+                dry_run=request.dry_run,
+                progress=_step(progress, sentence),
+                stop=progress.check,
+                policy=None if request.policy is None else POLICIES[request.policy],
+            )
+        with store.read() as session:
+            found = find_dataset(session, request.dataset)
+        if found is not None:
+            jobs.belongs(progress.job_id, int(found.id))
+        if outcome.nothing is not None:
+            raise FailedWithReportError(*outcome.nothing, _result(outcome, request))
+        if request.dry_run or not outcome.fresh:
+            return _result(outcome, request)
+        return _result(outcome, request, **_following(jobs, store, request, actor))
+
+    return work
+
+
+def import_in_worker(
+    store: Store,
+    dataset: str,
+    source: Source,
+    *,
+    actor: str,
+    dry_run: bool,
+    progress: TellProgress,
+    stop: Callable[[], None],
+    policy: Policy | None = None,
+) -> Outcome:
+    """``import_source`` in a worker process, within the limits of the settings.
+
+    The process reads the files and writes the database in the short transactions of an import.
+
+    Args:
+        stop: Called every now and then; an error that it raises ends the import.
+
+    Raises:
+        DamagedError: The worker met damage; from then on this process refuses changes, too.
+        TooLargeError: It went beyond the limits, or made the process crash.
+    """
+    limits = WorkerLimits(store.settings.import_memory, store.settings.import_seconds, SILENCE)
+    given = import_here, dataset, source, actor, dry_run, policy
+    try:
+        return run_in_worker(store, "imports", *given, limits=limits, progress=progress, stop=stop)
+    except WorkerEnded as error:
+        raise TooLargeError(f"{source.label} {error}", hint=LIMITS_HINT) from error
+
+
+def import_here(
+    store: Store,
+    dataset: str,
+    source: Source,
+    actor: str,
+    dry_run: bool,
+    policy: Policy | None,
+    progress: TellProgress,
+) -> Outcome:
+    """The import itself, in this process."""
+    settings = store.settings
+    imported = import_source(
+        store, dataset, source, settings, progress, actor=actor, dry_run=dry_run, policy=policy
+    )
+    result = imported.result
+    nothing = None if imported.something else imported.nothing_read()
+    return Outcome(imported.values(), bool(result.new + result.changed), nothing)
+
+
+def _following(
+    jobs: Jobs, store: Store, request: ImportRequest, actor: str
+) -> dict[str, int | None]:
+    """Ids of the jobs that compute what is new.
+
+    The clicks are solved first, for that takes seconds; reading the pictures is asked for next, and
+    solves once more what it changes. For frames that nobody has annotated cameras are sought last.
+    """
+    found = get_dataset_head(store, request.dataset)
+    solve, paint = request_solve(jobs, store, found.id, actor=actor), None
+    if request.format == "frames":
+        proposals = PROPOSALS.request(jobs, store, found.id, None, actor=actor)
+        return {"solve_job": solve.id, "proposals_job": proposals.id}
+    if found.policy.calibration.source == "paint" and has_pictures(store, found.id):
+        paint = PAINT.request(jobs, store, found.id, None, actor=actor).id
+    return {"solve_job": solve.id, "paint_job": paint}
+
+
+def _step(progress: JobProgress, sentence: str) -> TellProgress:
+    def step(done: int, _total: int | None = None, said: str = "") -> None:
+        more = f" {said}" if said else ""
+        progress(done, None, f"{sentence}{more} {plural(done, 'group')} so far.")
+
+    return step
+
+
+def _result(
+    outcome: Outcome,
+    request: ImportRequest,
+    *,
+    solve_job: int | None = None,
+    paint_job: int | None = None,
+    proposals_job: int | None = None,
+) -> Json:
+    """The report; with the jobs that solve what is new, read its paint and propose its cameras,
+    where there are any."""
+    values = outcome.values
+    hidden = max(len(values["skipped"]) - SHOWN, 0)
+    return {
+        **values,
+        "dataset": request.dataset,
+        "dry_run": request.dry_run,
+        "solve_job": solve_job,
+        "paint_job": paint_job,
+        "proposals_job": proposals_job,
+        "skipped": values["skipped"][:SHOWN],
+        "more_skipped": values["more_skipped"] + hidden,
+    }
+
+
+def source_of(settings: Settings, request: ImportRequest) -> Source:
+    """What a request means, under a name that tells nobody where it lies.
+
+    Raises:
+        InputError: Unknown format, unusable path, or an option that the format does not use.
+        NotFoundError: There is no such upload or folder.
+    """
+    if request.format not in FORMATS:
+        raise InputError(
+            f'"{request.format}" cannot be imported; {", ".join(FORMATS)} can', pointer="/format"
+        )
+    path, name = _place(settings, request.source)
+    options = dict(request.options)
+    size = options.pop("size", None)
+    offset = options.pop("frame_offset", 8)
+    if isinstance(offset, dict):
+        offset = {int(camera): number for camera, number in offset.items()}
+    source = Source(
+        request.format,
+        path,
+        size=None if size is None else ImageSize(*size),
+        lines=None if request.lines is None else _place(settings, request.lines)[0],
+        frames=None if request.frames is None else _place(settings, request.frames)[0],
+        calibration=options.get("calibration"),
+        frame_offset=offset,
+        flipped=frozenset(options.get("flipped", ())),
+        name=name,
+        ball_category=options.get("ball_category", ""),
+        grouping=options.get("grouping", ""),
+    )
+    source.check(policy=request.policy is not None)
+    return source
+
+
+def _place(settings: Settings, source: Mapping[str, str]) -> tuple[Root, str]:
+    if "upload" in source:
+        upload = get_upload(settings, source["upload"])
+        return upload_path(settings, upload.id), upload.name
+    return resolve_folder(settings, source["folder"]), source["folder"].rstrip("/")

@@ -1,0 +1,357 @@
+"""Edits and verdicts of another installation, merged with those of this one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import islice
+from typing import TypeVar
+
+from app.db.json_columns import Json
+from app.db.log import Entry, append
+from app.db.session import Session, now
+from app.db.store import Store
+from app.errors import DatasetFormatError, InputError
+from app.features.datasets.queries import find_dataset
+from app.features.datasets.service import insert_dataset
+from app.features.findings.queries import replace_station_finding, station_finding
+from app.features.groups.codecs import station_to_json
+from app.features.groups.digest import station_digest
+from app.features.groups.queries import read_groups
+from app.features.groups.reimport import KIND, SharedStations
+from app.features.groups.revision_queries import refresh_inputs_hashes
+from app.features.groups.undo_stacks import Lineages, StationLineage, base_digest, station_lineage
+from app.features.groups.view_queries import StoredStation, groups_of_station, save_station
+from app.features.imports.edits_export import GROUPS, SPARE, STATIONS
+from app.features.imports.ingest import IngestReport, Origin, attempt, ingest_batch
+from app.features.imports.merge_group import (
+    CONFLICT,
+    FOLLOW,
+    UPSTREAM,
+    Side,
+    decide,
+    merge_dismissals,
+    merge_group,
+    merge_verdicts,
+)
+from app.features.imports.merge_parse import (
+    CarriedGroup,
+    CarriedHead,
+    CarriedStation,
+    parse_group,
+    parse_spare,
+    parse_station,
+    read_head,
+    read_lines,
+)
+from app.features.imports.queries import known_groups, shared_stations
+from app.features.imports.spare import SpareFrame, ingest_spare
+from app.features.queue.queries import refresh_queue
+from app.formats.file_tree import FileTree, Limits, Root
+from app.formats.report import Report
+from app.formats.trees import opened_tree
+from app.progress import TellProgress
+from app.soccer.group import Group, Station
+
+
+def merge_stations(
+    session: Session, origin: Origin, carried: Iterable[CarriedStation], report: IngestReport
+) -> None:
+    """Bring static cameras up to what another installation made of them."""
+    for item in carried:
+        stored = _stored(session, origin.dataset_id, item.station.key)
+        if stored is None or _is_upstream(session, stored, item):
+            shared = SharedStations(session, origin.dataset_id, origin.source, origin.actor)
+            shared.follow([item.base])
+            report.changed += len(shared.changed)
+            report.findings += len(shared.kept)
+            stored = _stored(session, origin.dataset_id, item.station.key)
+        assert stored is not None
+        report.changed += _merge(session, origin, stored, item, report)
+
+
+def _is_upstream(session: Session, stored: StoredStation, item: CarriedStation) -> bool:
+    """Whether the other's dataset brought what this one's never did."""
+    base = station_digest(item.base)
+    if base == stored.source_digest:
+        return False
+    return base not in station_lineage(session, stored).states
+
+
+def _merge(
+    session: Session,
+    origin: Origin,
+    stored: StoredStation,
+    item: CarriedStation,
+    report: IngestReport,
+) -> bool:
+    lineage = station_lineage(session, stored)
+    here = Side(stored.digest, stored.source_digest, lineage.states)
+    there = Side(station_digest(item.station), station_digest(item.base), item.states)
+    decision = decide(here, there)
+    if decision in (FOLLOW, UPSTREAM):
+        _follow(session, origin, stored, item, lineage, _sentence(decision, stored))
+    elif decision == CONFLICT:
+        return _note(session, origin, stored, lineage, _sentence(decision, stored), report)
+    return decision in (FOLLOW, UPSTREAM)
+
+
+def _sentence(decision: str, stored: StoredStation) -> str | None:
+    key = stored.station.key
+    if decision == CONFLICT:
+        return (
+            f"another installation edited the lines or the camera of {key} too; what is here stays"
+        )
+    if decision == UPSTREAM:
+        return (
+            f"another installation edited the lines or the camera of {key} on another state of "
+            "the dataset; its edit is in place now"
+        )
+    return None
+
+
+def _follow(
+    session: Session,
+    origin: Origin,
+    stored: StoredStation,
+    item: CarriedStation,
+    lineage: StationLineage,
+    sentence: str | None,
+) -> None:
+    station = stored.station.with_said(item.station)
+    save_station(session, stored, station)
+    replace_station_finding(session, stored.id, KIND, sentence)
+    _log(session, origin, replace(stored, station=station), lineage, sentence, list(item.log))
+    groups = groups_of_station(session, stored.id)
+    refresh_inputs_hashes(session, groups)
+    refresh_queue(session, groups)
+
+
+def _note(
+    session: Session,
+    origin: Origin,
+    stored: StoredStation,
+    lineage: StationLineage,
+    sentence: str | None,
+    report: IngestReport,
+) -> bool:
+    """Save a conflict, unless it is known; whether it was new."""
+    if station_finding(session, stored.id) == sentence:
+        return False
+    # A revision of its own, as every entry of the log about a station makes one.
+    save_station(session, stored, stored.station)
+    replace_station_finding(session, stored.id, KIND, sentence)
+    _log(session, origin, stored, lineage, sentence, [])
+    refresh_queue(session, groups_of_station(session, stored.id))
+    report.findings += 1
+    return True
+
+
+def _log(
+    session: Session,
+    origin: Origin,
+    stored: StoredStation,
+    lineage: StationLineage,
+    sentence: str | None,
+    carried: list[object],
+) -> None:
+    station, base = station_to_json(stored.station), station_to_json(lineage.base)
+    body = {
+        "source": origin.source,
+        "station": station,
+        "base": None if base == station else base,
+        "kept": sentence,
+        "carried": carried,
+    }
+    entry = Entry("station", origin.actor, now(), body, origin.dataset_id, station_id=stored.id)
+    append(session, [entry])
+
+
+def _stored(session: Session, dataset_id: int, key: str) -> StoredStation | None:
+    return next(iter(shared_stations(session, dataset_id, key)), None)
+
+
+BATCH = 20
+T = TypeVar("T")
+
+
+@dataclass
+class _Run:
+    """One import under way."""
+
+    store: Store
+    dataset: str
+    head: CarriedHead
+    source: str
+    actor: str
+    keep: bool
+    report: IngestReport
+    counted: set[str]
+    """Static cameras that are counted already."""
+
+    def origin(self, session: Session) -> Origin:
+        """The dataset, made with the other's policy when there is none of that name."""
+        row = find_dataset(session, self.dataset)
+        number = (
+            insert_dataset(session, self.dataset, self.head.policy, self.actor)
+            if row is None
+            else int(row.id)
+        )
+        return Origin(number, self.source, self.actor)
+
+
+def carry_in(
+    store: Store,
+    dataset: str,
+    path: Root,
+    report: Report,
+    limits: Limits,
+    *,
+    source: str,
+    actor: str,
+    progress: TellProgress | None = None,
+    dry_run: bool = False,
+) -> IngestReport:
+    """Merge what ``carry_out`` wrote into a dataset, which is made when there is none.
+
+    Killed anywhere and started again, it ends in the same state.
+
+    Args:
+        store: The database.
+        dataset: Name.
+        path: Folder or zip.
+        report: What the files hold, and what of it had to be left out.
+        limits: Caps on what is read.
+        source: Where it comes from, for the log.
+        actor: Who imports.
+        progress: Called with the number of groups done.
+        dry_run: Dry run: report what would happen, change nothing.
+    """
+    result = IngestReport()
+    with opened_tree(path, report, limits) as tree:
+        if tree is None:
+            return result
+        try:
+            head = read_head(tree)
+            run = _Run(store, dataset, head, source, actor, not dry_run, result, set())
+            _carry(run, tree, report, progress)
+        except DatasetFormatError as error:
+            report.skip(error)
+    return result
+
+
+def _carry(run: _Run, tree: FileTree, report: Report, progress: TellProgress | None) -> None:
+    stations = {item.station.key: item for item in _parsed(tree, STATIONS, report, parse_station)}
+    with attempt(run.store, keep=run.keep) as session:
+        origin = run.origin(session)
+        _note_policy(session, run)
+        merge_stations(session, origin, stations.values(), run.report)
+    known = {key: item.station for key, item in stations.items()}
+    groups = _parsed(tree, GROUPS, report, lambda value: parse_group(value, known))
+    done = 0
+    while batch := list(islice(groups, BATCH)):
+        with attempt(run.store, keep=run.keep) as session:
+            _merge_batch(session, run, batch, stations)
+        done += len(batch)
+        if progress is not None:
+            progress(done)
+    if run.keep:
+        frames = (SpareFrame(*item) for item in _parsed(tree, SPARE, report, parse_spare))
+        ingest_spare(run.store, run.dataset, frames, source=run.source, actor=run.actor)
+
+
+def _parsed(tree: FileTree, name: str, report: Report, parse: Callable[[Json], T]) -> Iterator[T]:
+    for place, value in read_lines(tree, name, report):
+        try:
+            item = parse(value)
+        except InputError as error:
+            report.note(tree.shown(name), place, None, error.message)
+            continue
+        report.imported += 1
+        yield item
+
+
+def _note_policy(session: Session, run: _Run) -> None:
+    row = find_dataset(session, run.dataset)
+    if row is not None and row.policy_hash != run.head.policy.hash:
+        run.report.problems.append(
+            "the other installation judges by another policy; the one here stays"
+        )
+
+
+def _merge_batch(
+    session: Session,
+    run: _Run,
+    batch: Sequence[CarriedGroup],
+    stations: Mapping[str, CarriedStation],
+) -> None:
+    origin = run.origin(session)
+    if not run.keep:
+        # A dry run took its stations back; the groups need them for a moment.
+        merge_stations(session, origin, stations.values(), IngestReport())
+    items = {item.group.key: item for item in batch}
+    known = {item.key: item.id for item in known_groups(session, origin.dataset_id, items)}
+    upstream = _upstream(session, origin, items, known)
+    ingest_batch(session, origin, upstream, run.report, run.counted)
+    counted = {group.key for group in upstream}
+    ids = {item.key: item.id for item in known_groups(session, origin.dataset_id, items)}
+    stored = read_groups(session, list(ids.values()))
+    lineages = Lineages(session, origin.dataset_id).of(stored.values())
+    touched = []
+    for key, number in ids.items():
+        item = items[key]
+        changed = merge_group(session, origin, stored[number], lineages[number], item, run.report)
+        judged = merge_verdicts(session, origin, number, item.verdicts)
+        judged |= merge_dismissals(session, origin, number, item.dismissals)
+        if changed or judged:
+            touched.append(number)
+        if key not in counted:
+            run.report.changed += changed or judged
+            run.report.unchanged += not (changed or judged)
+    refresh_queue(session, touched)
+
+
+def _upstream(
+    session: Session, origin: Origin, items: Mapping[str, CarriedGroup], known: Mapping[str, int]
+) -> list[Group]:
+    """What the other's dataset brought and this one's never did: groups as they came."""
+    stored = read_groups(session, list(known.values()))
+    lineages = Lineages(session, origin.dataset_id).of(stored.values())
+    shared = _shared(session, origin.dataset_id)
+    upstream = []
+    for key, item in items.items():
+        base = _here(item.base, shared)
+        if key not in known:
+            upstream.append(base)
+        elif base_digest(base) not in lineages[known[key]].bases:
+            upstream.append(_with_media(base, stored[known[key]].group))
+    return upstream
+
+
+def _here(group: Group, shared: Mapping[str, Station]) -> Group:
+    """The group with its static cameras as the dataset brought them here.
+
+    They are merged on their own; in an import of groups they must look untouched.
+    """
+    views = (
+        replace(view, station=shared[view.station.key]) if view.station.shared else view
+        for view in group.views
+    )
+    return replace(group, views=tuple(views))
+
+
+def _with_media(group: Group, stored: Group) -> Group:
+    """The group with the frames that are known here; whether they are mirrored, too."""
+    views = []
+    for view in group.views:
+        old = stored.view(view.key)
+        views.append(view if old is None else replace(view, media=old.media))
+    return replace(group, views=tuple(views))
+
+
+def _shared(session: Session, dataset_id: int) -> dict[str, Station]:
+    """The static cameras as the dataset last brought them, by key."""
+    return {
+        item.station.key: station_lineage(session, item).base if item.edited else item.station
+        for item in shared_stations(session, dataset_id)
+    }

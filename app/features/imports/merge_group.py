@@ -1,0 +1,229 @@
+"""One group of this installation merged with the same group of another, with its verdicts."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+from app.db.log import Entry, append
+from app.db.session import Session, now
+from app.features.findings.queries import carried_dismissals, group_findings, insert_dismissal
+from app.features.groups.digest import station_digest, view_digest
+from app.features.groups.queries import StoredGroup, read_groups
+from app.features.groups.reimport import KeptEdit
+from app.features.groups.revision_queries import save_group
+from app.features.groups.undo_stacks import Lineage, pitch_size
+from app.features.imports.body import import_body, places_of
+from app.features.imports.ingest import IngestReport, Origin, note_kept
+from app.features.imports.merge_parse import CarriedGroup
+from app.features.imports.queries import VERDICT, group_verdicts
+from app.features.pitches.service import give_pitch
+from app.features.verdicts.queries import StoredVerdict, insert_verdicts, next_verdict_id
+from app.soccer.finding import Dismissal
+from app.soccer.group import Group, View
+
+
+@dataclass(frozen=True)
+class Side:
+    """One unit that is edited as a whole, as an installation has it.
+
+    Attributes:
+        now: Digest of its present state.
+        base: Digest of what its dataset brought.
+        past: Digests of the states that it went through, oldest first, the present one last.
+    """
+
+    now: str
+    base: str
+    past: Sequence[str]
+
+    def goes_through(self, other: Side) -> bool:
+        """Whether it went through everything that the other did, in that order."""
+        states = iter(self.past)
+        return all(state in states for state in other.past)
+
+
+FOLLOW, STAY, CONFLICT, UPSTREAM = "follow", "stay", "conflict", "upstream"
+
+
+def decide(here: Side, there: Side) -> str:
+    """What becomes of a unit (a view or a camera) in this installation.
+
+    Returns:
+        ``follow``: take the other's; ``stay``: nothing to do; ``conflict``: both edited it and
+        neither is behind the other; ``upstream``: take the other's edit, which was made on
+        another state of the dataset than the one here.
+    """
+    if here.now == there.now:
+        return STAY
+    if there.goes_through(here):
+        return FOLLOW
+    if here.goes_through(there) or there.now == there.base:
+        return STAY
+    if here.now == here.base:
+        return FOLLOW if here.now in there.past else UPSTREAM
+    behind, ahead = here.now in there.past, there.now in here.past
+    if behind == ahead:
+        return CONFLICT
+    return FOLLOW if behind else STAY
+
+
+def merge_group(
+    session: Session,
+    origin: Origin,
+    stored: StoredGroup,
+    lineage: Lineage,
+    carried: CarriedGroup,
+    report: IngestReport,
+) -> bool:
+    """Bring a group up to what another installation made of it; whether anything changed."""
+    merged, kept = _merged(stored, lineage, carried)
+    pitch = decide(*_pitch_sides(stored, lineage, carried))
+    kept += _kept(None, pitch, f"pitch of {merged.key}")
+    fresh = _not_noticed(session, stored.id, kept)
+    if merged == stored.group and pitch not in (FOLLOW, UPSTREAM) and not fresh:
+        return False
+    at = now()
+    save_group(session, stored, merged, at=at, source=lineage.base)
+    after = read_groups(session, [stored.id])[stored.id]
+    noticed = note_kept(session, after, kept)
+    base = lineage.base
+    body = import_body(merged, base, origin.source, stored.source_hash, places_of(after))
+    body["kept"] = [[item.view, item.sentence] for item in noticed]
+    body["carried"] = list(carried.log)
+    append(session, [Entry("import", origin.actor, at, body, origin.dataset_id, stored.id)])
+    if pitch in (FOLLOW, UPSTREAM):
+        # An edit of its own: the size before can be had back here, too.
+        give_pitch(session, origin.dataset_id, [stored.id], carried.group.pitch, origin.actor)
+    report.findings += len(fresh)
+    return True
+
+
+def _merged(
+    stored: StoredGroup, lineage: Lineage, carried: CarriedGroup
+) -> tuple[Group, list[KeptEdit]]:
+    group, kept = stored.group, list[KeptEdit]()
+    for view in stored.group.views:
+        other, base = carried.group.view(view.key), carried.base.view(view.key)
+        if other is None or base is None or other.station.shared != view.station.shared:
+            continue
+        ball = decide(_view_side(stored, lineage, view), _other_view(carried, other, base))
+        if ball in (FOLLOW, UPSTREAM):
+            view = replace(
+                view, balls=other.balls, included=other.included, left_out=other.left_out
+            )
+        kept += _kept(view.key, ball, f"ball of {view.key}")
+        if not view.station.shared:
+            here, there = _station_side(stored, lineage, view), _other_station(carried, other, base)
+            lines = decide(here, there)
+            if lines in (FOLLOW, UPSTREAM):
+                view = replace(view, station=view.station.with_said(other.station))
+            kept += _kept(view.key, lines, f"lines or the camera of {view.key}")
+        group = group.with_view(view)
+    return group, kept
+
+
+def _kept(view: str | None, decision: str, what: str) -> list[KeptEdit]:
+    if decision == CONFLICT:
+        sentence = f"another installation edited the {what} too; what is here stays"
+    elif decision == UPSTREAM:
+        sentence = (
+            f"another installation edited the {what} on another state of the "
+            "dataset; its edit is in place now"
+        )
+    else:
+        return []
+    return [KeptEdit(view, sentence)]
+
+
+def _pitch_sides(stored: StoredGroup, lineage: Lineage, carried: CarriedGroup) -> tuple[Side, Side]:
+    here = Side(pitch_size(stored.group.pitch), pitch_size(lineage.base.pitch), lineage.pitches)
+    size, base = pitch_size(carried.group.pitch), pitch_size(carried.base.pitch)
+    return here, Side(size, base, carried.pitches)
+
+
+def _view_side(stored: StoredGroup, lineage: Lineage, view: View) -> Side:
+    present, base = stored.view_digests[view.key]
+    return Side(present, base, lineage.views.get(view.key, (present,)))
+
+
+def _other_view(carried: CarriedGroup, view: View, base: View) -> Side:
+    past = carried.views.get(view.key, ())
+    return Side(view_digest(view), view_digest(base), past)
+
+
+def _station_side(stored: StoredGroup, lineage: Lineage, view: View) -> Side:
+    own = stored.stations[view.key]
+    return Side(own.digest, own.source_digest, lineage.stations.get(view.key, (own.digest,)))
+
+
+def _other_station(carried: CarriedGroup, view: View, base: View) -> Side:
+    past = carried.stations.get(view.key, ())
+    return Side(station_digest(view.station), station_digest(base.station), past)
+
+
+def _not_noticed(session: Session, group_id: int, kept: list[KeptEdit]) -> list[KeptEdit]:
+    """Those of the findings that are not there already."""
+    if not kept:
+        return []
+    known = set(group_findings(session, group_id))
+    return [item for item in kept if (item.view, item.sentence) not in known]
+
+
+def merge_verdicts(
+    session: Session, origin: Origin, group_id: int, carried: Sequence[Mapping[str, Any]]
+) -> bool:
+    """Add the verdicts of another installation that are not here; whether there were any.
+
+    The last one added is the one that counts, so one that was given here later than all of
+    theirs is given once more, with its own time and person.
+    """
+    if not carried:
+        return False
+    known = group_verdicts(session, [group_id]).get(group_id, [])
+    seen = {_identity(item) for item in known}
+    fresh = [item for item in carried if _identity(item) not in seen]
+    if not fresh:
+        return False
+    fresh = sorted(fresh, key=lambda item: str(item["at"]))
+    if known and str(known[-1]["at"]) > str(fresh[-1]["at"]):
+        fresh.append(known[-1])
+    first = next_verdict_id(session)
+    given = [StoredVerdict(first + place, group_id, **item) for place, item in enumerate(fresh)]
+    insert_verdicts(session, origin.dataset_id, given, actor=origin.actor, at=now())
+    return True
+
+
+def merge_dismissals(
+    session: Session, origin: Origin, group_id: int, carried: Sequence[Mapping[str, Any]]
+) -> bool:
+    """Add what was dismissed in another installation and is not here; whether there was any.
+
+    The last one of a finding counts: what was said here later than the first of theirs is said
+    once more, after them.
+    """
+    if not carried:
+        return False
+    known = carried_dismissals(session, [group_id]).get(group_id, [])
+    fresh = [item for item in carried if item not in known]
+    if not fresh:
+        return False
+    first = min(str(item["at"]) for item in fresh)
+    later = [item for item in known if str(item["at"]) > first]
+    brought = (origin.actor, now())
+    for item in sorted([*fresh, *later], key=lambda one: str(one["at"])):
+        values = {name: value for name, value in item.items() if name != "dismissed"}
+        insert_dismissal(
+            session,
+            origin.dataset_id,
+            group_id,
+            Dismissal(**values),
+            dismissed=item["dismissed"],
+            brought=brought,
+        )
+    return True
+
+
+def _identity(verdict: Mapping[str, Any]) -> tuple[Any, ...]:
+    return tuple(verdict[name] for name in VERDICT)

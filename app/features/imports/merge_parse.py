@@ -1,0 +1,333 @@
+"""Carry, parsed: lines that another installation wrote, looked at before anything is believed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import IO, Any
+
+from app.db.json_columns import Json
+from app.errors import DatasetFormatError, InputError, ReviewError
+from app.features.findings.queries import CARRIED
+from app.features.groups.codecs import extras_from_json, policy_from_json, station_from_json
+from app.features.groups.undo_stacks import logged_group, pitch_size
+from app.features.imports.body import MAX_POINTS, MAX_VIEWS, points_of
+from app.features.imports.edits_export import EDIT_KINDS, FORMAT, FORMAT_VERSION, HEAD
+from app.features.imports.queries import VERDICT
+from app.features.policies.text import CUSTOM, policy_values, policy_with
+from app.features.verdicts.service import STATES
+from app.finite import json_text
+from app.formats.file_tree import BROKEN, FileTree
+from app.formats.json_text import read_json
+from app.formats.report import Report
+from app.soccer.annotation import Extras
+from app.soccer.finding import FINDING_KINDS
+from app.soccer.frames import MAX_SIDE
+from app.soccer.group import CALIBRATIONS, Group, Station, View
+from app.soccer.pitch import canonical_marking
+from app.soccer.policy import PAPER, Policy
+from app.soccer.reasons import MAX_NOTE, REASONS, left_out
+
+MAX_LINE = 32 * 1024 * 1024
+MAX_BALLS, MAX_TEXT = 100, 1000
+MAX_STATES = 100_000
+_MISSHAPEN = (ArithmeticError, AttributeError, LookupError, ReviewError, TypeError, ValueError)
+"""What reading a value raises that is not of the shape that it should have."""
+
+
+@dataclass(frozen=True)
+class CarriedHead:
+    """What the file says of itself."""
+
+    dataset: str
+    policy: Policy
+
+
+@dataclass(frozen=True)
+class CarriedStation:
+    """A static camera: as it is there, as its dataset brought it, and its past."""
+
+    station: Station
+    base: Station
+    states: tuple[str, ...]
+    log: tuple[Json, ...]
+
+
+@dataclass(frozen=True)
+class CarriedGroup:
+    """A group: as it is there, as its dataset brought it, its past, and what people decided."""
+
+    group: Group
+    base: Group
+    views: Mapping[str, tuple[str, ...]]
+    stations: Mapping[str, tuple[str, ...]]
+    pitches: tuple[str, ...]
+    log: tuple[Json, ...]
+    verdicts: tuple[Mapping[str, Any], ...]
+    dismissals: tuple[Mapping[str, Any], ...] = ()
+
+
+def read_head(tree: FileTree) -> CarriedHead:
+    """What the file says of itself.
+
+    Raises:
+        DatasetFormatError: It is no export of Touchline, or one of a newer kind.
+    """
+    shown = tree.shown(HEAD)
+    if HEAD not in tree.names():
+        raise DatasetFormatError(shown, None, None, "is missing; this is no export as touchline")
+    value = read_json(tree.read_bytes(HEAD), shown)
+    if not isinstance(value, dict) or value.get("format") != FORMAT:
+        raise DatasetFormatError(shown, None, "format", f'is not "{FORMAT}"')
+    if value.get("version") != FORMAT_VERSION:
+        problem = f"is {value.get('version')}; this version of Touchline reads {FORMAT_VERSION}"
+        raise DatasetFormatError(shown, None, "version", problem)
+    try:
+        policy = policy_from_json(_mapping(value["policy"]))
+        # Its values reach the solver: a text in place of a number would break there.
+        policy_with(PAPER, policy_values(policy), name=CUSTOM)
+        _text(policy.name)
+        return CarriedHead(_text(value["dataset"]), policy)
+    except InputError as error:
+        raise DatasetFormatError(shown, None, "policy", f"is not a policy: {error}") from error
+    except _MISSHAPEN as error:
+        raise DatasetFormatError(shown, None, "policy", "is not a policy") from error
+
+
+def read_lines(tree: FileTree, name: str, report: Report) -> Iterator[tuple[str, Json]]:
+    """The records of a file of lines with their places; a broken line is skipped and told."""
+    if name not in tree.names():
+        return
+    with tree.open(name) as file:
+        for number, line in enumerate(_lines(file, tree.shown(name)), 1):
+            report.read += 1
+            try:
+                yield f"line {number}", read_json(line, tree.shown(name), record=f"line {number}")
+            except DatasetFormatError as error:
+                report.skip(error)
+
+
+def _lines(file: IO[bytes], shown: str) -> Iterator[bytes]:
+    while line := _line(file, shown):
+        if len(line) > MAX_LINE:
+            raise DatasetFormatError(shown, None, None, f"has a line above {MAX_LINE:,} bytes")
+        yield line
+
+
+def _line(file: IO[bytes], shown: str) -> bytes:
+    try:
+        return file.readline(MAX_LINE + 1)
+    except BROKEN as error:
+        problem = "is damaged, here or in its zip file"
+        raise DatasetFormatError(shown, None, None, problem) from error
+
+
+def parse_station(value: Json) -> CarriedStation:
+    """A static camera of its line.
+
+    Raises:
+        InputError: It is not what Touchline writes.
+    """
+    try:
+        station = _station(_mapping(value)["station"])
+        base = station if value["base"] is None else _station(value["base"])
+        if not (station.shared and base.shared and station.key == base.key):
+            raise InputError("has a `base` that is another camera, or no static one")
+        return CarriedStation(station, base, _states(value["states"]), _log(value["log"]))
+    except _MISSHAPEN as error:
+        raise _problem(error) from error
+
+
+def parse_group(value: Json, shared: Mapping[str, Station]) -> CarriedGroup:
+    """A group of its line.
+
+    Raises:
+        InputError: It is not what Touchline writes.
+    """
+    try:
+        group = _group(_mapping(value)["group"], shared)
+        base = group if value["base"] is None else _group(value["base"], shared)
+        if group.key != base.key:
+            raise InputError("has a `base` that is another group")
+        return CarriedGroup(
+            group=group,
+            base=base,
+            views={key: _states(item) for key, item in _mapping(value["views"]).items()},
+            stations={key: _states(item) for key, item in _mapping(value["stations"]).items()},
+            pitches=_pitches(value, group, base),
+            log=_log(value["log"]),
+            verdicts=tuple(map(_verdict, _list(value["verdicts"], MAX_STATES))),
+            dismissals=tuple(map(_dismissal, _list(value.get("dismissals", []), MAX_STATES))),
+        )
+    except _MISSHAPEN as error:
+        raise _problem(error) from error
+
+
+def parse_spare(value: Json) -> tuple[str, str, Extras]:
+    """Camera, frame and extras of a line.
+
+    Raises:
+        InputError: It is not what Touchline writes.
+    """
+    try:
+        extras = _mapping(value)["extras"]
+        return _text(value["camera"]), _text(value["frame"]), _extras(extras)
+    except _MISSHAPEN as error:
+        raise _problem(error) from error
+
+
+def _problem(error: Exception) -> InputError:
+    if isinstance(error, ReviewError):
+        return InputError(error.message)
+    what = f"lacks {error}" if isinstance(error, KeyError) else "is not what Touchline writes"
+    return InputError(what)
+
+
+def _group(value: Json, shared: Mapping[str, Station]) -> Group:
+    views = _list(_mapping(value)["views"], MAX_VIEWS)
+    names = {view["station"] for view in views if isinstance(view["station"], str)}
+    if names - shared.keys():
+        raise InputError(f'names the static camera "{min(names - shared.keys())}", unknown here')
+    group = logged_group({**value, "views": [{**view, "media": None} for view in views]}, shared)
+    keys = [_text(view.key) for view in group.views]
+    if not keys or len(set(keys)) < len(keys):
+        raise InputError("has no views, or two views of the same name")
+    for text in (group.key, group.match, group.split, group.label):
+        _text(text, empty=text is not group.key)
+    if not (0 < group.pitch.length < 1000 and 0 < group.pitch.width < 1000):
+        raise InputError("has a pitch of an impossible size")
+    for view, said in zip(group.views, views, strict=True):
+        _list(said["balls"], MAX_BALLS)
+        _extras(said["extras"])
+        if view.included not in (True, False):
+            raise InputError("has another value where true or false is expected for a view")
+        if view.left_out is not None:
+            _check_left_out(view)
+        if not isinstance(said["station"], str) and _checked(view.station).shared:
+            raise InputError(f"has the static camera {view.station.key} in a view")
+    return group
+
+
+def _check_left_out(view: View) -> None:
+    why = view.left_out
+    if view.included or why is None or left_out(_text(why.reason), why.note) != why:
+        raise InputError("has a view that was left out for a reason that Touchline does not know")
+
+
+def _station(value: Json) -> Station:
+    return _checked(station_from_json(_mapping(value)))
+
+
+def _checked(station: Station) -> Station:
+    _text(station.key)
+    for side in (station.size.width, station.size.height):
+        if not isinstance(side, int) or isinstance(side, bool) or not 2 <= side <= MAX_SIDE:
+            raise InputError(f"has an image side of {side}")
+    if station.calibration not in CALIBRATIONS:
+        raise InputError("has a calibration that Touchline does not know")
+    _require_truth_values("a station", station.flipped, station.shared)
+    for marking in station.said_lines:
+        if canonical_marking(marking) != marking:
+            raise InputError(f"has {marking}, which is not a pitch marking")
+    if (count := points_of(station.lines)) > MAX_POINTS:
+        raise InputError(
+            f"has {count:,} points in the lines of {station.key}, and a view may have {MAX_POINTS:,}"
+        )
+    if [*station.proposed] != [name for name in station.lines if name in station.proposed]:
+        raise InputError("has lines that were proposed and are not there")
+    return station
+
+
+def _require_truth_values(what: str, *values: object) -> None:
+    if not all(isinstance(value, bool) for value in values):
+        raise InputError(f"has {what} with a value in the place of true or false")
+
+
+def _verdict(value: Json) -> Mapping[str, Any]:
+    values = {name: _mapping(value)[name] for name in VERDICT}
+    for name in ("actor", "at", "inputs_hash", "policy_hash"):
+        _text(values[name])
+    for name in ("reason", "note", "override"):
+        if values[name] is not None:
+            _text(values[name], most=MAX_NOTE)
+    if values["state"] not in STATES or values["fixed"] not in (True, False):
+        raise InputError("has a verdict that Touchline does not know")
+    if (values["state"] == "rejected") != (values["reason"] in REASONS):
+        raise InputError("has a rejection without a reason, or a reason without a rejection")
+    return values
+
+
+def _dismissal(value: Json) -> Mapping[str, Any]:
+    values = {name: _mapping(value)[name] for name in CARRIED}
+    for name in ("actor", "at", "sentence"):
+        _text(values[name], most=MAX_NOTE)
+    for name in ("view", "marking", "suggested", "note"):
+        if values[name] is not None:
+            _text(values[name], most=MAX_NOTE)
+    number = values["number"]
+    if number is not None and (type(number) not in (int, float) or not math.isfinite(number)):
+        raise InputError("has a dismissed finding whose number is none")
+    if values["kind"] not in FINDING_KINDS or values["dismissed"] not in (True, False):
+        raise InputError("has a dismissed finding that Touchline does not know")
+    return values
+
+
+def _log(value: Json) -> tuple[Json, ...]:
+    for entry in _list(value, MAX_STATES):
+        if entry["kind"] not in EDIT_KINDS:
+            raise InputError("has a log entry of an unknown kind")
+        _text(entry["actor"])
+        _text(entry["at"])
+        _mapping(entry["edit"])
+    return tuple(value)
+
+
+def _extras(value: Json) -> Extras:
+    if value is None:
+        return Extras()
+    for name in ("boxes", "lines"):
+        for item in _list(_mapping(value)[name], MAX_STATES):
+            _mapping(item)
+    _mapping(value["metadata"])
+    return extras_from_json(value)
+
+
+def _pitches(value: Json, group: Group, base: Group) -> tuple[str, ...]:
+    """The sizes that a group's pitch had; exports of before do not say more than two of them."""
+    if "pitches" in value:
+        return _states(value["pitches"])
+    return tuple(dict.fromkeys(map(pitch_size, (base.pitch, group.pitch))))
+
+
+def _states(value: Json) -> tuple[str, ...]:
+    return tuple(_text(item) for item in _list(value, MAX_STATES))
+
+
+def _kind(value: Json) -> str:
+    """What a value is, for a sentence."""
+    if isinstance(value, str):
+        return f"a text of {len(value)} letters"
+    if isinstance(value, list):
+        return f"a list of {len(value)}"
+    return "an object" if isinstance(value, dict) else json_text(value)[:40]
+
+
+def _mapping(value: Json) -> dict[str, Json]:
+    if not isinstance(value, dict):
+        raise InputError(f"has {_kind(value)} where an object is expected")
+    return value
+
+
+def _list(value: Json, most: int) -> list[Json]:
+    if not isinstance(value, list) or len(value) > most:
+        raise InputError(f"has {_kind(value)} where a list of at most {most} is expected")
+    return value
+
+
+def _text(value: Json, *, empty: bool = False, most: int = MAX_TEXT) -> str:
+    if value == "" and not empty:
+        raise InputError("has an empty text where one is expected that says something")
+    if not isinstance(value, str) or len(value) > most:
+        raise InputError(f"has {_kind(value)} where a text of at most {most} letters is expected")
+    return value

@@ -1,0 +1,212 @@
+"""Imports, their folders, and uploads."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from functools import partial
+from typing import Annotated, Any, TypeVar
+
+from anyio import CancelScope, CapacityLimiter, to_thread
+from anyio.lowlevel import RunVar
+from fastapi import APIRouter, Path, Query, Request, Response
+from starlette.requests import ClientDisconnect
+
+from app.errors import InputError, OverloadedError
+from app.features.imports.folders import (
+    FolderListing,
+    begin_upload,
+    delete_sent,
+    find_upload,
+    finish_upload,
+    list_folder,
+    own_uploads,
+)
+from app.features.imports.jobs import request_import
+from app.features.imports.schemas import FolderDocument, ImportBody, UploadDocument, UploadList
+from app.features.imports.upload_queries import Upload, UploadWriter
+from app.features.imports.upload_quota import quota_of, used_bytes
+from app.features.jobs.queries import Job
+from app.http.cursor import paged
+from app.http.deps import Actor, AppServices, DryRun, Sees
+from app.http.job_responses import by_job, job_answer
+from app.http.problem import responses
+from app.http.respond import no_content, responds
+from app.http.services import Services
+
+imports_router = APIRouter(prefix="/imports", tags=["imports"])
+
+FolderPath = Annotated[
+    str, Query(max_length=4000, description="`path` of an item; empty for the allowed folders.")
+]
+
+
+@imports_router.get(
+    "/folders",
+    operation_id="listImportFolders",
+    response_model=FolderDocument,
+    responses=responses(404),
+)
+@paged()
+def get_folders(services: AppServices, path: FolderPath = "") -> FolderListing:
+    """What may be imported from: the operator names folders in TOUCHLINE_IMPORT_FOLDERS."""
+    return list_folder(services.settings, path)
+
+
+@imports_router.post(
+    "",
+    operation_id="startImport",
+    **by_job(404, 413, 415, 503),
+)
+@responds(job_answer)
+def start_import(
+    request: ImportBody, services: AppServices, actor: Actor, dry_run: DryRun = False
+) -> Job:
+    """Read files into a dataset, which is made when there is none of that name.
+
+    The job's result is the report: read, imported, new, changed, unchanged, findings, and what
+    was skipped with file, record and reason. A dry run reports the same and keeps nothing.
+    """
+    return request_import(
+        services.jobs,
+        services.store,
+        services.settings,
+        request.value(dry_run=dry_run),
+        actor=actor,
+    )
+
+
+uploads_router = APIRouter(prefix="/uploads", tags=["imports"])
+T = TypeVar("T")
+
+CHUNK = 1024 * 1024
+"""Bytes that are gathered before they are written."""
+DISK_THREADS = 1
+"""For the files of all uploads: each takes turns with the event loop at each call of the disk. Beside a
+flood of uploads an editor's slowest answers took 3.0 to 3.8 times as long as alone with two, and take
+2.4 to 2.8 times as long with one."""
+_THREADS: RunVar[CapacityLimiter] = RunVar("threads of uploads")
+LOOK_SECONDS = 0.25
+"""Between two looks whether the server stops."""
+UploadId = Annotated[str, Path(max_length=64)]
+FileName = Annotated[
+    str, Query(min_length=1, max_length=255, description="Name of the file; its ending matters.")
+]
+BODY: dict[str, Any] = {
+    "requestBody": {
+        "required": True,
+        "description": "The file.",
+        "content": {"application/octet-stream": {"schema": {"type": "string", "format": "binary"}}},
+    }
+}
+
+
+@uploads_router.post(
+    "",
+    operation_id="uploadFile",
+    status_code=201,
+    openapi_extra=BODY,
+    responses={
+        **responses(413, 415, 507),
+        201: {
+            "description": "The file is on disk.",
+            "headers": {"Location": {"description": "Of it.", "schema": {"type": "string"}}},
+        },
+    },
+)
+async def upload_file(
+    request: Request, services: AppServices, actor: Actor, name: FileName, response: Response
+) -> UploadDocument:
+    """Take a file, to import it or its predictions; the same file again is the same upload."""
+    upload = await _receive(request, services, name, actor)
+    response.headers["Location"] = f"/api/v1/uploads/{upload.id}"
+    return UploadDocument.model_validate(upload)
+
+
+async def _receive(request: Request, services: Services, name: str, actor: str) -> Upload:
+    """Write what comes, off the event loop; nothing stays of what does not come whole."""
+    writer = await _on_disk(begin_upload, services.settings, name, _declared(request), actor)
+    writing = asyncio.ensure_future(_write(request, writer))
+    try:
+        while not writing.done():
+            await asyncio.wait({writing}, timeout=LOOK_SECONDS)
+            if services.stopping.is_set():
+                raise OverloadedError(
+                    "the server is shutting down", hint="Send the file again in a moment."
+                )
+        writing.result()
+        return await _on_disk(finish_upload, writer)
+    except BaseException as error:
+        with CancelScope(shield=True):
+            writing.cancel()
+            await asyncio.wait({writing})
+            await _on_disk(writer.abort)
+        if isinstance(error, ClientDisconnect):
+            raise InputError("the upload was cut off") from None
+        raise
+
+
+def _declared(request: Request) -> int:
+    """How many bytes a request says that it has; 0: it says nothing that can be read."""
+    declared = request.headers.get("content-length", "")
+    known = declared.isascii() and declared.isdigit() and len(declared) < 19
+    return int(declared) if known else 0
+
+
+async def _write(request: Request, writer: UploadWriter) -> None:
+    waiting = bytearray()
+    async for chunk in request.stream():
+        waiting += chunk
+        if len(waiting) >= CHUNK:
+            await _on_disk(writer.write, bytes(waiting))
+            waiting.clear()
+    await _on_disk(writer.write, bytes(waiting))
+
+
+async def _on_disk(work: Callable[..., T], *arguments: Any) -> T:
+    """Work on files, in one of ``DISK_THREADS``."""
+    try:
+        threads = _THREADS.get()
+    except LookupError:
+        threads = CapacityLimiter(DISK_THREADS)
+        _THREADS.set(threads)
+    return await to_thread.run_sync(work, *arguments, limiter=threads)
+
+
+@uploads_router.get("", operation_id="listUploads", responses=responses())
+@paged()
+def get_uploads(services: AppServices, sight: Sees, actor: Actor) -> UploadList:
+    """Every file of one's own that is still here; an admin is shown everybody's.
+
+    `used_bytes` and `quota_bytes` are of whoever asks.
+    """
+    settings = services.settings
+    return UploadList(
+        items=own_uploads(settings, sight),
+        max_bytes=settings.max_upload_bytes,
+        days=settings.upload_days,
+        used_bytes=used_bytes(settings, actor),
+        quota_bytes=quota_of(settings),
+    )
+
+
+@uploads_router.get("/{upload}", operation_id="getUpload", responses=responses(404))
+def get_one(upload: UploadId, services: AppServices) -> UploadDocument:
+    """One uploaded file, without its content."""
+    return UploadDocument.model_validate(find_upload(services.settings, upload))
+
+
+@uploads_router.delete(
+    "/{upload}",
+    operation_id="deleteUpload",
+    status_code=204,
+    response_class=Response,
+    responses={**responses(404), 204: {"description": "It is gone."}},
+)
+@responds(no_content)
+def delete_one(upload: UploadId, services: AppServices, sight: Sees) -> None:
+    """Delete a file; 400 while a dataset reads its frames from it.
+
+    Where others have sent the same file, it stays with them; an admin deletes it for all.
+    """
+    delete_sent(services.store, upload, partial(sight.sees, None))

@@ -1,0 +1,163 @@
+"""Documents of imports and uploads."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from typing import Annotated, Any
+
+from pydantic import BaseModel, ConfigDict, Field, StrictBool, model_validator
+
+from app.features.imports.folders import FolderItem
+from app.features.imports.jobs import ImportRequest
+from app.formats.format_names import ImportFormat
+from app.http.documents import Document, ListDocument
+from app.soccer.choices import CalibrationChoice, PolicyName
+from app.soccer.frames import MAX_SIDE
+
+Camera = Annotated[int, Field(ge=0, le=999)]
+Offset = Annotated[int, Field(ge=-999_999, le=999_999)]
+Side = Annotated[int, Field(ge=2, le=MAX_SIDE)]
+
+
+class ImportPlace(BaseModel):
+    """Where files are: exactly one of an upload and a folder, which may be `s3://NAME/...` in a store."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    upload: Annotated[str, Field(pattern=r"^[0-9a-f]{32}$")] | None = None
+    folder: Annotated[str, Field(min_length=1, max_length=4000)] | None = None
+
+    @model_validator(mode="after")
+    def _one(self) -> ImportPlace:
+        if (self.upload is None) == (self.folder is None):
+            raise ValueError("name an upload or a folder, and not both")
+        return self
+
+    def values(self) -> dict[str, str]:
+        """The place that was given, by its kind."""
+        return {"upload": self.upload} if self.upload else {"folder": self.folder or ""}
+
+
+class ImportOptions(BaseModel):
+    """What the files do not say themselves."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    calibration: CalibrationChoice | None = Field(
+        default=None,
+        description="Which calibration counts where a view has a given camera and lines; null: the "
+        "given one. Of `issia` and `issia-3d`, `given` leaves the lines of given cameras aside, "
+        "which otherwise measure them.",
+    )
+    frame_offset: Offset | dict[Camera, Offset] = Field(
+        default=8, description="ISSIA: XGTF frame minus video frame, for all or by camera."
+    )
+    flipped: list[Camera] = Field(
+        default=[], max_length=100, description="ISSIA: cameras whose videos are mirrored."
+    )
+    size: tuple[Side, Side] | None = Field(
+        default=None,
+        description="Width and height of the annotated images, where files lack it; of cameras: of the "
+        "images that they were made for.",
+    )
+    ball_category: Annotated[str, Field(max_length=200)] = Field(
+        default="",
+        description="COCO: name or id of the category that is the ball; empty: by names such as "
+        "ball, sports_ball and soccer-ball.",
+    )
+    grouping: Annotated[str, Field(max_length=200)] = Field(
+        default="",
+        description="frames: which pictures are one group: `folder`, or a pattern of their names such "
+        "as `{instant}_{camera}.jpg`; empty: each picture is a group.",
+    )
+    lines: ImportPlace | None = Field(
+        default=None, description="ISSIA: line files of the static cameras."
+    )
+    frames: ImportPlace | None = Field(
+        default=None,
+        description="A JSON list of where frames lie in object stores, apart from the labels.",
+    )
+
+
+class ImportBody(BaseModel):
+    """What to import."""
+
+    model_config = ConfigDict(
+        extra="forbid",
+        json_schema_extra={
+            "examples": [
+                {
+                    "dataset": "league",
+                    "format": "soccernet-v3",
+                    "source": {"folder": "soccernet/england_epl"},
+                    "dry_run": True,
+                }
+            ]
+        },
+    )
+
+    dataset: Annotated[str, Field(min_length=1, max_length=200)]
+    format: ImportFormat
+    source: ImportPlace
+    options: ImportOptions = ImportOptions()
+    policy: PolicyName | None = Field(
+        default=None,
+        description="Of a dataset that is made; null: `touchline` where most of its views have a "
+        "picture whose paint can place their camera, else `paper`.",
+    )
+    dry_run: StrictBool = Field(
+        default=False, description="The same as the parameter: report, and save nothing."
+    )
+
+    def value(self, *, dry_run: bool = False) -> ImportRequest:
+        """The import as the review floor takes it; options that were not given are left out."""
+        options: dict[str, Any] = self.options.model_dump(
+            mode="json", exclude_defaults=True, exclude={"lines", "frames"}
+        )
+        lines, frames = self.options.lines, self.options.frames
+        return ImportRequest(
+            self.dataset,
+            self.format,
+            self.source.values(),
+            None if lines is None else lines.values(),
+            options,
+            dry_run or self.dry_run,
+            self.policy,
+            None if frames is None else frames.values(),
+        )
+
+
+class FolderEntry(Document, shows=FolderItem):
+    """A folder or a file that an import can name."""
+
+
+class FolderDocument(ListDocument[FolderEntry]):
+    """What is in a folder that the operator allows; without a path, the folders themselves."""
+
+    path: str
+    format: str | None = Field(description="Format that its files most likely have.")
+    more: bool = Field(description="Whether there is more than is listed.")
+
+
+class UploadDocument(Document):
+    """An uploaded file."""
+
+    id: str = Field(description="Digest of its name and content.")
+    name: str
+    bytes: int
+    created: datetime
+    kept: bool = Field(description="Whether a dataset reads frames from it; it then stays.")
+    format: str | None = Field(description="Format that it most likely has.")
+
+
+class UploadList(ListDocument[UploadDocument]):
+    """Uploads, the newest first."""
+
+    max_bytes: int = Field(description="Largest file that is taken.")
+    days: int = Field(description="After so many days an upload expires.")
+    used_bytes: int = Field(
+        description="What one's own uploads have together, with those that are on their way."
+    )
+    quota_bytes: int | None = Field(
+        description="What they may have together; null: there is no limit."
+    )

@@ -1,0 +1,97 @@
+"""Spare frames: what a dataset knows of images that are no view of a group (persons only)."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from itertools import islice
+
+from app.db.json_columns import pack, unpack
+from app.db.log import Entry, append
+from app.db.session import Session, now
+from app.db.store import Store
+from app.features.datasets.service import read_dataset_head
+from app.features.groups.codecs import extras_from_json
+from app.features.groups.queries import known_spare, put_spare, spare_rows
+from app.features.imports.ingest import IngestReport, ensure_dataset
+from app.formats.issia import FramePersons
+from app.soccer.annotation import Extras
+
+BATCH = 1000
+"""Frames a transaction and a log entry."""
+_NUMBER = re.compile(r"-?\d{1,9}", re.ASCII)
+_CAMERA = re.compile(r"cam[1-6]", re.ASCII)
+
+
+@dataclass(frozen=True)
+class SpareFrame:
+    """One image: the camera that took it, its frame, and what is known of it."""
+
+    camera: str
+    frame: str
+    extras: Extras
+
+
+def ingest_spare(
+    store: Store, dataset: str, frames: Iterable[SpareFrame], *, source: str, actor: str
+) -> IngestReport:
+    """Keep spare frames with a dataset; keeping them again changes nothing.
+
+    People do not edit them, so they follow whatever the dataset brings.
+    """
+    report, items = IngestReport(), iter(frames)
+    while batch := list(islice(items, BATCH)):
+        dataset_id = ensure_dataset(store, dataset, actor)
+        with store.write() as session:
+            _keep(session, dataset_id, batch, source, actor, report)
+    return report
+
+
+def spare_frames(session: Session, dataset_id: int) -> Iterator[SpareFrame]:
+    """The spare frames of a dataset, by camera and frame as texts."""
+    for row in spare_rows(session, dataset_id):
+        yield SpareFrame(row.camera, row.frame, extras_from_json(unpack(row.extras)))
+
+
+def spare_persons(session: Session, dataset: str | int) -> Iterator[FramePersons]:
+    """People of the spare frames of a dataset of ISSIA, for its original shape."""
+    for item in spare_frames(session, read_dataset_head(session, dataset).id):
+        if _NUMBER.fullmatch(item.frame) and _CAMERA.fullmatch(item.camera):
+            yield FramePersons(int(item.frame), item.camera, item.extras.boxes)
+
+
+def _keep(
+    session: Session,
+    dataset_id: int,
+    batch: Sequence[SpareFrame],
+    source: str,
+    actor: str,
+    report: IngestReport,
+) -> None:
+    known = known_spare(session, dataset_id, {item.frame for item in batch})
+    fresh = {}
+    for item in batch:
+        place, body = (item.camera, item.frame), pack(item.extras.values())
+        if known.get(place) == body:
+            report.unchanged += 1
+        else:
+            report.changed += place in known
+            report.new += place not in known
+            fresh[place] = body
+    _write(session, dataset_id, fresh, source, actor)
+
+
+def _write(
+    session: Session,
+    dataset_id: int,
+    fresh: dict[tuple[str, str], bytes],
+    source: str,
+    actor: str,
+) -> None:
+    if not fresh:
+        return
+    put_spare(session, dataset_id, fresh)
+    frames = [[camera, frame, unpack(body)] for (camera, frame), body in fresh.items()]
+    body = {"source": source, "frames": frames}
+    append(session, [Entry("spare", actor, now(), body, dataset_id)])

@@ -1,0 +1,216 @@
+"""Adopting: a person's own annotation becomes that of the original, as their edit and verdict."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+
+from app.db.log import Entry, append
+from app.db.session import Session, now
+from app.db.store import Store
+from app.errors import ConflictError
+from app.features.groups.edit import (
+    Edit,
+    IncludeView,
+    SetBalls,
+    SetCalibrationSource,
+    SetLines,
+    SetPicture,
+    SetStationCalibration,
+    SetStationLines,
+    Several,
+    StationEdit,
+)
+from app.features.groups.edit_codec import step_to_json
+from app.features.groups.queries import StoredGroup
+from app.features.groups.revision_queries import refresh_inputs_hashes
+from app.features.groups.state import GroupState, need_group
+from app.features.groups.submit import current_etag, solved_in, submit
+from app.features.groups.view_paint import PaintFollower
+from app.features.groups.view_queries import groups_of_station, save_station
+from app.features.independent_annotations.copying import aligned
+from app.features.independent_annotations.queries import GOLD, update_take
+from app.features.independent_annotations.service import Take, get_take, read_take
+from app.features.independent_annotations.submission_queries import KIND
+from app.features.queue.queries import refresh_queue
+from app.features.verdicts.queries import (
+    StoredVerdict,
+    insert_verdicts,
+    next_verdict_id,
+    read_last_verdicts,
+)
+from app.soccer.group import Group, Station
+
+
+def adopt_take(
+    store: Store,
+    take_id: int,
+    *,
+    actor: str,
+    paint: PaintFollower | None = None,
+    also: Callable[[Session], None] | None = None,
+) -> GroupState:
+    """Take a person's annotation and verdict over into the original, in one transaction.
+
+    The edit and the verdict are that person's; that ``actor`` decided so is an entry of its own.
+    Undo takes the edit back as any other. Lines of a static camera are edits of that camera.
+    ``also`` writes what becomes true with it into the same transaction.
+
+    Raises:
+        NotFoundError: There is no such take.
+        ConflictError: It is not handed in, was decided about, or is of a gold group.
+        StaleRevisionError: Somebody changed the original at the same moment.
+    """
+    take = get_take(store, take_id)
+    _require_ready(take)
+    # First: what changes the original from here on is seen by the edit that builds on it.
+    etag = current_etag(store, take.group_id)
+    with store.read() as session:
+        copy = need_group(session, take.copy_id)
+        original = need_group(session, take.group_id)
+    copy = replace(copy, group=aligned(original.group, copy.group))
+    edit = Several(tuple(edits_between(original.group, copy.group)))
+    after: list[GroupState] = []
+
+    def settle(session: Session) -> None:
+        _require_ready(read_take(session, take_id))
+        _adopt_stations(session, original, copy, take.person)
+        give_verdict_of(session, take, actor=take.person)
+        at = now()
+        update_take(session, take_id, settled=at)
+        body = {"take": take_id, "person": take.person, "did": "adopted"}
+        append(session, [Entry(KIND, actor, at, body, original.dataset_id, original.id)])
+        if also is not None:
+            also(session)
+        refresh_queue(session, [original.id])
+        after.append(solved_in(session, original.id))
+        session.respond(after[-1])
+
+    if edit.edits:
+        submit(
+            store,
+            take.group_id,
+            edit,
+            if_match=etag,
+            actor=take.person,
+            then=lambda session, _state: settle(session),
+            paint=paint,
+        )
+    if not after:
+        # The original says the same already.
+        with store.write() as session:
+            settle(session)
+    return after[-1]
+
+
+def edits_between(before: Group, after: Group) -> Iterator[Edit]:
+    """The edits that make what one annotation of a group says of another one.
+
+    Views are those of the first, by their keys; static cameras are left alone.
+    """
+    for view in before.views:
+        own = after.view(view.key)
+        if own is None:
+            continue
+        if own.balls != view.balls:
+            yield SetBalls(view.key, own.balls)
+        if (own.included, own.left_out) != (view.included, view.left_out):
+            why = own.left_out
+            said = (None, None) if why is None else (why.reason, why.note)
+            yield IncludeView(view.key, own.included, *said)
+        if view.station.shared:
+            continue
+        lines = _line_changes(view.station, own.station)
+        if lines is not None:
+            yield SetLines(view.key, lines.lines, lines.proposed, lines.not_visible)
+        if own.station.calibration != view.station.calibration:
+            yield SetCalibrationSource(view.key, own.station.calibration)
+        if own.station.picture != view.station.picture:
+            yield SetPicture(view.key, own.station.picture)
+
+
+def _line_changes(before: Station, after: Station) -> SetStationLines | None:
+    names = sorted({*before.lines, *after.lines})
+    changed = {
+        name: tuple(after.lines[name]) if name in after.lines else None
+        for name in names
+        if before.lines.get(name) != after.lines.get(name)
+    }
+    for name in ({*before.proposed} ^ {*after.proposed}) | (
+        {*before.not_visible} ^ {*after.not_visible}
+    ):
+        changed.setdefault(name, tuple(after.lines.get(name, ())) or None)
+    if not changed:
+        return None
+    proposed, not_visible = (
+        tuple(one for one in names if one in changed)
+        for names in (after.proposed, after.not_visible)
+    )
+    return SetStationLines(changed, proposed, not_visible)
+
+
+def _require_ready(take: Take) -> None:
+    if take.kind == GOLD:
+        raise ConflictError("this is an annotation of a gold group, whose truth is known")
+    if take.handed_in is None:
+        raise ConflictError(f"{take.person} has not submitted this yet")
+    if take.settled is not None:
+        raise ConflictError("this annotation was adjudicated already")
+
+
+def _adopt_stations(
+    session: Session, original: StoredGroup, copy: StoredGroup, person: str
+) -> None:
+    """Edit the static cameras as the copy has them."""
+    for key, held in original.stations.items():
+        view = copy.group.view(key)
+        if not held.station.shared or view is None:
+            continue
+        station, own, edits = held.station, view.station, list[StationEdit]()
+        lines = _line_changes(station, own)
+        edits += [] if lines is None else [lines]
+        if own.calibration != station.calibration:
+            edits.append(SetStationCalibration(own.calibration))
+        for edit in edits:
+            body = step_to_json(edit, edit.inverse(station))
+            station = edit.apply(station)
+            where = {"dataset_id": original.dataset_id, "station_id": held.id}
+            append(session, [Entry("station_edit", person, now(), body, **where)])
+            save_station(session, held, station)
+            held = replace(held, station=station, revision=held.revision + 1)
+        if edits:
+            groups = groups_of_station(session, held.id)
+            refresh_inputs_hashes(session, groups)
+            refresh_queue(session, groups)
+
+
+def give_verdict_of(
+    session: Session, take: Take, *, actor: str, note: str | None = None
+) -> StoredVerdict | None:
+    """Give the original the verdict of a take's copy, where there is one.
+
+    Args:
+        session: The write session that takes the take over; what waits for the verdict is told
+            once the queue is refreshed.
+        take: The take.
+        actor: Whose verdict it is.
+        note: Its note, where that of the copy has none.
+    """
+    given = next(iter(read_last_verdicts(session, [take.copy_id]).get(take.copy_id, ())), None)
+    if take.verdict is None or given is None:
+        return None
+    after = need_group(session, take.group_id)
+    verdict = StoredVerdict(
+        **{
+            **vars(given),
+            "id": next_verdict_id(session),
+            "group_id": after.id,
+            "actor": actor,
+            "at": now(),
+            "note": given.note or note,
+            "inputs_hash": after.inputs_hash,
+            "policy_hash": after.policy.hash,
+        }
+    )
+    insert_verdicts(session, after.dataset_id, [verdict], actor=actor, at=verdict.at)
+    return verdict

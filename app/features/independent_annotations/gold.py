@@ -1,0 +1,369 @@
+"""Gold groups: marked by leads with what is true of them, and how far each person is from that."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from enum import StrEnum
+from typing import Any
+
+from app.db.json_columns import Json
+from app.db.log import Entry, append
+from app.db.session import Session, now
+from app.db.store import Store
+from app.errors import ConflictError, InputError, NotFoundError
+from app.features.datasets.service import need_dataset
+from app.features.groups.codecs import group_from_json, group_to_json
+from app.features.groups.state import GroupState, need_group, read_states
+from app.features.groups.submit import load_solved
+from app.features.groups.view_queries import group_dataset
+from app.features.independent_annotations.copying import aligned
+from app.features.independent_annotations.errors import (
+    AnnotationError,
+    TrueView,
+    error_of,
+    world_error,
+)
+from app.features.independent_annotations.gold_queries import (
+    STARTS,
+    gold_head,
+    gold_heads,
+    gold_truth,
+    mark_gold,
+    start_gold,
+    unmark_gold,
+)
+from app.features.independent_annotations.queries import GOLD, is_copy, takes_in
+from app.features.independent_annotations.submission_queries import submissions_of
+from app.features.solutions.service import known_calibrations
+from app.formats.camera_json import camera_from_json
+from app.soccer.frames import ImagePoint
+from app.soccer.group import Group
+from app.soccer.solution import Solution
+from app.solving.solve import solve
+
+KIND = "gold"
+JUDGED = ("accepted", "rejected")
+Z = 1.959963984540054
+"""Of a normal distribution: 95 % lie within."""
+_FEW = 6
+"""From so many on a median has an interval of 95 % that rests on no assumption."""
+
+
+class TruthSource(StrEnum):
+    """Where the truth of a gold group is from."""
+
+    VERDICT = "verdict"
+    """What it held when a lead marked it."""
+    SAMPLE = "sample"
+    """The cameras and the ball with which it was drawn."""
+    VERSION = "version"
+    """What a frozen version holds of it, upon which people agreed or somebody decided."""
+
+
+@dataclass(frozen=True)
+class GoldGroup:
+    """A gold group; ``start`` is what its annotators begin with, ``source`` where its truth is from."""
+
+    group: int
+    label: str
+    start: str
+    marked: str
+    marked_by: str
+    source: TruthSource
+
+
+@dataclass(frozen=True)
+class GoldResult:
+    """What one person made of a gold group: what they submitted first, whatever was returned since.
+
+    Attributes:
+        handed_in: When they submitted it first.
+        right: Whether they judged as is true, if they did.
+        submissions: How often they submitted it: more than once where a lead returned it.
+    """
+
+    group: int
+    label: str
+    handed_in: str
+    verdict: str | None
+    true_verdict: str
+    right: bool | None
+    error: AnnotationError
+    submissions: int = 1
+
+
+@dataclass(frozen=True)
+class Middle:
+    """The median of some numbers with an interval of 95 %, which few numbers do not have."""
+
+    count: int
+    median: float | None
+    low: float | None
+    high: float | None
+
+
+@dataclass(frozen=True)
+class PersonResults:
+    """What somebody made of gold groups, oldest first, and what that comes to.
+
+    ``right`` of ``judged`` verdicts were the true ones: a share between ``right_low`` and
+    ``right_high`` (Wilson's interval, 95 %).
+    """
+
+    person: str
+    results: tuple[GoldResult, ...]
+    line_px: Middle
+    ball_px: Middle
+    ball_m: Middle
+    judged: int
+    right: int
+    right_low: float | None
+    right_high: float | None
+
+
+@dataclass(frozen=True)
+class GoldReport:
+    """The gold groups of a dataset, and everybody who had some."""
+
+    groups: tuple[GoldGroup, ...]
+    people: tuple[PersonResults, ...]
+
+
+def mark(store: Store, group_id: int, start: str, *, actor: str) -> GoldGroup:
+    """Say that what a group holds now is true; annotators begin with what ``start`` leaves of it.
+
+    Raises:
+        NotFoundError: There is no such group.
+        InputError: There is no such start.
+        ConflictError: Nobody has judged the group as it is now, or it is a copy.
+    """
+    check_start(start)
+    state = load_solved(store, group_id)
+    if state.verdict.state not in JUDGED or state.verdict.stale:
+        raise ConflictError(
+            "a gold group is one that was accepted or rejected as it is now",
+            hint="Judge it first: what it holds is what everybody is measured by.",
+        )
+    with store.write() as session:
+        if is_copy(session, state.dataset_id):
+            raise ConflictError("a person's own annotation cannot be a gold group")
+        mark_gold(session, group_id, state.dataset_id, start, _truth(state), actor)
+        # Not an entry of the group: everybody who sees it reads its history.
+        body = {"group": group_id, "did": "marked", "start": start}
+        append(session, [Entry(KIND, actor, now(), body, state.dataset_id)])
+        _, marked = _need_gold(session, group_id)
+        session.respond(marked)
+    return marked
+
+
+def start_with(store: Store, group_id: int, start: str, *, actor: str) -> GoldGroup:
+    """Let annotators of a gold group begin with something else; what is true of it stays.
+
+    Copies that were begun stay as they are.
+
+    Raises:
+        InputError: There is no such start.
+        NotFoundError: It is no gold group.
+    """
+    check_start(start)
+    with store.write() as session:
+        dataset_id, gold = _need_gold(session, group_id)
+        changed = replace(gold, start=start)
+        if changed != gold:
+            start_gold(session, group_id, start)
+            body = {"group": group_id, "did": "changed", "start": start}
+            append(session, [Entry(KIND, actor, now(), body, dataset_id)])
+        session.respond(changed)
+    return changed
+
+
+def unmark(store: Store, group_id: int, *, actor: str) -> GoldGroup:
+    """Let a gold group be an ordinary one again; what was measured by it is no longer shown.
+
+    Raises:
+        NotFoundError: It is none.
+    """
+    with store.write() as session:
+        dataset_id, gone = _need_gold(session, group_id)
+        unmark_gold(session, group_id)
+        body = {"group": group_id, "did": "unmarked"}
+        append(session, [Entry(KIND, actor, now(), body, dataset_id)])
+        session.respond(gone)
+    return gone
+
+
+def read_report(store: Store, dataset: str | int) -> GoldReport:
+    """The gold groups of a dataset, and how far each person was from them, by name.
+
+    Raises:
+        NotFoundError: There is no such dataset.
+    """
+    with store.read() as session:
+        dataset_id = need_dataset(session, dataset)
+        found: dict[str, list[GoldResult]] = {}
+        known = {row.group_id: _known(session, row) for row in gold_heads(session, dataset_id)}
+        takes = [one for one in takes_in(session, dataset_id, kind=GOLD) if one.group_id in known]
+        submitted = submissions_of(session, [take.copy_id for take in takes])
+        for take in takes:
+            made = submitted.get(take.copy_id, [])
+            if take.handed_in is None and not made:
+                continue
+            gold, truth = known[take.group_id]
+            result = _result(gold, truth, _first(session, take, made), max(len(made), 1))
+            found.setdefault(take.person, []).append(result)
+    people = tuple(_person(name, results) for name, results in sorted(found.items()))
+    return GoldReport(tuple(gold for gold, _ in known.values()), people)
+
+
+def wilson(right: int, of: int) -> tuple[float | None, float | None]:
+    """Wilson's 95 % interval of a share (E. B. Wilson 1927, J. Am. Stat. Assoc. 22).
+
+    Example:
+        >>> [round(end, 3) for end in wilson(9, 10)]
+        [0.596, 0.982]
+    """
+    if of == 0:
+        return None, None
+    share, square = right / of, Z * Z
+    middle = (share + square / (2 * of)) / (1 + square / of)
+    half = Z * math.sqrt(share * (1 - share) / of + square / (4 * of * of)) / (1 + square / of)
+    return max(0.0, middle - half), min(1.0, middle + half)
+
+
+def middle_of(values: Sequence[float | None]) -> Middle:
+    """The median of the numbers among some values, with the interval between two of them that
+    holds the true median in 95 of 100 cases, whatever the distribution.
+
+    Example:
+        >>> middle_of([3.0, None, 1.0, 2.0])
+        Middle(count=3, median=2.0, low=None, high=None)
+    """
+    known = sorted(value for value in values if value is not None)
+    count = len(known)
+    if count == 0:
+        return Middle(0, None, None, None)
+    half = count // 2
+    median = known[half] if count % 2 else (known[half - 1] + known[half]) / 2
+    if count < _FEW:
+        return Middle(count, median, None, None)
+    # The largest rank of which the binomial tail (n, 1/2) on either side is at most 2.5 %.
+    tail, rank = 0.0, 0
+    for k in range(count):
+        tail += math.comb(count, k) / 2**count
+        if tail > 0.025:
+            break
+        rank = k + 1
+    return Middle(count, median, known[rank - 1], known[count - rank])
+
+
+def check_start(start: str) -> None:
+    """Raises InputError where annotators cannot begin with that."""
+    if start not in STARTS:
+        raise InputError(f"annotators begin with {', '.join(STARTS)}", pointer="/start")
+
+
+def _truth(state: GroupState) -> Json:
+    ball = None if state.solution is None or state.solution.ball is None else state.solution.ball
+    return {
+        "group": group_to_json(state.group),
+        "verdict": state.verdict.state,
+        "ball": None if ball is None else [*ball.point],
+    }
+
+
+def _known(session: Session, row: Any) -> tuple[GoldGroup, Json]:
+    """A gold group, and what is true of it."""
+    truth, said = gold_truth(session, row.group_id) or {}, row._mapping
+    gold = GoldGroup(
+        said["group_id"],
+        said["label"] or said["key"],
+        said["start"],
+        said["marked"],
+        said["marked_by"],
+        TruthSource(truth.get("source", TruthSource.VERDICT)),
+    )
+    return gold, truth
+
+
+def _need_gold(session: Session, group_id: int) -> tuple[int, GoldGroup]:
+    """A gold group and the id of its dataset."""
+    row = gold_head(session, group_id)
+    if row is None and group_dataset(session, group_id) is None:
+        raise NotFoundError.group(group_id)
+    if row is None:
+        raise NotFoundError(f"group {group_id} is no gold group")
+    return row.dataset_id, _known(session, row)[0]
+
+
+@dataclass(frozen=True)
+class _Submission:
+    """An annotation as it was submitted, with its solution."""
+
+    at: str
+    verdict: str | None
+    group: Group
+    solution: Solution | None
+
+
+def _first(session: Session, take: Any, made: Sequence[Mapping[str, Any]]) -> _Submission:
+    """What somebody submitted first of a copy; as the copy is now where no entry holds it."""
+    (state,) = read_states(session, [take.copy_id])
+    if not made:
+        return _Submission(take.handed_in, take.verdict, state.group, state.solution)
+    first = made[0]
+    stored = need_group(session, take.copy_id)
+    if first["inputs_hash"] == stored.inputs_hash:
+        return _Submission(first["at"], first["verdict"], state.group, state.solution)
+    group = group_from_json(first["submitted"])
+    known = known_calibrations(session, [group], state.policy)
+    return _Submission(first["at"], first["verdict"], group, solve(group, state.policy, known))
+
+
+def _result(gold: GoldGroup, truth: Json, said: _Submission, submissions: int) -> GoldResult:
+    group = group_from_json(truth["group"])
+    solution = said.solution
+    own = None if solution is None or solution.ball is None else solution.ball.point
+    ball = None if truth["ball"] is None else tuple(truth["ball"])
+    verdict, judged = said.verdict, truth["verdict"] in JUDGED
+    annotated = aligned(group, said.group)
+    if ball is not None and "views" in truth:
+        error = world_error(group, true_views(truth), annotated, ball, own)
+    else:
+        error = error_of(group, annotated, ball, own)
+    return GoldResult(
+        group=gold.group,
+        label=gold.label,
+        handed_in=said.at,
+        verdict=verdict,
+        true_verdict=truth["verdict"],
+        right=verdict == truth["verdict"] if judged and verdict in JUDGED else None,
+        error=error,
+        submissions=submissions,
+    )
+
+
+def true_views(truth: Json) -> dict[str, TrueView]:
+    """The true cameras and balls of a truth that has them, by key of the view."""
+    return {
+        key: TrueView(camera_from_json(view["camera"], "gold", key), ImagePoint(*view["center"]))
+        for key, view in truth["views"].items()
+    }
+
+
+def _person(name: str, results: list[GoldResult]) -> PersonResults:
+    results.sort(key=lambda one: one.handed_in)
+    judged = [one.right for one in results if one.right is not None]
+    low, high = wilson(sum(judged), len(judged))
+    return PersonResults(
+        person=name,
+        results=tuple(results),
+        line_px=middle_of([one.error.line_px for one in results]),
+        ball_px=middle_of([one.error.ball_px for one in results]),
+        ball_m=middle_of([one.error.ball_m for one in results]),
+        judged=len(judged),
+        right=sum(judged),
+        right_low=low,
+        right_high=high,
+    )

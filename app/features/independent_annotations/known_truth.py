@@ -1,0 +1,322 @@
+"""Gold groups by known truth, and how they are mixed into a batch."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import islice
+from pathlib import Path
+from random import Random, SystemRandom
+from typing import Any
+
+import numpy as np
+
+from app.db.json_columns import Json
+from app.db.log import Entry, append
+from app.db.session import Session, now
+from app.db.store import Store
+from app.errors import ConflictError, InputError
+from app.features.agreement.queries import AGREED, DECIDED, states_of
+from app.features.datasets.service import dataset_id
+from app.features.groups.codecs import group_to_json
+from app.features.groups.queries import StoredGroup, read_groups
+from app.features.groups.submit import solved
+from app.features.independent_annotations.gold import KIND, TruthSource, check_start
+from app.features.independent_annotations.gold_queries import fresh_gold, mark_gold
+from app.features.independent_annotations.queries import GOLD, INDEPENDENT, is_copy, takes_of_batch
+from app.features.independent_annotations.service import Take, begin
+from app.features.queue.listing_queries import Listing
+from app.features.queue.query import MAX_LISTED_LENGTH, parse_query
+from app.features.versions.queries import BATCH, read_rows
+from app.features.versions.service import Version, find_version, thaw
+from app.formats.camera_json import camera_to_json
+from app.sample.scene import SceneTruth
+from app.sample.truth import TRUTH, read_truth
+from app.soccer.actors import person_of
+from app.soccer.group import Group
+
+MOST = 1000
+"""Groups that are marked at a time."""
+LARGEST = 256 * 1024 * 1024
+"""Bytes of a ``truth.json`` that is read."""
+_NOT_ONE_WORLD = frozenset({"not_synchronous", "tiny_baseline"})
+"""Faults of a sample by which its true 3D ball is not what a good annotation comes to."""
+
+
+@dataclass(frozen=True)
+class GoldChoice:
+    """Which groups become gold, and by what.
+
+    Attributes:
+        source: ``sample`` or ``version``.
+        version: Name or id of the version.
+        query: Which groups, as in the queue.
+        size: So many of them at most, the first ones.
+        start: What annotators begin with.
+    """
+
+    source: TruthSource
+    version: str | None = None
+    query: str = ""
+    size: int = MOST
+    start: str = "imported"
+
+
+@dataclass(frozen=True)
+class GoldChosen:
+    """What came of it: groups that are gold by now, and how many of those asked for are not."""
+
+    groups: tuple[int, ...]
+    left_out: int
+
+
+def mark_known(store: Store, dataset: str | int, choice: GoldChoice, *, actor: str) -> GoldChosen:
+    """Make gold groups of those whose truth is known, also while batches are under way.
+
+    Of a sample those are left out whose pictures do not show one moment, or were taken from one
+    place; of a version those upon which nobody agreed or decided, and what is not in it.
+
+    Raises:
+        InputError: There is no such start, version or query, or nothing is known of any group.
+        ConflictError: The dataset holds copies.
+    """
+    check_start(choice.start)
+    number = dataset_id(store, dataset)
+    query = parse_query(choice.query, longest=MAX_LISTED_LENGTH)
+    version = _version(store, dataset, choice)
+    with store.read() as session:
+        if is_copy(session, number):
+            raise ConflictError("a person's own annotation cannot be a gold group")
+        asked = Listing(session, number, query.conditions).ids(query.order)
+        found = _of_sample(session, asked)
+        if version is not None:
+            found = _of_version(session, asked, version)
+        truths = dict(islice(found, choice.size))
+    if not truths:
+        raise _nothing(choice.source)
+    chosen = GoldChosen(tuple(truths), len(asked) - len(truths))
+    with store.write() as session:
+        for group_id, truth in truths.items():
+            mark_gold(session, group_id, number, choice.start, truth, actor)
+        body: Json = {"did": "marked", "start": choice.start, "source": str(choice.source)}
+        body |= {"groups": [*truths], "version": choice.version}
+        append(session, [Entry(KIND, actor, now(), body, number)])
+        session.respond(chosen)
+    return chosen
+
+
+def _of_sample(session: Session, group_ids: Sequence[int]) -> Iterator[tuple[int, Json]]:
+    """Truths of groups whose frames lie beside what is true of them."""
+    known: dict[Path, Mapping[str, SceneTruth]] = {}
+    for start in range(0, len(group_ids), BATCH):
+        groups = read_groups(session, group_ids[start : start + BATCH])
+        for group_id in group_ids[start : start + BATCH]:
+            truth = _scene(groups[group_id], known)
+            if truth is not None:
+                yield group_id, _sample_truth(groups[group_id].group, truth)
+
+
+def _scene(stored: StoredGroup, known: dict[Path, Mapping[str, SceneTruth]]) -> SceneTruth | None:
+    """The truth of a group, where its frames lie where the truth beside them says."""
+    group = stored.group
+    media = next((view.media for view in group.views if view.media is not None), None)
+    place = None if media is None else Path(media.path).parent
+    match = Path(group.key).parent
+    if place is None or not match.parts or place.parts[-len(match.parts) :] != match.parts:
+        return None
+    root = place.parents[len(match.parts) - 1]
+    if root not in known:
+        known[root] = _read(root / TRUTH)
+    truth = known[root].get(group.key)
+    if truth is None or {fault.kind for fault in truth.faults} & _NOT_ONE_WORLD:
+        return None
+    return (
+        truth if {view.key for view in group.views} <= {one.view for one in truth.views} else None
+    )
+
+
+def _read(file: Path) -> Mapping[str, SceneTruth]:
+    if not file.is_file() or file.is_symlink() or file.stat().st_size > LARGEST:
+        return {}
+    return read_truth(file)
+
+
+def _sample_truth(group: Group, truth: SceneTruth) -> Json:
+    views: dict[str, Any] = {}
+    for view in truth.views:
+        center = view.camera.project(np.array([view.ball]))[0]
+        views[view.view] = {"camera": camera_to_json(view.camera), "center": [*map(float, center)]}
+    # Whether a group is good enough is a question to the policy, which no scene answers.
+    said = {
+        "group": group_to_json(group),
+        "verdict": "unreviewed",
+        "source": str(TruthSource.SAMPLE),
+    }
+    return {**said, "ball": [*truth.ball], "views": views}
+
+
+def _version(store: Store, dataset: str | int, choice: GoldChoice) -> Version | None:
+    """The version that knows the truth; None where another source does."""
+    if choice.source is not TruthSource.VERSION:
+        return None
+    if choice.version is None:
+        raise InputError(
+            "name the frozen version whose verdicts and balls are the truth", pointer="/version"
+        )
+    return find_version(store, dataset, choice.version)
+
+
+def _of_version(
+    session: Session, asked: Sequence[int], version: Version
+) -> Iterator[tuple[int, Json]]:
+    """Truths of groups that a version holds, and upon which people agreed or somebody decided."""
+    ids: dict[str, int] = {}
+    for start in range(0, len(asked), BATCH):
+        states = states_of(session, asked[start : start + BATCH])
+        settled = [group for group, state in states.items() if state in (AGREED, DECIDED)]
+        ids |= {one.group.key: group for group, one in read_groups(session, settled).items()}
+    for row in read_rows(session, version.id, members=True):
+        if row.key not in ids or row.ball is None:
+            continue
+        (frozen,) = thaw(session, version, [row])
+        verdict = (row.verdict or {}).get("state", "unreviewed")
+        said = {"group": group_to_json(frozen.group), "verdict": verdict, "ball": [*row.ball]}
+        yield ids[row.key], {**said, "source": str(TruthSource.VERSION)}
+
+
+def _nothing(source: TruthSource) -> InputError:
+    if source is TruthSource.SAMPLE:
+        return InputError(
+            "the truth of none of these groups is known",
+            hint=f"Their frames have to lie where the sample was written, beside its {TRUTH}.",
+            pointer="/source",
+        )
+    return InputError(
+        "this version holds none of these groups as several people agreed on it, or as somebody decided",
+        hint="Let several people annotate them in a batch first.",
+        pointer="/version",
+    )
+
+
+@dataclass(frozen=True)
+class Terms:
+    """What a batch asks of own annotations.
+
+    Attributes:
+        batch_id: Its id.
+        dataset_id: Of whose groups.
+        groups: Ids of its groups, in order.
+        verdicts: How many people annotate each.
+        blind: Nobody sees what others did.
+        since: When it began.
+        gold_every: One of so many is a gold group; None: none is.
+    """
+
+    batch_id: int
+    dataset_id: int
+    groups: Sequence[int]
+    verdicts: int
+    blind: bool
+    since: str
+    gold_every: int | None = None
+
+
+def begin_next(
+    store: Store, terms: Terms, *, person: str, chance: Random | None = None
+) -> Take | None:
+    """The take that a person shall work on now: the one that is open, else a new one.
+
+    New are groups that they have no take of and that fewer than ``verdicts`` people have, in the
+    batch's order; where gold groups are mixed in by chance, lest an order that is known tells which
+    ones they are; or a gold group that they never had. Two who ask at once get what they would have
+    got one after the other.
+
+    Args:
+        store: The database.
+        terms: Of the batch.
+        person: Who asks.
+        chance: Which of ``gold_every`` takes is a gold one; None: nobody can know.
+
+    Returns:
+        None where there is nothing left for them.
+    """
+    with store.write() as session:
+        take = _next(session, terms, person_of(person), chance or SystemRandom())
+    if take is not None:
+        solved(store, take.copy_id)
+    return take
+
+
+def _next(session: Session, terms: Terms, person: str, chance: Random) -> Take | None:
+    takes = takes_of_batch(session, terms.batch_id, terms.dataset_id)
+    mine = [Take(**row._mapping) for row in takes if row.person == person]
+    waiting = next((take for take in mine if take.handed_in is None), None)
+    if waiting is not None:
+        return waiting
+    begun = Counter(row.group_id for row in takes if row.kind == INDEPENDENT)
+    had = {take.group_id for take in mine}
+    free = [one for one in terms.groups if one not in had and begun[one] < terms.verdicts]
+    kind, choice = INDEPENDENT, free if terms.gold_every else free[:1]
+    if terms.gold_every and is_gold_turn(
+        [take.kind for take in mine], terms.gold_every, len(free), chance
+    ):
+        fresh = fresh_outside(session, terms.dataset_id, person, terms.groups)
+        kind, choice = (GOLD, fresh) if fresh else (kind, choice)
+    if not choice:
+        return None
+    group_id = chance.choice(choice)
+    return begin(
+        session,
+        group_id,
+        person=person,
+        batch_id=terms.batch_id,
+        kind=kind,
+        since=terms.since,
+        blind=terms.blind,
+        nameless=terms.gold_every is not None,
+    )
+
+
+def fresh_outside(
+    session: Session, dataset_id: int, person: str, groups: Collection[int]
+) -> list[int]:
+    """Gold groups of a dataset that a person never had, and that wait in no batch of theirs."""
+    inside = set(groups)
+    return [one for one in fresh_gold(session, dataset_id, person) if one not in inside]
+
+
+def is_gold_turn(kinds: Sequence[str], every: int, free: int, chance: Random) -> bool:
+    """Whether the take after these is a gold one: one of each ``every``, at a place by chance.
+
+    The last ones of a batch, which may be fewer, have one among them, too: the last take is a gold
+    one as often as any other.
+
+    Args:
+        kinds: Of the takes of a person so far, in order.
+        every: How many takes have one gold group among them.
+        free: How many ordinary groups there are left for them.
+        chance: Decides where.
+    """
+    begun = len(kinds) % every
+    if GOLD in kinds[len(kinds) - begun :] or (begun == 0 and free == 0):
+        return False
+    return chance.randrange(min(every - begun, free + 1)) == 0
+
+
+def count_gold_left(kinds: Sequence[str], every: int, free: int, fresh: int) -> int:
+    """How many gold takes are still to come, by ``is_gold_turn``: what is left for somebody counts
+    them, so that it falls by one with each take, whatever it is of.
+
+    Args:
+        kinds: Of the takes of a person so far, in order.
+        every: How many takes have one gold group among them.
+        free: How many ordinary groups there are left for them.
+        fresh: How many gold groups they never had.
+    """
+    begun = len(kinds) % every
+    due = begun > 0 and GOLD not in kinds[len(kinds) - begun :]
+    here = every - begun - due if begun else 0
+    rest = max(free - here, 0)
+    later = -(-rest // (every - 1)) if every > 1 else fresh if rest else 0
+    return min(due + later, fresh)

@@ -1,0 +1,223 @@
+"""Independent annotations: which copy is whose annotation of which group, and how far it is."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from sqlalchemy import Select, bindparam, exists, func, insert, or_, select, update
+from sqlalchemy.orm import aliased
+
+from app.db.session import Session, now
+from app.features.batches.tables import BatchGroupModel
+from app.features.datasets.tables import DatasetModel, GroupModel
+from app.features.groups.insert_queries import next_id
+from app.features.independent_annotations.tables import CopyDatasetModel, TakeModel
+from app.features.queue.tables import QueueModel
+
+GOLD = "gold"
+INDEPENDENT = "independent"
+_TAKES = select(*TakeModel.__table__.columns)
+# What somebody made of a gold group tells nothing of its own: nobody is to know which one it is.
+_READY = (TakeModel.kind == INDEPENDENT, TakeModel.handed_in.is_not(None))
+_OF_COPY = _TAKES.where(TakeModel.copy_id == bindparam("copy"))
+
+
+def insert_take(
+    session: Session,
+    *,
+    batch_id: int | None,
+    group_id: int,
+    copy_id: int,
+    person: str,
+    kind: str,
+    place: int,
+) -> int:
+    """Insert a take that begins now; returns its id."""
+    identity = next_id(session, TakeModel)
+    values = {"batch_id": batch_id, "group_id": group_id, "copy_id": copy_id, "person": person}
+    ends = dict.fromkeys(("handed_in", "verdict", "settled"))
+    row = {"id": identity, **values, "kind": kind, "place": place, "begun": now(), **ends}
+    session.execute(insert(TakeModel), [row])
+    return identity
+
+
+def find_take(session: Session, take_id: int) -> Any | None:
+    """A take by its id."""
+    return session.execute(_TAKES.where(TakeModel.id == take_id)).one_or_none()
+
+
+def take_of_copy(session: Session, copy_id: int) -> Any | None:
+    """The take whose copy a group is; None for an ordinary group."""
+    return session.execute(_OF_COPY, {"copy": copy_id}).one_or_none()
+
+
+def closed_copies(session: Session, dataset_id: int) -> set[int]:
+    """Ids of the copies in a dataset that were handed in or settled: nothing in them changes."""
+    closed = or_(TakeModel.handed_in.is_not(None), TakeModel.settled.is_not(None))
+    statement = select(TakeModel.copy_id).join(GroupModel, GroupModel.id == TakeModel.copy_id)
+    return set(session.scalars(statement.where(GroupModel.dataset_id == dataset_id, closed)))
+
+
+def takes_of_group(session: Session, group_id: int) -> Sequence[Any]:
+    """The takes of a group in the order in which they began."""
+    mine = TakeModel.group_id == group_id
+    return session.execute(_TAKES.where(mine).order_by(TakeModel.id)).all()
+
+
+def takes_of_batch(session: Session, batch_id: int | None, dataset_id: int) -> Sequence[Any]:
+    """The takes of a batch (None: of none) of a dataset, in the order in which they began."""
+    batch = TakeModel.batch_id
+    mine = batch.is_(None) if batch_id is None else batch == batch_id
+    statement = _TAKES.where(mine, TakeModel.copy_id.in_(_copies_of(dataset_id)))
+    return session.execute(statement.order_by(TakeModel.id)).all()
+
+
+def count_left(
+    session: Session, batch_id: int, dataset_id: int, person: str, verdicts: int
+) -> tuple[int, int]:
+    """How many takes of a batch a person has begun, and of how many of its groups they may make one.
+
+    ``verdicts`` people may have a group.
+    """
+    take, group = TakeModel, BatchGroupModel
+    here = (take.batch_id == batch_id, take.copy_id.in_(_copies_of(dataset_id)))
+    mine, this = take.person == person, take.group_id == group.group_id
+    ends = (take.handed_in.is_(None), take.settled.is_(None))
+    asked = select(func.count()).where(*here, this, take.kind == INDEPENDENT).scalar_subquery()
+    free = select(func.count()).where(
+        group.batch_id == batch_id,
+        group.settled.is_(None),
+        group.handed_in.is_(None),
+        ~exists().where(*here, this, mine),
+        asked < verdicts,
+    )
+    begun = select(func.count()).select_from(take).where(*here, mine, *ends)
+    return session.scalar(begun) or 0, session.scalar(free) or 0
+
+
+def _copies_of(dataset_id: int) -> Select[int]:
+    return (
+        select(GroupModel.id)
+        .join(CopyDatasetModel, CopyDatasetModel.dataset_id == GroupModel.dataset_id)
+        .where(CopyDatasetModel.of_id == dataset_id)
+    )
+
+
+def groups_with_takes(
+    compare: Callable[[Any, float], Any] | None = None, number: float = 0
+) -> Select[int]:
+    """Ids of groups of which somebody handed in an annotation of their own, or so many people did."""
+    statement = select(TakeModel.group_id).where(*_READY).group_by(TakeModel.group_id)
+    return statement if compare is None else statement.having(compare(func.count(), number))
+
+
+def count_handed_in(session: Session, group_ids: Sequence[int]) -> dict[int, int]:
+    """How many people handed in an annotation of their own, by group; groups without are left out."""
+    statement = select(TakeModel.group_id, func.count()).where(*_READY)
+    rows = session.execute(
+        statement.where(TakeModel.group_id.in_(group_ids)).group_by(TakeModel.group_id)
+    )
+    return {row[0]: row[1] for row in rows}
+
+
+def open_takes(session: Session, batch_ids: Collection[int], person: str) -> Sequence[Any]:
+    """Rows (batch_id, group_id) of the copies in batches that somebody has begun and not handed in."""
+    mine = (TakeModel.person == person, TakeModel.handed_in.is_(None), TakeModel.settled.is_(None))
+    columns = (TakeModel.batch_id, TakeModel.copy_id.label("group_id"))
+    statement = select(*columns).where(TakeModel.batch_id.in_(batch_ids), *mine)
+    return session.execute(statement.order_by(TakeModel.id)).all()
+
+
+def takes_in(
+    session: Session, dataset_id: int, person: str | None = None, kind: str | None = None
+) -> Sequence[Any]:
+    """The takes of a dataset, of one person or one kind where these are named, oldest first."""
+    statement = _TAKES.join(GroupModel, GroupModel.id == TakeModel.copy_id).join(
+        CopyDatasetModel, CopyDatasetModel.dataset_id == GroupModel.dataset_id
+    )
+    where = [CopyDatasetModel.of_id == dataset_id]
+    if person is not None:
+        where.append(TakeModel.person == person)
+    if kind is not None:
+        where.append(TakeModel.kind == kind)
+    return session.execute(statement.where(*where).order_by(TakeModel.id)).all()
+
+
+def names_of(session: Session, copy_ids: Sequence[int]) -> Sequence[Any]:
+    """``id``, ``key``, ``label``, ``of_id`` and ``same`` (whether it has the original's key) of copies, and
+    ``number``, ``of_key`` and ``of_label`` of the original."""
+    original = aliased(GroupModel)
+    statement = (
+        select(
+            GroupModel.id,
+            GroupModel.key,
+            GroupModel.label,
+            CopyDatasetModel.of_id,
+            (original.key == GroupModel.key).label("same"),
+            original.key.label("of_key"),
+            original.label.label("of_label"),
+            QueueModel.number,
+        )
+        .join(CopyDatasetModel, CopyDatasetModel.dataset_id == GroupModel.dataset_id)
+        .join(TakeModel, TakeModel.copy_id == GroupModel.id)
+        .join(original, original.id == TakeModel.group_id)
+        .join(QueueModel, QueueModel.group_id == original.id)
+    )
+    return session.execute(statement.where(GroupModel.id.in_(copy_ids))).all()
+
+
+def count_takes(session: Session, batch_id: int | None, person: str) -> int:
+    """How many takes a person has begun in a batch."""
+    batch = TakeModel.batch_id
+    mine = batch.is_(None) if batch_id is None else batch == batch_id
+    statement = select(func.count()).where(mine, TakeModel.person == person)
+    return session.scalar(statement) or 0
+
+
+def update_take(session: Session, take_id: int, **values: str | None) -> None:
+    """Write when a take was handed in, judged or settled."""
+    session.execute(update(TakeModel).where(TakeModel.id == take_id).values(**values))
+
+
+_COPIES = select(*CopyDatasetModel.__table__.columns, DatasetModel.name).join(
+    DatasetModel, DatasetModel.id == CopyDatasetModel.dataset_id
+)
+
+
+@dataclass(frozen=True)
+class CopiesOf:
+    """Of what a dataset holds copies: of the groups of ``of_id``, by a person, in a batch (0: none)."""
+
+    of_id: int
+    batch_id: int
+    person: str
+
+
+def insert_copy_dataset(session: Session, dataset_id: int, copies: CopiesOf) -> None:
+    """Say whose copies a dataset holds."""
+    session.execute(insert(CopyDatasetModel), [{"dataset_id": dataset_id, **vars(copies)}])
+
+
+def copies_of(session: Session, dataset_id: int) -> Sequence[Any]:
+    """``dataset_id``, ``of_id``, ``batch_id``, ``person`` and ``name`` of a dataset's copies."""
+    return session.execute(_COPIES.where(CopyDatasetModel.of_id == dataset_id)).all()
+
+
+def find_copies(session: Session, copies: CopiesOf) -> Any | None:
+    """The dataset of such copies."""
+    column = CopyDatasetModel
+    mine = (column.of_id == copies.of_id) & (column.batch_id == copies.batch_id)
+    return session.execute(_COPIES.where(mine, column.person == copies.person)).one_or_none()
+
+
+def copy_dataset_ids(session: Session) -> frozenset[int]:
+    """Ids of the datasets that hold somebody's copies."""
+    return frozenset(session.scalars(select(CopyDatasetModel.dataset_id)))
+
+
+def is_copy(session: Session, dataset_id: int) -> bool:
+    """Whether a dataset holds somebody's copies."""
+    mine = CopyDatasetModel.dataset_id == dataset_id
+    return session.scalar(select(CopyDatasetModel.dataset_id).where(mine)) is not None

@@ -1,0 +1,106 @@
+"""Hand back: work that was handed in goes back to its person, with a sentence that says why."""
+
+from __future__ import annotations
+
+from app.db.log import Entry, append
+from app.db.session import Session, now
+from app.db.store import Store
+from app.errors import InputError
+from app.features.groups.queries import StoredGroup
+from app.features.groups.state import need_group
+from app.features.independent_annotations.queries import take_of_copy
+from app.features.independent_annotations.service import TakeView, read_take, show
+from app.features.independent_annotations.submission_queries import KIND, RETURNED, return_copy
+from app.features.notifications.service import RingKind, tell
+from app.features.webhooks.queries import HANDED_BACK, announce, stamp
+from app.soccer.actors import person_of
+
+MAX_REASON = 500
+"""Letters of the sentence that says why."""
+
+
+def hand_back_take(store: Store, take_id: int, reason: str = "", *, actor: str) -> TakeView:
+    """Let the person of an annotation that was handed in go on with it, and tell them why.
+
+    A comparison of it that waits for a decision waits no longer: it is made anew once it is handed
+    in again.
+
+    Raises:
+        NotFoundError: There is no such take.
+        ConflictError: It is not handed in, or it was decided about.
+        InputError: There is no sentence, or it is too long.
+    """
+    said = checked_reason(reason)
+    if not said:
+        raise InputError(
+            "an annotation goes back with a reason",
+            hint="Say in a sentence what its person shall change.",
+            pointer="/reason",
+        )
+    with store.write() as session:
+        take = read_take(session, take_id)
+        return_copy(session, take)
+        copy = take.copy_id
+        note_hand_back(session, KIND, copy, take.person, said, actor=actor, batch=take.batch_id)
+        back = show(session, read_take(session, take_id))
+        session.respond(back)
+        return back
+
+
+def note_hand_back(
+    session: Session,
+    kind: str,
+    group_id: int,
+    person: str,
+    reason: str,
+    *,
+    actor: str,
+    batch: int | None,
+) -> None:
+    """Write into the log that a group was handed back to somebody, and tell them.
+
+    The entry names the group: its history says so, and a page that has it open hears of it.
+
+    Args:
+        session: The write session in which it happens.
+        kind: Of the entry.
+        group_id: What they worked on; for an annotation of their own, its copy.
+        person: Whom it goes back to.
+        reason: Why; may be empty.
+        actor: Who hands it back.
+        batch: Of which batch it is; None: of none.
+    """
+    group = need_group(session, group_id)
+    body: dict[str, str | int] = {"did": RETURNED, "person": person, "reason": reason}
+    if batch is not None:
+        body["batch"] = batch
+    at = now()
+    append(session, [Entry(kind, actor, at, body, group.dataset_id, group_id)])
+    _announce(session, group, person, actor=actor, at=at, batch=batch)
+    why = f": {reason}" if reason else ""
+    walk = "" if batch is None else f"?q=batch%3A{batch}"
+    tell(
+        session, person, RingKind.RETURNED, f"{person_of(actor)} returned {group.group.label or group.group.key} to you{why}",
+        actor=actor, address=f"/review/{group_id}{walk}", dataset_id=group.dataset_id, group_id=group_id,
+    )  # fmt: skip
+
+
+def _announce(
+    session: Session, group: StoredGroup, person: str, *, actor: str, at: str, batch: int | None
+) -> None:
+    """Tell webhooks of the dataset, for a copy of the one that it is of."""
+    row = take_of_copy(session, group.id)
+    where, told = group.dataset_id, {"group": group.id, "person": person}
+    if row is not None:
+        where = need_group(session, row.group_id).dataset_id
+        told = {"group": row.group_id, "person": person, "copy": group.id}
+    event = f"group{group.id}_handed_back{stamp(at)}"
+    announce(session, where, HANDED_BACK, event, actor=actor, at=at, batch_id=batch, also=told)
+
+
+def checked_reason(reason: str) -> str:
+    """The sentence without blanks around it; raises InputError where it is too long."""
+    said = " ".join(reason.split())
+    if len(said) > MAX_REASON:
+        raise InputError(f"the reason has at most {MAX_REASON} letters", pointer="/reason")
+    return said

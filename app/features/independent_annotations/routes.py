@@ -1,0 +1,185 @@
+"""Independent annotations and gold groups."""
+
+from __future__ import annotations
+
+from fastapi import APIRouter, BackgroundTasks, Request
+
+from app.features.agreement.adjudicate import take_over
+from app.features.agreement.service import after_hand_in
+from app.features.groups.routes import ETAG, group_answer
+from app.features.groups.schemas import GroupDocument
+from app.features.groups.state import GroupState
+from app.features.independent_annotations import gold
+from app.features.independent_annotations import service as takes
+from app.features.independent_annotations.known_truth import GoldChoice, GoldChosen, mark_known
+from app.features.independent_annotations.return_work import hand_back_take
+from app.features.independent_annotations.schemas import (
+    GoldChoiceDocument,
+    GoldChosenDocument,
+    GoldEdit,
+    GoldGroupDocument,
+    GoldReportDocument,
+    HandBack,
+    TakeDocument,
+    TakeList,
+)
+from app.features.people.roles import Action, may
+from app.http.access import login_of
+from app.http.cursor import paged
+from app.http.deps import Actor, AppServices, AppStore, DatasetPath, Id
+from app.http.problem import responses
+from app.http.respond import as_document, responds
+
+takes_router = APIRouter(tags=["takes"])
+
+
+@takes_router.get("/datasets/{dataset}/takes", operation_id="listTakes", responses=responses(404))
+@paged()
+def list_takes(dataset: DatasetPath, store: AppStore, request: Request, actor: Actor) -> TakeList:
+    """Own annotations of a dataset's groups: for a lead everybody's, else those of whoever asks."""
+    login = login_of(request.scope)
+    found = takes.list_takes(
+        store,
+        dataset,
+        lambda dataset_id: login is None or may(login.roles.role_in(dataset_id), Action.LEAD),
+        person=actor,
+    )
+    return TakeList(items=[TakeDocument.model_validate(one) for one in found])
+
+
+@takes_router.post(
+    "/groups/{group}/takes",
+    operation_id="beginTake",
+    response_model=TakeDocument,
+    status_code=201,
+    responses=responses(404, 409),
+)
+@responds(as_document(TakeDocument.model_validate, 201))
+def begin(group: Id, store: AppStore, actor: Actor) -> takes.TakeView:
+    """Begin an own annotation of a group, on a copy that nobody else sees; the one begun, if so."""
+    return takes.begin_take(store, group, person=actor)
+
+
+@takes_router.get(
+    "/groups/{group}/take",
+    operation_id="getTake",
+    response_model=TakeDocument,
+    responses=responses(404),
+)
+def get_take(group: Id, store: AppStore) -> takes.TakeView:
+    """Whose own annotation a group is; 404 for an ordinary group."""
+    return takes.shown(store, takes.get_take_of(store, group))
+
+
+@takes_router.post(
+    "/groups/{group}/hand-in",
+    operation_id="handInTake",
+    response_model=TakeDocument,
+    responses=responses(403, 404, 409),
+)
+@responds(as_document(TakeDocument.model_validate))
+def hand_in(
+    group: Id, services: AppServices, actor: Actor, background: BackgroundTasks
+) -> takes.TakeView:
+    """Submit an independent annotation; a verdict on it does the same. Only a lead can return it."""
+    store = services.store
+    take = takes.get_take_of(store, group)
+    background.add_task(after_hand_in, store, group, services.paint)
+    return takes.hand_in(store, take.id, actor=actor)
+
+
+@takes_router.post(
+    "/groups/{group}/hand-back",
+    operation_id="handBackTake",
+    response_model=TakeDocument,
+    responses=responses(404, 409, 413, 415),
+)
+@responds(as_document(TakeDocument.model_validate))
+def hand_back(
+    group: Id, store: AppStore, actor: Actor, why: HandBack | None = None
+) -> takes.TakeView:
+    """Let the person of an annotation that was handed in go on with it, and tell them why."""
+    take, reason = takes.get_take_of(store, group), "" if why is None else why.reason
+    return hand_back_take(store, take.id, reason, actor=actor)
+
+
+@takes_router.post(
+    "/groups/{group}/adoption",
+    operation_id="adoptTake",
+    response_model=GroupDocument,
+    responses={**responses(404, 409, 412), 200: {"headers": ETAG}},
+)
+@responds(group_answer)
+def adopt(group: Id, services: AppServices, actor: Actor) -> GroupState:
+    """Take an annotation and its verdict over into the group that it is of; the answer is that group.
+
+    They are its person's there, as one edit that undo takes back.
+    """
+    take = takes.get_take_of(services.store, group)
+    return take_over(services.store, take, actor=actor, paint=services.paint)
+
+
+gold_router = APIRouter(tags=["takes"])
+
+
+@gold_router.get(
+    "/datasets/{dataset}/gold",
+    operation_id="getGoldReport",
+    response_model=GoldReportDocument,
+    responses=responses(404),
+)
+def get_report(dataset: DatasetPath, store: AppStore) -> gold.GoldReport:
+    """The gold groups of a dataset, and what each person made of those that they were given."""
+    return gold.read_report(store, dataset)
+
+
+@gold_router.post(
+    "/datasets/{dataset}/gold",
+    operation_id="chooseGoldGroups",
+    response_model=GoldChosenDocument,
+    responses=responses(404, 409, 413, 415),
+)
+@responds(as_document(GoldChosenDocument.model_validate))
+def choose(
+    dataset: DatasetPath, choice: GoldChoiceDocument, store: AppStore, actor: Actor
+) -> GoldChosen:
+    """Make gold groups of those whose truth is known, also while batches are under way."""
+    values = choice.model_dump(exclude={"q", "source"})
+    wanted = GoldChoice(gold.TruthSource(choice.source), query=choice.q, **values)
+    return mark_known(store, dataset, wanted, actor=actor)
+
+
+@gold_router.put(
+    "/groups/{group}/gold",
+    operation_id="markGold",
+    response_model=GoldGroupDocument,
+    responses=responses(404, 409, 413, 415),
+)
+@responds(as_document(GoldGroupDocument.model_validate))
+def mark(group: Id, edit: GoldEdit, store: AppStore, actor: Actor) -> gold.GoldGroup:
+    """Say that what a group holds now, with its verdict, is true."""
+    return gold.mark(store, group, edit.start, actor=actor)
+
+
+@gold_router.patch(
+    "/groups/{group}/gold",
+    operation_id="changeGold",
+    response_model=GoldGroupDocument,
+    responses=responses(404, 413, 415),
+)
+@responds(as_document(GoldGroupDocument.model_validate))
+def change(group: Id, edit: GoldEdit, store: AppStore, actor: Actor) -> gold.GoldGroup:
+    """Let annotators of a gold group begin with something else; what is true of it stays."""
+    return gold.start_with(store, group, edit.start, actor=actor)
+
+
+@gold_router.delete(
+    "/groups/{group}/gold",
+    operation_id="unmarkGold",
+    response_model=GoldGroupDocument,
+    responses=responses(404),
+)
+@responds(as_document(GoldGroupDocument.model_validate))
+def unmark(group: Id, store: AppStore, actor: Actor) -> gold.GoldGroup:
+    """Let a gold group be an ordinary one again; what people made of it is no longer shown."""
+    return gold.unmark(store, group, actor=actor)

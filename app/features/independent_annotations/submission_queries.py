@@ -1,0 +1,119 @@
+"""Submissions: the one rule by which a person's copy of a group is submitted, judged and returned.
+
+Nothing else writes when a copy was submitted. Every submission and every return is a log entry, and
+a submission's entry holds the annotation as it was then: what is measured is the first one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from app.db.json_columns import Json
+from app.db.log import Entry, append, read_entries_of
+from app.db.session import Session
+from app.errors import ConflictError, ForbiddenError
+from app.features.agreement.queries import forget_open
+from app.features.groups.codecs import group_to_json
+from app.features.groups.queries import read_groups
+from app.features.independent_annotations.queries import take_of_copy, update_take
+from app.soccer.actors import LOCAL_USER, person_of
+
+KIND = "take"
+"""Kind of the log's entries about what became of a copy."""
+SUBMITTED = "handed in"
+RETURNED = "handed back"
+"""What such an entry says was done."""
+_ONLY_LEADS = "Only a lead can return it, and says why."
+
+
+def require_open(take: Any | None) -> None:
+    """Raise ConflictError where a copy was submitted; ``None`` is an ordinary group.
+
+    Whether it was adjudicated since the sentence does not say: copies of gold groups never are.
+    """
+    if take is not None and (take.handed_in is not None or take.settled is not None):
+        raise ConflictError(
+            "this annotation was submitted, and can no longer be changed", hint=_ONLY_LEADS
+        )
+
+
+def _require_person(take: Any, actor: str) -> None:
+    """Raise ForbiddenError where a copy is somebody else's."""
+    # On a server without accounts everybody is the local user.
+    if person_of(actor) not in (take.person, LOCAL_USER):
+        raise ForbiddenError(f"only {take.person} submits and judges this annotation")
+
+
+def submit_copy(
+    session: Session, take: Any, *, actor: str, at: str, verdict: str | None = None
+) -> None:
+    """Submit a copy, with its person's verdict where they judged it.
+
+    Raises:
+        ForbiddenError: It is somebody else's.
+        ConflictError: It was submitted already.
+    """
+    _require_person(take, actor)
+    require_open(take)
+    (stored,) = read_groups(session, [take.copy_id]).values()
+    # Of a copy that was returned the verdict stays, unless its person gives another one.
+    verdict = verdict or take.verdict
+    update_take(session, take.id, handed_in=at, verdict=verdict)
+    body: dict[str, Json] = {
+        "take": take.id,
+        "person": take.person,
+        "did": SUBMITTED,
+        "verdict": verdict,
+        "inputs_hash": stored.inputs_hash,
+        "submitted": group_to_json(stored.group),
+    }
+    append(session, [Entry(KIND, actor, at, body, stored.dataset_id, stored.id)])
+
+
+def judge_copy(session: Session, copy_id: int, state: str, *, actor: str, at: str) -> None:
+    """A verdict on a copy submits it; on an ordinary group nothing comes of it.
+
+    Raises:
+        ForbiddenError: It is somebody else's.
+        ConflictError: It was submitted already: its verdict stays, too.
+    """
+    take = take_of_copy(session, copy_id)
+    if take is None:
+        return
+    if state != "unreviewed":
+        submit_copy(session, take, actor=actor, at=at, verdict=state)
+    else:
+        _require_person(take, actor)
+        require_open(take)
+        update_take(session, take.id, verdict=None)
+
+
+def return_copy(session: Session, take: Any) -> None:
+    """Let the person of a submitted copy go on with it; the caller logs who returned it, and why.
+
+    What was compared with it waits for no decision any more.
+
+    Raises:
+        ConflictError: It is not submitted, or it was decided about.
+    """
+    if take.settled is not None:
+        raise ConflictError("this annotation was adjudicated already")
+    if take.handed_in is None:
+        raise ConflictError(f"{take.person} has not submitted this yet")
+    update_take(session, take.id, handed_in=None)
+    forget_open(session, take.group_id, take.batch_id or 0)
+
+
+def submissions_of(
+    session: Session, copy_ids: Sequence[int]
+) -> Mapping[int, list[Mapping[str, Any]]]:
+    """The bodies of the entries about submissions of copies, the first one first.
+
+    Copies that were submitted before there were such entries have none.
+    """
+    found: dict[int, list[Mapping[str, Any]]] = {}
+    for entry in read_entries_of(session, copy_ids, (KIND,)):
+        if entry.group_id is not None and entry.body.get("did") == SUBMITTED:
+            found.setdefault(entry.group_id, []).append({"at": entry.at, **entry.body})
+    return found

@@ -1,0 +1,246 @@
+"""A home beside its tables: settings, permissions, room, clock, leftovers, object stores."""
+
+from __future__ import annotations
+
+import os
+import secrets
+import shutil
+from datetime import UTC, datetime, timedelta
+from itertools import islice
+
+import cv2
+import pysqlite3.dbapi2
+
+from app.config import Settings
+from app.db.check import Check
+from app.db.dialects.sqlite import MIN_SQLITE
+from app.db.home import open_to_others
+from app.db.leftovers import leftovers
+from app.db.log import entries_after, last_time
+from app.db.recovery.anchor import read_anchor
+from app.db.session import Session, text_of
+from app.db.store import Store
+from app.errors import ConflictError, InputError, ReviewError, StorageError
+from app.features.datasets.orphan_queries import spare_calibrations, unread_uploads
+from app.features.people.provider import Provider
+from app.features.people.sign_on_rules import linked_admins, read_rules
+from app.mail import read_mail_server
+from app.object_store.store import ChangedObjectError, ObjectStore, open_store
+from app.plural import plural
+
+KEYS = "Correct TOUCHLINE_STORES or the file of keys: docs/operations.md says what a store needs."
+CONDITIONS = "Update the store, or use another one: docs/operations.md says which."
+_UNCONDITIONAL = (
+    "reads whatever is there, although another content was asked for (If-Match): a frame that was"
+    " changed would be shown as the imported one"
+)
+_PROBE = ".touchline-check"
+_NO_CONTENT = '"touchline-asks-for-no-content"'
+"""What no store calls any content."""
+
+
+def examine_stores(settings: Settings) -> list[Check]:
+    """Ask every configured store for what the service needs of it."""
+    return [_examine(settings, name) for name in sorted(settings.stores)]
+
+
+def _examine(settings: Settings, name: str) -> Check:
+    title, done = f"store {name}", list[str]()
+    try:
+        store = open_store(settings, name)
+        found = next(islice(store.below(""), 1), None)
+        done.append("lists")
+        if found is not None and found.size:
+            store.read(found.key, 0, 1, found.etag)
+            done.append("reads")
+            if not _keeps_apart(store, found.key):
+                return Check(title, False, _UNCONDITIONAL, CONDITIONS)
+        if store.settings.exports:
+            _write(store)
+            done.append("writes")
+    except ReviewError as error:
+        can = f"; it {' and '.join(done)}" if done else ""
+        return Check(title, False, f"{error.message}{can}", KEYS)
+    empty = "" if found is not None else ", and nothing is in it"
+    return Check(title, True, f"{', '.join(done)}{empty}")
+
+
+def _keeps_apart(store: ObjectStore, key: str) -> bool:
+    """Whether an object is not given out as the content that it is not."""
+    try:
+        store.read(key, 0, 1, _NO_CONTENT)
+    except ChangedObjectError:
+        return True
+    return False
+
+
+def _write(store: ObjectStore) -> None:
+    key = f"{_PROBE}-{secrets.token_hex(4)}"
+    store.put(key, b"Touchline writes and deletes this to see that it can.\n")
+    store.delete(key)
+
+
+ROOM_BYTES = 2**30
+"""Room on the disk below which the next import may not fit."""
+_PREFIX = "TOUCHLINE_"
+_FORMATS = (".jpg", ".png", ".webp")
+
+
+def examine_home(settings: Settings) -> list[Check]:
+    """What can be said of a home without its database."""
+    examined = (_settings, _permissions, _room, _anchor, _sign_on, _mail)
+    return [*(examine(settings) for examine in examined), _versions(), *examine_stores(settings)]
+
+
+def examine_surroundings(store: Store) -> list[Check]:
+    """What lies around the tables of a database that can be opened."""
+    settings, admins = store.settings, _linked_admins(store)
+    with store.read() as session:
+        return [
+            *([admins] if admins else []),
+            _clock(session),
+            _leftovers(settings),
+            _calibrations(session),
+            _uploads(session, settings),
+        ]
+
+
+def _settings(settings: Settings) -> Check:
+    known = {_PREFIX + name.upper() for name in Settings.model_fields}
+    unknown = sorted(name for name in os.environ if name.startswith(_PREFIX) and name not in known)
+    gone = [str(folder) for folder in settings.import_folders if not folder.is_dir()]
+    if unknown:
+        sentence = f"{', '.join(unknown)} is no setting, and is not heeded"
+        return Check("settings", False, sentence, "app/config.py lists all; correct or unset it.")
+    if gone:
+        sentence = f"TOUCHLINE_IMPORT_FOLDERS names {', '.join(gone)}, which is no folder"
+        return Check("settings", False, sentence, "Make the folder, or take it out.")
+    return Check("settings", True, f"home {settings.home}")
+
+
+def _sign_on(settings: Settings) -> Check:
+    """Whether single sign-on is set up whole, and its provider answers."""
+    name, mend = "single sign-on", "Look at the settings TOUCHLINE_SSO_...; docs/teams.md has them."
+    try:
+        # Whether it is a team that is served, serve is told on its own command line.
+        rules = read_rules(settings.model_copy(update={"team": True}))
+        if rules is None:
+            return Check(name, True, "not set up")
+        return Check(name, True, Provider(rules).examine())
+    except (InputError, ConflictError) as error:
+        return Check(
+            name, False, error.message, error.hint if isinstance(error, InputError) else mend
+        )
+
+
+def _mail(settings: Settings) -> Check:
+    """Whether the mail server takes us; it is sent nothing."""
+    try:
+        server = read_mail_server(settings)
+        if server is None:
+            return Check("mail", True, "not set up")
+        found = server.examine()
+    except InputError as error:
+        return Check("mail", False, error.message, error.hint)
+    if settings.url is None:
+        return Check("mail", False, f"{found}; letters need TOUCHLINE_URL", "Set TOUCHLINE_URL.")
+    return Check("mail", True, found)
+
+
+def _linked_admins(store: Store) -> Check | None:
+    """Whether an admin can come in where there is no other way; None: there is one."""
+    try:
+        rules = read_rules(store.settings.model_copy(update={"team": True}))
+    except InputError:
+        return None
+    if rules is None or not rules.only:
+        return None
+    count = linked_admins(store, rules)
+    sentence = f"{count} admins are linked with {rules.label}, by which alone people log in"
+    mend = (
+        None if count else "touchline users reset NAME prints a link with which an admin is linked."
+    )
+    return Check("admins", count > 0, sentence, mend)
+
+
+def _permissions(settings: Settings) -> Check:
+    found = open_to_others(settings)
+    if found:
+        sentence = f"other users can read {plural(len(found), 'file or folder', 'files and folders')}: {found[0]}"
+        more = " and others" if found[1:] else ""
+        mend = f"Start touchline serve, or run chmod -R go= {settings.home}"
+        return Check("permissions", False, sentence + more, mend)
+    return Check("permissions", True, "the home is its owner's alone")
+
+
+def _room(settings: Settings) -> Check:
+    free = shutil.disk_usage(settings.home).free
+    # A migration copies the database twice: once as it is, once packed.
+    database = settings.database_file
+    needed = max(ROOM_BYTES, 2 * (database.stat().st_size if database.exists() else 0))
+    sentence = f"{free / 1e9:,.1f} GB are free"
+    if free < needed:
+        mend = f"Free some space: at least {needed / 1e9:,.1f} GB."
+        return Check("room", False, sentence, mend)
+    return Check("room", True, sentence)
+
+
+def _versions() -> Check:
+    sqlite = pysqlite3.dbapi2.sqlite_version
+    lacking = [ending for ending in _FORMATS if not cv2.haveImageWriter(ending)]
+    sentence = f"SQLite {sqlite}, OpenCV {cv2.__version__}"
+    if pysqlite3.dbapi2.sqlite_version_info < MIN_SQLITE:
+        mend = "Install the packages of requirements.lock: this SQLite can corrupt its file."
+        return Check("versions", False, sentence, mend)
+    if lacking:
+        sentence += f", which knows no {', '.join(lacking)}"
+        return Check("versions", False, sentence, "Install the packages of requirements.lock.")
+    return Check("versions", True, sentence)
+
+
+def _anchor(settings: Settings) -> Check:
+    try:
+        anchor = read_anchor(settings.database_file)
+    except StorageError as error:
+        return Check("anchor", False, error.message, error.hint)
+    if anchor is None:
+        return Check("anchor", True, "none yet: it is made when the database is opened")
+    sentence = f"installation {anchor.installation[:8]}, {anchor.entries:,} entries or more"
+    return Check("anchor", True, sentence)
+
+
+def _clock(session: Session) -> Check:
+    now = datetime.now(UTC)
+    # Two machines that edit in turn may differ by a little.
+    count, latest = entries_after(session, text_of(now + timedelta(minutes=5)))
+    if count == 0:
+        return Check("clock", True, "not behind the log")
+    sentence = f"{plural(count, 'entry of the log is', 'entries of the log are')} later than the clock, which says {text_of(now)}; the latest is of {latest}"
+    last = last_time(session)
+    if last is not None and datetime.fromisoformat(last) > now + timedelta(minutes=5):
+        return Check("clock", False, sentence, "Set the clock of this machine.")
+    # Written while the clock was ahead: entries are in order all the same, and nothing can change them.
+    return Check("clock", True, f"{sentence}; the newest is not: the clock was set right since")
+
+
+def _leftovers(settings: Settings) -> Check:
+    found = [str(path.relative_to(settings.home)) for path in leftovers(settings)]
+    if found:
+        sentence = f"{len(found):,} half-written files are left: {found[0]}"
+        return Check(
+            "leftovers", True, sentence, "The server deletes them when it has nothing to do."
+        )
+    return Check("leftovers", True, "none")
+
+
+def _calibrations(session: Session) -> Check:
+    count = len(spare_calibrations(session))
+    mend = "The server deletes them when it has nothing to do." if count else None
+    return Check("spare calibrations", True, f"{count:,} that no solution rests on", mend)
+
+
+def _uploads(session: Session, settings: Settings) -> Check:
+    found = unread_uploads(session, settings)
+    sentence = f"{len(found):,} kept for frames that no dataset reads"
+    mend = f"Delete the folder {settings.uploads / found[0]}, and the others." if found else None
+    return Check("uploads", True, sentence, mend)

@@ -1,0 +1,363 @@
+"""A whole database copied into another one, of either engine, and compared with it."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+import shutil
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, closing
+from dataclasses import dataclass
+from itertools import islice
+from pathlib import Path
+from typing import Any
+
+from sqlalchemy import (
+    Connection,
+    Engine,
+    LargeBinary,
+    String,
+    Table,
+    cast,
+    func,
+    insert,
+    inspect,
+    literal,
+    select,
+    text,
+)
+
+from app.config import Settings
+from app.db.dialects.dialect import WRITE, Dialect, dialect_in, dialect_of
+from app.db.engine import make_engine, reported
+from app.db.home import make_file
+from app.db.locks import database_alone, server_lock
+from app.db.log import verify_chain
+from app.db.migrate import UNFINISHED, make_schema, schema_revision
+from app.db.recovery.anchor import anchor_of
+from app.db.session import Session
+from app.db.store import Store
+from app.errors import DamagedError, InputError
+from app.features.tables import Base
+from app.plural import plural
+from app.private_file import read_private
+
+_PASSWORD = re.compile(r"://[^:/@]*:[^@]*@|[?&]password=")
+"""In the address of a database, as its driver reads it."""
+
+
+def ends_of(source: str, target: str, settings: Settings) -> tuple[Settings, Settings]:
+    """Settings of the database that is copied, and of the one that it is copied to.
+
+    Args:
+        source: A home folder, the address of a database, or a file that holds one.
+        target: The same.
+        settings: Everything else.
+
+    Raises:
+        InputError: An address has a password that everybody could read, others than its owner may
+            use a file, or it holds no address.
+    """
+    begin = _database(source, "FROM", settings)
+    # The files of a home that goes into a database stay in that home.
+    into = settings if _address(target, "TO") is None else begin
+    return begin, _database(target, "TO", into)
+
+
+def _database(place: str, name: str, settings: Settings) -> Settings:
+    address = _address(place, name)
+    if address is not None:
+        return settings.model_copy(update={"database_url": address})
+    return settings.model_copy(update={"home": Path(place).absolute(), "database_url": None})
+
+
+def _address(place: str, name: str) -> str | None:
+    """The address that an argument is, or that the file holds which it names; None: it is a home."""
+    if "://" in place:
+        if _PASSWORD.search(place):
+            raise InputError(
+                f"everybody on this machine can read the password in {name} while this runs",
+                hint="Write the address into a file, chmod 600 it, and name that file instead.",
+            )
+        return place
+    file = Path(place)
+    if not file.is_file():
+        return None
+    address = read_private(file, name)
+    if "://" not in address:
+        raise InputError(
+            f"{file} holds no address of a database",
+            hint="Write postgresql://USER:PASSWORD@HOST/DATABASE into it, or name a home folder.",
+        )
+    return address
+
+
+NULL_CHARACTER, REPLACEMENT = "\0", "\ufffd"
+
+
+@dataclass(frozen=True)
+class NullCharacter:
+    """A text of the database that holds U+0000.
+
+    Attributes:
+        table: Name of the table.
+        key: Primary key of the row, by column.
+        column: Name of the column.
+        text: What stands there.
+    """
+
+    table: str
+    key: Mapping[str, Any]
+    column: str
+    text: str
+
+    def __str__(self) -> str:
+        key = " ".join(f"{name}={value}" for name, value in self.key.items())
+        return f"{self.table} {key} column {self.column}"
+
+
+def find_null_characters(session: Session) -> list[NullCharacter]:
+    """Every text of the database that holds U+0000, by table and column; none on PostgreSQL."""
+    if not dialect_in(session).is_file:
+        return []
+    found = []
+    for table in Base.metadata.sorted_tables:
+        keys = list(table.primary_key.columns)
+        for column in table.columns:
+            if not isinstance(column.type, String):
+                continue
+            # Functions of SQLite on text end at U+0000; those on bytes do not.
+            has_it = func.instr(cast(column, LargeBinary), literal(b"\0", LargeBinary)) > 0
+            for row in session.execute(select(*keys, column.label("text_")).where(has_it)):
+                values = dict(row._mapping)
+                text = values.pop("text_")
+                key = {name: values.get(name, text) for name in (item.name for item in keys)}
+                found.append(NullCharacter(table.name, key, column.name, str(text)))
+    return found
+
+
+def without_null_characters(row: Mapping[str, Any]) -> dict[str, Any]:
+    """A row whose texts have U+FFFD, the replacement character, where they had U+0000."""
+    return {
+        name: value.replace(NULL_CHARACTER, REPLACEMENT) if isinstance(value, str) else value
+        for name, value in row.items()
+    }
+
+
+def named(found: Sequence[NullCharacter], most: int = 5) -> str:
+    """Rows and columns as a sentence lists them."""
+    return ", ".join(map(str, found[:most])) + (" and others" if len(found) > most else "")
+
+
+_BATCH = 500
+_INSTALLATION, _VERSION, _MARKS = "installation", "version", "group_change"
+_REVISION = text("UPDATE alembic_version SET version_num = :revision")
+
+
+@dataclass(frozen=True)
+class Transferred:
+    """What a transfer came to.
+
+    Attributes:
+        rows: Rows by table, in both.
+        copied: How many of them this run has copied; the others an earlier one had.
+        entries: Length of the log, whose hash chain was followed in the target.
+        versions: Hash of each frozen version, by dataset and name.
+    """
+
+    rows: dict[str, int]
+    copied: int
+    entries: int
+    versions: dict[str, str]
+
+
+def transfer(
+    source: Settings,
+    target: Settings,
+    tell: Callable[[str, int], None] = lambda *_: None,
+    *,
+    replace_null: bool = False,
+) -> Transferred:
+    """Copy a database into an empty one, or go on with a copy that was stopped.
+
+    Args:
+        source: What is copied; no server may run on its home.
+        target: Where to.
+        tell: Told the name of each table, and how many rows of it have been copied.
+        replace_null: Write U+FFFD where texts of the source hold U+0000.
+
+    Raises:
+        InputError: They are the same, the target holds something else, or texts of the source
+            hold U+0000 and are not to be replaced.
+        StorageError: A server runs, or one of them cannot be read or written.
+        DamagedError: The source is damaged, or the copy is not equal to it.
+    """
+    if source.database == target.database:
+        raise InputError("a database cannot be transferred into itself")
+    dialect = dialect_of(target)
+    with ExitStack() as held:
+        held.enter_context(server_lock(source))
+        if target.home != source.home:
+            held.enter_context(server_lock(target))
+        store = held.enter_context(closing(Store.open(source)))
+        if dialect.is_file:
+            held.enter_context(database_alone(target, "nothing can be copied into it"))
+            make_file(target.database_file)
+        engine = make_engine(target)
+        held.callback(engine.dispose)
+        held.enter_context(reported(target))
+        # Before the source is read: what goes wrong in there is told as the source's.
+        dialect.require_promises(engine)
+        with store.read() as session:
+            writer = engine.execution_options(**WRITE)
+            if not replace_null and (found := find_null_characters(session)):
+                raise _unkeepable(found)
+            return _transfer(session, writer, dialect, target.yields, tell)
+
+
+def _unkeepable(found: Sequence[NullCharacter]) -> InputError:
+    count = plural(len(found), "text holds", "texts hold")
+    return InputError(
+        f"{count} U+0000, which no database takes any more: {named(found)}",
+        hint="Run touchline transfer with --replace-null: it writes U+FFFD in its place.",
+    )
+
+
+def _transfer(
+    session: Session,
+    target: Engine,
+    dialect: Dialect,
+    yields: Path,
+    tell: Callable[[str, int], None],
+) -> Transferred:
+    anchor = anchor_of(session)
+    if anchor is None:
+        raise InputError(
+            "the database that is copied was never set up by Touchline",
+            hint="Run touchline migrate.",
+        )
+    _begin(target, dialect, anchor.installation)
+    copied = 0
+    for tables in _steps():
+        copied += _copy(session, target, tables, tell)
+    with Session(target) as copy:
+        rows = _require_equal(session, copy)
+        entries = _require_chain(copy, anchor.entries, anchor.hash)
+        dialect.settle(copy, _tables(), anchor.installation)
+        # Their marks are those of the changes of another database.
+        shutil.rmtree(yields, ignore_errors=True)
+        copy.execute(_REVISION, {"revision": anchor.schema})
+        versions = _versions(copy)
+        copy.commit()
+    return Transferred(rows, copied, entries, versions)
+
+
+def _begin(target: Engine, dialect: Dialect, installation: str) -> None:
+    """Make an empty schema that says that it is unfinished; or see that it is one of ours.
+
+    Raises:
+        InputError: The target is in use.
+    """
+    revision = schema_revision(target)
+    if revision is None:
+        with target.connect() as connection:
+            if inspect(connection).get_table_names():
+                raise InputError("the target holds tables of something else", hint=_EMPTY)
+        make_schema(target, dialect, new=True)
+        with target.begin() as connection:
+            connection.execute(text("DELETE FROM installation"))
+            connection.execute(_REVISION, {"revision": UNFINISHED})
+        return
+    with target.connect() as connection:
+        keys = list(connection.execute(text("SELECT key FROM installation")).scalars())
+    if revision != UNFINISHED or keys not in ([], [installation]):
+        raise InputError("the target is in use already", hint=_EMPTY)
+
+
+_EMPTY = "Name a database without tables, or a home that does not exist yet."
+
+
+def _tables() -> list[Table]:
+    """What is copied; marks of changes are made by the target's own triggers."""
+    return [table for table in Base.metadata.sorted_tables if table.name != _MARKS]
+
+
+def _steps() -> Iterator[list[Table]]:
+    """Tables after those that they refer to; the groups of versions with these, which seal them."""
+    together = [table for table in _tables() if table.name in (f"{_VERSION}_group", _VERSION)]
+    together.sort(key=lambda table: table.name == _VERSION)
+    # Whose it is first: then a target of another installation is known.
+    yield [Base.metadata.tables[_INSTALLATION]]
+    for table in _tables():
+        if table.name == _VERSION:
+            yield together
+        elif table not in together and table.name != _INSTALLATION:
+            yield [table]
+
+
+def _copy(
+    session: Session, target: Engine, tables: Sequence[Table], tell: Callable[[str, int], None]
+) -> int:
+    """Copy what is missing of tables; several go over in one transaction."""
+    copied = 0
+    with ExitStack() as held:
+        connection = held.enter_context(target.connect())
+        for table in tables:
+            # Rows went over in this order: so many of the first ones are there.
+            present = connection.execute(select(func.count()).select_from(table)).scalar_one()
+            rows = iter(_rows(session, table, present))
+            while batch := list(islice(rows, _BATCH)):
+                connection.execute(insert(table), batch)
+                copied += len(batch)
+                if len(tables) == 1:
+                    connection.commit()
+                tell(table.name, present + copied)
+        connection.commit()
+    return copied
+
+
+def _rows(connection: Connection, table: Table, after: int = 0) -> Iterator[dict[str, Any]]:
+    """The rows of a table by key, a few at a time."""
+    statement = select(table).order_by(*table.primary_key.columns).offset(after)
+    found = connection.execute(statement, execution_options={"yield_per": _BATCH})
+    for row in found:
+        yield without_null_characters(dict(row._mapping))
+
+
+def _require_equal(session: Session, connection: Connection) -> dict[str, int]:
+    """Rows by table, where every row of the copy is that of the source."""
+    counts = {}
+    for table in _tables():
+        ours, theirs = _digest(connection, table), _digest(session, table)
+        if ours != theirs:
+            raise DamagedError(
+                f"table {table.name} of the copy is not equal: {ours[0]:,} rows of {theirs[0]:,}",
+                hint="Empty the target and run touchline transfer again.",
+            )
+        counts[table.name] = ours[0]
+    return counts
+
+
+def _digest(connection: Connection, table: Table) -> tuple[int, str]:
+    """How many rows there are, and a digest of their values in order."""
+    count, digest = 0, hashlib.sha256()
+    for row in _rows(connection, table):
+        count += 1
+        digest.update(repr(list(row.values())).encode())
+    return count, digest.hexdigest()
+
+
+def _require_chain(session: Session, entries: int, last: str) -> int:
+    count = verify_chain(session)
+    found = session.execute(text("SELECT hash FROM log WHERE id = :id"), {"id": entries})
+    if count != entries or (found.scalar() or "") != last:
+        raise DamagedError("the log of the copy does not end as the source's does")
+    return count
+
+
+def _versions(connection: Connection) -> dict[str, str]:
+    statement = text(
+        "SELECT dataset.name AS dataset, version.name AS name, version.hash AS hash FROM version"
+        " JOIN dataset ON dataset.id = version.dataset_id ORDER BY version.id"
+    )
+    return {f"{row.dataset}/{row.name}": row.hash for row in connection.execute(statement)}

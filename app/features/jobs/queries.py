@@ -1,0 +1,233 @@
+"""Jobs in the database: what is under way and what came of it, newest first."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime, timedelta
+from typing import Any
+
+from sqlalchemy import case, delete, func, insert, select, update
+
+from app.canonical import canonical
+from app.db.dialects.statements import member
+from app.db.json_columns import Json, parse
+from app.db.session import Session, now, text_of
+from app.features.datasets.tables import DatasetModel
+from app.features.groups.insert_queries import next_id
+from app.features.jobs.tables import JobModel
+from app.features.people.alias_queries import columns_shown
+from app.features.people.visibility_queries import EVERYTHING, Sight
+from app.finite import finite
+from app.soccer.choices import JobState
+
+WAITING: JobState = "waiting"
+RUNNING: JobState = "running"
+DONE: JobState = "done"
+FAILED: JobState = "failed"
+CANCELLED: JobState = "cancelled"
+EXPORT = "export"
+"""The kind of job whose row is the only way to its file."""
+OPEN = (WAITING, RUNNING)
+"""States that are not the last one of a job."""
+
+
+@dataclass(frozen=True)
+class Job:
+    """A piece of background work as it stands.
+
+    Attributes:
+        dataset: Name of its dataset; None where it has none, or that is gone. Of an import the
+            name that it was asked for, until the dataset is there.
+        state: ``waiting``, ``running``, ``done``, ``failed`` or ``cancelled``.
+        total: How much there is to do; None while that is unknown.
+        sentence: What it is at, for people.
+        request: What it was asked for.
+        problem: ``{"detail", "hint", "pointer"}`` of what failed.
+        tries: How often it was begun and neither ended nor was stopped in good order.
+        ending: Somebody wants the running one to end.
+    """
+
+    id: int
+    kind: str
+    title: str
+    dataset_id: int | None
+    dataset: str | None
+    state: str
+    done: int
+    total: int | None
+    sentence: str
+    request: Json
+    result: Json
+    problem: Json
+    created: str
+    started: str | None
+    ended: str | None
+    actor: str
+    tries: int
+    ending: bool = False
+
+
+@dataclass(frozen=True)
+class NewJob:
+    """What a job is from its start."""
+
+    kind: str
+    title: str
+    actor: str
+    dataset_id: int | None = None
+    request: Json = None
+
+
+def insert_job(session: Session, job: NewJob) -> int:
+    """Insert a job that waits; returns its id."""
+    identity = next_id(session, JobModel)
+    values = {
+        "id": identity,
+        "kind": job.kind,
+        "title": job.title,
+        "dataset_id": job.dataset_id,
+        "actor": job.actor,
+        "state": WAITING,
+        "done": 0,
+        "sentence": "",
+        "tries": 0,
+        "request": _text(job.request),
+        "created": now(),
+    }
+    session.execute(insert(JobModel), [values])
+    return identity
+
+
+def update_job(session: Session, job_id: int, *, begun: int = 0, **values: Any) -> None:
+    """Set columns of a job; ``result`` and ``problem`` are JSON values, ``begun`` adds to its tries."""
+    if begun:
+        values["tries"] = JobModel.tries + begun
+    for name in ("result", "problem"):
+        if name in values:
+            values[name] = _text(values[name])
+    session.execute(update(JobModel).where(JobModel.id == job_id).values(values))
+
+
+def read_job(session: Session, job_id: int) -> Job | None:
+    """A job by its id."""
+    row = session.execute(_SELECT.where(JobModel.id == job_id)).one_or_none()
+    return None if row is None else _job(row)
+
+
+def read_jobs(
+    session: Session,
+    *,
+    dataset_id: int | None = None,
+    kinds: Sequence[str] = (),
+    states: Sequence[str] = (),
+    before: int | None = None,
+    limit: int = 50,
+    sight: Sight = EVERYTHING,
+) -> list[Job]:
+    """Jobs, the newest first.
+
+    Args:
+        session: Any session.
+        dataset_id: Of this dataset alone.
+        kinds: Of these kinds alone.
+        states: In these states alone.
+        before: Those older than the job of this id.
+        limit: How many at most.
+        sight: Those that somebody sees.
+    """
+    statement = _SELECT.order_by(JobModel.id.desc()).limit(limit)
+    if dataset_id is not None:
+        statement = statement.where(JobModel.dataset_id == dataset_id)
+    seen = sight.condition(JobModel.dataset_id, JobModel.actor)
+    if seen is not None:
+        statement = statement.where(seen)
+    if kinds:
+        statement = statement.where(JobModel.kind.in_(kinds))
+    if states:
+        statement = statement.where(JobModel.state.in_(states))
+    if before is not None:
+        statement = statement.where(JobModel.id < before)
+    return [_job(row) for row in session.execute(statement)]
+
+
+def job_ids(session: Session, dataset_id: int, kind: str) -> list[int]:
+    """Ids of all jobs of a kind in a dataset."""
+    mine = (JobModel.dataset_id == dataset_id, JobModel.kind == kind)
+    return list(session.scalars(select(JobModel.id).where(*mine).order_by(JobModel.id)))
+
+
+def jobs_of(
+    session: Session, dataset_id: int, kinds: Sequence[str], states: Sequence[str]
+) -> list[int]:
+    """Ids of a dataset's jobs in some states, of some kinds or, without any, of all."""
+    found = select(JobModel.id).where(JobModel.dataset_id == dataset_id, JobModel.state.in_(states))
+    if kinds:
+        found = found.where(JobModel.kind.in_(kinds))
+    return list(session.scalars(found.order_by(JobModel.id)))
+
+
+def is_asked_to_end(session: Session, job_id: int) -> bool:
+    """Whether somebody wants a running job to end."""
+    return bool(session.scalar(select(JobModel.ending).where(JobModel.id == job_id)))
+
+
+def count_jobs(session: Session) -> dict[tuple[str, str], int]:
+    """How many jobs there are, by kind and state."""
+    kinds = select(JobModel.kind, JobModel.state, func.count())
+    rows = session.execute(kinds.group_by(JobModel.kind, JobModel.state))
+    return {(kind, state): number for kind, state, number in rows}
+
+
+def delete_job(session: Session, job_id: int) -> None:
+    """Forget one job."""
+    session.execute(delete(JobModel).where(JobModel.id == job_id))
+
+
+def trim_jobs(session: Session, kind: str, keep: int) -> None:
+    """Forget the oldest jobs of a kind that are over, so that the table does not grow forever."""
+    oldest = (
+        select(JobModel.id)
+        .where(JobModel.kind == kind, JobModel.state.not_in(OPEN))
+        .order_by(JobModel.id.desc())
+        .offset(keep)
+    )
+    session.execute(delete(JobModel).where(JobModel.id.in_(oldest)))
+
+
+def forget_jobs(session: Session, days: int) -> int:
+    """Forget jobs that ended so many days ago; one that made an export stays as long as its file.
+
+    Returns:
+        How many.
+    """
+    oldest = text_of(datetime.now(UTC) - timedelta(days=days))
+    gone = (
+        delete(JobModel)
+        .where(JobModel.state.not_in(OPEN), JobModel.ended < oldest)
+        .where((JobModel.kind != EXPORT) | (JobModel.state != "done"))
+        .returning(JobModel.id)
+    )
+    return len(session.scalars(gone).all())
+
+
+def _text(value: Json) -> str | None:
+    return None if value is None else canonical(finite(value))
+
+
+def _job(row: Any) -> Job:
+    values = dict(row._mapping)
+    for name in ("request", "result", "problem"):
+        values[name] = None if values[name] is None else parse(values[name])
+    return Job(**values)
+
+
+_TO_BE = case(
+    (
+        (JobModel.kind == "import") & JobModel.dataset_id.is_(None),
+        member(JobModel.request, "dataset"),
+    )
+)
+_SELECT = select(
+    *columns_shown(JobModel), func.coalesce(DatasetModel.name, _TO_BE).label("dataset")
+).outerjoin(DatasetModel, DatasetModel.id == JobModel.dataset_id)

@@ -1,0 +1,159 @@
+"""Records of jobs: rows that outlast the server, read, forgotten, and told of when they change."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from typing import Any
+
+from app.db.session import Session
+from app.db.store import Store
+from app.errors import ConflictError, NotFoundError, StorageError
+from app.features.audit.audit_events import note_deed
+from app.features.jobs.queries import DONE as DONE
+from app.features.jobs.queries import (
+    FAILED,
+    OPEN,
+    delete_job,
+    job_ids,
+    read_job,
+    read_jobs,
+    update_job,
+)
+from app.features.jobs.queries import Job as Job
+from app.features.jobs.run import JobRun
+from app.features.notifications.service import RingKind, tell
+from app.features.people.visibility_queries import EVERYTHING, Sight
+from app.soccer.actors import person_of
+
+TICK = 0.25
+"""Seconds between two looks at the progress of the running job."""
+
+_TOLD = {DONE: "done", FAILED: "it failed"}
+"""Ends of jobs of which people are told, in words."""
+
+Listener = Callable[[Job], None]
+Then = Callable[[Session, Job], None]
+
+
+class JobRecords:
+    """What is kept of the jobs of a home, and who wants to hear of them."""
+
+    def __init__(self, store: Store):
+        self._store = store
+        self._listeners: list[Listener] = []
+
+    def listen(self, listener: Listener) -> None:
+        """Call a function, on the worker's thread, whenever a job changes; it must be quick."""
+        self._listeners.append(listener)
+
+    def get(self, job_id: int) -> Job:
+        """A job as it stands.
+
+        Raises:
+            NotFoundError: There is none of that id.
+        """
+        with self._store.read() as session:
+            return need_job(session, job_id)
+
+    def find(
+        self,
+        *,
+        dataset_id: int | None = None,
+        kinds: Sequence[str] = (),
+        states: Sequence[str] = (),
+        before: int | None = None,
+        limit: int = 50,
+        sight: Sight = EVERYTHING,
+    ) -> list[Job]:
+        """Jobs that somebody sees, the newest first; ``before`` is the last id of the page before."""
+        with self._store.read() as session:
+            return read_jobs(
+                session,
+                dataset_id=dataset_id,
+                kinds=kinds,
+                states=states,
+                before=before,
+                limit=limit,
+                sight=sight,
+            )
+
+    def under_way(self, dataset_id: int | None, sight: Sight) -> list[Job]:
+        """Jobs that somebody sees and that wait or run, the oldest first."""
+        return self.find(dataset_id=dataset_id, states=OPEN, sight=sight)[::-1]
+
+    def every(self, *, dataset_id: int, kind: str) -> list[int]:
+        """Ids of all jobs of a kind in a dataset, however many there are."""
+        with self._store.read() as session:
+            return job_ids(session, dataset_id, kind)
+
+    def forget(self, job_id: int) -> None:
+        """Delete the record of a job that is over.
+
+        Raises:
+            NotFoundError: There is none of that id.
+            ConflictError: It is not over.
+        """
+        with self._store.write() as session:
+            if need_job(session, job_id).state in OPEN:
+                raise ConflictError(f"job {job_id} is not over yet", hint="Cancel it first.")
+            delete_job(session, job_id)
+
+    def _tick(self, run: JobRun, ended: threading.Event) -> None:
+        """Keep the record in step with the progress, off the work's own thread: the work may hold
+        the write lock when it tells how far it is."""
+        shown = run.progress.place
+        while not ended.wait(TICK):
+            if run.progress.place != shown:
+                shown = run.progress.place
+                with suppress(StorageError):
+                    self._save(run.id, **run.columns)
+
+    def _save(self, job_id: int, **values: Any) -> None:
+        with self._store.write() as session:
+            update_job(session, job_id, **values)
+            job = read_job(session, job_id)
+        if job is not None:
+            self._announce(job)
+
+    def _save_end(self, job_id: int, by: str | None = None, **values: Any) -> Job | None:
+        """Save how a job ended, and tell who asked for it, at once; ``by``: see ``cancel``."""
+        with self._store.write() as session:
+            update_job(session, job_id, **values)
+            job = read_job(session, job_id)
+            if job is not None:
+                cancelled_by(session, job, by)
+            if job is not None and job.state in _TOLD:
+                tell(
+                    session,
+                    person_of(job.actor),
+                    RingKind.JOB,
+                    f"{job.title}: {_TOLD[job.state]}",
+                    actor=job.actor,
+                    address="/jobs",
+                    dataset_id=job.dataset_id if job.dataset is not None else None,
+                )
+        if job is not None:
+            self._announce(job)
+        return job
+
+    def _announce(self, job: Job) -> None:
+        for listener in self._listeners:
+            listener(job)
+
+
+def need_job(session: Session, job_id: int) -> Job:
+    """A job by its id; raises NotFoundError without one."""
+    job = read_job(session, job_id)
+    if job is None:
+        raise NotFoundError(f"there is no job {job_id}")
+    return job
+
+
+def cancelled_by(session: Session, job: Job, by: str | None) -> Job:
+    """Note who cancels a job and answer their request with it; None: it ends with other work."""
+    if by is not None:
+        note_deed(session, by, "job cancelled", job.dataset_id, job=job.id, title=job.title)
+        session.respond(job)
+    return job

@@ -1,0 +1,63 @@
+"""Jobs: listed, looked at, cancelled."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from fastapi import APIRouter, Query
+
+from app.features.datasets.service import dataset_id
+from app.features.jobs.queries import Job
+from app.features.jobs.schemas import JobDocument, JobKind, JobPage
+from app.http.cursor import parse_cursor
+from app.http.deps import Actor, AppServices, Id, SeesWhole
+from app.http.problem import responses
+from app.http.respond import as_document, responds
+from app.soccer.choices import JobState
+
+router = APIRouter(prefix="/jobs", tags=["jobs"])
+
+Limit = Annotated[int, Query(ge=1, le=500)]
+Cursor = Annotated[str | None, Query(max_length=30, description="`next` of the page before.")]
+DatasetFilter = Annotated[
+    str | None, Query(max_length=200, description="Name or id of the dataset; default: all.")
+]
+
+
+@router.get("", operation_id="listJobs", responses=responses(404))
+def list_jobs(
+    services: AppServices,
+    sight: SeesWhole,
+    dataset: DatasetFilter = None,
+    kind: Annotated[JobKind | None, Query()] = None,
+    state: Annotated[JobState | None, Query()] = None,
+    limit: Limit = 50,
+    cursor: Cursor = None,
+) -> JobPage:
+    """Jobs, the newest first."""
+    found = None if dataset is None else dataset_id(services.store, dataset)
+    jobs = services.jobs.find(
+        dataset_id=found,
+        kinds=[kind] if kind else [],
+        states=[state] if state else [],
+        before=parse_cursor(cursor),
+        limit=limit + 1,
+        sight=sight,
+    )
+    more = str(jobs[limit - 1].id) if len(jobs) > limit else None
+    return JobPage(items=jobs[:limit], next=more)
+
+
+@router.get("/{job}", operation_id="getJob", response_model=JobDocument, responses=responses(404))
+def get_job(job: Id, services: AppServices) -> Job:
+    """A job as it stands."""
+    return services.jobs.get(job)
+
+
+@router.delete(
+    "/{job}", operation_id="cancelJob", response_model=JobDocument, responses=responses(404, 409)
+)
+@responds(as_document(JobDocument.model_validate))
+def cancel_job(job: Id, services: AppServices, actor: Actor) -> Job:
+    """End a job: one that waits at once, one that runs at its next step; 409 when it is over."""
+    return services.jobs.cancel(job, by=actor)

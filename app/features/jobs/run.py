@@ -1,0 +1,400 @@
+"""The work of one job: in this process or one of its own.
+
+How far it is, how it ended and what it says then.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Collection, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from typing import Any, TypeVar
+
+import structlog
+
+from app.db.database_worker import no_answer, run_here, run_in_worker, with_grace
+from app.db.json_columns import Json
+from app.db.store import Store
+from app.errors import JobCancelled, OverloadedError, ReviewError, TooLargeError
+from app.features.datasets.queries import has_more_groups
+from app.features.jobs.queries import CANCELLED, DONE, FAILED
+from app.formats.export_formats import lacking
+from app.plural import counted, plural
+from app.progress import TellProgress
+from app.worker_process import EndReason, WorkerEnded
+
+
+def ending(kind: str, result: Json) -> str | None:
+    """The sentence of a job that is done; None where its result says nothing that is known here."""
+    tell = _ENDINGS.get(kind)
+    try:
+        return None if tell is None else tell(result)
+    except (AttributeError, KeyError, TypeError):
+        # The work is done, whatever can be said of it.
+        return None
+
+
+def _solved(result: Json) -> str:
+    pitches = _estimated(result)
+    if not result["solved"] and not result["failed"]:
+        return pitches or "Nothing was left to solve."
+    passed, rest = result["passed"], result["solved"] - result["passed"]
+    gates = ", ".join(f"{gate} {count:,}" for gate, count in result.get("failing", {}).items())
+    why = f" (first failing gate: {gates})" if gates else ""
+    return (
+        f"{plural(result['solved'], 'group')} solved: {passed:,} pass, {rest:,} do not{why}; "
+        f"{plural(result['failed'], 'error')}."
+        + (f" {pitches}" if pitches else "")
+        + (f" {advice}" if (advice := result.get("advice")) else "")
+    )
+
+
+def _estimated(result: Json) -> str:
+    """What solving found of pitches, "" where it estimated none; results of older servers say nothing."""
+    if not result.get("estimated"):
+        return ""
+    matches = plural(result["estimated"], "match", "matches")
+    proposed = plural(result["proposed"], "match", "matches")
+    found = (
+        f"another size is proposed for {proposed}"
+        if result["proposed"]
+        else "no other size is proposed"
+    )
+    return f"The pitch of {matches} was estimated: {found}."
+
+
+def _imported(result: Json) -> str:
+    counts = {name: result.get(name, 0) for name in ("new", "changed", "unchanged")}
+    would = " (dry run: nothing was changed)" if result.get("dry_run") else ""
+    told = ", ".join(f"{count:,} {name}" for name, count in counts.items())
+    left = len(result.get("skipped", ())) + result.get("more_skipped", 0)
+    more = f"; {plural(left, 'record')} left out" if left else ""
+    return f"{plural(sum(counts.values()), 'group')} read: {told}{more}{would}."
+
+
+def _exported(result: Json) -> str:
+    counts = result["counts"]
+    told = ", ".join(counted(count, name) for name, count in counts.items())
+    lacks = lacking(result.get("format", ""), counts)
+    return f"Written: {told}." + ("" if lacks is None else f" {lacks}.")
+
+
+def _frozen(result: Json) -> str:
+    return f"Version {result['name']} holds {plural(result['counts']['groups'], 'group')}."
+
+
+def _verified(result: Json) -> str:
+    return str(result["sentence"])
+
+
+def _evaluated(result: Json) -> str:
+    return f"Evaluation {result['name']} is ready."
+
+
+def _accepted(result: Json) -> str:
+    refused = sum(result["refused"].values())
+    more = f"; {plural(refused, 'view')} refused" if refused else ""
+    groups = plural(result["groups"], "group")
+    return f"{plural(result['changed'], 'view')} of {groups} have a ball from predictions{more}."
+
+
+def _practice(result: Json) -> str:
+    groups = plural(result["groups"], "practice group")
+    return f"{groups} made." if result["made"] else f"The {groups} were there already."
+
+
+def _rig(result: Json) -> str:
+    cameras = plural(len(result["cameras"]), "camera")
+    if result["accepted"] is None:
+        return f"An adjustment of {cameras} is proposed."
+    return f"The adjustment of {cameras} was accepted ({result['accepted']})."
+
+
+def _positions(result: Json) -> str:
+    shared, matches = result["shared"], plural(result["matches"], "match", "matches")
+    return f"{plural(shared, 'picture')} of {matches} share the position of their camera."
+
+
+def _painted(result: Json) -> str:
+    return f"The paint of {plural(result['read'], 'picture')} was read."
+
+
+def _proposed(result: Json) -> str:
+    looked = result["proposed"] + result["unsure"] + result["nothing"]
+    return (
+        f"{plural(looked, 'view')} looked at: {result['proposed']:,} proposed, "
+        f"{result['unsure']:,} unsure, {result['nothing']:,} without a proposal."
+    )
+
+
+def _pictures(result: Json) -> str:
+    items = result["items"]
+    proposed = sum(item["proposed"] is not None for item in items)
+    matches = plural(len(items), "match", "matches")
+    return f"{matches} estimated, {proposed:,} with a proposal."
+
+
+_ENDINGS: Mapping[str, Callable[[Json], str]] = {
+    "solve": _solved,
+    "import": _imported,
+    "export": _exported,
+    "freeze": _frozen,
+    "verify": _verified,
+    "evaluate": _evaluated,
+    "bulk": _accepted,
+    "practice": _practice,
+    "rig": _rig,
+    "positions": _positions,
+    "paint": _painted,
+    "proposals": _proposed,
+    "pictures": _pictures,
+}
+"""By the kind of the job."""
+
+
+log = structlog.get_logger("touchline.jobs")
+
+Work = Callable[["JobProgress"], Json]
+"""What a job does; returns its result. It must be safe to start again from the beginning."""
+Result = TypeVar("Result")
+
+SMALL = 100
+"""Work on a dataset of at most so many groups is done here: to start a process takes longer."""
+STOP_SECONDS = 2.0
+"""A server may be told to stop so long after its worker processes."""
+_AGAIN = "Start it again."
+_MEMORY = f"{_AGAIN} Where it happens often, give more memory."
+_ENDS: dict[EndReason, tuple[str, str]] = {
+    "memory": ("needs more memory than there is", _MEMORY),
+    "killed": ("was killed, most likely for want of memory", _MEMORY),
+    "terminated": ("was told to end", _AGAIN),
+    "crash": ("crashed", f"{_AGAIN} Where it crashes again, report it."),
+    "processor": ("took too long to work out", _AGAIN),
+    "silence": ("came to no next step", f"{_AGAIN} The disk or a store may not answer."),
+}
+"""How a process ended, and what to do about it."""
+
+
+class FailedWithReportError(ReviewError):
+    """A job that failed, and what it has to tell all the same.
+
+    Args:
+        message: One sentence that says what is wrong.
+        hint: What to do about it.
+        result: The job's result.
+    """
+
+    def __init__(self, message: str, hint: str | None, result: Json):
+        super().__init__(message, hint=hint)
+        self.result = result
+
+
+def counting(progress: JobProgress, what: str) -> TellProgress:
+    """A progress that says its numbers in words, too: ``1,200 of 12,764 groups solved``.
+
+    Where the work says a sentence, it is that one.
+    """
+
+    def count(done: int, total: int | None = None, sentence: str = "") -> None:
+        of = "" if total is None else f" of {total:,}"
+        progress(done, total, sentence or f"{done:,}{of} {what}")
+
+    return count
+
+
+class JobProgress:
+    """How far a job is; its work calls it often, and it costs next to nothing.
+
+    ``job_id`` is the job's, for what its work writes under that name.
+    """
+
+    def __init__(self, job_id: int, closing: threading.Event):
+        self.job_id = job_id
+        self.place: tuple[int, int | None, str] = (0, None, "")
+        self.cancelled = threading.Event()
+        self._closing = closing
+
+    def __call__(self, done: int, total: int | None = None, sentence: str = "") -> None:
+        """Note how much is done; what is not said stays as it was.
+
+        Raises:
+            JobCancelled: The work shall end here.
+        """
+        _, last_total, last_sentence = self.place
+        self.place = (done, last_total if total is None else total, sentence or last_sentence)
+        self.check()
+
+    def require_wanted(self) -> None:
+        """Raise ``JobCancelled`` where somebody cancelled it; a server that stops did not."""
+        if self.cancelled.is_set():
+            raise JobCancelled
+
+    def check_within(self, seconds: float) -> None:
+        """``check``, once the server stops or this time is over."""
+        self._closing.wait(seconds)
+        self.check()
+
+    def check(self) -> None:
+        """Raise ``JobCancelled`` where the work shall end here."""
+        if self.cancelled.is_set() or self._closing.is_set():
+            raise JobCancelled
+
+
+@dataclass(eq=False)
+class JobRun:
+    """A job of this process that waits or runs."""
+
+    id: int
+    kind: str
+    dataset_id: int | None
+    actor: str
+    work: Work
+    progress: JobProgress
+    over: threading.Event = field(default_factory=threading.Event)
+    counted: bool = False
+    """Whether its record says that it was begun here."""
+
+    @property
+    def columns(self) -> dict[str, Any]:
+        """How far it is, as columns of its record."""
+        return dict(zip(("done", "total", "sentence"), self.progress.place, strict=True))
+
+    def outcome(self) -> dict[str, Any] | None:
+        """Do the work; how it ended, as columns. None where the server stops and the next one
+        decides."""
+        try:
+            self.progress.require_wanted()
+            with structlog.contextvars.bound_contextvars(job=self.id):
+                result = self.work(self.progress)
+            told = ending(self.kind, result)
+            return {"state": DONE, "result": result, **({} if told is None else {"sentence": told})}
+        except JobCancelled:
+            if not self.progress.cancelled.is_set():
+                return None
+            return {"state": CANCELLED, "sentence": "Cancelled."}
+        except FailedWithReportError as error:
+            return {**_failure(error.message, error.hint), "result": error.result}
+        except ReviewError as error:
+            return _failure(error.message, error.hint, error.pointer)
+        except Exception:
+            log.exception("job failed", job=self.id, kind=self.kind)
+            return _failure(
+                "something went wrong inside the server", f"The server's log names job {self.id}."
+            )
+
+
+def _failure(detail: str, hint: str | None, pointer: str | None = None) -> dict[str, Any]:
+    problem = {"detail": detail, "hint": hint, "pointer": pointer}
+    return {"state": FAILED, "sentence": detail, "problem": problem}
+
+
+@dataclass(frozen=True)
+class RunQueue:
+    """Which jobs of this process wait, and which run."""
+
+    waiting: tuple[JobRun, ...] = ()
+    running: tuple[JobRun, ...] = ()
+
+    @property
+    def runs(self) -> tuple[JobRun, ...]:
+        """Those that wait and those that run."""
+        return (*self.waiting, *self.running)
+
+    @property
+    def ready(self) -> list[JobRun]:
+        """Those that wait, and for nothing of their own dataset that runs."""
+        taken = {run.dataset_id for run in self.running} - {None}
+        return [run for run in self.waiting if run.dataset_id not in taken]
+
+    def ready_beside(self, kinds: Collection[str]) -> list[JobRun]:
+        """Those of some kinds that are ready, and of whose dataset nothing was asked for before."""
+        first: dict[int | None, int] = {}
+        for run in self.waiting:
+            first[run.dataset_id] = min(run.id, first.get(run.dataset_id, run.id))
+        return [
+            run
+            for run in self.ready
+            if run.kind in kinds and (run.dataset_id is None or run.id == first[run.dataset_id])
+        ]
+
+    def running_of(self, job_id: int) -> JobRun | None:
+        """The run of a job, where it runs."""
+        return next((run for run in self.running if run.id == job_id), None)
+
+    def joined_by(self, *runs: JobRun) -> RunQueue:
+        """With more that wait."""
+        return replace(self, waiting=(*self.waiting, *runs))
+
+    def begun(self, run: JobRun) -> RunQueue:
+        """With one running that waited."""
+        left = self.left_by(run)
+        return replace(left, running=(*left.running, run))
+
+    def left_by(self, run: JobRun) -> RunQueue:
+        """Without one that waits or runs."""
+        waiting, running = (
+            tuple(item for item in items if item is not run)
+            for items in (self.waiting, self.running)
+        )
+        return RunQueue(waiting, running)
+
+
+def run_job_in_worker(
+    store: Store,
+    kind: str,
+    what: str,
+    work: Callable[..., Result],
+    *arguments: Any,
+    dataset_id: int | None,
+    progress: JobProgress,
+    report: TellProgress | None = None,
+    answer: Callable[[Any], Any] = no_answer,
+) -> Result:
+    """Call ``work(store, *arguments, caller)`` in a worker process (``database_worker.run_in_worker``).
+
+    Args:
+        store: The database.
+        kind: What is done; see ``worker_process.KINDS``.
+        what: The same in a sentence.
+        work: A function of a module.
+        arguments: Its arguments between the database and the caller.
+        dataset_id: What it works on; where that is small, it is done here. None: never here.
+        progress: Of the job; the work ends when the job is cancelled.
+        report: Receives the progress of the work; None: the job's progress itself.
+        answer: Answers the work's questions.
+
+    Raises:
+        OverloadedError: The process did not come to its end, or could not be started.
+        ReviewError: As the work raised it.
+    """
+    report = report or progress
+    if dataset_id is not None and _is_small(store, dataset_id):
+        return run_here(store, work, *arguments, progress=report, answer=answer)
+    stop = with_grace(progress.check)
+    try:
+        with left_to_next_server(progress):
+            return run_in_worker(
+                store, kind, work, *arguments, progress=report, stop=stop, answer=answer
+            )
+    except WorkerEnded as error:
+        ended, hint = _ENDS[error.reason]
+        raise OverloadedError(f"the process of {what} {ended}", hint=hint) from error
+
+
+@contextmanager
+def left_to_next_server(progress: JobProgress) -> Iterator[None]:
+    """Let the next server go on where a process ended because this server is about to stop.
+
+    A service manager may end the processes of a service first.
+    """
+    try:
+        yield
+    except (WorkerEnded, OverloadedError, TooLargeError):
+        progress.check_within(STOP_SECONDS)
+        raise
+
+
+def _is_small(store: Store, dataset_id: int) -> bool:
+    with store.read() as session:
+        return not has_more_groups(session, dataset_id, SMALL)

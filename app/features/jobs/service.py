@@ -1,0 +1,450 @@
+"""Jobs: work that outlasts a request, with progress, cancel and a record.
+
+One runs at a time, and beside it one that only reads (``BESIDE``) where no earlier job of its dataset
+is left. Those who wait have their turns person by person.
+
+The record of a job is a row of the database; the work itself is a function of this process. A
+server that stops leaves its jobs where they are, and the next one takes up again those whose kind
+knows how (``Jobs.resumes``) and marks the others failed.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Collection, Iterable, Iterator
+from concurrent.futures import Executor
+from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext, suppress
+from time import monotonic
+from typing import Any
+
+import structlog
+
+from app.db.json_columns import Json
+from app.db.session import Session, now
+from app.db.store import Store
+from app.errors import ConflictError, NotFoundError, OverloadedError, StorageError
+from app.features.audit.audit_events import note_job
+from app.features.jobs.queries import (
+    CANCELLED,
+    DONE,
+    FAILED,
+    OPEN,
+    RUNNING,
+    WAITING,
+    Job,
+    NewJob,
+    insert_job,
+    read_jobs,
+    trim_jobs,
+    update_job,
+)
+from app.features.jobs.records import JobRecords, Then, cancelled_by, need_job
+from app.features.jobs.run import JobProgress, JobRun, RunQueue, Work
+
+log = structlog.get_logger("touchline.jobs")
+
+CAPACITY = 32
+"""Jobs that may wait; one more is told to come back."""
+CLOSE_SECONDS = 10.0
+"""How long a server that stops waits for the running job's next step."""
+LEFT_TO_OTHERS = 4
+"""One person leaves this part of the waiting places (one of so many) to others."""
+BESIDE = frozenset({"export"})
+"""Kinds that only read and that somebody waits for; a long import or solve does not keep them waiting."""
+PROMPT = frozenset({"solve"})
+"""Kinds that go before the others: somebody looks at the numbers and waits."""
+KEPT = {"solve": 200, "bulk": 200, "verify": 200}
+"""How many finished jobs of a kind are remembered; kinds that are not named keep all."""
+
+MOST_TRIES = 2
+"""So many times a server may die at a job before it is left alone."""
+
+Pool = Callable[[], AbstractContextManager[Executor | None]]
+"""Makes an executor for the length of one large job, so that requests keep their processor;
+``nullcontext`` makes none, and the work stays in this process."""
+
+
+class Jobs(JobRecords):
+    """The jobs of one server: a worker beside the requests, and who wants to hear of them.
+
+    ``pool`` is for work that is worth processes of its own; without one it stays in this process.
+    """
+
+    def __init__(self, store: Store, *, capacity: int = CAPACITY, pool: Pool = nullcontext):
+        super().__init__(store)
+        self._capacity, self.pool = capacity, pool
+        # Replaced as a whole and only under ``_changed``, so that it is read without.
+        self._queue = RunQueue()
+        self._entering = 0
+        # Never held while the database is asked: requests and the event loop wait for it.
+        self._changed = threading.Condition()
+        self._closing = threading.Event()
+        self._workers: list[threading.Thread] = []
+        self._turns: dict[str, int] = {}
+        """When each person had a turn last, by the number of the turn."""
+        self._resumers: dict[str, Callable[[Job], Work]] = {}
+        self._beginners: list[Callable[[], None]] = []
+
+    def resumes(self, kind: str, work_of: Callable[[Job], Work]) -> None:
+        """Start jobs of a kind again after a restart; to be told before ``start``.
+
+        Args:
+            kind: The kind.
+            work_of: From a job's record (its ``request`` above all) to its work.
+        """
+        self._resumers[kind] = work_of
+
+    def makes(self, kind: str, work_of: Callable[[Job], Work]) -> None:
+        """How the work of a kind is made from its record, where a process carries out what another
+        one was asked for; it is not begun again after a death."""
+
+    def leads(self) -> bool:
+        """Whether this process carries out jobs and what else is one process's."""
+        return True
+
+    def on_lead(self, begin: Callable[[], None]) -> None:
+        """Call a function once this process leads, on whichever thread finds that out."""
+        self._beginners.append(begin)
+
+    def start(self) -> None:
+        """Take up what an earlier server left behind, or say that it is lost; then lead."""
+        self._take_up()
+        for begin in self._beginners:
+            begin()
+
+    def _take_up(self) -> None:
+        with self._store.write() as session:
+            for kind, keep in KEPT.items():
+                trim_jobs(session, kind, keep)
+            left = read_jobs(session, states=OPEN, limit=10_000)[::-1]
+            for job in left:
+                update_job(session, job.id, **self._settled(job))
+        with self._changed:
+            resumed = [self._run(job) for job in left if self._is_resumed(job)]
+            self._queue = self._queue.joined_by(*resumed)
+            self._wake()
+
+    def submit(
+        self,
+        kind: str,
+        title: str,
+        work: Work,
+        *,
+        dataset_id: int | None = None,
+        actor: str,
+        request: Json = None,
+        once: bool = False,
+        then: Then = Session.respond,
+    ) -> Job:
+        """Queue work; not to be called inside a transaction.
+
+        Args:
+            kind: What it is, for programs.
+            title: What it is, for people.
+            work: Does it.
+            dataset_id: The dataset that it belongs to.
+            actor: Who wants it.
+            request: What was asked for; a kind that is resumed finds its way from it.
+            once: Where a job of this kind waits for this dataset already, answer that one; without
+                a dataset one's own, for nobody sees another person's.
+            then: Ends the transaction; default: the request is answered with the job.
+
+        Raises:
+            OverloadedError: Too many jobs wait.
+        """
+        new = NewJob(kind, title, actor, dataset_id, request)
+        with ExitStack() as entry, self._store.write() as session:
+            # Others that enter wait for the write lock, so that none of them is counted twice.
+            enter = entry.enter_context(self._entry())
+            known = self._waiting_for(session, new) if once else None
+            if not once:
+                self._require_room(session, actor)
+            job = need_job(session, insert_job(session, new) if known is None else known)
+            if known is None:
+                note_job(session, actor, job.id, kind, title, dataset_id)
+            then(session, job)
+            if known is None:
+                progress = JobProgress(job.id, self._closing)
+                enter(JobRun(job.id, kind, dataset_id, actor, work, progress))
+        if known is not None:
+            return job
+        self._announce(job)
+        return job
+
+    def cancel(self, job_id: int, *, by: str | None = None) -> Job:
+        """End a job: one that waits at once, one that runs at its next step.
+
+        Args:
+            job_id: Which.
+            by: Who asks for it, as the log says; the request is answered with the job. None: it
+                ends with other work.
+
+        Raises:
+            NotFoundError: There is none of that id.
+            ConflictError: It is done or failed already.
+        """
+        job = self.get(job_id)
+        if job.state in (DONE, FAILED):
+            raise ConflictError(f"job {job_id} is over already")
+        with self._changed:
+            run = next((item for item in self._queue.waiting if item.id == job_id), None)
+            running = self._queue.running_of(job_id)
+            if run is not None:
+                self._queue = self._queue.left_by(run)
+            elif running is not None:
+                running.progress.cancelled.set()
+        if run is not None:
+            sentence = "Cancelled before it began."
+            return self._finish(run, by, state=CANCELLED, sentence=sentence) or self.get(job_id)
+        if by is None:
+            return self.get(job_id)
+        with self._store.write() as session:
+            return cancelled_by(session, need_job(session, job_id), by)
+
+    def belongs(self, job_id: int, dataset_id: int) -> None:
+        """Note whose a running job is, where its dataset came to be while it ran."""
+        self._save(job_id, dataset_id=dataset_id)
+        running = self._queue.running_of(job_id)
+        if running is not None:
+            running.dataset_id = dataset_id
+
+    def ids_of(self, dataset_id: int, *kinds: str) -> list[int]:
+        """Ids of a dataset's jobs that wait or run here, of some kinds or, without any, of all.
+
+        Within a write transaction that stays true to its end. A record that is open and that
+        nobody works on is none.
+        """
+        return [
+            run.id
+            for run in self._queue.runs
+            if run.dataset_id == dataset_id and (not kinds or run.kind in kinds)
+        ]
+
+    def end_with(self, session: Session, ids: Collection[int]) -> None:
+        """Let jobs write nothing more, nor begin, once a transaction is kept."""
+        session.once_kept(lambda: self.end_soon(ids))
+
+    def end_soon(self, ids: Collection[int]) -> None:
+        """Let jobs write nothing more, nor begin: without asking the database, so that it can be
+        called when a transaction is kept (``Session.once_kept``)."""
+        for run in self._queue.runs:
+            if run.id in ids:
+                run.progress.cancelled.set()
+
+    def cancel_each(self, ids: Iterable[int]) -> None:
+        """End jobs as far as they are not over, and wait for nothing."""
+        for number in ids:
+            with suppress(ConflictError, NotFoundError):
+                self.cancel(number)
+
+    def cancel_kind(self, dataset_id: int, *kinds: str) -> None:
+        """End a dataset's jobs of some kinds, or of all where none is named, and wait for nothing.
+
+        Work that asks ``JobProgress.require_wanted`` in its transactions writes nothing in any
+        that begins after this.
+        """
+        self.cancel_each(self.ids_of(dataset_id, *kinds))
+
+    def cancel_all(self, dataset_id: int) -> None:
+        """End all jobs of a dataset and wait until none of them runs any more.
+
+        Raises:
+            ConflictError: One that runs has not ended in time.
+        """
+        self.cancel_kind(dataset_id)
+        for run in self._queue.running:
+            if run.dataset_id == dataset_id and not run.over.wait(CLOSE_SECONDS):
+                raise ConflictError(f"job {run.id} of this dataset is still running")
+
+    def wait(self, job_id: int, seconds: float) -> Job:
+        """A job once it is over, or as it stands after some seconds."""
+        run = next((item for item in self._queue.runs if item.id == job_id), None)
+        if run is not None:
+            run.over.wait(seconds)
+        return self.get(job_id)
+
+    def is_open(self, job_id: int, kind: str) -> bool:
+        """Whether a job of a kind waits or runs here; waits for nothing."""
+        return any((run.id, run.kind) == (job_id, kind) for run in self._queue.runs)
+
+    def are_idle(self) -> bool:
+        """Whether none waits or runs."""
+        return not self._queue.runs
+
+    def stop(self) -> None:
+        """Tell the jobs that run to stop after their next step; none begins any more."""
+        with self._changed:
+            self._closing.set()
+            self._changed.notify_all()
+
+    def close(self, seconds: float = CLOSE_SECONDS) -> None:
+        """Stop, and wait so long for it; the records of the jobs say where they were.
+
+        A job that takes no step for long is left to itself.
+        """
+        self.stop()
+        until = monotonic() + seconds
+        for worker in self._workers:
+            worker.join(max(until - monotonic(), 0.0))
+        if any(worker.is_alive() for worker in self._workers):
+            for run in self._queue.running:
+                log.warning("a job did not end in time", job=run.id)
+                self._take_back(run)
+
+    def _waiting_for(self, session: Session, new: NewJob) -> int | None:
+        """Id of the waiting job of a kind and dataset; one without a dataset is its maker's."""
+        place = (new.kind, new.dataset_id)
+        for run in self._queue.waiting:
+            if (run.kind, run.dataset_id) != place:
+                continue
+            if new.dataset_id is not None or need_job(session, run.id).actor == new.actor:
+                return run.id
+        return None
+
+    def _require_room(self, session: Session, actor: str) -> None:
+        waiting = self._who_waits(session)
+        own = waiting.count(actor)
+        if len(waiting) >= self._capacity:
+            raise OverloadedError(
+                f"{len(waiting)} jobs wait already", hint="Send it again in a while."
+            )
+        if own >= self._capacity - self._capacity // LEFT_TO_OTHERS:
+            raise OverloadedError(
+                f"{own} jobs that you asked for wait already",
+                hint="Send it again when some of them are done.",
+            )
+
+    def _who_waits(self, _session: Session) -> list[str]:
+        """Who asked for each job that waits."""
+        return [run.actor for run in self._queue.waiting]
+
+    @contextmanager
+    def _entry(self) -> Iterator[Callable[[JobRun], None]]:
+        """Lets a job in while its record is written; none begins before that is kept.
+
+        What is let in is out again where the record could not be written.
+        """
+        entered: list[JobRun] = []
+
+        def enter(run: JobRun) -> None:
+            with self._changed:
+                entered.append(run)
+                self._queue = self._queue.joined_by(run)
+
+        with self._changed:
+            self._entering += 1
+        try:
+            yield enter
+        except BaseException:
+            with self._changed:
+                for run in entered:
+                    self._queue = self._queue.left_by(run)
+            raise
+        finally:
+            with self._changed:
+                self._entering -= 1
+                self._wake()
+
+    def _settled(self, job: Job) -> dict[str, Any]:
+        """What an earlier server's job becomes."""
+        if self._is_resumed(job):
+            return {"state": WAITING, "started": None, "sentence": "Started again."}
+        sentence = "The server stopped before this was done. Start it again."
+        if job.kind in self._resumers:
+            sentence = f"The server died {job.tries} times at this, so it is not begun again."
+        problem = {"detail": sentence, "hint": None, "pointer": None}
+        return {"state": FAILED, "ended": now(), "sentence": sentence, "problem": problem}
+
+    def _is_resumed(self, job: Job) -> bool:
+        return job.kind in self._resumers and job.tries < MOST_TRIES
+
+    def _run(self, job: Job) -> JobRun:
+        work = self._resumers[job.kind](job)
+        progress = JobProgress(job.id, self._closing)
+        return JobRun(job.id, job.kind, job.dataset_id, job.actor, work, progress)
+
+    def _wake(self) -> None:
+        if not self._workers and self._queue.waiting:
+            for ready in (lambda: self._queue.ready, lambda: self._queue.ready_beside(BESIDE)):
+                # Daemons: a job that does not come to its next step must not hold the process.
+                worker = threading.Thread(
+                    target=self._work, args=(ready,), name="jobs", daemon=True
+                )
+                self._workers.append(worker)
+                worker.start()
+        self._changed.notify_all()
+
+    def _work(self, ready: Callable[[], list[JobRun]]) -> None:
+        while (run := self._next(ready)) is not None:
+            try:
+                self._carry_out(run)
+            except Exception:
+                log.exception("the record of a job could not be written", job=run.id)
+            finally:
+                with self._changed:
+                    self._queue = self._queue.left_by(run)
+                    # What was of its dataset may run beside another now.
+                    self._changed.notify_all()
+                run.over.set()
+
+    def _next(self, ready: Callable[[], list[JobRun]]) -> JobRun | None:
+        """The next job to run, of those that may; None when the server stops."""
+        with self._changed:
+            self._changed.wait_for(
+                lambda: self._closing.is_set() or (not self._entering and ready())
+            )
+            if self._closing.is_set():
+                return None
+            run = min(ready(), key=self._turn_of)
+            self._turns[run.actor] = max(self._turns.values(), default=0) + 1
+            self._queue = self._queue.begun(run)
+            return run
+
+    def _turn_of(self, run: JobRun) -> tuple[bool, int, int]:
+        """Its place among those that may run: the smallest is the next."""
+        return run.kind not in PROMPT, self._turns.get(run.actor, 0), run.id
+
+    def _carry_out(self, run: JobRun) -> None:
+        if not self._begin(run):
+            return
+        run.counted = True
+        ended = threading.Event()
+        ticker = threading.Thread(target=self._tick, args=(run, ended), daemon=True)
+        ticker.start()
+        try:
+            values = run.outcome()
+        finally:
+            ended.set()
+            ticker.join()
+        if values is not None:
+            self._finish(run, **values)
+        else:
+            self._take_back(run)
+
+    def _begin(self, run: JobRun) -> bool:
+        """Write that a job is begun; False where it shall not be."""
+        self._save(run.id, state=RUNNING, started=now(), begun=1)
+        return True
+
+    def _take_back(self, run: JobRun) -> None:
+        """Let a server that stops in good order count for no death: it is none of this job's doing."""
+        with self._changed:
+            counted, run.counted = run.counted, False
+        if counted:
+            with suppress(StorageError):
+                self._save(run.id, begun=-1)
+
+    def _finish(self, run: JobRun, by: str | None = None, **values: Any) -> Job | None:
+        """Save how a job ended; ``by``: see ``cancel``. None where it cannot be written."""
+        place, job = run.columns, None
+        # Where the disk is full for a moment, the record waits for it.
+        for _ in range(5):
+            try:
+                job = self._save_end(run.id, by, **{**place, "ended": now(), **values})
+            except StorageError as error:
+                log.warning("the record of a job could not be written", error=str(error))
+                self._closing.wait(1.0)
+            else:
+                break
+        run.over.set()
+        return job

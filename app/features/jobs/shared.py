@@ -1,0 +1,336 @@
+"""Jobs of several processes over one database: any of them is asked, one of them carries them out.
+
+Who carries out holds a claim, which ends with its process; the next one takes up what it was at. What
+waits, what runs and what shall end is read from the rows alone: a row is begun by whoever changes it
+from waiting to running, within the write lock.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Collection, Iterator
+from contextlib import contextmanager, nullcontext
+from typing import Any
+
+import structlog
+
+from app.db.session import Session, now
+from app.db.store import Store
+from app.errors import ConflictError, JobCancelled, ReviewError, StorageError
+from app.features.jobs.queries import (
+    CANCELLED,
+    DONE,
+    FAILED,
+    OPEN,
+    RUNNING,
+    WAITING,
+    Job,
+    NewJob,
+    is_asked_to_end,
+    jobs_of,
+    read_job,
+    read_jobs,
+    trim_jobs,
+    update_job,
+)
+from app.features.jobs.records import cancelled_by, need_job
+from app.features.jobs.run import JobProgress, JobRun, Work
+from app.features.jobs.service import CLOSE_SECONDS, KEPT, Jobs, Pool
+
+log = structlog.get_logger("touchline.jobs")
+
+CLAIM = "jobs"
+LOOK_SECONDS = 1.0
+"""Between two looks for what no word came of, and whether whoever carries out jobs still lives."""
+GLANCE_SECONDS = 0.05
+MOST = 10_000
+_WORD = "job"
+
+
+class SharedProgress(JobProgress):
+    """A progress of which another process may say that its work shall end."""
+
+    def __init__(self, job_id: int, closing: threading.Event, store: Store):
+        super().__init__(job_id, closing)
+        self._store = store
+
+    def require_wanted(self) -> None:
+        """See ``JobProgress``. In a write transaction the answer stays true to its end."""
+        super().require_wanted()
+        if self._closing.is_set():
+            # Another process may carry it out by now.
+            raise JobCancelled
+        with self._store.glance() as session:
+            if is_asked_to_end(session, self.job_id):
+                self.cancelled.set()
+        super().require_wanted()
+
+
+class SharedJobs(Jobs):
+    """The jobs of a database that several processes serve."""
+
+    def __init__(self, store: Store, *, pool: Pool = nullcontext):
+        super().__init__(store, pool=pool)
+        self._makers: dict[str, Callable[[Job], Work]] = {}
+        self._look, self._ended = threading.Event(), threading.Event()
+        self._lost: threading.Event | None = None
+        """Set once the claim is lost; None: it is another's."""
+        self._leader: threading.Thread | None = None
+        self._alone = True
+        """Before the start no other process knows of this one: what it is asked for it does itself."""
+
+    def makes(self, kind: str, work_of: Callable[[Job], Work]) -> None:
+        """See ``Jobs``."""
+        self._makers[kind] = work_of
+
+    def resumes(self, kind: str, work_of: Callable[[Job], Work]) -> None:
+        """See ``Jobs``."""
+        super().resumes(kind, work_of)
+        self.makes(kind, work_of)
+
+    def leads(self) -> bool:
+        """See ``Jobs``."""
+        return self._lost is not None
+
+    def start(self) -> None:
+        """Carry out jobs from when no other process does."""
+        self._alone = False
+        self._store.sharing.hear(self._hear)
+        self._attempt()
+        self._leader = threading.Thread(target=self._follow, name="leader", daemon=True)
+        self._leader.start()
+
+    def stop(self) -> None:
+        """See ``Jobs``."""
+        self._ended.set()
+        self._look.set()
+        if self._lost is not None:
+            self._lost.set()
+        super().stop()
+
+    def close(self, seconds: float = CLOSE_SECONDS) -> None:
+        """See ``Jobs``; another process goes on."""
+        until = time.monotonic() + seconds
+        self.stop()
+        if self._leader is not None:
+            self._leader.join(seconds)
+        super().close(max(until - time.monotonic(), 0.0))
+        self._store.sharing.give_back(CLAIM)
+
+    def cancel(self, job_id: int, *, by: str | None = None) -> Job:
+        """See ``Jobs``."""
+        with self._store.write() as session:
+            if need_job(session, job_id).state in (DONE, FAILED):
+                raise ConflictError(f"job {job_id} is over already")
+            self._ask_to_end(session, [job_id])
+            job = cancelled_by(session, need_job(session, job_id), by)
+        self._announce(job)
+        return job
+
+    def ids_of(self, dataset_id: int, *kinds: str) -> list[int]:
+        """See ``Jobs``; whichever process works on them."""
+        with self._store.glance() as session:
+            return jobs_of(session, dataset_id, kinds, OPEN)
+
+    def end_with(self, session: Session, ids: Collection[int]) -> None:
+        """See ``Jobs``."""
+        self._ask_to_end(session, ids)
+
+    def end_soon(self, ids: Collection[int]) -> None:
+        """See ``Jobs``."""
+        self.cancel_each(ids)
+
+    def cancel_all(self, dataset_id: int) -> None:
+        """See ``Jobs``."""
+        self.cancel_kind(dataset_id)
+        until = time.monotonic() + CLOSE_SECONDS
+        while left := self._running_of(dataset_id):
+            if time.monotonic() > until:
+                raise ConflictError(f"job {left[0]} of this dataset is still running")
+            time.sleep(GLANCE_SECONDS)
+
+    def wait(self, job_id: int, seconds: float) -> Job:
+        """See ``Jobs``."""
+        until = time.monotonic() + seconds
+        while (job := self.get(job_id)).state in OPEN and time.monotonic() < until:
+            time.sleep(GLANCE_SECONDS)
+        return job
+
+    def is_open(self, job_id: int, kind: str) -> bool:
+        """See ``Jobs``; asks the database."""
+        with self._store.glance() as session:
+            job = read_job(session, job_id)
+        return job is not None and job.kind == kind and job.state in OPEN
+
+    def _running_of(self, dataset_id: int) -> list[int]:
+        with self._store.glance() as session:
+            return jobs_of(session, dataset_id, (), (RUNNING,))
+
+    def _ask_to_end(self, session: Session, ids: Collection[int]) -> None:
+        """End what waits, and let what runs see that it shall end."""
+        for number in ids:
+            job = read_job(session, number)
+            if job is not None and job.state == WAITING:
+                sentence = "Cancelled before it began."
+                update_job(session, number, state=CANCELLED, ended=now(), sentence=sentence)
+            elif job is not None and job.state == RUNNING:
+                update_job(session, number, ending=True)
+
+    # What a row says is told to all, and heard from all.
+
+    def _announce(self, job: Job) -> None:
+        super()._announce(job)
+        self._follow_row(job)
+        try:
+            self._store.say(f"{_WORD} {job.id}")
+        except StorageError as error:
+            log.warning("other processes were not told of a job", job=job.id, error=error.message)
+
+    def _hear(self, word: str) -> None:
+        kind, _, number = word.partition(" ")
+        if kind != _WORD:
+            return
+        with self._store.glance() as session:
+            job = read_job(session, int(number))
+        if job is not None:
+            super()._announce(job)
+            self._follow_row(job)
+
+    def _follow_row(self, job: Job) -> None:
+        """Do what the row of a job asks for."""
+        self._follow_ending(job)
+        if job.state == WAITING:
+            self._look.set()
+
+    # Who carries out.
+
+    def _follow(self) -> None:
+        while not self._ended.is_set():
+            self._look.wait(LOOK_SECONDS)
+            self._look.clear()
+            if not self._ended.is_set():
+                self._attempt()
+
+    def _attempt(self) -> None:
+        try:
+            self._lead()
+        except ReviewError as error:
+            log.warning("jobs could not be looked after", error=error.message)
+        except Exception:
+            log.exception("jobs could not be looked after")
+
+    def _lead(self) -> None:
+        sharing = self._store.sharing
+        if self._lost is None:
+            if not sharing.take(CLAIM):
+                return
+            try:
+                self._take_up()
+            except BaseException:
+                sharing.give_back(CLAIM)
+                raise
+            self._lost = threading.Event()
+            log.info("this process carries out jobs")
+            for begin in self._beginners:
+                begin()
+        if not sharing.holds(CLAIM):
+            self._lose()
+            return
+        self._join_waiting()
+
+    def _lose(self) -> None:
+        """Let another process go on: the connection that held the claim is gone."""
+        log.warning("this process no longer carries out jobs")
+        lost, self._lost = self._lost, None
+        with self._changed:
+            for run in self._queue.waiting:
+                self._queue = self._queue.left_by(run)
+        if lost is not None:
+            lost.set()
+
+    def _take_up(self) -> None:
+        """Settle what a process that died was at; what waits is begun as its turn comes."""
+        with self._store.write() as session:
+            for kind, keep in KEPT.items():
+                trim_jobs(session, kind, keep)
+            for job in read_jobs(session, states=(RUNNING,), limit=MOST):
+                ended = {"state": CANCELLED, "ended": now(), "sentence": "Cancelled."}
+                update_job(session, job.id, **(ended if job.ending else self._settled(job)))
+
+    def _join_waiting(self) -> None:
+        with self._store.glance() as session:
+            rows = read_jobs(session, states=OPEN, limit=MOST)
+        for job in reversed(rows):
+            self._follow_ending(job)
+            if job.state == WAITING and all(run.id != job.id for run in self._queue.runs):
+                self._join(job)
+
+    def _follow_ending(self, job: Job) -> None:
+        run = self._queue.running_of(job.id)
+        if job.ending and run is not None:
+            run.progress.cancelled.set()
+
+    def _join(self, job: Job) -> None:
+        lost = self._lost
+        maker = self._makers.get(job.kind)
+        if lost is None or maker is None:
+            return
+        try:
+            work = maker(job)
+        except Exception:
+            log.exception("the work of a job could not be made", job=job.id)
+            sentence = "It could not be read what was asked for. Ask for it again."
+            problem = {"detail": sentence, "hint": None, "pointer": None}
+            ended: dict[str, Any] = {"state": FAILED, "ended": now(), "sentence": sentence}
+            self._save_end(job.id, **ended, problem=problem)
+            return
+        progress = SharedProgress(job.id, lost, self._store)
+        run = JobRun(job.id, job.kind, job.dataset_id, job.actor, work, progress)
+        with self._changed:
+            self._queue = self._queue.joined_by(run)
+            self._wake()
+
+    @contextmanager
+    def _entry(self) -> Iterator[Callable[[JobRun], None]]:
+        """Lets a job in by its row alone."""
+        if self._alone:
+            with super()._entry() as enter:
+                yield enter
+            return
+        yield self._require_made
+        self._look.set()
+
+    def _require_made(self, run: JobRun) -> None:
+        if run.kind not in self._makers:
+            raise RuntimeError(f"no process could make the work of {run.kind}")
+
+    def _waiting_for(self, session: Session, new: NewJob) -> int | None:
+        """See ``Jobs``."""
+        for job in reversed(read_jobs(session, kinds=[new.kind], states=(WAITING,), limit=MOST)):
+            mine = new.dataset_id is not None or job.actor == new.actor
+            if job.dataset_id == new.dataset_id and mine:
+                return job.id
+        return None
+
+    def _who_waits(self, session: Session) -> list[str]:
+        """See ``Jobs``."""
+        return [job.actor for job in read_jobs(session, states=(WAITING,), limit=MOST)]
+
+    def _begin(self, run: JobRun) -> bool:
+        """See ``Jobs``: another process may have ended or begun it."""
+        with self._store.write() as session:
+            job = read_job(session, run.id)
+            if job is None or job.state != WAITING or not (self._alone or self.leads()):
+                return False
+            update_job(session, run.id, state=RUNNING, started=now(), begun=1)
+            job = need_job(session, run.id)
+        self._announce(job)
+        return True
+
+    def _finish(self, run: JobRun, by: str | None = None, **values: Any) -> Job | None:
+        if self._alone or self.leads():
+            return super()._finish(run, by, **values)
+        # Whoever carries out jobs now begins it again.
+        run.over.set()
+        return None

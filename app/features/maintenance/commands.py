@@ -1,0 +1,55 @@
+"""The command that shows everybody a notice: maintenance."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from typing import Annotated
+
+import typer
+
+from app.terminal.opened import opened_store
+from app.terminal.options import Json, acting
+from app.terminal.terminal import print_values
+
+commands = typer.Typer()
+WHEN = "2030-01-31T18:00; without an offset in this machine's time."
+
+
+@commands.command()
+def maintenance(
+    text: Annotated[
+        str | None, typer.Argument(help="The notice, one line; without it the present one is told.")
+    ] = None,
+    starts: Annotated[
+        str | None, typer.Option(metavar="TIME", help=f"Show it from then on: {WHEN}")
+    ] = None,
+    until: Annotated[
+        str | None, typer.Option(metavar="TIME", help=f"Show it until then: {WHEN}")
+    ] = None,
+    clear: Annotated[bool, typer.Option("--clear", help="Take the notice away.")] = False,
+    json_: Json = False,
+) -> None:
+    """Show a notice on every page of the browser application, also before people log in."""
+    from app.features.maintenance.service import clear_banner, read_banner, set_banner
+
+    if clear and (text or starts or until):
+        raise typer.BadParameter("--clear takes the notice away, and needs nothing else")
+    if text is None and (starts or until):
+        raise typer.BadParameter("--starts and --until belong to a text")
+    begin, end = _time(starts, "--starts"), _time(until, "--until")
+    with opened_store() as store:
+        if clear:
+            clear_banner(store, actor=acting())
+        elif text is not None:
+            set_banner(store, text, starts=begin, until=end, actor=acting())
+        banner = read_banner(store)
+    print_values(vars(banner) if banner else {"text": None}, json_)
+
+
+def _time(said: str | None, option: str) -> datetime | None:
+    if said is None:
+        return None
+    try:
+        return datetime.fromisoformat(said).astimezone()
+    except (ValueError, OverflowError):
+        raise typer.BadParameter(f'{option} "{said}" is no time, such as {WHEN}') from None

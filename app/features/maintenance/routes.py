@@ -1,0 +1,79 @@
+"""The notice for everybody, and the health of the server."""
+
+from __future__ import annotations
+
+from fastapi import APIRouter, Request, Response
+from prometheus_client import CONTENT_TYPE_LATEST, CollectorRegistry, generate_latest
+
+from app.errors import BusyError, NotFoundError, OverloadedError, StorageError
+from app.features.maintenance.schemas import BannerDocument, Health, NewBanner, Readiness
+from app.features.maintenance.service import clear_banner, set_banner
+from app.features.queue.changes import read_position
+from app.http.deps import Actor, AppStore
+from app.http.metrics import SharedNumbers
+from app.http.problem import responses
+
+maintenance_router = APIRouter(prefix="/maintenance", tags=["sessions"])
+
+
+@maintenance_router.put("", operation_id="setMaintenance", responses=responses(413, 415))
+def put_maintenance(new: NewBanner, store: AppStore, actor: Actor) -> BannerDocument:
+    """Show a notice on every page, in place of the one before.
+
+    Windows that are open show it within some seconds; the login page has it, too.
+    """
+    banner = set_banner(store, new.text, starts=new.starts, until=new.until, actor=actor)
+    return BannerDocument.model_validate(banner)
+
+
+@maintenance_router.delete(
+    "",
+    operation_id="clearMaintenance",
+    status_code=204,
+    response_class=Response,
+    responses={**responses(404), 204: {"description": "It is gone."}},
+)
+def delete_maintenance(store: AppStore, actor: Actor) -> Response:
+    """Take the notice away."""
+    if not clear_banner(store, actor=actor):
+        raise NotFoundError("there is no notice of maintenance")
+    return Response(status_code=204)
+
+
+health_router = APIRouter(tags=["health"])
+
+
+@health_router.get("/healthz", operation_id="getHealth", responses=responses())
+async def get_health(request: Request) -> Health:
+    """Whether the process answers; it needs no thread and no database."""
+    return Health(status="ok", version=request.app.version)
+
+
+@health_router.get("/readyz", operation_id="getReadiness", responses=responses())
+def get_readiness(store: AppStore) -> Readiness:
+    """Whether the database answers, keeps changes, and was not seen to be damaged; else 503."""
+    store.require_undamaged()
+    read_position(store)
+    try:
+        store.require_writable()
+    except BusyError:
+        # Others are writing: changes are kept.
+        pass
+    except StorageError as error:
+        raise OverloadedError(f"changes are refused: {error.message}", hint=error.hint) from error
+    return Readiness(status="ready")
+
+
+@health_router.get(
+    "/metrics",
+    operation_id="getMetrics",
+    response_class=Response,
+    responses={**responses(), 200: {"content": {CONTENT_TYPE_LATEST: {}}}},
+)
+def get_metrics(request: Request) -> Response:
+    """Requests, lanes, event streams, processes, jobs, files and room, in Prometheus' text format."""
+    shared: SharedNumbers | None = getattr(request.app.state, "shared_metrics", None)
+    if shared is not None:
+        shared.refresh()
+    registry: CollectorRegistry = request.app.state.answered_metrics
+    return Response(generate_latest(registry), media_type=CONTENT_TYPE_LATEST)

@@ -1,0 +1,201 @@
+"""Pictures of matches, and positions of main cameras that matches share."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from itertools import groupby
+from typing import Any
+
+from sqlalchemy import func, select
+
+from app.db.json_columns import as_written, parse
+from app.db.log import LogEntry, LogModel, read_entries
+from app.db.session import Session
+from app.features.datasets.tables import GroupModel, StationModel, ViewModel
+from app.features.groups.codecs import picture_from_json, positions_from_json
+from app.features.groups.digest import digest
+from app.soccer.group import SharedPosition
+from app.soccer.picture import PictureGeometry
+
+
+@dataclass(frozen=True)
+class MatchPictures:
+    """The pictures of a match's main camera as they are in use.
+
+    Attributes:
+        frames: How many have lines.
+        picture: What was done to most of them; None: they are as they were taken.
+        mixed: They are not all alike.
+    """
+
+    match: str
+    frames: int
+    picture: PictureGeometry | None
+    mixed: bool
+
+
+def match_pictures(session: Session, dataset_id: int) -> list[MatchPictures]:
+    """Every match of a dataset whose main camera has lines, by name."""
+    group, station, count = GroupModel, StationModel, func.count()
+    statement = (
+        select(group.match, station.picture, count)
+        .join(ViewModel, ViewModel.group_id == group.id)
+        .join(station, station.id == ViewModel.station_id)
+        .where(
+            group.dataset_id == dataset_id,
+            group.match != "",
+            ViewModel.position == 0,
+            station.shared.is_(False),
+            station.lines != "{}",
+        )
+        .group_by(group.match, station.picture)
+        .order_by(group.match, count.desc(), station.picture.nulls_first())
+    )
+    found: dict[str, list[tuple[str | None, int]]] = {}
+    for match, picture, frames in session.execute(statement):
+        found.setdefault(match, []).append((picture, frames))
+    return [
+        MatchPictures(match, sum(frames for _, frames in rows), _picture(rows[0][0]), len(rows) > 1)
+        for match, rows in found.items()
+    ]
+
+
+def _picture(text: str | None) -> PictureGeometry | None:
+    if text is None:
+        return None
+    with as_written():
+        return picture_from_json(parse(text))
+
+
+POSITION = "position"
+"""Kind of the log's entries that say where a match puts cameras, one for each group."""
+
+
+@dataclass
+class MatchPositions:
+    """The pictures of a match's main camera.
+
+    Attributes:
+        parts: What their positions are estimated from, but for the policy: digests.
+        groups: Ids of its groups.
+        views: How many have lines.
+        positions: Those that are shared.
+    """
+
+    match: str
+    parts: list[list[Any]] = field(default_factory=list)
+    groups: list[int] = field(default_factory=list)
+    views: int = 0
+    positions: list[SharedPosition] = field(default_factory=list)
+
+    @property
+    def inputs(self) -> str:
+        """Digest of the parts, in whatever order they were read."""
+        return digest(sorted(self.parts))
+
+
+def match_positions(session: Session, dataset_id: int) -> list[MatchPositions]:
+    """Every match of a dataset, by name; the main camera is that of each group's first view."""
+    group = GroupModel
+    statement = (
+        select(
+            group.id, group.match, group.pitch_length, group.pitch_width, group.positions,
+            StationModel.digest, (StationModel.lines != "{}").label("has_lines"),
+        )
+        .join(ViewModel, ViewModel.group_id == group.id)
+        .join(StationModel, StationModel.id == ViewModel.station_id)
+        .where(
+            group.dataset_id == dataset_id,
+            group.match != "",
+            ViewModel.position == 0,
+            StationModel.shared.is_(False),
+        )
+        .order_by(group.match, group.id)
+    )  # fmt: skip
+    found: dict[str, MatchPositions] = {}
+    for row in session.execute(statement):
+        item = found.setdefault(row.match, MatchPositions(row.match))
+        item.groups.append(row.id)
+        item.views += row.has_lines
+        item.parts.append([row.pitch_length, row.pitch_width, row.digest])
+        if row.positions is not None:
+            item.positions += read_positions(row.positions).values()
+    return list(found.values())
+
+
+def read_positions(text: str) -> Mapping[str, SharedPosition]:
+    """The positions of a group from their column."""
+    with as_written():
+        return positions_from_json(parse(text))
+
+
+def position_inputs(
+    session: Session, dataset_id: int, match: str | None = None
+) -> dict[str, str | None]:
+    """What the positions of each match are estimated from, where any were ever given.
+
+    Args:
+        session: Any session.
+        dataset_id: Of the dataset.
+        match: This match alone; None: all.
+
+    Returns:
+        Keys by match; None for one whose first share was taken back.
+    """
+    rows = session.execute(
+        _given(
+            func.max(LogModel.id), GroupModel.match, dataset_id=dataset_id, match=match
+        ).group_by(GroupModel.match)
+    ).all()
+    newest = {entry.id: entry for entry in read_entries(session, [number for number, _ in rows])}
+    found: dict[str, str | None] = {}
+    for number, name in rows:
+        entry: LogEntry | None = newest[number]
+        if not _is_of(newest[number], name):
+            # Its group was given that in another match.
+            entry = next((of[0] for of in _times(session, dataset_id, name)), None)
+        if entry is not None:
+            found[name] = entry.body["inputs"]
+    return found
+
+
+def last_share(session: Session, dataset_id: int, match: str) -> list[LogEntry]:
+    """The entries of a match's newest share that was not taken back; none where there is none."""
+    taken_back = set()
+    for entries in _times(session, dataset_id, match):
+        first = entries[0]
+        if first.at in taken_back:
+            continue
+        if first.body["inputs"] is None:
+            break
+        if first.body.get("takes_back") is None:
+            return entries
+        taken_back.add(first.body["takes_back"])
+    return []
+
+
+def _times(session: Session, dataset_id: int, match: str) -> Iterator[list[LogEntry]]:
+    """The entries that groups were given while in a match, by time, the newest first."""
+    statement = _given(LogModel.id, LogModel.at, dataset_id=dataset_id, match=match)
+    rows = session.execute(statement.order_by(LogModel.id.desc())).all()
+    for _, of_time in groupby(rows, key=lambda row: row.at):
+        ids = sorted(row.id for row in of_time)
+        entries = [entry for entry in read_entries(session, ids) if _is_of(entry, match)]
+        if entries:
+            yield entries
+
+
+def _given(*columns: Any, dataset_id: int, match: str | None) -> Any:
+    """Columns of the entries about the groups of a match, or of all, as these are now."""
+    statement = (
+        select(*columns)
+        .join(GroupModel, GroupModel.id == LogModel.group_id)
+        .where(LogModel.kind == POSITION, GroupModel.dataset_id == dataset_id)
+    )
+    return statement if match is None else statement.where(GroupModel.match == match)
+
+
+def _is_of(entry: LogEntry, match: str) -> bool:
+    """Whether the group was in the match then; the first entries did not say."""
+    return bool(entry.body.get("match", match) == match)

@@ -1,0 +1,227 @@
+"""Pictures: aspect and principal point that the frames of a match show together, and their change.
+
+A match's main cameras are filmed, cut and scaled alike, so what was done to one picture was done to
+all of them. The estimate reads the lines alone and does not depend on what is in use. Accepting it
+is an edit of each group, on its own undo stack like any other. Replays are left alone: each shot has
+its own geometry, and a finding of the view offers what its own lines say.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass
+
+from app.db.session import Session
+from app.db.store import Store
+from app.errors import GeometryError
+from app.features.datasets.service import need_dataset, read_dataset_head, require_matches
+from app.features.file_tools.score import fan_out
+from app.features.groups.edit import SetPicture
+from app.features.groups.group_edits import give_edits
+from app.features.groups.queries import StoredGroup, read_groups
+from app.features.match_estimates.picture_queries import MatchPictures, match_pictures
+from app.features.pitches.queries import groups_of_match, match_pitches
+from app.progress import TellProgress
+from app.soccer.group import Group, View
+from app.soccer.picture import PictureGeometry
+from app.soccer.policy import CalibrationPolicy
+from app.solving.match_picture import PictureEstimate, PictureFrame, estimate_match_picture
+
+_BATCH = 100
+
+
+@dataclass(frozen=True)
+class PictureState:
+    """The main cameras' pictures of one match.
+
+    Attributes:
+        frames: How many of its main camera's frames have lines.
+        picture: The one in use, None as it was taken; the most frequent where they differ.
+        estimate: What the lines show; None where ``problem`` says why there is none.
+        proposed: The picture to use instead; None where what is in use agrees.
+    """
+
+    match: str
+    frames: int
+    picture: PictureGeometry | None
+    estimate: PictureEstimate | None
+    problem: str | None
+
+    @property
+    def proposed(self) -> PictureGeometry | None:
+        """What the lines certainly show and is not in use."""
+        found = None if self.estimate is None else self.estimate.proposal
+        return None if found == self.picture else found
+
+    @property
+    def sentence(self) -> str:
+        """What people read of it."""
+        if self.estimate is None:
+            return self.problem or ""
+        found, sigma = self.estimate.picture, self.estimate.picture.sigma
+        wide, right, down = 100 * (found.aspect - 1), *found.shift
+        return (
+            f"pixels {abs(wide):.1f} % {'wide' if wide > 0 else 'narrow'} (sigma {100 * sigma[0]:.1f}), axis "
+            f"{right:+.3f} right and {down:+.3f} down, in half diagonals "
+            f"(sigma {sigma[1]:.3f} and {sigma[2]:.3f})"
+        )
+
+
+@dataclass(frozen=True)
+class _Task:
+    match: str
+    frames: tuple[PictureFrame, ...]
+    used: tuple[PictureGeometry | None, ...]
+    policy: CalibrationPolicy
+
+
+def read_pictures(store: Store, dataset: str | int) -> list[MatchPictures]:
+    """What main cameras' pictures of a dataset's matches are taken to be.
+
+    Raises:
+        NotFoundError: There is no such dataset.
+    """
+    with store.read() as session:
+        return match_pictures(session, need_dataset(session, dataset))
+
+
+def estimate_pictures(
+    store: Store,
+    dataset: str | int,
+    executor: Executor | None = None,
+    progress: TellProgress | None = None,
+    only: Collection[str] | None = None,
+) -> list[PictureState]:
+    """What the lines of each match's main cameras say of their pictures; saves nothing.
+
+    Args:
+        store: The database.
+        dataset: Name or id.
+        executor: Where matches are worked on; None: here, one after the other.
+        progress: Called with matches done and in all.
+        only: These matches; None: all.
+
+    Raises:
+        NotFoundError: There is no such dataset.
+    """
+    with store.read() as session:
+        found = read_dataset_head(session, dataset)
+        names = (item.match for item in match_pitches(session, found.id) if item.match)
+        matches = [match for match in names if only is None or match in only]
+    tasks = (_task(store, found.id, match, found.policy.calibration) for match in matches)
+    states = []
+    for state in fan_out(_estimate, tasks, executor):
+        states.append(state)
+        if progress is not None:
+            progress(len(states), len(matches))
+    return sorted(states, key=lambda state: state.match)
+
+
+def change_pictures(
+    store: Store,
+    dataset: str | int,
+    wanted: Mapping[str, PictureGeometry | None],
+    *,
+    actor: str,
+) -> int:
+    """Say what the main cameras' pictures of matches are; how many views that changed.
+
+    Their groups are stale until they are solved again. Each gets an edit that it can undo.
+
+    Args:
+        store: The database.
+        dataset: Name or id.
+        wanted: Pictures by match; None: as they were taken.
+        actor: Who says so.
+    """
+    with store.write() as session:
+        return apply_pictures(session, dataset, wanted, actor=actor)
+
+
+def pictures_asked(
+    chosen: Iterable[PictureState], *, accept: bool = False, as_taken: bool = False
+) -> dict[str, PictureGeometry | None]:
+    """What somebody wants the pictures of matches to be, by match.
+
+    Args:
+        chosen: The matches that are meant, as they are.
+        accept: Those that are proposed.
+        as_taken: All of them as they were taken.
+    """
+    if as_taken:
+        return {item.match: None for item in chosen}
+    return {item.match: item.proposed for item in chosen if accept and item.proposed}
+
+
+def apply_pictures(
+    session: Session,
+    dataset: str | int,
+    wanted: Mapping[str, PictureGeometry | None],
+    *,
+    actor: str,
+) -> int:
+    """``change_pictures`` within a write session.
+
+    Raises:
+        NotFoundError: There is no such dataset or match.
+    """
+    found = require_matches(session, dataset, [*wanted])
+    return sum(
+        _give(session, found.id, groups_of_match(session, found.id, match), picture, actor)
+        for match, picture in wanted.items()
+    )
+
+
+def _give(
+    session: Session,
+    dataset_id: int,
+    ids: Sequence[int],
+    picture: PictureGeometry | None,
+    actor: str,
+) -> int:
+    def edits(some: Mapping[int, StoredGroup]) -> dict[int, SetPicture]:
+        views = {number: _main_view(stored.group) for number, stored in some.items()}
+        return {
+            number: SetPicture(view.key, picture)
+            for number, view in views.items()
+            if view is not None
+        }
+
+    return give_edits(session, dataset_id, "edit", ids, edits, actor=actor)
+
+
+def _main_view(group: Group) -> View | None:
+    """The main camera's view, the first; None where it is static, given or without lines."""
+    view = next(iter(group.views), None)
+    if view is None or view.station.shared or not view.station.lines:
+        return None
+    is_given = view.station.given is not None and view.station.calibration == "given"
+    return None if is_given else view
+
+
+def _task(store: Store, dataset_id: int, match: str, policy: CalibrationPolicy) -> _Task:
+    seen = list(_main_views(store, dataset_id, match))
+    frames = tuple(PictureFrame(view.station.lines, view.size, at.pitch) for at, view in seen)
+    return _Task(match, frames, tuple(view.station.picture for _, view in seen), policy)
+
+
+def _main_views(store: Store, dataset_id: int, match: str) -> Iterator[tuple[Group, View]]:
+    with store.read() as session:
+        ids = groups_of_match(session, dataset_id, match)
+        for start in range(0, len(ids), _BATCH):
+            batch = read_groups(session, ids[start : start + _BATCH], extras=False)
+            for stored in batch.values():
+                view = _main_view(stored.group)
+                if view is not None:
+                    yield stored.group, view
+
+
+def _estimate(task: _Task) -> PictureState:
+    """Of one match; runs in a worker."""
+    used = max(set(task.used), key=task.used.count) if task.used else None
+    try:
+        found = estimate_match_picture(task.frames, task.policy)
+    except GeometryError as error:
+        return PictureState(task.match, len(task.frames), used, None, error.message)
+    return PictureState(task.match, len(task.frames), used, found, None)

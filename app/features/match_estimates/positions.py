@@ -1,0 +1,370 @@
+"""Positions: where a match's main camera stands, shared with each of its pictures.
+
+What a picture gets is what the match's other pictures say, so its own lines never count twice and
+an edit of them leaves it as it is. It is given when somebody asks for it and renewed when they ask
+again, as an entry of the log for each group; ``solve`` reads it like the size of the pitch.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from concurrent.futures import Executor
+from dataclasses import asdict, dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from app.db.session import Session
+from app.db.store import Store
+from app.errors import ConflictError, NotFoundError
+from app.features.datasets.service import DatasetHead, read_dataset_head
+from app.features.file_tools.score import fan_out
+from app.features.groups.digest import digest
+from app.features.groups.edit import Edit, SetPositions
+from app.features.groups.edit_codec import edit_from_json
+from app.features.groups.group_edits import give_edits
+from app.features.groups.queries import StoredGroup, read_groups
+from app.features.match_estimates.picture_queries import (
+    POSITION,
+    MatchPositions,
+    last_share,
+    match_positions,
+    position_inputs,
+)
+from app.features.solutions.queries import read_calibrations
+from app.progress import TellProgress
+from app.soccer.group import Group, SharedPosition, Station
+from app.soccer.pitch import Pitch
+from app.soccer.policy import CalibrationPolicy
+from app.soccer.solution import SOLVER_VERSION, Calibration
+from app.solving.calibrate import calibrate_station, calibration_key
+from app.solving.match_model import FramePlace
+from app.solving.match_position import Places, pan_of, place_of
+
+_BATCH = 100
+_DIGITS = 4
+"""Of a metre: what lies below is no difference."""
+
+
+@dataclass(frozen=True)
+class PositionState:
+    """The shared position of one match.
+
+    Attributes:
+        groups: How many it has.
+        views: Pictures of the main camera that have lines.
+        shared: How many of them have a position.
+        mean: The mean of those, pitch frame, metres; None without any.
+        sigma_m: How far off it may be for one picture, the median over pictures and axes.
+        current: Whether it would be estimated from the same now; None where it never was.
+        used: Whether the policy uses it.
+    """
+
+    match: str
+    groups: int
+    views: int
+    shared: int
+    mean: tuple[float, float, float] | None
+    sigma_m: float | None
+    current: bool | None
+    used: bool
+
+    @property
+    def sentence(self) -> str:
+        """What people read of it."""
+        if self.current is None:
+            return f"none of {self.views} pictures of the main camera uses a shared position"
+        verb = "use" if self.used else "keep"
+        kept = f"{self.shared} of {self.views} pictures of the main camera {verb} a shared position"
+        if self.mean is not None:
+            x, y, z = self.mean
+            kept += f", ({x:.1f}, {y:.1f}, {z:.1f}) m on average, sigma {self.sigma_m:.2f} m"
+        changed = "what it was estimated from has changed since"
+        if not self.used:
+            kept += "; the policy does not use it"
+            return kept if self.current else f"{kept}, and {changed}"
+        return kept if self.current else f"{kept}; {changed}: share it again"
+
+
+@dataclass(frozen=True)
+class DatasetPositions:
+    """The shared positions of a dataset's matches; ``used``: whether its policy uses them."""
+
+    dataset_id: int
+    dataset: str
+    used: bool
+    items: tuple[PositionState, ...]
+
+
+@dataclass(frozen=True)
+class _Picture:
+    """The main camera of a group, and its calibration by its lines alone, where that is known."""
+
+    group_id: int
+    view: str
+    station: Station
+    pitch: Pitch
+    alone: Calibration | None
+
+
+@dataclass(frozen=True)
+class _Task:
+    match: str
+    inputs: str
+    pictures: tuple[_Picture, ...]
+    policy: CalibrationPolicy
+
+
+def get_positions(store: Store, dataset: str | int) -> DatasetPositions:
+    """What the matches of a dataset share.
+
+    Raises:
+        NotFoundError: There is no such dataset.
+    """
+    with store.read() as session:
+        return _read(session, dataset)
+
+
+def share_positions(
+    store: Store,
+    dataset: str | int,
+    matches: Collection[str] | None = None,
+    *,
+    actor: str,
+    executor: Executor | None = None,
+    progress: TellProgress | None = None,
+    require_wanted: Callable[[], None] | None = None,
+) -> DatasetPositions:
+    """Estimate where matches' main cameras stand, and give it to their groups; stale until solved.
+
+    Args:
+        store: The database.
+        dataset: Name or id.
+        matches: By name; None: those where what it is estimated from has changed since it was
+            shared last.
+        actor: Who wants it.
+        executor: Where matches are worked on; None: here.
+        progress: Called with matches done and in all; an error that it raises ends the run.
+        require_wanted: Called in each transaction that gives something, before it does; what is
+            not wanted any more it stops with an error.
+
+    Raises:
+        ConflictError: The dataset's policy does not use shared positions.
+        NotFoundError: There is no such dataset or match.
+    """
+    found = require_sharable(store, dataset, matches)
+    policy = found.policy.calibration
+    with store.read() as session:
+        chosen = _chosen(session, found, matches)
+    tasks = (_task(store, item, policy) for item in chosen)
+    for done, (task, positions) in enumerate(fan_out(_estimate, tasks, executor), start=1):
+        edits = {group: SetPositions(at) for group, at in positions.items()}
+        with store.write() as session:
+            if require_wanted is not None:
+                require_wanted()
+            then = position_inputs(session, found.id, task.match).get(task.match)
+            body = {"match": task.match, "inputs": task.inputs, "before": then}
+            _give(session, found.id, edits, actor, body)
+        if progress is not None:
+            progress(done, len(chosen))
+    return get_positions(store, found.id)
+
+
+def require_sharable(
+    store: Store, dataset: str | int, matches: Collection[str] | None = None
+) -> DatasetHead:
+    """The dataset, unless nothing would use what is shared.
+
+    Raises:
+        ConflictError: The dataset's policy does not use shared positions.
+        NotFoundError: There is no such dataset or match.
+    """
+    with store.read() as session:
+        found = read_dataset_head(session, dataset)
+        _chosen(session, found, matches)
+    if not found.policy.calibration.share_position:
+        raise ConflictError(
+            f'the policy of "{found.name}" does not use the position that a match shares',
+            hint="Set calibration.share_position to true in the policy first.",
+        )
+    return found
+
+
+def take_back_positions(
+    store: Store, dataset: str | int, match: str, *, actor: str
+) -> DatasetPositions:
+    """Give a match the positions that it had before they were shared last.
+
+    Once more takes back the share before that one.
+
+    Raises:
+        ConflictError: Nothing is shared, or all of it is taken back.
+        NotFoundError: There is no such dataset or match.
+    """
+    with store.write() as session:
+        apply_take_back(session, dataset, match, actor=actor)
+    return get_positions(store, dataset)
+
+
+def apply_take_back(
+    session: Session,
+    dataset: str | int,
+    match: str,
+    *,
+    actor: str,
+    stopped: Sequence[str | None] = (),
+) -> None:
+    """``take_back_positions`` within a write session.
+
+    Args:
+        stopped: When shares that were stopped for it had begun; None: never. One that came to the
+            match is taken back, and where none did no earlier one is.
+    """
+    found = read_dataset_head(session, dataset)
+    _chosen(session, found, [match])
+    entries = last_share(session, found.id, match)
+    if stopped and not any(begun and entries and begun <= entries[0].at for begun in stopped):
+        return
+    if not entries:
+        raise ConflictError(f"nothing is shared in {match}")
+    edits = {entry.group_id or 0: edit_from_json(entry.body["inverse"]) for entry in entries}
+    share = entries[0]
+    body = {
+        "match": match,
+        "inputs": share.body["before"],
+        "before": share.body["inputs"],
+        "takes_back": share.at,
+    }
+    _give(session, found.id, edits, actor, body)
+
+
+def _give(
+    session: Session, dataset_id: int, edits: Mapping[int, Edit], actor: str, body: dict[str, Any]
+) -> None:
+    """One entry for each group that changes, and for the first in any case: it says from what.
+
+    A group that has left the match of the body meanwhile is left alone.
+    """
+    ids = sorted(edits)
+
+    def of_match(some: Mapping[int, StoredGroup]) -> dict[int, Edit]:
+        return {
+            number: edits[number]
+            for number, stored in some.items()
+            if stored.group.match == body["match"]
+        }
+
+    where = (session, dataset_id, POSITION, ids, of_match)
+    give_edits(*where, actor=actor, body=body, told=ids[0] if ids else None)
+
+
+def _read(session: Session, dataset: str | int) -> DatasetPositions:
+    found = read_dataset_head(session, dataset)
+    policy, then = found.policy.calibration, position_inputs(session, found.id)
+    items = tuple(
+        _state(item, then.get(item.match), policy)
+        for item in match_positions(session, found.id)
+        if item.views
+    )
+    return DatasetPositions(found.id, found.name, policy.share_position, items)
+
+
+def _state(item: MatchPositions, then: str | None, policy: CalibrationPolicy) -> PositionState:
+    x = y = z = sigma = 0.0
+    if item.positions:
+        x, y, z = np.mean([at.mean for at in item.positions], axis=0).tolist()
+        sigma = float(np.median([at.sigma for at in item.positions]))
+    return PositionState(
+        match=item.match,
+        groups=len(item.groups),
+        views=item.views,
+        shared=len(item.positions),
+        mean=(x, y, z) if item.positions else None,
+        sigma_m=sigma if item.positions else None,
+        current=None if then is None else then == _inputs(item, policy),
+        used=policy.share_position,
+    )
+
+
+def _inputs(item: MatchPositions, policy: CalibrationPolicy) -> str:
+    """Key of what is estimated: all that it is computed from."""
+    # Whether the policy uses it changes nothing of that, nor does paint: lines alone say it.
+    values = asdict(replace(policy, share_position=True))
+    del values["source"]
+    return digest([SOLVER_VERSION, values, item.inputs])
+
+
+def _chosen(
+    session: Session, dataset: DatasetHead, matches: Collection[str] | None
+) -> list[tuple[MatchPositions, str]]:
+    """Matches to share in, each with the key of what it will be shared from."""
+    policy = dataset.policy.calibration
+    known = {item.match: item for item in match_positions(session, dataset.id) if item.views}
+    for match in matches or ():
+        if match not in known:
+            raise NotFoundError(f'"{dataset.name}" has no match {match} with lines')
+    if matches is not None:
+        return [(known[match], _inputs(known[match], policy)) for match in matches]
+    then = position_inputs(session, dataset.id)
+    keyed = [(item, _inputs(item, policy)) for item in known.values()]
+    return [(item, inputs) for item, inputs in keyed if then.get(item.match) != inputs]
+
+
+def _task(store: Store, chosen: tuple[MatchPositions, str], policy: CalibrationPolicy) -> _Task:
+    item, inputs = chosen
+    pictures: list[_Picture] = []
+    with store.read() as session:
+        for start in range(0, len(item.groups), _BATCH):
+            stored = read_groups(session, item.groups[start : start + _BATCH], extras=False)
+            keys = {
+                number: calibration_key(it.group.views[0].station, it.group.pitch, policy)
+                for number, it in stored.items()
+            }
+            known = read_calibrations(session, keys.values())
+            pictures += (
+                _picture(number, it.group, known.get(keys[number])) for number, it in stored.items()
+            )
+    return _Task(item.match, inputs, tuple(pictures), policy)
+
+
+def _picture(group_id: int, group: Group, alone: Calibration | None) -> _Picture:
+    view = group.views[0]
+    return _Picture(group_id, view.key, view.station, group.pitch, alone)
+
+
+def _estimate(task: _Task) -> tuple[_Task, dict[int, dict[str, SharedPosition]]]:
+    """Positions by group and view; runs in a worker."""
+    found = list(_alone(task))
+    places = [place for _, _, place in found if place is not None]
+    every, row = Places(places), iter(range(len(places)))
+    positions: dict[int, dict[str, SharedPosition]] = {}
+    for picture, calibration, place in found:
+        others = every if place is None else every.without(next(row))
+        pan = None if calibration is None else pan_of(calibration)
+        near = None if pan is None else others.prior(pan)
+        at = {}
+        if near is not None:
+            at[picture.view] = SharedPosition(_rounded(near.mean), _rounded(near.sigma))
+        positions[picture.group_id] = at
+    # What was read travels back no farther than it must.
+    return replace(task, pictures=()), positions
+
+
+def _alone(task: _Task) -> Iterator[tuple[_Picture, Calibration | None, FramePlace | None]]:
+    """Pictures, calibrated; None where solving would take no position from others."""
+    for picture in task.pictures:
+        station = picture.station
+        # A stretched or cropped picture is solved by its own lines, and a given camera is what it is.
+        if station.picture is not None:
+            yield picture, None, None
+            continue
+        alone = picture.alone or calibrate_station(station, picture.pitch, task.policy)
+        if alone.source != "lines":
+            yield picture, None, None
+            continue
+        yield picture, alone, place_of(alone, station.size)
+
+
+def _rounded(values: np.ndarray) -> tuple[float, float, float]:
+    x, y, z = np.round(values, _DIGITS).tolist()
+    return x, y, z

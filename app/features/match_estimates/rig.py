@@ -1,0 +1,300 @@
+"""Rig: the static cameras of a dataset adjusted together, proposed first and then accepted."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from concurrent.futures import Executor
+from dataclasses import asdict, dataclass, fields
+from pathlib import Path
+from typing import Any
+
+from app.db.log import read_entry
+from app.db.session import Session
+from app.db.store import Store
+from app.errors import ConflictError, InputError
+from app.features.datasets.service import need_dataset, read_dataset_head
+from app.features.groups.codecs import lines_to_json
+from app.features.groups.digest import digest
+from app.features.groups.edit import SetStationCamera
+from app.features.groups.queries import read_groups
+from app.features.groups.undo_stacks import read_station_stacks
+from app.features.groups.view_queries import station_pitches
+from app.features.imports.queries import known_groups, shared_stations
+from app.features.stations.service import StationState, load_station, submit_stations, undo_stations
+from app.formats.report import Report
+from app.formats.sn_calibration_reader import read_line_files
+from app.soccer.annotation import Lines
+from app.soccer.frames import ImagePoint
+from app.soccer.group import View
+from app.soccer.pitch import Pitch
+from app.soccer.policy import Policy
+from app.soccer.solution import SOLVER_VERSION
+from app.solving.calibrate import calibrate_station
+from app.solving.rig import RigCamera, RigFrame
+from app.solving.rig_proposal import PROPOSAL_VERSION, RigProposal, propose_rig
+
+CAMERAS, SIGMA = "cameras", "sigma"
+"""What can be accepted: the adjusted cameras; or how far those in use may be off, alone."""
+EDIT = "set_station_camera"
+CHUNK = 200
+MIN_OFFSET_FRAMES, MIN_OFFSET_SIGMAS = 0.1, 3.0
+"""What a difference in time is more than, both."""
+
+
+@dataclass(frozen=True)
+class ProposedRig:
+    """A proposal, what it rests on, and the cameras as they were when it was made, by key.
+
+    ``inputs`` is a digest: the same one, the same proposal.
+    """
+
+    proposal: RigProposal
+    pitch: Pitch
+    stations: Mapping[str, StationState]
+    inputs: str
+
+
+def propose(
+    store: Store,
+    dataset: str | int,
+    lines: Path | None = None,
+    *,
+    executor: Executor | None = None,
+) -> ProposedRig:
+    """Adjust the static cameras of a dataset to their lines and balls; nothing is saved.
+
+    Args:
+        store: The database.
+        dataset: Name or id.
+        lines: Folder or zip of line files named like the cameras (``cam1.json``), which count
+            instead of those of the dataset; None: those of the dataset.
+        executor: Where it is computed; None: here.
+
+    Raises:
+        InputError: Too few cameras share balls, or their pitches differ.
+        ConflictError: The cameras were adjusted already.
+    """
+    states, pitch, policy = adjustable(store, dataset)
+    with store.read() as session:
+        frames = _frames(session, states[0].dataset_id)
+    own = None if lines is None else _read_lines(lines, states)
+    cameras = [
+        RigCamera(
+            state.station.key,
+            state.station.size,
+            state.station.lines if own is None else own.get(state.station.key, {}),
+            camera,
+        )
+        for state in states
+        if (camera := calibrate_station(state.station, pitch, policy.calibration).camera)
+    ]
+    asked = cameras, frames, pitch, policy
+    if executor is None:
+        proposal = propose_rig(*asked)
+    else:
+        proposal = executor.submit(propose_rig, *asked).result()
+    inputs = digest(
+        [
+            SOLVER_VERSION,
+            PROPOSAL_VERSION,
+            policy.hash,
+            asdict(pitch),
+            [state.etag for state in states],
+            [lines_to_json(camera.lines) for camera in cameras],
+            [[frame.time, {key: [*at] for key, at in frame.balls.items()}] for frame in frames],
+        ]
+    )
+    return ProposedRig(proposal, pitch, {state.station.key: state for state in states}, inputs)
+
+
+def adjustable(store: Store, dataset: str | int) -> tuple[list[StationState], Pitch, Policy]:
+    """The static cameras of a dataset, their pitch, and the dataset's policy.
+
+    Raises:
+        InputError: There are fewer than two, or their pitches differ.
+        ConflictError: They were adjusted already.
+    """
+    with store.read() as session:
+        found = read_dataset_head(session, need_dataset(session, dataset))
+        stations = [item.id for item in shared_stations(session, found.id)]
+        pitches = {pitch for _, pitch in station_pitches(session, found.id)}
+    states = [load_station(store, station) for station in stations]
+    if len(states) < 2:
+        raise InputError(
+            f"{found.name} has {len(states)} static cameras, a rig has two at least",
+            hint="Only cameras that stand still can be adjusted to each other.",
+        )
+    if any(state.station.given_covariance is not None for state in states):
+        raise ConflictError(
+            f"the cameras of {found.name} were adjusted already",
+            hint="Take that back first, or the same balls would count twice.",
+        )
+    if len(pitches) != 1:
+        raise InputError(
+            f"the static cameras of {found.name} look at {len(pitches)} sizes of pitch",
+            hint="Cameras are adjusted together where they look at one pitch.",
+        )
+    return states, pitches.pop(), found.policy
+
+
+def accept(store: Store, proposed: ProposedRig, what: str, *, actor: str) -> None:
+    """Save a proposal as an edit of each of its cameras, all at once.
+
+    Args:
+        store: The database.
+        proposed: What ``propose`` said.
+        what: ``CAMERAS`` for the adjusted cameras with their covariance; ``SIGMA`` to keep the
+            cameras in use and save how far they may be off, so that no ball moves and its
+            uncertainty becomes right.
+        actor: Who says so.
+
+    Raises:
+        StaleRevisionError: A camera has changed since.
+        ConflictError: The size of the pitch has changed since.
+        InputError: ``what`` is neither.
+    """
+    if what not in (CAMERAS, SIGMA):
+        raise InputError('accept "cameras" or "sigma"')
+    edits = [
+        (
+            proposed.stations[change.key],
+            SetStationCamera(change.after, change.covariance)
+            if what == CAMERAS
+            else SetStationCamera(change.before, change.covariance_before),
+        )
+        for change in proposed.proposal.cameras
+    ]
+    datasets = {state.dataset_id for state in proposed.stations.values()}
+
+    def check(session: Session) -> None:
+        found = {pitch for item in datasets for _, pitch in station_pitches(session, item)}
+        if found != {proposed.pitch}:
+            raise ConflictError(
+                "the size of the pitch has changed since that proposal",
+                hint="Look at a new one, and accept that.",
+            )
+
+    submit_stations(store, edits, actor=actor, check=check)
+
+
+def take_back(store: Store, dataset: str | int, *, actor: str) -> int:
+    """Undo an accepted rig, all its cameras at once; returns how many there were.
+
+    Raises:
+        ConflictError: No camera's last edit is an accepted rig.
+    """
+    with store.read() as session:
+        found = need_dataset(session, dataset)
+        adjusted = [
+            item.id
+            for item in shared_stations(session, found)
+            if item.station.given_covariance is not None and _was_adjusted_last(session, item.id)
+        ]
+    if not adjusted:
+        raise ConflictError(
+            "no static camera was adjusted by its last edit, so there is nothing to take back"
+        )
+    states = [load_station(store, station) for station in adjusted]
+    return undo_stations(store, states, actor=actor)
+
+
+def proposal_values(proposed: ProposedRig) -> dict[str, Any]:
+    """A proposal for people and scripts: numbers by name, without the cameras themselves."""
+    proposal = proposed.proposal
+    hidden = {"before", "after", "covariance", "covariance_before"}
+    values = {item.name: getattr(proposal, item.name) for item in fields(proposal)}
+    values["cameras"] = [
+        {name: value for name, value in vars(change).items() if name not in hidden}
+        for change in proposal.cameras
+    ]
+    values["pairs"] = [dict(vars(change)) for change in proposal.pairs]
+    values["left_alone"] = list(proposal.left_alone)
+    values["anchor"] = anchor_sentence(proposal)
+    values["time"] = time_sentence(proposal)
+    values["inputs"] = proposed.inputs
+    return values
+
+
+def anchor_sentence(proposal: RigProposal) -> str:
+    """What holds the adjusted cameras in their place."""
+    weak = "the cameras in use, as far as 10 px in the picture"
+    if proposal.line_points:
+        return f"held in place by {proposal.line_points} points of field lines and by {weak}"
+    return f"held in place by {weak}; no camera has lines, so where the pitch lies rests on them"
+
+
+def time_sentence(proposal: RigProposal) -> str:
+    """What the balls say about the time of the cameras: the largest difference that is one."""
+    known = [
+        (pair, pair.offset_frames, pair.offset_sigma_frames)
+        for pair in proposal.pairs
+        if pair.offset_frames is not None and pair.offset_sigma_frames
+    ]
+    if not known:
+        return "too few moving balls to see whether a camera is ahead of another"
+    sure = [
+        item for item in known if abs(item[1]) > max(MIN_OFFSET_FRAMES, MIN_OFFSET_SIGMAS * item[2])
+    ]
+    if not sure:
+        pair, offset, sigma = min(known, key=lambda item: item[2])
+        return (
+            "no camera is ahead of another: "
+            f"{pair.b} of {pair.a} by {offset:+.3f} +- {sigma:.3f} frames, the surest pair"
+        )
+    pair, offset, sigma = max(sure, key=lambda item: abs(item[1]))
+    first, second = (pair.b, pair.a) if offset > 0 else (pair.a, pair.b)
+    return (
+        f"{first} is {abs(offset):.2f} +- {sigma:.2f} frames ahead of {second}: its frame t shows "
+        f"what {second} shows at t + {abs(offset):.2f}; times are not adjusted: look for a wrong "
+        "frame offset"
+    )
+
+
+def _read_lines(path: Path, states: Sequence[StationState]) -> dict[str, Lines]:
+    """Lines of a folder or zip by camera.
+
+    Raises:
+        InputError: No file is named like a camera.
+    """
+    lines = {}
+    for size in {state.station.size for state in states}:
+        keys = {state.station.key for state in states if state.station.size == size}
+        for file in read_line_files(path, size, Report()):
+            if file.stem in keys:
+                lines[file.stem] = file.lines
+    if not lines:
+        raise InputError(
+            f"{path.name} has no line file of a static camera",
+            hint="Name the files like the cameras: cam1.json, cam2.json.",
+        )
+    return lines
+
+
+def _frames(session: Session, dataset_id: int) -> list[RigFrame]:
+    """Every instant of a dataset that at least two static cameras show the ball in."""
+    known = known_groups(session, dataset_id)
+    numbered = all(item.key.isascii() and item.key.isdigit() for item in known)
+    frames = []
+    for start in range(0, len(known), CHUNK):
+        part = known[start : start + CHUNK]
+        groups = read_groups(session, [item.id for item in part], extras=False)
+        for place, item in enumerate(part, start):
+            balls = {
+                view.station.key: center
+                for view in groups[item.id].group.views
+                if view.station.shared and (center := _center(view)) is not None
+            }
+            if len(balls) > 1:
+                frames.append(RigFrame(int(item.key) if numbered else place, balls))
+    return frames
+
+
+def _center(view: View) -> ImagePoint | None:
+    """Where a view shows the one ball, in its own right; None where it does not."""
+    ball = view.ball
+    return ball.center if view.included and ball is not None and not ball.inferred else None
+
+
+def _was_adjusted_last(session: Session, station_id: int) -> bool:
+    done = read_station_stacks(session, station_id).done
+    return bool(done) and read_entry(session, done[-1]).body["edit"]["edit"] == EDIT

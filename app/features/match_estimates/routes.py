@@ -1,0 +1,216 @@
+"""Estimates of a match: position, rig, noise, picture."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from fastapi import APIRouter, Query, Response
+
+from app.features.jobs.queries import Job
+from app.features.match_estimates.jobs import (
+    PICTURES,
+    POSITIONS,
+    request_noise,
+    request_noise_back,
+    request_pictures,
+    request_rig,
+    take_positions_back,
+    take_rig_back,
+)
+from app.features.match_estimates.noise import Noise
+from app.features.match_estimates.pictures import read_pictures
+from app.features.match_estimates.positions import get_positions
+from app.features.match_estimates.schemas import (
+    MatchPictureChange,
+    MatchPicturesDocument,
+    NoiseDocument,
+    PictureEstimateRequest,
+    PositionsRequest,
+    RigRequest,
+    RigTakenBack,
+    SharedPositionsDocument,
+)
+from app.http.cursor import paged
+from app.http.deps import Actor, AppServices, AppStore, DatasetPath
+from app.http.job_responses import by_job, job_answer
+from app.http.problem import responses
+from app.http.respond import document, responds
+
+positions_router = APIRouter(prefix="/datasets/{dataset}/positions", tags=["datasets"])
+
+
+@positions_router.get("", operation_id="listPositions", responses=responses(404))
+@paged()
+def list_positions(dataset: DatasetPath, store: AppStore) -> SharedPositionsDocument:
+    """Where each match's main camera stands, as far as that is shared with its pictures."""
+    return SharedPositionsDocument.model_validate(get_positions(store, dataset))
+
+
+@positions_router.post(
+    "",
+    operation_id="sharePositions",
+    **by_job(404, 409, 413, 415),
+)
+@responds(job_answer)
+def share_positions(
+    dataset: DatasetPath, request: PositionsRequest, services: AppServices, actor: Actor
+) -> Job:
+    """Estimate where main cameras stand and give each picture what its match's others say of it.
+
+    Their groups are solved again. An edit of lines never renews it; this does. 409 while the
+    policy does not use it.
+    """
+    return POSITIONS.request(services.jobs, services.store, dataset, request.match, actor=actor)
+
+
+@positions_router.delete(
+    "",
+    operation_id="takePositionsBack",
+    **by_job(404, 409),
+)
+@responds(job_answer)
+def take_back_positions(
+    dataset: DatasetPath,
+    services: AppServices,
+    actor: Actor,
+    match: Annotated[str, Query(min_length=1, max_length=1000, description="Name of the match.")],
+) -> Job:
+    """Give a match the positions that it had before they were shared last; the job solves it.
+
+    Once more takes back the share before that one; 409 when nothing is shared any more.
+    """
+    return take_positions_back(services.jobs, services.store, dataset, match, actor=actor)
+
+
+rig_router = APIRouter(tags=["stations"])
+
+
+@rig_router.post(
+    "/datasets/{dataset}/rig",
+    operation_id="adjustRig",
+    **by_job(404, 409, 413, 415),
+)
+@responds(job_answer)
+def adjust_rig(
+    dataset: DatasetPath, request: RigRequest, services: AppServices, actor: Actor
+) -> Job:
+    """Adjust the static cameras of a dataset to lines and balls over time.
+
+    The job's result is the proposal: each camera and each pair before and after, on instants that
+    were used and on instants that were held out. With `accept` and the `inputs` of the
+    proposal that was looked at it is saved as an edit of each camera.
+    """
+    return request_rig(
+        services.jobs,
+        services.store,
+        dataset,
+        what=request.accept,
+        inputs=request.inputs,
+        actor=actor,
+    )
+
+
+def _taken_back(count: int) -> Response:
+    return document(RigTakenBack(taken_back=count))
+
+
+@rig_router.delete(
+    "/datasets/{dataset}/rig",
+    operation_id="takeRigBack",
+    response_model=RigTakenBack,
+    responses=responses(404, 409),
+)
+@responds(_taken_back)
+def delete_rig(dataset: DatasetPath, services: AppServices, actor: Actor) -> int:
+    """Take an accepted rig back, all its cameras at once; 409 when there is none."""
+    return take_rig_back(services.jobs, services.store, dataset, actor=actor)
+
+
+noise_router = APIRouter(prefix="/datasets/{dataset}/noise", tags=["policies"])
+
+
+@noise_router.get(
+    "", operation_id="getNoise", response_model=NoiseDocument, responses=responses(404)
+)
+def get_noise(dataset: DatasetPath, services: AppServices) -> Noise:
+    """Sigma of balls, given cameras and field lines with intervals, and what the policy says.
+
+    Changes nothing: to judge by the estimates, `POST` here, or send `values` alone to the dataset's
+    policy.
+    """
+    return services.noises.read(dataset)
+
+
+@noise_router.post(
+    "",
+    operation_id="acceptNoise",
+    **by_job(404, 412),
+)
+@responds(job_answer)
+def accept_noise(dataset: DatasetPath, services: AppServices, actor: Actor) -> Job:
+    """Judge by the estimates: `values` go into the policy, `factors` to the balls; the job solves.
+
+    A ball that is placed later has the factor of its camera and of who places it.
+    """
+    found = services.noises.read(dataset)
+    return request_noise(services.jobs, services.store, found, actor=actor)
+
+
+@noise_router.delete(
+    "",
+    operation_id="takeNoiseBack",
+    **by_job(404),
+)
+@responds(job_answer)
+def take_noise_back(dataset: DatasetPath, services: AppServices, actor: Actor) -> Job:
+    """Take the balls of all cameras and people to be as noisy as the dataset's; the job solves.
+
+    The policy stays as it is.
+    """
+    return request_noise_back(services.jobs, services.store, dataset, actor=actor)
+
+
+pictures_router = APIRouter(prefix="/datasets/{dataset}/pictures", tags=["datasets"])
+
+
+@pictures_router.get("", operation_id="listMatchPictures", responses=responses(404))
+@paged()
+def list_match_pictures(dataset: DatasetPath, store: AppStore) -> MatchPicturesDocument:
+    """What the pictures of each match's main camera are taken to be: stretched, cropped or neither."""
+    return MatchPicturesDocument.model_validate({"items": read_pictures(store, dataset)})
+
+
+@pictures_router.post(
+    "",
+    operation_id="estimateMatchPictures",
+    **by_job(404, 413, 415),
+)
+@responds(job_answer)
+def estimate_match_pictures(
+    dataset: DatasetPath, request: PictureEstimateRequest, services: AppServices, actor: Actor
+) -> Job:
+    """Look at up to thirty frames of each match together; changes nothing.
+
+    `result.items` of the job has what they show (`estimate`), what to use instead (`proposed`, null
+    where nothing certainly happened), and both in words.
+    """
+    return PICTURES.request(services.jobs, services.store, dataset, request.match, actor=actor)
+
+
+@pictures_router.patch(
+    "",
+    operation_id="setMatchPicture",
+    **by_job(404, 413, 415),
+)
+@responds(job_answer)
+def set_match_picture(
+    dataset: DatasetPath, change: MatchPictureChange, services: AppServices, actor: Actor
+) -> Job:
+    """Say what was done to the pictures of a match's main camera; the job solves its groups.
+
+    Each group gets an edit that it can undo. Replays are left alone: each shot has its own.
+    """
+    picture = None if change.picture is None else change.picture.picture()
+    return request_pictures(
+        services.jobs, services.store, dataset, {change.match: picture}, actor=actor
+    )

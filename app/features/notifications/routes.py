@@ -1,0 +1,49 @@
+"""The bell: what somebody is told: mentions, replies, jobs that ended, work that is theirs."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from fastapi import APIRouter, Query
+
+from app.features.notifications import service as bell
+from app.features.notifications.schemas import BellDocument, BellRead
+from app.features.notifications.service import Bell
+from app.features.people.session_routes import Me
+from app.http.cursor import Before, Cursor, first_below
+from app.http.deps import AppStore
+from app.http.problem import responses
+from app.http.respond import as_document, responds
+from app.http.team import AppTeam
+
+router = APIRouter(prefix="/bell", tags=["comments"])
+
+
+@router.get("", operation_id="getBell", responses=responses(401, 409))
+def get_bell(
+    store: AppStore,
+    _team: AppTeam,
+    me: Me,
+    limit: Annotated[int, Query(ge=1, le=200)] = 50,
+    cursor: Cursor = None,
+    before: Before = None,
+) -> BellDocument:
+    """What one was told in the last 90 days, of what one sees now, the newest first."""
+    found = bell.read_bell(store, me, limit + 1, first_below(cursor, before))
+    document = BellDocument.model_validate(found)
+    if len(document.items) > limit:
+        document.items = document.items[:limit]
+        document.next = str(document.items[-1].id)
+    return document
+
+
+@router.post(
+    "/read",
+    operation_id="readBell",
+    response_model=BellDocument,
+    responses=responses(401, 409, 413, 415),
+)
+@responds(as_document(BellDocument.model_validate))
+def read_bell(said: BellRead, store: AppStore, _team: AppTeam, me: Me) -> Bell:
+    """One has seen some of it, or all."""
+    return bell.read_all(store, me, said.ids)

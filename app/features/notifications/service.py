@@ -1,0 +1,112 @@
+"""Bell: what people are told, each for themselves, and never about what they may not see."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime, timedelta
+from enum import StrEnum
+
+from app.db.session import Session, now, text_of
+from app.db.store import Store
+from app.features.notifications.queries import (
+    Ring,
+    count_unread,
+    forget_rings,
+    insert_ring,
+    mark_read,
+    read_rings,
+)
+from app.features.people.logins import Login, read_roles
+from app.features.people.queries import person_by_name
+from app.features.people.roles import Role
+from app.soccer.actors import person_of
+
+KEPT_DAYS = 90
+"""So long somebody can read what they were told."""
+
+
+class RingKind(StrEnum):
+    """Why somebody is told."""
+
+    MENTION = "mention"
+    REPLY = "reply"
+    JOB = "job"
+    ASSIGNED = "assigned"
+    RETURNED = "returned"
+
+
+@dataclass(frozen=True)
+class Bell:
+    """What a person was told, the newest first, and how much of all of it they have not seen."""
+
+    items: list[Ring]
+    unread: int
+
+
+def tell(
+    session: Session,
+    person: str,
+    kind: RingKind,
+    sentence: str,
+    *,
+    actor: str,
+    address: str,
+    dataset_id: int | None = None,
+    group_id: int | None = None,
+) -> bool:
+    """Tell somebody of something, in the transaction in which it happens.
+
+    Nobody is told of what they did themselves, and of what they do not see.
+
+    Args:
+        session: A write session.
+        person: Their name.
+        kind: Why they are told.
+        sentence: What, for them.
+        actor: Who did it.
+        address: Of the page that it is about.
+        dataset_id: The dataset that it is about; None: none.
+        group_id: The group.
+
+    Returns:
+        Whether they were told.
+    """
+    if kind is not RingKind.JOB and person_of(actor) == person:
+        return False
+    row = person_by_name(session, person)
+    if row is None or row.disabled:
+        return False
+    roles = read_roles(session, row.id, Role(row.role))
+    if dataset_id is not None and roles.role_in(dataset_id) is Role.NONE:
+        return False
+    at = now()
+    forget_rings(session, row.id, _oldest())
+    what = {"at": at, "kind": str(kind), "actor": actor, "sentence": sentence}
+    where = {"address": address, "dataset_id": dataset_id, "group_id": group_id}
+    insert_ring(session, row.id, {**what, **where})
+    return True
+
+
+def read_bell(store: Store, login: Login, limit: int = 50, before: int | None = None) -> Bell:
+    """What somebody was told in the last 90 days, of what they see at this moment."""
+    with store.read() as session:
+        return _read(session, login, limit, before)
+
+
+def read_all(store: Store, login: Login, ids: Sequence[int] | None = None) -> Bell:
+    """They have seen some of what they were told, or (None) all of it."""
+    with store.write() as session:
+        mark_read(session, login.person_id, login.sight, ids, now())
+        bell = _read(session, login)
+        session.respond(bell)
+        return bell
+
+
+def _read(session: Session, login: Login, limit: int = 50, before: int | None = None) -> Bell:
+    mine = (login.person_id, login.sight, _oldest())
+    return Bell(read_rings(session, *mine, limit, before), count_unread(session, *mine))
+
+
+def _oldest() -> str:
+    return text_of(datetime.now(UTC) - timedelta(days=KEPT_DAYS))

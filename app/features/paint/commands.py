@@ -1,0 +1,222 @@
+"""Commands that read the paint of pictures: paint, snap, agree, propose."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated, Any, get_args
+
+import typer
+
+from app.features.match_estimates.commands import print_sentences
+from app.plural import plural
+from app.soccer.choices import ProposalOutcome
+from app.terminal.opened import opened_store
+from app.terminal.options import Json, Workers, acting, parse_size, read_settings
+from app.terminal.terminal import print_json, print_values, say, show_progress
+
+commands = typer.Typer()
+
+Images = Annotated[
+    list[Path],
+    typer.Argument(metavar="IMAGES...", exists=True, help="Folder, zip or files (jpg, png, webp)."),
+]
+
+
+@commands.command()
+def paint(
+    dataset: Annotated[str, typer.Argument(metavar="DATASET", help="Name of the dataset.")],
+    match: Annotated[str | None, typer.Option(help="The pictures of this match alone.")] = None,
+    show: Annotated[
+        bool, typer.Option("--show", help="Read nothing: show what was read before.")
+    ] = False,
+    undo: Annotated[
+        bool, typer.Option("--undo", help="Give all groups what they had before the last reading.")
+    ] = False,
+    workers: Workers = None,
+    json_: Json = False,
+) -> None:
+    """Read the paint of a dataset's pictures: cameras are drawn onto it.
+
+    Pictures that were read for the lines that they have now are left alone. The policy must say
+    calibration.source paint, as touchline does; `touchline solve` computes what follows.
+    """
+    from app.features.datasets.match_choice import of_match
+    from app.features.paint.service import get_paint, read_paint, take_back_paint
+
+    if show and undo:
+        raise typer.BadParameter("show what was read or take it back, one at a time")
+    with opened_store() as store:
+        if undo:
+            found = take_back_paint(store, dataset, actor=acting())
+        elif show:
+            found = get_paint(store, dataset)
+        else:
+            with show_progress("Reading paint") as progress:
+                found = read_paint(
+                    store,
+                    dataset,
+                    None if match is None else [match],
+                    actor=acting(),
+                    workers=workers,
+                    progress=progress,
+                )
+    print_sentences(of_match(found.items, match), json_)
+
+
+@commands.command()
+def snap(
+    lines: Annotated[
+        Path, typer.Argument(metavar="LINES", exists=True, help="Folder or zip of line files.")
+    ],
+    images: Images,
+    out: Annotated[Path, typer.Argument(metavar="OUT", help="Folder for camera files.")],
+    size: Annotated[
+        str, typer.Option(help="native: the size of each picture is its own.")
+    ] = "native",
+    json_: Json = False,
+) -> None:
+    """Cameras from clicked lines and the paint of their pictures."""
+    from app.features.file_tools.paint import snap_files
+
+    if size != "native":
+        raise typer.BadParameter(
+            "each picture is read in its own size; leave this out", param_hint="--size"
+        )
+    with show_progress("Snapping") as progress:
+        rows = snap_files(lines, images, out, settings=read_settings(), progress=progress)
+    _print_rows(rows, json_)
+
+
+@commands.command()
+def agree(
+    cameras: Annotated[
+        Path, typer.Argument(metavar="CAMERAS", exists=True, help="Folder or zip of camera files.")
+    ],
+    images: Images,
+    json_: Json = False,
+) -> None:
+    """How well cameras agree with the paint of their pictures; needs no lines."""
+    from app.features.file_tools.paint import agree_files
+
+    with show_progress("Reading paint") as progress:
+        rows = agree_files(cameras, images, settings=read_settings(), progress=progress)
+    _print_rows(rows, json_)
+
+
+def _print_rows(rows: list[dict[str, Any]], as_json: bool) -> None:
+    """A line for each picture, or all as JSON."""
+    if as_json:
+        print_json(rows)
+        return
+    for row in rows:
+        numbers = [
+            f"{name.replace('_', ' ')} {row[name]:.3g}"
+            for name in ("supported", "explained", "points", "error_px", "moved_px")
+            if row[name] is not None
+        ]
+        say("  ".join([row["frame"], row["outcome"], *numbers, row["reason"] or ""]).rstrip())
+
+
+@commands.command()
+def propose(
+    images: Annotated[
+        list[Path] | None,
+        typer.Argument(metavar="IMAGES...", exists=True, help="Folders, zips or files: jpg, png."),
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Argument(metavar="OUT", help="Folder for camera files.")
+    ] = None,
+    size: Annotated[
+        str,
+        typer.Option(metavar="native|WxH", help="Size of the images that the cameras are for."),
+    ] = "native",
+    known: Annotated[
+        list[Path] | None,
+        typer.Option(
+            exists=True,
+            metavar="CAMERAS",
+            help="Cameras of the same match: a file, folder or zip; may be given several times.",
+        ),
+    ] = None,
+    dataset: Annotated[
+        str | None,
+        typer.Option(metavar="NAME", help="In place of IMAGES and OUT: a dataset's views."),
+    ] = None,
+    match: Annotated[str | None, typer.Option(help="With --dataset: this match alone.")] = None,
+    show: Annotated[
+        bool, typer.Option("--show", help="With --dataset: show what was proposed before.")
+    ] = False,
+    undo: Annotated[
+        bool, typer.Option("--undo", help="With --dataset: forget all that was proposed.")
+    ] = False,
+    workers: Workers = None,
+    json_: Json = False,
+) -> None:
+    """Propose a camera for each picture from its painted lines alone.
+
+    OUT gets camera_<stem>.json of the proposed ones, and propose.json with the outcome of each
+    (proposed, unsure, nothing). Sides are by convention: the camera stands where y > 0.
+    With --dataset the views without a camera are looked at, and what is found is kept
+    as predictions: nothing counts before a person accepts one.
+    """
+    if dataset is not None:
+        if images or out or known or size != "native":
+            raise typer.BadParameter("a dataset has its pictures and cameras: name nothing else")
+        if show and undo:
+            raise typer.BadParameter("show what was proposed or forget it, one at a time")
+        _propose_for_views(dataset, match, show, undo, workers, json_)
+        return
+    if not images or out is None:
+        raise typer.BadParameter("name IMAGES and OUT, or --dataset")
+    if match is not None or show or undo or workers is not None:
+        raise typer.BadParameter("--match, --show, --undo and --workers go with --dataset")
+    _propose_for_files(images, out, size, known or (), json_)
+
+
+def _propose_for_views(
+    dataset: str, match: str | None, show: bool, undo: bool, workers: int | None, json_: bool
+) -> None:
+    from app.features.paint.proposals import forget_proposals, get_proposals, propose_views
+
+    matches = None if match is None else [match]
+    with opened_store() as store:
+        if undo:
+            if match is not None:
+                raise typer.BadParameter("all of a dataset is forgotten, or nothing")
+            print_values({"forgotten": forget_proposals(store, dataset)}, json_)
+            return
+        if show:
+            items = [asdict(item) for item in get_proposals(store, dataset, matches).items]
+            if json_:
+                print_json(items)
+                return
+            for item in items:
+                counts = ", ".join(f"{item[name]} {name}" for name in get_args(ProposalOutcome))
+                said = f"{item['looked']} of {plural(item['views'], 'view')} looked at: {counts}"
+                name = f"{item['match']}: " if item["match"] else ""
+                say(f"{name}{said}, {item['accepted']} accepted")
+            return
+        with show_progress("Proposing") as progress:
+            run = propose_views(store, dataset, matches, workers=workers, progress=progress)
+    print_values(asdict(run), json_)
+
+
+def _propose_for_files(
+    images: list[Path], out: Path, size: str, known: Sequence[Path], json_: bool
+) -> None:
+    from app.features.file_tools.propose import counts_of, propose_files
+
+    wanted = None if size == "native" else parse_size(size)
+    with show_progress("Proposing") as progress:
+        rows = propose_files(
+            images, out, read_settings(), size=wanted, known=known, progress=progress
+        )
+    if json_:
+        print_json(rows)
+        return
+    for row in rows:
+        if row["reason"]:
+            say(f"{row['frame']}: {row['outcome']}; {row['reason']}")
+    print_values(counts_of(rows), False)

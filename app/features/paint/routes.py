@@ -1,0 +1,206 @@
+"""Paint of a dataset and of a view, and proposals."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+from anyio import to_thread
+from fastapi import APIRouter, Request, Response
+
+from app.features.groups.schemas import points_of
+from app.features.groups.view_paint import PaintQuestion, paint_question, proposal_question
+from app.features.groups.view_routes import CLIENT_GONE, told_with_view
+from app.features.jobs.queries import Job
+from app.features.jobs.schemas import JobDocument
+from app.features.paint.jobs import PAINT, PROPOSALS, stop_and_forget, take_paint_back
+from app.features.paint.proposals import get_group_proposals, get_proposals
+from app.features.paint.schemas import (
+    DatasetPaintDocument,
+    DatasetPaintRequest,
+    DatasetProposalsDocument,
+    DatasetProposalsRequest,
+    ForgottenProposalsDocument,
+    GroupProposal,
+    GroupProposals,
+    PaintDocument,
+    PaintRequest,
+    ProposalDocument,
+    ProposalPlanDocument,
+)
+from app.features.paint.service import get_paint
+from app.http.cursor import paged
+from app.http.deps import Actor, AppServices, AppStore, DatasetPath, DryRun, Id
+from app.http.job_responses import ACCEPTED, by_job, job_answer
+from app.http.problem import responses
+from app.http.respond import document, responds
+from app.worker_pool import PoolTask
+
+paint_router = APIRouter(prefix="/datasets/{dataset}/paint", tags=["datasets"])
+
+
+@paint_router.get("", operation_id="listDatasetPaint", responses=responses(404))
+@paged()
+def list_paint(dataset: DatasetPath, store: AppStore) -> DatasetPaintDocument:
+    """How many pictures of each match were read for their paint, and what came of it."""
+    return DatasetPaintDocument.model_validate(get_paint(store, dataset))
+
+
+@paint_router.post(
+    "",
+    operation_id="readDatasetPaint",
+    **by_job(404, 409, 413, 415),
+)
+@responds(job_answer)
+def read_paint(
+    dataset: DatasetPath, request: DatasetPaintRequest, services: AppServices, actor: Actor
+) -> Job:
+    """Read the paint of pictures and give it to their groups, which are solved again.
+
+    Pictures that were read for the lines that their view has now are left alone. An edit never
+    reads any; this does. 409 while the policy does not use paint.
+    """
+    return PAINT.request(services.jobs, services.store, dataset, request.match, actor=actor)
+
+
+@paint_router.delete(
+    "",
+    operation_id="takeDatasetPaintBack",
+    **by_job(404, 409),
+)
+@responds(job_answer)
+def take_back_paint(dataset: DatasetPath, services: AppServices, actor: Actor) -> Job:
+    """Give all groups what they had before paint was read last; the job solves them.
+
+    Once more takes back the reading before that one; 409 when there is none any more. A reading
+    that waits or runs is cancelled, and is the one that is taken back, as far as it came.
+    """
+    return take_paint_back(services.jobs, services.store, dataset, actor=actor)
+
+
+view_paint_router = APIRouter(prefix="/views", tags=["views"])
+
+REFUSALS = (404, 409, 413, 415, 503)
+
+
+@view_paint_router.post(
+    "/{view}/paint",
+    operation_id="readPaint",
+    response_model=PaintDocument,
+    responses=responses(*REFUSALS),
+)
+async def read_view_paint(
+    view: Id, wanted: PaintRequest, services: AppServices, request: Request
+) -> PaintDocument | Response:
+    """What the frame shows of the markings near a view's camera; saves nothing."""
+    question = await to_thread.run_sync(
+        paint_question, services.store, view, points_of(wanted.lines)
+    )
+    found = await _answer(request, question, partial(question.ask_paint, services.frames))
+    return Response(status_code=CLIENT_GONE) if found is None else PaintDocument.of(found)
+
+
+@view_paint_router.post(
+    "/{view}/propose",
+    operation_id="proposeLines",
+    response_model=ProposalDocument,
+    responses=responses(404, 413, 415, 503),
+)
+async def propose_lines(
+    view: Id, services: AppServices, request: Request, wanted: PaintRequest | None = None
+) -> ProposalDocument | Response:
+    """Lines for a view without a camera, from its frame alone; saves nothing.
+
+    Where the view has lines, those that nobody drew are proposed beside them.
+    """
+    lines = {} if wanted is None else points_of(wanted.lines)
+    question = await to_thread.run_sync(proposal_question, services.store, view, lines)
+    found = await _answer(request, question, partial(question.ask_proposal, services.frames))
+    return Response(status_code=CLIENT_GONE) if found is None else ProposalDocument.of(found)
+
+
+async def _answer(request: Request, question: PaintQuestion, ask: Callable[[], PoolTask]) -> Any:
+    """What was found, or None where nobody waits for it any more."""
+    with told_with_view(question.view.key):
+        return await ask().result_unless(request.is_disconnected)
+
+
+proposals_router = APIRouter(tags=["datasets"])
+
+
+@proposals_router.get(
+    "/datasets/{dataset}/proposals", operation_id="listDatasetProposals", responses=responses(404)
+)
+@paged()
+def list_proposals(dataset: DatasetPath, store: AppStore) -> DatasetProposalsDocument:
+    """For how many views of each match something is proposed; nothing of it counts."""
+    return DatasetProposalsDocument.model_validate(get_proposals(store, dataset))
+
+
+@proposals_router.post(
+    "/datasets/{dataset}/proposals",
+    operation_id="proposeDatasetLines",
+    status_code=202,
+    response_model=JobDocument,
+    responses={
+        **responses(404, 413, 415),
+        **ACCEPTED,
+        200: {
+            "model": ProposalPlanDocument,
+            "description": "After a dry run: how many views would be looked at.",
+        },
+    },
+)
+@responds(job_answer)
+def accept_proposed_lines(
+    dataset: DatasetPath,
+    request: DatasetProposalsRequest,
+    services: AppServices,
+    actor: Actor,
+    dry_run: DryRun = False,
+) -> Job | Response:
+    """Look at the pictures of views without a camera, neither given nor from their lines.
+
+    What is found is kept as predictions: nothing counts before a person saves the lines of one.
+    Views that were looked at are left alone, unless their picture is another, or more is known of
+    their match and nothing was proposed. The job's result counts the outcomes.
+    """
+    if dry_run or request.dry_run:
+        matches = None if request.match is None else [request.match]
+        found = get_proposals(services.store, dataset, matches)
+        counts = {name: found.count(name) for name in ("views", "looked")}
+        return document(ProposalPlanDocument(**counts))
+    return PROPOSALS.request(services.jobs, services.store, dataset, request.match, actor=actor)
+
+
+def _forgotten(gone: int) -> Response:
+    return document(ForgottenProposalsDocument(forgotten=gone))
+
+
+@proposals_router.delete(
+    "/datasets/{dataset}/proposals",
+    operation_id="forgetDatasetProposals",
+    response_model=ForgottenProposalsDocument,
+    responses=responses(404),
+)
+@responds(_forgotten)
+def forget(dataset: DatasetPath, services: AppServices) -> int:
+    """Forget everything that was proposed for a dataset; lines that were accepted stay.
+
+    A search that waits or runs is cancelled, and nothing that it finds is kept afterwards.
+    """
+    return stop_and_forget(services.jobs, services.store, dataset)
+
+
+@proposals_router.get(
+    "/groups/{group}/proposals",
+    operation_id="getGroupProposals",
+    tags=["groups"],
+    responses=responses(404),
+)
+@paged()
+def group_proposals(group: Id, store: AppStore) -> GroupProposals:
+    """What was proposed for the views of a group, with its lines and scores."""
+    found = get_group_proposals(store, group)
+    return GroupProposals(items=[GroupProposal.of(*item) for item in found])

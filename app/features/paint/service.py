@@ -1,0 +1,376 @@
+"""Paint: what is read of the paint in a dataset's pictures, given to its groups, and taken back.
+
+It is read when somebody asks for it, in processes of their own, and is data of the group from then
+on: ``solve`` needs no picture. Views whose picture was read for the clicks that they have now are
+left alone. A run can be killed anywhere; the next one goes on where it was.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from contextlib import closing
+from dataclasses import dataclass, replace
+from typing import Any
+
+from app.db.session import Session, now
+from app.db.store import Store
+from app.errors import ConflictError, ImageError, TooLargeError
+from app.features.datasets.queries import group_ids
+from app.features.datasets.service import DatasetHead, need_dataset, require_matches
+from app.features.groups.edit import SetPaint
+from app.features.groups.group_edits import give_edits
+from app.features.groups.pictures import (
+    PaintTask,
+    PictureTask,
+    outdated_beside_others,
+    read_view_paint,
+)
+from app.features.groups.queries import StoredGroup, read_groups
+from app.features.paint.queries import (
+    PAINT,
+    MatchPaint,
+    insert_readings,
+    last_run,
+    match_paint,
+    read_readings,
+)
+from app.features.solutions.service import known_calibrations
+from app.media.frames import VideoIndexer
+from app.progress import TellProgress
+from app.soccer.paint_evidence import NO_FRAME, NO_PAINT, PAINT_DISAGREES, PaintReading
+from app.soccer.policy import CalibrationPolicy
+from app.solving.calibrate import clicks_key, sought_key
+from app.worker_pool import WorkerPool
+from app.worker_process import COUNTS, WorkerLimits
+
+LIMITS = WorkerLimits(memory=2 * 2**30, processor=60.0, silence=180.0)
+"""For one picture; the first one of a process may have to wait for kernels to be compiled."""
+_PER_WORKER = 6
+"""Groups that each worker gets before they are written."""
+_BATCH = 100
+MOST_COMPARED = 1000
+"""Groups with paint whose lines are compared with those that it was read for, when somebody asks
+how a dataset stands; a reading compares all."""
+
+
+@dataclass(frozen=True)
+class PaintState:
+    """What was read of the pictures of one match.
+
+    Attributes:
+        groups: How many it has.
+        views: Views of moving cameras with lines.
+        without_picture: How many of them have no picture.
+        read: How many were read.
+        old: How many were read for other lines or beside other people than they have, or by an
+            older extractor; None: too many were read to compare them. Whether a picture is still the same only reading says.
+        painted: How many of those have a camera from their paint, as far as the lines are still
+            those that it was read for.
+        no_paint: How many show too little of it.
+        paint_disagrees: In how many it does not lie where the lines were drawn.
+        no_frame: How many have no picture that can be read.
+    """
+
+    match: str
+    groups: int
+    views: int
+    without_picture: int
+    read: int
+    old: int | None
+    painted: int
+    no_paint: int
+    paint_disagrees: int
+    no_frame: int
+
+    @property
+    def sentence(self) -> str:
+        """What people read of it."""
+        left = max(self.views - self.without_picture, self.read)
+        if not left:
+            return f"none of {self.views} views has a picture" if self.views else "nothing to read"
+        if self.read:
+            parts = [f"{self.read} of {left} pictures were read: {self.painted} by their paint"]
+        else:
+            parts = [f"the paint of none of {left} pictures was read"]
+        parts += [
+            f"{count} {words}"
+            for count, words in (
+                (self.no_paint, "with too little paint"),
+                (self.paint_disagrees, "with paint that disagrees with the lines"),
+                (self.no_frame, "missing or unreadable"),
+                (self.old, "to be read again"),
+            )
+            if count
+        ]
+        if self.without_picture:
+            parts.append(f"{self.without_picture} without a picture")
+        return ", ".join(parts)
+
+
+@dataclass(frozen=True)
+class DatasetPaint:
+    """What was read of a dataset's pictures; ``used``: whether its policy uses it."""
+
+    dataset_id: int
+    dataset: str
+    used: bool
+    items: tuple[PaintState, ...]
+
+
+def get_paint(store: Store, dataset: str | int) -> DatasetPaint:
+    """What was read of the pictures of a dataset's matches.
+
+    Raises:
+        NotFoundError: There is no such dataset.
+    """
+    with store.read() as session:
+        found = require_matches(session, dataset)
+        matches = match_paint(session, found.id)
+        old = _old(session, found, matches)
+    items = tuple(_state(item, None if old is None else old[item.match]) for item in matches)
+    return DatasetPaint(found.id, found.name, found.policy.calibration.source == "paint", items)
+
+
+def read_paint(
+    store: Store,
+    dataset: str | int,
+    matches: Collection[str] | None = None,
+    *,
+    actor: str,
+    run: str | None = None,
+    workers: int | None = None,
+    progress: TellProgress | None = None,
+    require_wanted: Callable[[], None] | None = None,
+) -> DatasetPaint:
+    """Read the paint of pictures and give it to their groups; stale until solved.
+
+    Views whose picture was read for the same lines before, and is the same, are left alone.
+
+    Args:
+        store: The database.
+        dataset: Name or id.
+        matches: By name; None: all.
+        actor: Who wants it.
+        run: Name of this reading, by which it is taken back; None: the time.
+        workers: How many pictures are read at once; None: as the settings say.
+        progress: Called with groups done and in all; an error that it raises ends the run.
+        require_wanted: Called in each transaction that gives something, before it does; what is
+            not wanted any more it stops with an error.
+
+    Raises:
+        ConflictError: The dataset's policy does not use paint.
+        NotFoundError: There is no such dataset or match.
+        OverloadedError: Processes were killed over one picture, twice; what was read stays.
+    """
+    found = require_readable(store, dataset, matches)
+    with store.read() as session:
+        ids = group_ids(session, found.id, matches)
+    run, count, done = run or now(), workers or store.settings.image_workers, 0
+    with (
+        closing(VideoIndexer(store.settings)) as videos,
+        closing(WorkerPool(LIMITS, count, 0, "pictures", COUNTS["paint"])) as pool,
+    ):
+        for start in range(0, len(ids), _PER_WORKER * count):
+            some = ids[start : start + _PER_WORKER * count]
+            tasks = _tasks(store, some, found)
+            views = [task.view.media for of_group in tasks.values() for task in of_group]
+            videos.make_ready(views, done, len(ids), progress)
+            readings = _readings(store, pool, videos, tasks)
+            with store.write() as session:
+                if require_wanted is not None:
+                    require_wanted()
+                _give(session, found.id, readings, actor, {"run": run})
+            done += len(some)
+            if progress is not None:
+                progress(done, len(ids))
+    return get_paint(store, found.id)
+
+
+def require_readable(
+    store: Store, dataset: str | int, matches: Collection[str] | None = None
+) -> DatasetHead:
+    """The dataset, unless nothing would use what is read.
+
+    Raises:
+        ConflictError: The dataset's policy does not use paint.
+        NotFoundError: There is no such dataset or match.
+    """
+    with store.read() as session:
+        found = require_matches(session, dataset, matches)
+    if found.policy.calibration.source != "paint":
+        raise ConflictError(
+            f'the policy of "{found.name}" does not use the paint of pictures',
+            hint="Choose the policy touchline, or set calibration.source to paint, first.",
+        )
+    return found
+
+
+def take_back_paint(store: Store, dataset: str | int, *, actor: str) -> DatasetPaint:
+    """Give the groups of a dataset what they had before paint was read last.
+
+    Once more takes back the reading before that one.
+
+    Raises:
+        ConflictError: Nothing was read, or all of it is taken back.
+        NotFoundError: There is no such dataset.
+    """
+    with store.write() as session:
+        apply_take_back(session, dataset, actor=actor)
+    return get_paint(store, dataset)
+
+
+def apply_take_back(
+    session: Session, dataset: str | int, *, actor: str, stopped: Collection[str] = ()
+) -> None:
+    """``take_back_paint`` within a write session.
+
+    Args:
+        stopped: Readings that were stopped for it: the last of those is taken back as far as it
+            came, and where none came to anything no earlier one is.
+    """
+    found = require_matches(session, dataset)
+    entries = last_run(session, found.id)
+    if stopped and not (entries and entries[0].body["run"] in stopped):
+        return
+    if not entries:
+        raise ConflictError(f'no paint was read in "{found.name}"')
+    before: dict[int, Mapping[str, str]] = {}
+    for entry in entries:
+        # A run that was begun again may have given a group something twice.
+        before.setdefault(entry.group_id or 0, entry.body["inverse"]["paint"])
+    named = {digest for paint in before.values() for digest in paint.values()}
+    known = read_readings(session, named)
+    wanted = {
+        number: {view: known[digest] for view, digest in paint.items()}
+        for number, paint in before.items()
+    }
+    run = entries[0].body["run"]
+    _give(session, found.id, wanted, actor, {"run": f"{run} back", "takes_back": run})
+
+
+def _give(
+    session: Session,
+    dataset_id: int,
+    wanted: Mapping[int, Mapping[str, PaintReading]],
+    actor: str,
+    body: dict[str, Any],
+) -> None:
+    """One entry for each group that changes; of a take-back for the first in any case."""
+    ids = sorted(wanted)
+
+    def edits(some: Mapping[int, StoredGroup]) -> dict[int, SetPaint]:
+        fitting = {
+            number: SetPaint(outdated_beside_others(stored.group, wanted[number])).apply(
+                stored.group
+            )
+            for number, stored in some.items()
+        }
+        for group in fitting.values():
+            insert_readings(session, dataset_id, group.paint.values())
+        return {number: SetPaint(group.paint) for number, group in fitting.items()}
+
+    told = ids[0] if ids and "takes_back" in body else None
+    give_edits(session, dataset_id, PAINT, ids, edits, actor=actor, body=body, told=told)
+
+
+def _tasks(store: Store, ids: Sequence[int], dataset: DatasetHead) -> dict[int, list[PaintTask]]:
+    """What is to be read for each group; groups without a view that takes paint have none."""
+    with store.read() as session:
+        stored = read_groups(session, ids)
+        clicks = replace(dataset.policy, calibration=_without_paint(dataset.policy.calibration))
+        known = known_calibrations(session, [item.group for item in stored.values()], clicks)
+    return {
+        number: list(_group_tasks(item, dataset.policy.calibration, known))
+        for number, item in stored.items()
+    }
+
+
+def _without_paint(policy: CalibrationPolicy) -> CalibrationPolicy:
+    return replace(policy, source="lines")
+
+
+def _group_tasks(
+    stored: StoredGroup, policy: CalibrationPolicy, known: Mapping[str, Any]
+) -> Iterator[PaintTask]:
+    group = stored.group
+    for view in group.views:
+        if view.takes_paint:
+            clicked = known.get(clicks_key(group, view, policy))
+            alone = replace(group, views=(view,), paint={})
+            key, old = sought_key(group, view, policy), group.paint.get(view.key)
+            yield PaintTask(alone, policy, key, clicked, old)
+
+
+def _readings(
+    store: Store,
+    pool: WorkerPool,
+    videos: VideoIndexer,
+    tasks: Mapping[int, Sequence[PaintTask]],
+) -> dict[int, dict[str, PaintReading]]:
+    """What was read for each group, by view; views without a camera of their clicks are left out."""
+
+    def ask(task: PaintTask) -> PictureTask:
+        work = (read_view_paint, task, store.settings)
+        media = task.view.media
+        return PictureTask(pool, *(work if media is None else videos.with_index(media, *work)))
+
+    asked = {number: [(task, ask(task)) for task in some] for number, some in tasks.items()}
+    return {
+        number: {
+            task.view.key: reading
+            for task, reads in some
+            if (reading := _result(task, reads)) is not None
+        }
+        for number, some in asked.items()
+    }
+
+
+def _result(task: PaintTask, reads: PictureTask) -> PaintReading | None:
+    try:
+        reading: PaintReading | None = reads.result()
+    except (ImageError, TooLargeError):
+        # Its process ended over it: to this service that picture is unreadable.
+        return task.fitting or task.without_frame
+    return reading
+
+
+def has_pictures(store: Store, dataset: str | int) -> bool:
+    """Whether there is a picture whose paint could be read.
+
+    Raises:
+        NotFoundError: There is no such dataset.
+    """
+    with store.read() as session:
+        number = need_dataset(session, dataset)
+        return any(item.views > item.without_picture for item in match_paint(session, number))
+
+
+def _old(
+    session: Session, dataset: DatasetHead, matches: Sequence[MatchPaint]
+) -> dict[str, int] | None:
+    """How many readings of each match do not fit any more; None where they are too many."""
+    ids = [number for item in matches for number in item.painted]
+    if len(ids) > MOST_COMPARED:
+        return None
+    old = {item.match: 0 for item in matches}
+    for start in range(0, len(ids), _BATCH):
+        some = read_groups(session, ids[start : start + _BATCH])
+        for stored in some.values():
+            tasks = _group_tasks(stored, dataset.policy.calibration, {})
+            old[stored.group.match] += sum(task.is_old for task in tasks)
+    return old
+
+
+def _state(item: MatchPaint, old: int | None) -> PaintState:
+    return PaintState(
+        match=item.match,
+        groups=len(item.groups),
+        views=item.views,
+        without_picture=item.without_picture,
+        read=sum(item.reasons.values()),
+        old=old,
+        painted=item.reasons.get(None, 0),
+        no_paint=item.reasons.get(NO_PAINT, 0),
+        paint_disagrees=item.reasons.get(PAINT_DISAGREES, 0),
+        no_frame=item.reasons.get(NO_FRAME, 0),
+    )

@@ -1,0 +1,284 @@
+"""Commands on accounts: invite people, list them, disable them, give them another role or password."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from app.terminal.opened import opened_store
+from app.terminal.options import Json, acting, read_settings
+from app.terminal.terminal import print_json, print_values, say
+
+if TYPE_CHECKING:
+    from app.features.people.access_tokens import AccessToken
+    from app.features.people.invitations import Invitation, Post
+    from app.features.people.roles import Role
+    from app.features.people.service import Person
+
+commands = typer.Typer(help="Who may log in to the server of a team.", no_args_is_help=True)
+
+Name = Annotated[str, typer.Argument(help="Name of the person.")]
+Email = Annotated[str | None, typer.Option(metavar="ADDRESS", help="Send the link there by mail.")]
+Dataset = Annotated[str, typer.Argument(help="Name or id of the dataset.")]
+
+
+def _role(said: str) -> Role:
+    from app.features.people.roles import Role
+
+    try:
+        return Role(said.strip().lower())
+    except ValueError:
+        known = ", ".join(Role)
+        raise typer.BadParameter(f'"{said}" is no role; there are {known}') from None
+
+
+@commands.command()
+def add(
+    name: Name,
+    role: Annotated[
+        str, typer.Option(help="none, viewer, annotator, reviewer, lead or admin.")
+    ] = "reviewer",
+    email: Email = None,
+    json_: Json = False,
+) -> None:
+    """Make an account, and print or mail the link with which its person chooses a password."""
+    from app.features.people.invitations import invite_one
+
+    wanted, post = _role(role), _post()
+    with opened_store() as store:
+        _, row = invite_one(store, name, wanted, email, post, actor=acting())
+    _print_link(row, json_)
+
+
+@commands.command("invite-many")
+def invite_many(
+    file: Annotated[
+        typer.FileText,
+        typer.Argument(help="A line of name,role,email for each person; - reads standard input."),
+    ],
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="Only report what would happen.")
+    ] = False,
+    json_: Json = False,
+) -> None:
+    """Make many accounts at once; mail or print each link. 1 if a row was refused."""
+    from app.features.people.invitations import invite_many as invite
+    from app.features.people.invitations import read_list
+
+    rows, post = read_list(file.read()), _post()
+    with opened_store() as store:
+        report = invite(store, rows, post, actor=acting(), dry_run=dry_run)
+    refused = sum(row.state == "refused" for row in report)
+    if json_:
+        print_json([vars(row) for row in report])
+    else:
+        for row in report:
+            told = [row.link, "link sent by mail" if row.mailed else None, row.problem]
+            more = "; ".join(part for part in told if part)
+            say(f"row {row.row:<4} {row.name:24} {row.role:10} {row.state:9} {more}".rstrip())
+        say(f"{len(report) - refused} {'possible' if dry_run else 'invited'}, {refused} refused")
+    if refused:
+        raise typer.Exit(1)
+
+
+def _post() -> Post:
+    from app.features.people.invitations import Post
+    from app.mail import read_mail_server
+
+    settings = read_settings()
+    base = settings.url or f"http://{settings.host}:{settings.port}"
+    return Post(read_mail_server(settings), settings.url, base)
+
+
+@commands.command("list")
+def list_(json_: Json = False) -> None:
+    """List everybody with an account."""
+    from app.features.people.service import list_people
+
+    with opened_store() as store:
+        found = [_values(person) for person in list_people(store)]
+    if json_:
+        print_json(found)
+        return
+    for value in found:
+        single = ", ".join(f"{one}: {role}" for one, role in value.get("datasets", {}).items())
+        seen = value["seen"] or ""
+        more = ", ".join(part for part in (value.get("sign_on"), single) if part)
+        say(f"{value['name']:40} {value['role']:10} {value['state']:12} {seen:33} {more}".rstrip())
+
+
+@commands.command()
+def disable(name: Name, json_: Json = False) -> None:
+    """Stop letting somebody in, and log them out everywhere; what they did stays."""
+    _change(name, json_, disabled=True)
+
+
+@commands.command()
+def enable(name: Name, json_: Json = False) -> None:
+    """Let somebody in again, with the password that they had."""
+    _change(name, json_, disabled=False)
+
+
+@commands.command()
+def role(
+    name: Name,
+    role: Annotated[str, typer.Argument(help="none, viewer, annotator, reviewer, lead or admin.")],
+    json_: Json = False,
+) -> None:
+    """Give somebody another role, in every dataset in which they have none of their own."""
+    _change(name, json_, role=_role(role))
+
+
+@commands.command()
+def grant(
+    name: Name,
+    dataset: Dataset,
+    role: Annotated[
+        str, typer.Argument(help="none (sees nothing of it), viewer, annotator, reviewer or lead.")
+    ],
+    json_: Json = False,
+) -> None:
+    """Give somebody a role in one dataset, in place of what they are in all of them."""
+    _give(name, dataset, _role(role), json_)
+
+
+@commands.command()
+def take(name: Name, dataset: Dataset, json_: Json = False) -> None:
+    """Take somebody's role in one dataset: what they are in all of them counts there again."""
+    _give(name, dataset, None, json_)
+
+
+@commands.command()
+def adopt(name: Name, json_: Json = False) -> None:
+    """Show what was done before there were accounts as somebody's; once. The log keeps its names."""
+    from app.features.audit.audit_events import adopt as give
+    from app.features.people.service import find_person
+
+    with opened_store() as store:
+        found = give(store, find_person(store, name).id, actor=acting())
+    print_values({"name": found, "shown as theirs": "what was done until now as local"}, json_)
+
+
+@commands.command()
+def reset(
+    name: Name,
+    second_factor: Annotated[
+        bool, typer.Option("--second-factor", help="Take away their second factor, too.")
+    ] = False,
+    email: Email = None,
+    json_: Json = False,
+) -> None:
+    """Print or mail a link with which somebody chooses another password; using it logs them out."""
+    from app.features.people.invitations import renew_one
+    from app.features.people.second_factor import SecondFactors
+    from app.features.people.service import find_person
+
+    post = _post()
+    with opened_store() as store:
+        found = find_person(store, name)
+        if second_factor:
+            SecondFactors(store).clear(found.id, actor=acting())
+        _, row = renew_one(store, found.id, email, post, actor=acting())
+    _print_link(row, json_)
+
+
+@commands.command()
+def unlink(name: Name, json_: Json = False) -> None:
+    """Take away the account of the provider by which somebody comes in, and end those sessions."""
+    from app.features.people.service import find_person
+    from app.features.people.sign_on_rules import unlink_person
+
+    with opened_store() as store:
+        found = find_person(store, name)
+        unlink_person(store, found.id, actor=acting())
+        person = find_person(store, name)
+    print_values(_values(person), json_)
+
+
+def _give(name: str, dataset: str, role: Role | None, json_: bool) -> None:
+    from app.features.people.members import give_role
+    from app.features.people.service import find_person
+
+    with opened_store() as store:
+        found = find_person(store, name)
+        one = give_role(store, dataset, found.id, role, actor=acting())
+    print_values({"name": one.name, "dataset": dataset, "role": str(one.role)}, json_)
+
+
+class Switch(StrEnum):
+    """Whether something counts."""
+
+    ON = "on"
+    OFF = "off"
+
+
+@commands.command("require-second-factor")
+def require_second_factor(
+    switch: Annotated[Switch, typer.Argument(metavar="on|off")], json_: Json = False
+) -> None:
+    """Let everybody need a second factor: whoever has none makes one before anything else."""
+    from app.features.people.second_factor import SecondFactors
+
+    with opened_store() as store:
+        SecondFactors(store).require(switch is Switch.ON, actor=acting())
+    print_values({"second_factor_required": switch is Switch.ON}, json_)
+
+
+@commands.command()
+def tokens(
+    name: Annotated[
+        str | None, typer.Argument(help="Of this person; default: everybody's.")
+    ] = None,
+    end: Annotated[int | None, typer.Option(metavar="ID", help="End the token of this id.")] = None,
+    json_: Json = False,
+) -> None:
+    """List the tokens with which scripts ask, or end one; they are made in the browser."""
+    from app.features.people.access_tokens import AccessTokens
+    from app.features.people.service import find_person
+
+    with opened_store() as store:
+        asked = AccessTokens(store)
+        person = None if name is None else find_person(store, name).id
+        found = asked.of_person(person) if end is None else [asked.end(end, person, actor=acting())]
+    _print_tokens(found, json_, ended=end is not None)
+
+
+def _print_tokens(found: list[AccessToken], json_: bool, *, ended: bool) -> None:
+    state = ["expired" if one.expired else "ended" if ended else "good" for one in found]
+    if json_:
+        print_json([{**vars(one), "state": word} for one, word in zip(found, state, strict=True)])
+        return
+    for one, word in zip(found, state, strict=True):
+        where = one.dataset or "all datasets"
+        say(
+            f"{one.id:4} {one.person:20} {one.name:24} {one.start}...  {','.join(one.scopes):24} "
+            f"{where}, {word}, until {one.expires[:10]}, used {(one.used or 'never')[:10]}"
+        )
+
+
+def _change(name: str, json_: bool, **change: Any) -> None:
+    from app.features.people.service import change_person, find_person
+
+    with opened_store() as store:
+        found = find_person(store, name)
+        person = change_person(store, found.id, actor=acting(), **change)
+    print_values(_values(person), json_)
+
+
+def _values(person: Person) -> dict[str, Any]:
+    datasets = {one.dataset: str(one.role) for one in person.datasets}
+    values = {
+        "name": person.name,
+        "role": str(person.role),
+        "state": person.state,
+        "seen": person.seen,
+    }
+    linked = {"sign_on": person.sign_on} if person.sign_on else {}
+    return values | linked | ({"datasets": datasets} if datasets else {})
+
+
+def _print_link(row: Invitation, json_: bool) -> None:
+    values = {key: value for key, value in vars(row).items() if key not in ("row", "state")}
+    print_values({key: value for key, value in values.items() if value not in (None, False)}, json_)

@@ -1,0 +1,269 @@
+"""Devices from which a person has logged in.
+
+Attempts counted against a limit, challenges and codes.
+"""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import hmac
+import secrets
+import time
+from base64 import urlsafe_b64encode
+from collections.abc import Callable
+from datetime import UTC, datetime, timedelta
+from threading import Lock
+from typing import Protocol
+
+import pyotp
+from cryptography.fernet import Fernet
+
+from app.db.ephemeral_state import note_attempt, oldest_attempt, put_begun, take_begun
+from app.db.home import BEGUN, DEVICES, SECOND_FACTOR, installation_key
+from app.db.session import Session, text_of
+from app.db.store import Store
+from app.features.people.links import hash_of
+from app.features.people.queries import (
+    find_second_factor,
+    person_by_name,
+    use_recovery_code,
+    use_step,
+)
+
+LASTS = timedelta(days=400)
+"""Browsers keep no cookie for longer, and after so long a device is unknown."""
+_NONCE_BYTES = 16
+
+
+class Devices:
+    """Makes and recognises the tokens that browsers keep after a login.
+
+    A token ends after ``LASTS``, and with the password that its person had then.
+
+    Args:
+        store: Of the home that holds the key of the tokens, and of people.
+        clock: Says what time it is, in UTC.
+    """
+
+    def __init__(self, store: Store, clock: Callable[[], datetime] = lambda: datetime.now(UTC)):
+        self._store, self._clock = store, clock
+
+    def make(self, name: str) -> str:
+        """A new token for the browser of a person."""
+        issued = str(int(self._clock().timestamp()))
+        nonce = secrets.token_hex(_NONCE_BYTES)
+        return f"{issued}.{nonce}.{self._signature(name, issued, nonce)}"
+
+    def recognise(self, name: str, token: str) -> str | None:
+        """What tells a device from others, if its token is one of this person; else None."""
+        issued, _, rest = token.partition(".")
+        nonce, _, signature = rest.partition(".")
+        # As bytes: what is sent may hold letters that are none of ASCII.
+        known = self._signature(name, issued, nonce).encode()
+        if not hmac.compare_digest(known, signature.encode("utf-8", "replace")):
+            return None
+        is_old = self._clock().timestamp() - int(issued) > LASTS.total_seconds()
+        return None if is_old else nonce
+
+    def cookie_of(self, name: str) -> str:
+        """What ends the name of a person's cookie: several people may use one browser."""
+        return hashlib.sha256(_folded(name)).hexdigest()[:12]
+
+    def _signature(self, name: str, issued: str, nonce: str) -> str:
+        key = installation_key(self._store.settings, DEVICES)
+        with self._store.glance() as session:
+            person = person_by_name(session, name.strip().lower())
+        password = "" if person is None else person.password or ""
+        parts = (_folded(name), issued.encode("utf-8", "replace"), nonce.encode("utf-8", "replace"))
+        text = b"\n".join((*parts, hashlib.sha256(password.encode()).digest()))
+        return hmac.new(key, text, hashlib.sha256).hexdigest()
+
+
+def _folded(name: str) -> bytes:
+    return name.strip().lower().encode("utf-8", "replace")
+
+
+class Attempts:
+    """Tries in a moving window.
+
+    Args:
+        store: Where they are counted.
+        clock: Says what time it is, in seconds since 1970.
+    """
+
+    def __init__(self, store: Store, clock: Callable[[], float] = time.time):
+        self._store, self._clock = store, clock
+
+    def hit(self, whose: str, most: int, seconds: float) -> float | None:
+        """Count a try; None, or after how many seconds there may be another where there were too many.
+
+        Who is refused writes nothing: a flood keeps nobody from writing.
+        """
+        at, name = self._clock(), hash_of(whose)
+        with self._store.glance() as session:
+            oldest = oldest_attempt(session, name, at - seconds, most)
+        if oldest is None:
+            with self._store.write(lasting=False) as session:
+                oldest = oldest_attempt(session, name, at - seconds, most)
+                if oldest is None:
+                    note_attempt(session, name, at)
+        return None if oldest is None else oldest + seconds - at
+
+
+CHALLENGE_LASTS = timedelta(minutes=5)
+BYTES = 32
+MOST = 10_000
+"""So many are remembered; beyond it the oldest makes room."""
+
+Clock = Callable[[], datetime]
+
+
+class Waiting(Protocol):
+    """What waits to be taken, for a short while."""
+
+    def put(self, asker: str, value: bytes) -> None:
+        """Let something wait for somebody, in the place of what did."""
+
+    def take(self, asker: str) -> bytes | None:
+        """What waits for somebody, and from then on does not; None where nothing does that is good."""
+
+
+class Remembered:
+    """What waits in the memory of this process: a restart forgets it.
+
+    Args:
+        clock: Says what time it is, in UTC.
+        lasts: How long something waits.
+    """
+
+    def __init__(self, clock: Clock, lasts: timedelta):
+        self._clock, self._lasts, self._lock = clock, lasts, Lock()
+        self._open: dict[str, tuple[bytes, datetime]] = {}
+
+    def put(self, asker: str, value: bytes) -> None:
+        """See ``Waiting``."""
+        at = self._clock()
+        with self._lock:
+            self._open.pop(asker, None)
+            # They lie in the order in which they end.
+            while self._open and (len(self._open) >= MOST or self._oldest_ended(at)):
+                del self._open[next(iter(self._open))]
+            self._open[asker] = value, at + self._lasts
+
+    def take(self, asker: str) -> bytes | None:
+        """See ``Waiting``."""
+        with self._lock:
+            value, ends = self._open.pop(asker, (None, None))
+        return value if ends is not None and self._clock() < ends else None
+
+    def _oldest_ended(self, at: datetime) -> bool:
+        return next(iter(self._open.values()))[1] <= at
+
+
+class Written:
+    """What waits in the database, for whichever process is asked next; encrypted with a key of the home.
+
+    Args:
+        store: The database.
+        clock: Says what time it is, in UTC.
+        lasts: How long something waits.
+        kind: What it is: askers of several kinds may have the same name.
+    """
+
+    def __init__(self, store: Store, clock: Clock, lasts: timedelta, kind: str):
+        self._store, self._clock, self._lasts, self._kind = store, clock, lasts, kind
+
+    def put(self, asker: str, value: bytes) -> None:
+        """See ``Waiting``."""
+        at = self._clock()
+        closed, ends = self._key().encrypt(value), text_of(at + self._lasts)
+        with self._store.write(lasting=False) as session:
+            put_begun(session, self._name(asker), closed, ends, text_of(at), MOST)
+
+    def take(self, asker: str) -> bytes | None:
+        """See ``Waiting``."""
+        with self._store.write() as session:
+            closed = take_begun(session, self._name(asker), text_of(self._clock()))
+        return None if closed is None else self._key().decrypt(closed)
+
+    def _name(self, asker: str) -> str:
+        return hash_of(f"{self._kind}/{asker}")
+
+    def _key(self) -> Fernet:
+        return Fernet(urlsafe_b64encode(installation_key(self._store.settings, BEGUN)))
+
+
+def waiting(store: Store, clock: Clock, lasts: timedelta, kind: str) -> Waiting:
+    """What waits, where every process finds it that may be asked for it."""
+    if store.sharing.is_shared:
+        return Written(store, clock, lasts, kind)
+    return Remembered(clock, lasts)
+
+
+class Challenges:
+    """Challenges of passkeys."""
+
+    def __init__(self, waiting: Waiting):
+        self._waiting = waiting
+
+    def make(self, asker: str) -> bytes:
+        """A challenge for somebody, in the place of the one that they had."""
+        challenge = secrets.token_bytes(BYTES)
+        self._waiting.put(asker, challenge)
+        return challenge
+
+    def take(self, asker: str) -> bytes | None:
+        """The challenge of somebody, who has none then; None where none is good."""
+        return self._waiting.take(asker)
+
+
+DIGITS, SECONDS = 6, 30
+"""Of a code, and for how long it is shown."""
+SKEW = 1
+"""So many codes before and after count as well: clocks differ."""
+CODE_BYTES = 10
+"""Random bytes of a recovery code."""
+
+
+def take_code(session: Session, store: Store, person_id: int, code: str, at: datetime) -> bool:
+    """Whether a code is right at a time, of an authenticator or a recovery code; it is then used."""
+    text = plain(code)
+    if len(text) == DIGITS:
+        return take_totp(session, store, person_id, text, at)
+    return use_recovery_code(session, person_id, hash_of(text))
+
+
+def take_totp(session: Session, store: Store, person_id: int, code: str, at: datetime) -> bool:
+    """The same of the code of an authenticator, of a second factor that is not confirmed too."""
+    found = find_second_factor(session, person_id)
+    if found is None:
+        return False
+    totp, step = totp_of(store, person_id, found.salt), int(at.timestamp()) // SECONDS
+    given = plain(code).encode("utf-8", "replace")
+    right = [
+        near
+        for near in range(step - SKEW, step + SKEW + 1)
+        if hmac.compare_digest(totp.generate_otp(near).encode(), given)
+    ]
+    return bool(right) and use_step(session, person_id, right[0])
+
+
+def totp_of(store: Store, person_id: int, salt: str) -> pyotp.TOTP:
+    """The secret of a person, of what the database and of what the home alone knows."""
+    text = f"{person_id} {salt}".encode()
+    digest = hmac.new(
+        installation_key(store.settings, SECOND_FACTOR), text, hashlib.sha256
+    ).digest()
+    return pyotp.TOTP(base64.b32encode(digest[:20]).decode(), interval=SECONDS)
+
+
+def new_code() -> str:
+    """A new recovery code, as people read it."""
+    text = base64.b32encode(secrets.token_bytes(CODE_BYTES)).decode().lower()
+    return "-".join(text[at : at + 4] for at in range(0, len(text), 4))
+
+
+def plain(code: str) -> str:
+    """A code as it is compared: people copy it with spaces, and in capitals."""
+    return code.strip().lower().replace("-", "").replace(" ", "")

@@ -1,0 +1,265 @@
+"""Invitations: one person or many at once, whose links go by mail where mail is set up."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from datetime import datetime
+from urllib.parse import urlsplit
+
+from app.db.store import Store
+from app.errors import InputError, ReviewError
+from app.features.people.links import Link
+from app.features.people.queries import person_by_name
+from app.features.people.roles import Role, checked_name, require_no_token
+from app.features.people.service import Person, insert_invited, invite, renew_link
+from app.finite import quoted
+from app.mail import Letter, MailServer, checked_address
+
+MOST = 500
+"""People in one list."""
+NO_MAIL = "this server sends no mail: hand over the link yourself"
+NO_URL = "the server does not know the address that people open (TOUCHLINE_URL): hand over the link"
+_COLUMNS = ("name", "role", "email")
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """Somebody who shall be invited, as a list says it: nothing is checked yet.
+
+    Attributes:
+        row: Which row of the list that is.
+    """
+
+    row: int
+    name: str
+    role: str
+    email: str | None = None
+
+
+@dataclass(frozen=True)
+class Invitation:
+    """What became of one row of a list.
+
+    Attributes:
+        state: ``invited``; ``reset``, who has a way in already; ``possible``, on a dry run; or
+            ``refused``.
+        link: Address of the link, for whoever invites to hand over; None: there is none, or it went
+            by mail.
+        expires: Until when it is good.
+        mailed: The mail server has taken the letter with the link.
+        problem: Why the row was refused, or its letter not sent.
+    """
+
+    row: int
+    name: str
+    role: str
+    state: str
+    link: str | None = None
+    expires: str | None = None
+    mailed: bool = False
+    problem: str | None = None
+
+
+@dataclass(frozen=True)
+class Post:
+    """How links reach people.
+
+    Attributes:
+        server: Sends letters; None: mail is not set up.
+        url: The address that people open, as the operator says it; None: letters name no other.
+        base: What links begin with that are shown.
+    """
+
+    server: MailServer | None
+    url: str | None
+    base: str
+
+    def hand_over(
+        self, rows: Sequence[tuple[Invitation, Link, str | None]], by: str
+    ) -> list[Invitation]:
+        """Send the links of those who have an address; what is not sent is shown.
+
+        Args:
+            rows: Invitations, their links, and to which address each goes; None: to none.
+            by: Who invites.
+        """
+        letters = [
+            _letter(self.url, row, link, address, by)
+            for row, link, address in rows
+            if address and self.url and self.server
+        ]
+        sent = iter(self.server.send(letters) if self.server and letters else [])
+        done = []
+        for row, link, address in rows:
+            problem = None
+            if address:
+                problem = NO_MAIL if not self.server else NO_URL if not self.url else next(sent)
+            mailed = bool(address) and problem is None
+            shown = None if mailed else link.address(self.base)
+            done.append(replace(row, link=shown, mailed=mailed, problem=problem))
+        return done
+
+
+def invite_one(
+    store: Store, name: str, role: Role, email: str | None, post: Post, *, actor: str
+) -> tuple[Person, Invitation]:
+    """Make an account, and hand over the link with which its person chooses a password.
+
+    Raises:
+        ForbiddenError: A token asks.
+        InputError: The name or the address cannot be one.
+        ConflictError: The name is taken.
+    """
+    address = checked_address(email, pointer="/email") if email else None
+    person, link = invite(store, name, role, actor=actor)
+    row = Invitation(1, person.name, person.role, "invited", expires=link.expires)
+    return person, post.hand_over([(row, link, address)], actor)[0]
+
+
+def renew_one(
+    store: Store, person_id: int, email: str | None, post: Post, *, actor: str
+) -> tuple[Person, Invitation]:
+    """Make another link for somebody, and hand it over as an invitation is.
+
+    Raises:
+        NotFoundError: There is nobody of that id.
+        ForbiddenError: It is oneself, or a token asks.
+        InputError: The address cannot be one.
+        ConflictError: They are disabled.
+    """
+    address = checked_address(email, pointer="/email") if email else None
+    person, link = renew_link(store, person_id, actor=actor)
+    state = "reset" if person.joined else "invited"
+    row = Invitation(1, person.name, person.role, state, expires=link.expires)
+    return person, post.hand_over([(row, link, address)], actor)[0]
+
+
+def invite_many(
+    store: Store, wanted: Sequence[Wanted], post: Post, *, actor: str, dry_run: bool
+) -> list[Invitation]:
+    """Invite everybody of a list whose row is right, and say of each row what became of it.
+
+    Args:
+        store: Of the home.
+        wanted: The rows.
+        post: How links reach people.
+        actor: Who invites.
+        dry_run: Only say what would happen.
+
+    Raises:
+        ForbiddenError: A token asks.
+        InputError: The list is empty or too long.
+    """
+    require_no_token(actor)
+    if not 0 < len(wanted) <= MOST:
+        raise InputError(
+            f"a list has 1 to {MOST} people, and this one {len(wanted):,}", pointer="/people"
+        )
+    refused: list[Invitation] = []
+    made: list[tuple[Invitation, Link | None, str | None]] = []
+    with store.read() if dry_run else store.write() as session:
+        seen: dict[str, int] = {}
+        for one in wanted:
+            try:
+                name, role, address = _checked(one, seen)
+                if person_by_name(session, name) is not None:
+                    raise InputError(f"there is a {name} already")
+            except ReviewError as error:
+                refused.append(_refused(one, error.message))
+                continue
+            seen[name] = one.row
+            if dry_run:
+                made.append((Invitation(one.row, name, role, "possible"), None, address))
+                continue
+            _, link = insert_invited(session, name, role, actor=actor)
+            row = Invitation(one.row, name, role, "invited", expires=link.expires)
+            made.append((row, link, address))
+    done = [row for row, link, _ in made if link is None]
+    links = [(row, link, address) for row, link, address in made if link is not None]
+    # After the transaction: a slow mail server keeps nobody from writing.
+    return sorted([*refused, *done, *post.hand_over(links, actor)], key=lambda row: row.row)
+
+
+def read_list(text: str) -> list[Wanted]:
+    """The rows of a list: ``name,role,email`` a line, with commas, semicolons or tabs between.
+
+    A first line of names of columns says in which order they come. Empty lines, and those that begin
+    with #, are passed over.
+
+    Raises:
+        InputError: A column is unknown, or there is none of names.
+    """
+    text = text.removeprefix("\ufeff")
+    divider = max(",;\t", key=text.count)
+    reader = csv.reader(io.StringIO(text), delimiter=divider, skipinitialspace=True)
+    columns: Sequence[str] | None = None
+    found: list[Wanted] = []
+    for cells in reader:
+        values = [cell.strip() for cell in cells]
+        if not any(values) or values[0].startswith("#"):
+            continue
+        if columns is None:
+            header = [value.lower().replace("e-mail", "email") for value in values]
+            columns = _header(header) if "name" in header else _COLUMNS
+            if "name" in header:
+                continue
+        found.append(_row(reader.line_num, columns, values))
+    return found
+
+
+def _header(names: Sequence[str]) -> Sequence[str]:
+    unknown = [name for name in names if name not in _COLUMNS]
+    if unknown or len(set(names)) != len(names):
+        raise InputError(
+            f"the columns of the list are {', '.join(map(quoted, names))}",
+            hint=f"Use {', '.join(_COLUMNS)}, each once.",
+        )
+    return names
+
+
+def _row(number: int, columns: Sequence[str], values: Sequence[str]) -> Wanted:
+    last = len(columns) - 1
+    # Cells beyond the last column make its value one that is refused, and that the report shows.
+    cells = [*values[:last], ",".join(value for value in values[last:] if value)]
+    named = dict(zip(columns, cells, strict=False))
+    return Wanted(
+        number, named.get("name", ""), named.get("role", ""), named.get("email", "") or None
+    )
+
+
+def _checked(one: Wanted, seen: dict[str, int]) -> tuple[str, Role, str | None]:
+    name = checked_name(one.name)
+    if name in seen:
+        raise InputError(f"{name} stands in row {seen[name]}, too")
+    try:
+        role = Role(one.role.strip().lower())
+    except ValueError:
+        known = ", ".join(Role)
+        said = f"{quoted(one.role)} is no role" if one.role.strip() else "the role is missing"
+        raise InputError(f"{said}; there are {known}") from None
+    return name, role, checked_address(one.email) if one.email else None
+
+
+def _refused(one: Wanted, problem: str) -> Invitation:
+    return Invitation(one.row, one.name[:80], one.role[:40], "refused", problem=problem)
+
+
+def _letter(url: str, row: Invitation, link: Link, address: str, by: str) -> Letter:
+    host = urlsplit(url).hostname
+    until = f"{datetime.fromisoformat(link.expires):%d %B %Y, %H:%M} UTC"
+    if row.state == "reset":
+        subject = f"A new password for Touchline at {host}"
+        why = f"{by} sends you a link to set a new password for Touchline at {url}."
+    else:
+        subject = f"Your account on Touchline at {host}"
+        why = f"{by} invites you to Touchline at {url} as {row.role}."
+    return Letter(
+        address,
+        subject,
+        f"Hello {row.name},\n\n{why}\n\nChoose your password here:\n\n{link.address(url)}\n\n"
+        f"The link works once, until {until}.\n"
+        "If you did not expect this mail, you need not do anything.\n",
+    )

@@ -1,0 +1,269 @@
+"""Sessions, passkeys, accounts of single sign-on, and tokens of scripts."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from functools import cache
+from typing import Any
+
+from sqlalchemy import Select, bindparam, delete, func, insert, select, update
+
+from app.db.session import Session
+from app.features.datasets.tables import DatasetModel
+from app.features.people.queries import MUST_ENROL, with_rights
+from app.features.people.tables import (
+    AccessTokenModel,
+    IdentityModel,
+    LoginModel,
+    PasskeyModel,
+    PersonModel,
+)
+
+_FOUND = select(
+    LoginModel.id,
+    LoginModel.person_id,
+    LoginModel.seen,
+    LoginModel.created,
+    LoginModel.expires,
+    LoginModel.way,
+    LoginModel.vouched,
+    PersonModel.name,
+    PersonModel.role,
+    MUST_ENROL.label("must_enrol"),
+).join(PersonModel, PersonModel.id == LoginModel.person_id)
+
+
+def insert_login(session: Session, values: dict[str, Any]) -> None:
+    """Insert a session."""
+    session.execute(insert(LoginModel), values)
+
+
+def find_login(
+    session: Session, token_hash: str, *, at: str, idle_since: str, leading: Collection[str]
+) -> Any | None:
+    """The session under a hash with its person, their rights (``rights_in``) and whether they
+    ``must_enrol``, unless it has ended or the person is disabled.
+
+    Args:
+        session: A transaction.
+        token_hash: SHA-256 of what the browser has.
+        leading: The roles that lead a dataset.
+        at: The time now.
+        idle_since: A session that was used last before this time has ended.
+    """
+    given = {"token_hash": token_hash, "at": at, "idle_since": idle_since}
+    return session.execute(_found(tuple(leading)), given).one_or_none()
+
+
+@cache
+def _found(leading: tuple[str, ...]) -> Select[*tuple[Any, ...]]:
+    """Made once: it takes longer to put together than to answer."""
+    return with_rights(_FOUND, leading).where(
+        LoginModel.token_hash == bindparam("token_hash"),
+        LoginModel.expires > bindparam("at"),
+        LoginModel.seen > bindparam("idle_since"),
+        PersonModel.disabled.is_(False),
+    )
+
+
+def logins_of(session: Session, person_id: int, *, at: str, idle_since: str) -> Sequence[Any]:
+    """The sessions of a person that have not ended, the one that was used last first."""
+    statement = select(*LoginModel.__table__.columns).where(
+        LoginModel.person_id == person_id, LoginModel.expires > at, LoginModel.seen > idle_since
+    )
+    return session.execute(statement.order_by(LoginModel.seen.desc())).all()
+
+
+def touch_login(session: Session, login_id: int, at: str) -> None:
+    """Note that a session was used."""
+    session.execute(update(LoginModel).where(LoginModel.id == login_id).values(seen=at))
+
+
+def delete_login(session: Session, login_id: int, person_id: int) -> bool:
+    """End a session of a person; returns whether there was one."""
+    statement = delete(LoginModel).where(
+        LoginModel.id == login_id, LoginModel.person_id == person_id
+    )
+    return session.execute(statement.returning(LoginModel.id)).one_or_none() is not None
+
+
+def delete_logins(
+    session: Session, person_id: int, *, but: int | None = None, way: str | None = None
+) -> None:
+    """End every session of a person, or all but one, or those that began in one way."""
+    statement = delete(LoginModel).where(LoginModel.person_id == person_id)
+    if way is not None:
+        statement = statement.where(LoginModel.way == way)
+    session.execute(statement if but is None else statement.where(LoginModel.id != but))
+
+
+def delete_ended(session: Session, *, at: str, idle_since: str) -> None:
+    """Forget the sessions that have ended by themselves."""
+    session.execute(
+        delete(LoginModel).where((LoginModel.expires <= at) | (LoginModel.seen <= idle_since))
+    )
+
+
+_ALL = select(*PasskeyModel.__table__.columns)
+
+
+def insert_passkey(session: Session, values: dict[str, Any]) -> int:
+    """Insert a passkey; returns its id."""
+    done = session.execute(insert(PasskeyModel).returning(PasskeyModel.id), values)
+    return int(done.scalar_one())
+
+
+def find_passkey(session: Session, credential: str) -> Any | None:
+    """The passkey of a credential's id, in base64url."""
+    return session.execute(_ALL.where(PasskeyModel.credential == credential)).one_or_none()
+
+
+def passkeys_of(session: Session, person_id: int) -> Sequence[Any]:
+    """The passkeys of a person, the oldest first."""
+    mine = _ALL.where(PasskeyModel.person_id == person_id)
+    return session.execute(mine.order_by(PasskeyModel.id)).all()
+
+
+def use_passkey(session: Session, passkey_id: int, sign_count: int, at: str) -> None:
+    """Note that a passkey was used, and how often its device says that it was."""
+    statement = update(PasskeyModel).where(PasskeyModel.id == passkey_id)
+    session.execute(statement.values(sign_count=sign_count, used=at))
+
+
+def delete_passkey(session: Session, passkey_id: int, person_id: int) -> str | None:
+    """Forget a passkey of a person; returns its name, None where there is none."""
+    statement = delete(PasskeyModel).where(
+        PasskeyModel.id == passkey_id, PasskeyModel.person_id == person_id
+    )
+    return session.execute(statement.returning(PasskeyModel.name)).scalar_one_or_none()
+
+
+def delete_passkeys(session: Session, person_id: int) -> bool:
+    """Forget every passkey of a person; whether there was one."""
+    statement = delete(PasskeyModel).where(PasskeyModel.person_id == person_id)
+    return bool(session.scalars(statement.returning(PasskeyModel.id)).all())
+
+
+_ALL_of_identities = select(*IdentityModel.__table__.columns)
+
+
+def find_identity(session: Session, issuer: str, subject: str) -> Any | None:
+    """The account of a subject at a provider, where it is somebody's."""
+    same = (IdentityModel.issuer == issuer, IdentityModel.subject == subject)
+    return session.execute(_ALL_of_identities.where(*same)).one_or_none()
+
+
+def identity_of(session: Session, person_id: int) -> Any | None:
+    """The account of a person."""
+    return session.execute(
+        _ALL_of_identities.where(IdentityModel.person_id == person_id)
+    ).one_or_none()
+
+
+def put_identity(session: Session, values: dict[str, Any]) -> None:
+    """Make an account a person's, in the place of the one that they had."""
+    delete_identity(session, values["person_id"])
+    session.execute(insert(IdentityModel), values)
+
+
+def use_identity(session: Session, person_id: int, shown: str, at: str) -> None:
+    """Note that a person came by their account, and what it is known by now."""
+    statement = update(IdentityModel).where(IdentityModel.person_id == person_id)
+    session.execute(statement.values(shown=shown, used=at))
+
+
+def delete_identity(session: Session, person_id: int) -> str | None:
+    """Take a person's account from them; returns what it was known by, None where there was none."""
+    statement = delete(IdentityModel).where(IdentityModel.person_id == person_id)
+    return session.execute(statement.returning(IdentityModel.shown)).scalar_one_or_none()
+
+
+def people_with_identity(session: Session) -> dict[int, str]:
+    """What the accounts of people are known by, by id of the person."""
+    statement = select(IdentityModel.person_id, IdentityModel.shown)
+    return {row.person_id: row.shown for row in session.execute(statement)}
+
+
+def count_linked(session: Session, issuer: str, people: list[int]) -> int:
+    """How many of some people have an account of a provider."""
+    statement = select(IdentityModel.person_id).where(
+        IdentityModel.issuer == issuer, IdentityModel.person_id.in_(people)
+    )
+    return len(session.scalars(statement).all())
+
+
+_ALL_of_access_tokens = (
+    select(
+        *(column for column in AccessTokenModel.__table__.c if column.name != "token_hash"),
+        PersonModel.name.label("person"),
+        PersonModel.role,
+        DatasetModel.name.label("dataset"),
+    )
+    .join(PersonModel, PersonModel.id == AccessTokenModel.person_id)
+    .join(DatasetModel, DatasetModel.id == AccessTokenModel.dataset_id, isouter=True)
+)
+
+
+def insert_access_token(session: Session, values: dict[str, Any]) -> int:
+    """Insert a token; returns its id."""
+    done = session.execute(insert(AccessTokenModel).returning(AccessTokenModel.id), values)
+    return int(done.scalar_one())
+
+
+def find_access_token(
+    session: Session, token_hash: str, at: str, leading: Collection[str]
+) -> Any | None:
+    """The token under a hash with its person and their rights (``rights_in``), unless it has expired
+    or the person is disabled; ``leading`` are the roles that lead a dataset."""
+    given = {"token_hash": token_hash, "at": at}
+    return session.execute(_found_of_access_tokens(tuple(leading)), given).one_or_none()
+
+
+@cache
+def _found_of_access_tokens(leading: tuple[str, ...]) -> Select[*tuple[Any, ...]]:
+    return with_rights(_ALL_of_access_tokens, leading).where(
+        AccessTokenModel.token_hash == bindparam("token_hash"),
+        AccessTokenModel.expires > bindparam("at"),
+        PersonModel.disabled.is_(False),
+    )
+
+
+def access_tokens(session: Session, person_id: int | None = None) -> Sequence[Any]:
+    """The tokens of a person, or of everybody, expired ones too; the newest of each first."""
+    statement = _ALL_of_access_tokens.order_by(PersonModel.name, AccessTokenModel.id.desc())
+    mine = AccessTokenModel.person_id == person_id
+    return session.execute(statement if person_id is None else statement.where(mine)).all()
+
+
+def count_access_tokens(session: Session) -> dict[int, int]:
+    """How many tokens each person has, by their id."""
+    statement = select(AccessTokenModel.person_id, func.count()).group_by(
+        AccessTokenModel.person_id
+    )
+    return {row[0]: row[1] for row in session.execute(statement)}
+
+
+def touch_access_token(session: Session, token_id: int, at: str) -> None:
+    """Note that a token was used."""
+    session.execute(update(AccessTokenModel).where(AccessTokenModel.id == token_id).values(used=at))
+
+
+def delete_access_token(session: Session, token_id: int) -> None:
+    """End a token."""
+    session.execute(delete(AccessTokenModel).where(AccessTokenModel.id == token_id))
+
+
+def delete_access_tokens(session: Session, person_id: int) -> None:
+    """End every token of a person."""
+    session.execute(delete(AccessTokenModel).where(AccessTokenModel.person_id == person_id))
+
+
+def delete_expired_token(session: Session, person_id: int, name: str, at: str) -> None:
+    """Make room for a token of that name, where the one that has it is no longer valid."""
+    session.execute(
+        delete(AccessTokenModel).where(
+            AccessTokenModel.person_id == person_id,
+            AccessTokenModel.name == name,
+            AccessTokenModel.expires <= at,
+        )
+    )

@@ -1,0 +1,241 @@
+"""Passkeys, second factors and tokens."""
+
+from __future__ import annotations
+
+import secrets
+
+import structlog
+from fastapi import APIRouter, Request, Response
+
+from app.errors import ConflictError, NotLoggedInError
+from app.features.datasets.service import dataset_id
+from app.features.people.login_schemas import (
+    AccessTokenDocument,
+    AccessTokenList,
+    CreationOptions,
+    MadeAccessToken,
+    NewAccessToken,
+    NewPasskey,
+    PasskeyDocument,
+    PasskeyList,
+    PasskeyLogin,
+    PasskeyMade,
+    RequestOptions,
+)
+from app.features.people.schemas import (
+    CodeOnly,
+    EnrolmentDocument,
+    PasswordOnly,
+    RecoveryCodes,
+    SecondFactorDocument,
+    SessionDocument,
+    TeamSettings,
+)
+from app.features.people.session_routes import Me, session_of
+from app.http.cursor import paged
+from app.http.deps import AppStore, Id
+from app.http.problem import responses
+from app.http.team import AppTeam
+
+passkeys_router = APIRouter(tags=["sessions"])
+OWN_PASSKEYS = "/session/passkeys"
+log = structlog.get_logger("touchline.access")
+
+
+@passkeys_router.get(OWN_PASSKEYS, operation_id="listPasskeys", responses=responses(401, 409))
+@paged()
+def list_passkeys(request: Request, team: AppTeam, me: Me) -> PasskeyList:
+    """One's own passkeys, and whether there can be any at this address."""
+    try:
+        team.site(request)
+        team.require_passwords()
+        unavailable = None
+    except ConflictError as error:
+        unavailable = f"{error.message}. {error.hint}"
+    items = [PasskeyDocument.model_validate(one) for one in team.passkeys.of(me.person_id)]
+    return PasskeyList(items=items, unavailable=unavailable)
+
+
+@passkeys_router.post(
+    f"{OWN_PASSKEYS}/begin",
+    operation_id="beginPasskey",
+    responses=responses(401, 409, 413, 415, 429),
+)
+def begin_passkey(said: PasswordOnly, request: Request, team: AppTeam, me: Me) -> CreationOptions:
+    """What a browser needs to make a passkey; takes the password."""
+    team.require_passwords()
+    team.count_try(request, me.name)
+    return CreationOptions(options=team.passkeys.begin(me, said.password, team.site(request)))
+
+
+@passkeys_router.post(
+    OWN_PASSKEYS,
+    operation_id="createPasskey",
+    status_code=201,
+    responses=responses(401, 409, 413, 415),
+)
+def make(new: NewPasskey, request: Request, team: AppTeam, me: Me) -> PasskeyMade:
+    """Keep a passkey that the browser has made; every other session ends. It is a second factor, too."""
+    credential = new.credential.model_dump()
+    made, codes = team.passkeys.make(me, new.name, credential, team.site(request))
+    return PasskeyMade(passkey=PasskeyDocument.model_validate(made), codes=codes)
+
+
+@passkeys_router.delete(
+    f"{OWN_PASSKEYS}/{{passkey}}",
+    operation_id="deletePasskey",
+    status_code=204,
+    responses=responses(401, 404, 409, 413, 415, 429),
+)
+def remove_passkey(
+    passkey: Id, said: PasswordOnly, request: Request, team: AppTeam, me: Me
+) -> None:
+    """Stop accepting a passkey; 409 for the last second factor, where everybody needs one."""
+    team.count_try(request, me.name)
+    team.passkeys.remove(me, passkey, said.password)
+
+
+@passkeys_router.post(
+    "/session/passkey/begin",
+    operation_id="beginPasskeyLogin",
+    responses=responses(409, 413, 415, 429),
+)
+def begin_login(request: Request, response: Response, team: AppTeam) -> RequestOptions:
+    """What a browser needs to log in with a passkey; it is for this browser, which gets a cookie."""
+    team.require_passwords()
+    team.tries.count_challenge(team.address(request))
+    asker = secrets.token_urlsafe()
+    options = team.passkeys.ask(asker, team.site(request))
+    response.set_cookie(**team.asker_values(asker))
+    return RequestOptions(options=options)
+
+
+@passkeys_router.post(
+    "/session/passkey",
+    operation_id="createSessionWithPasskey",
+    responses=responses(401, 409, 413, 415, 429),
+)
+def log_in(
+    said: PasskeyLogin, request: Request, response: Response, store: AppStore, team: AppTeam
+) -> SessionDocument:
+    """Log in with a passkey: no name, no password, and no code."""
+    team.require_passwords()
+    address = team.address(request)
+    team.count_try(request)
+    try:
+        token = team.passkeys.log_in(
+            team.asker(request),
+            said.credential.model_dump(),
+            team.site(request),
+            browser=request.headers.get("user-agent", ""),
+            address=address,
+            before=team.token(request),
+        )
+    except NotLoggedInError:
+        log.warning("a login with a passkey was refused", address=address)
+        raise
+    response.set_cookie(**team.cookie_values(token))
+    return session_of(team.logins.find(token), store)
+
+
+second_factors_router = APIRouter(tags=["sessions"])
+OWN_FACTOR = "/session/second-factor"
+
+
+@second_factors_router.get(
+    OWN_FACTOR, operation_id="getSecondFactor", responses=responses(401, 409)
+)
+def get_second_factor(team: AppTeam, me: Me) -> SecondFactorDocument:
+    """Whether a code is asked for after one's password, and how many recovery codes are left."""
+    return SecondFactorDocument.model_validate(team.factors.state(me.person_id))
+
+
+@second_factors_router.post(
+    OWN_FACTOR, operation_id="beginSecondFactor", responses=responses(401, 409, 413, 415, 429)
+)
+def begin_second_factor(
+    said: PasswordOnly, request: Request, team: AppTeam, me: Me
+) -> EnrolmentDocument:
+    """What an authenticator has to know, shown this once; nothing is asked for before it is confirmed."""
+    team.count_try(request, me.name)
+    return EnrolmentDocument.model_validate(team.factors.begin(me, said.password))
+
+
+@second_factors_router.post(
+    f"{OWN_FACTOR}/confirm",
+    operation_id="confirmSecondFactor",
+    responses=responses(401, 404, 409, 413, 415, 429),
+)
+def confirm(said: CodeOnly, team: AppTeam, me: Me) -> RecoveryCodes:
+    """Ask for a code from now on; every other session ends. The recovery codes are shown this once."""
+    team.tries.count_code(me.name)
+    return RecoveryCodes(codes=team.factors.confirm(me, said.code))
+
+
+@second_factors_router.delete(
+    OWN_FACTOR,
+    operation_id="deleteSecondFactor",
+    status_code=204,
+    responses=responses(401, 409, 413, 415, 429),
+)
+def remove_second_factor(said: PasswordOnly, request: Request, team: AppTeam, me: Me) -> None:
+    """Stop asking for a code; 409 where everybody needs a second factor."""
+    team.count_try(request, me.name)
+    team.factors.remove(me, said.password)
+
+
+@second_factors_router.delete(
+    "/users/{user}/second-factor",
+    operation_id="deleteSecondFactorOfUser",
+    status_code=204,
+    responses=responses(401, 404, 409),
+)
+def clear(user: Id, team: AppTeam, me: Me) -> None:
+    """Take away the second factor of somebody who has lost it."""
+    team.factors.clear(user, actor=me.actor)
+
+
+@second_factors_router.get("/team", operation_id="getTeam", responses=responses(401, 409))
+def get_settings(team: AppTeam, _me: Me) -> TeamSettings:
+    """What counts for everybody."""
+    return TeamSettings(require_second_factor=team.factors.required())
+
+
+@second_factors_router.put(
+    "/team", operation_id="changeTeam", responses=responses(401, 409, 413, 415)
+)
+def put_settings(wanted: TeamSettings, team: AppTeam, me: Me) -> TeamSettings:
+    """Let everybody need a second factor, or not; whoever has none makes one before anything else."""
+    team.factors.require(wanted.require_second_factor, actor=me.actor)
+    return wanted
+
+
+tokens_router = APIRouter(prefix="/tokens", tags=["tokens"])
+
+
+@tokens_router.get("", operation_id="listTokens", responses=responses(401, 409))
+@paged()
+def list_tokens(team: AppTeam, me: Me) -> AccessTokenList:
+    """One's own tokens, those that have expired too."""
+    return AccessTokenList(items=team.tokens.of_person(me.person_id))
+
+
+@tokens_router.post(
+    "",
+    operation_id="makeToken",
+    status_code=201,
+    responses=responses(401, 404, 409, 413, 415),
+)
+def make_token(new: NewAccessToken, store: AppStore, team: AppTeam, me: Me) -> MadeAccessToken:
+    """Make a token for a script of one's own; its text is shown this once, and kept nowhere."""
+    limit = None if new.dataset is None else dataset_id(store, new.dataset)
+    made, text = team.tokens.make(me, new.name, new.scopes, days=new.days, dataset_id=limit)
+    return MadeAccessToken(token=AccessTokenDocument.model_validate(made), text=text)
+
+
+@tokens_router.delete(
+    "/{token}", operation_id="endToken", status_code=204, responses=responses(401, 404, 409)
+)
+def end_token(token: Id, team: AppTeam, me: Me) -> None:
+    """End a token of one's own: whatever uses it is refused from now on."""
+    team.tokens.end(token, me.person_id, actor=me.actor)

@@ -1,0 +1,376 @@
+"""Logins: sessions that the server keeps, and that a person can look at and end."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from datetime import UTC, datetime, timedelta
+from enum import StrEnum
+
+from app.db.session import Session, text_of
+from app.db.store import Store
+from app.errors import InputError, NotFoundError, NotLoggedInError
+from app.features.people.devices import take_code
+from app.features.people.links import LONGEST, hash_of, hash_password, is_password, new_token
+from app.features.people.login_queries import (
+    delete_ended,
+    delete_login,
+    delete_logins,
+    find_login,
+    insert_login,
+    logins_of,
+    touch_login,
+)
+from app.features.people.queries import (
+    Rights,
+    forget_links,
+    has_second_factor,
+    person_by_id,
+    person_by_name,
+    rights_in,
+    rights_of,
+    update_person,
+)
+from app.features.people.roles import Action, DatasetRoles, Role, Scope, may, note
+from app.features.people.visibility_queries import Reader, Sight
+from app.soccer.actors import with_token
+
+LEADING = tuple(role for role in Role if may(role, Action.LEAD))
+"""Roles that lead a dataset."""
+IDLE = timedelta(hours=12)
+"""A session that nobody has used for so long has ended."""
+LASTS = timedelta(days=14)
+"""And every session after so long."""
+NOTED_AFTER = timedelta(minutes=5)
+"""When a session was used is written down no more often."""
+WRONG = "that name and that password do not belong together"
+ASK_CODE = "the code of your second factor is missing"
+WRONG_CODE = "that is not the code of this moment, or it was used before"
+LOST = "A passkey or a recovery code does as well; without any, an admin can take the second factor away."
+MOST = 20
+"""Sessions of one person; the one that was used longest ago makes room."""
+
+
+class Way(StrEnum):
+    """How somebody came in."""
+
+    PASSWORD = "password"
+    PASSKEY = "passkey"
+    SIGN_ON = "sign_on"
+    """By the provider of single sign-on."""
+
+
+@dataclass(frozen=True)
+class TokenUse:
+    """The token with which a script asks.
+
+    Attributes:
+        fresh: It was never used before.
+    """
+
+    name: str
+    scopes: tuple[Scope, ...]
+    fresh: bool = False
+
+
+@dataclass(frozen=True)
+class Login:
+    """Who asks, by which session or token (``id`` is that one's), and with which rights."""
+
+    id: int
+    person_id: int
+    name: str
+    roles: DatasetRoles
+    seen: datetime
+    token: TokenUse | None = None
+    must_enrol: bool = False
+    """They need a second factor, and have none: they may do nothing before they have."""
+    way: Way | None = None
+    """How the session began; None: there is none."""
+    created: datetime | None = None
+    """When it began."""
+
+    @property
+    def actor(self) -> str:
+        """What the log calls them: a person, or a person with the name of a token."""
+        return self.name if self.token is None else with_token(self.name, self.token.name)
+
+    @property
+    def role(self) -> Role:
+        """What they are in every dataset in which they are nothing else."""
+        return self.roles.everywhere
+
+    @property
+    def owner(self) -> str:
+        """Under which name it is theirs what belongs to no dataset: a token of one has its own."""
+        return self.actor if self.roles.limited else self.name
+
+    @property
+    def sight(self) -> Sight:
+        """What they see."""
+        return self.roles.sight(self.owner)
+
+    @property
+    def sight_of_whole(self) -> Sight:
+        """What they see and nothing of which is hidden from them."""
+        return self.roles.sight_of_whole(self.owner)
+
+    @property
+    def reader(self) -> Reader | None:
+        """What is hidden from them; None: nothing."""
+        if self.roles.is_admin:
+            return None
+        return Reader(
+            self.name, self.roles.blind, lambda one: may(self.roles.role_in(one), Action.REVIEW)
+        )
+
+
+@dataclass(frozen=True)
+class OpenSession:
+    """One session of a person, as they are shown it."""
+
+    id: int
+    browser: str
+    address: str
+    created: str
+    seen: str
+    expires: str
+
+
+class Logins:
+    """Everything that is asked of sessions.
+
+    Args:
+        store: Where they are.
+        clock: Says what time it is, in UTC.
+        only: Sessions that began in another way are none; None: all are.
+    """
+
+    def __init__(
+        self,
+        store: Store,
+        clock: Callable[[], datetime] = lambda: datetime.now(UTC),
+        *,
+        only: Way | None = None,
+    ):
+        self._store, self._clock, self._only = store, clock, only
+
+    def log_in(
+        self,
+        name: str,
+        password: str,
+        *,
+        code: str | None = None,
+        on_code: Callable[[], None] = lambda: None,
+        browser: str = "",
+        address: str = "",
+        before: str | None = None,
+    ) -> str:
+        """Begin a session; returns its token. The one that the browser had ``before`` ends.
+
+        A name that nobody has takes as long as a wrong password, and gets the same answer. A code is
+        looked at after the password alone; ``on_code`` is called before, to count it (in a
+        transaction of its own, which another that writes would wait for).
+
+        Raises:
+            NotLoggedInError: Name and password do not belong together, or the account is disabled; or
+                a code is missing or wrong (``pointer`` is then ``/code``).
+        """
+        name = name.strip().lower()[:LONGEST]
+        with self._store.read() as session:
+            person = person_by_name(session, name)
+            is_asked = person is not None and has_second_factor(session, person.id)
+        able = person is not None and not person.disabled
+        if not is_password(password, person.password if person and able else None):
+            raise NotLoggedInError(WRONG, hint="An admin can send you a link for a new password.")
+        assert person is not None
+        if is_asked and code is not None:
+            on_code()
+
+        def require_code(session: Session) -> None:
+            if has_second_factor(session, person.id):
+                # What was not counted, for the account had no second factor yet, is asked for.
+                if code is None or not is_asked:
+                    raise NotLoggedInError(ASK_CODE, hint=LOST, pointer="/code")
+                if not take_code(session, self._store, person.id, code, self._clock()):
+                    raise NotLoggedInError(WRONG_CODE, hint=LOST, pointer="/code")
+
+        return self.begin(
+            person.id, person.password, browser, address, before, require_code, Way.PASSWORD
+        )
+
+    def begin(
+        self,
+        person_id: int,
+        password: str | None,
+        browser: str,
+        address: str,
+        before: str | None,
+        require: Callable[[Session], None] = lambda _session: None,
+        way: Way = Way.PASSWORD,
+        *,
+        vouched: bool = False,
+    ) -> str:
+        """Begin a session of somebody who has shown who they are; returns its token.
+
+        Args:
+            person_id: Who it is.
+            password: The hash of their password as it was then; None: they had none.
+            browser: What their browser calls itself.
+            address: Where it is.
+            before: The token of the session that the browser had, which ends.
+            require: Raises in the transaction of the new session, unless they may.
+            way: How they have shown it.
+            vouched: The provider of single sign-on has asked for a second factor.
+
+        Raises:
+            NotLoggedInError: The password was changed meanwhile, or the account disabled.
+        """
+        token, at = new_token(), self._clock()
+        values = {
+            "token_hash": hash_of(token),
+            "person_id": person_id,
+            "created": text_of(at),
+            "seen": text_of(at),
+            "expires": text_of(at + LASTS),
+            "browser": browser[:200],
+            "address": address[:60],
+            "way": way,
+            "vouched": vouched,
+        }
+        with self._store.write() as session:
+            person = person_by_id(session, person_id)
+            # The password may have been changed, or the account disabled, since it was asked for.
+            if person is None or person.disabled or person.password != password:
+                raise NotLoggedInError(WRONG)
+            require(session)
+            delete_ended(session, at=text_of(at), idle_since=text_of(at - IDLE))
+            if before and (
+                old := find_login(session, hash_of(before), leading=LEADING, **self._alive(at))
+            ):
+                delete_login(session, old.id, old.person_id)
+            for spare in logins_of(session, person_id, **self._alive(at))[MOST - 1 :]:
+                delete_login(session, spare.id, person_id)
+            insert_login(session, values)
+            said = {"address": address[:60], "way": way.value}
+            note(session, person.name, person.name, "logged in", person.role, **said)
+        return token
+
+    def find(self, token: str, *, at_once: bool = False) -> Login | None:
+        """Who a token stands for; None where its session has ended.
+
+        Raises:
+            BusyError: It had to be said ``at_once``, and cannot be without waiting.
+        """
+        alive = self._alive(self._clock())
+        with self._store.peek() if at_once else self._store.glance() as session:
+            row = find_login(session, hash_of(token), leading=LEADING, **alive)
+        if row is None or self._only not in (None, row.way):
+            return None
+        roles = roles_with(Role(row.role), rights_in(row))
+        seen, created = datetime.fromisoformat(row.seen), datetime.fromisoformat(row.created)
+        enrol = row.must_enrol and not row.vouched
+        way = Way(row.way)
+        return Login(
+            row.id, row.person_id, row.name, roles, seen, None, enrol, way=way, created=created
+        )
+
+    def is_stale(self, login: Login) -> bool:
+        """Whether it should be written down that a session is used."""
+        return self._clock() - login.seen > NOTED_AFTER
+
+    def touch(self, login: Login) -> None:
+        """Write down that a session is used."""
+        with self._store.write(lasting=False) as session:
+            touch_login(session, login.id, text_of(self._clock()))
+
+    def sessions(self, login: Login) -> list[OpenSession]:
+        """Every session of a person, the one that was used last first."""
+        with self._store.read() as session:
+            rows = logins_of(session, login.person_id, **self._alive(self._clock()))
+        return [
+            OpenSession(row.id, row.browser, row.address, row.created, row.seen, row.expires)
+            for row in rows
+        ]
+
+    def end(self, login: Login, session_id: int) -> None:
+        """End a session of one's own.
+
+        Raises:
+            NotFoundError: There is none of that id, or it is another person's.
+        """
+        with self._store.write() as session:
+            if not delete_login(session, session_id, login.person_id):
+                raise NotFoundError(f"you have no session {session_id}")
+            did = "logged out" if session_id == login.id else "session ended"
+            note(session, login.actor, login.name, did, login.role)
+
+    def end_others(self, login: Login) -> None:
+        """End every session of a person but the one that asks."""
+        with self._store.write() as session:
+            delete_logins(session, login.person_id, but=login.id)
+            note(session, login.actor, login.name, "other sessions ended", login.role)
+
+    def change_password(self, login: Login, old: str, new: str) -> str:
+        """Give oneself another password; every session ends, and a new one begins.
+
+        Returns:
+            The token of the new one.
+
+        Raises:
+            InputError: The old one is wrong, or the new one cannot be one.
+        """
+        with self._store.read() as session:
+            person = person_by_id(session, login.person_id)
+        if person is None or not is_password(old, person.password):
+            raise InputError("that is not your present password", pointer="/old")
+        hashed = hash_password(new, login.name, pointer="/new")
+        with self._store.write() as session:
+            found = logins_of(session, login.person_id, **self._alive(self._clock()))
+            mine = next((row for row in found if row.id == login.id), None)
+            if mine is None:
+                raise NotLoggedInError("your session has ended")
+            update_person(session, login.person_id, password=hashed)
+            delete_logins(session, login.person_id)
+            forget_links(session, login.person_id)
+            note(session, login.name, login.name, "password", login.role)
+        way, vouched = Way(mine.way), mine.vouched
+        return self.begin(
+            login.person_id, hashed, mine.browser, mine.address, None, way=way, vouched=vouched
+        )
+
+    def _alive(self, at: datetime) -> dict[str, str]:
+        return {"at": text_of(at), "idle_since": text_of(at - IDLE)}
+
+
+def read_roles(session: Session, person_id: int, everywhere: Role) -> DatasetRoles:
+    """The rights of a person, who is that everywhere."""
+    if everywhere is Role.ADMIN:
+        return DatasetRoles(everywhere)
+    return roles_with(everywhere, rights_of(session, person_id, LEADING))
+
+
+def roles_with(everywhere: Role, rights: Rights) -> DatasetRoles:
+    """The rights of somebody who is that everywhere; in copies they are what they are in what those
+    are of."""
+    if everywhere is Role.ADMIN:
+        return DatasetRoles(everywhere)
+    single = {key: Role(role) for key, role in rights.roles.items()}
+    roles = DatasetRoles(everywhere, single)
+    copies = {key: roles.role_in(of_id) for key, of_id in rights.copies.items()}
+    return DatasetRoles(everywhere, {**single, **copies}, blind=_blind_in(roles, rights))
+
+
+def _blind_in(roles: DatasetRoles, rights: Rights) -> dict[int, frozenset[int]]:
+    """The batches in which somebody annotates blind, by dataset.
+
+    Leads see everything. Who judges decides where people differ: also in a batch of their own, once
+    they have nothing left to annotate in it.
+    """
+    found: dict[int, frozenset[int]] = {}
+    for batch, dataset, waits in rights.blind:
+        role = roles.role_in(dataset)
+        if may(role, Action.LEAD) or (may(role, Action.REVIEW) and not waits):
+            continue
+        found[dataset] = found.get(dataset, frozenset()) | {batch}
+    return found

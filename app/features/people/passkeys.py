@@ -1,0 +1,295 @@
+"""Passkeys: key pairs in people's devices (WebAuthn), with which they log in without a password.
+
+One counts as a second factor as well: it takes the device and what unlocks it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from typing import Any
+
+import structlog
+from webauthn import (
+    generate_authentication_options,
+    generate_registration_options,
+    verify_authentication_response,
+    verify_registration_response,
+)
+from webauthn.helpers import base64url_to_bytes, bytes_to_base64url, options_to_json_dict
+from webauthn.helpers.structs import (
+    AuthenticatorSelectionCriteria,
+    PublicKeyCredentialDescriptor,
+    ResidentKeyRequirement,
+    UserVerificationRequirement,
+)
+
+from app.db.session import Session, text_of
+from app.db.store import Store
+from app.errors import ConflictError, InputError, NotFoundError, NotLoggedInError
+from app.features.people.devices import CHALLENGE_LASTS as LASTS
+from app.features.people.devices import Challenges, waiting
+from app.features.people.links import hash_of
+from app.features.people.login_queries import (
+    delete_logins,
+    delete_passkey,
+    find_passkey,
+    insert_passkey,
+    passkeys_of,
+    use_passkey,
+)
+from app.features.people.logins import Login, Logins, Way
+from app.features.people.queries import count_recovery_codes, person_by_id, put_recovery_codes
+from app.features.people.roles import note
+from app.features.people.second_factor import (
+    ISSUER,
+    end_factor,
+    hashes_of,
+    new_codes,
+    require_password,
+)
+
+log = structlog.get_logger("touchline.access")
+
+MOST = 20
+"""Passkeys of one person."""
+VERIFIED = UserVerificationRequirement.REQUIRED
+REFUSED = "this passkey is not accepted"
+AGAIN = "Try again; if it stays so, log in with your password and make another one under Account."
+LATE = "that took too long, or was answered before"
+
+
+@dataclass(frozen=True)
+class PasskeySite:
+    """For whom passkeys are: the name that people open, and the origin of its pages.
+
+    Example:
+        >>> PasskeySite("touchline.example.org", "https://touchline.example.org").name
+        'touchline.example.org'
+    """
+
+    name: str
+    origin: str
+
+
+@dataclass(frozen=True)
+class Passkey:
+    """A passkey as its person is shown it; ``used`` None: never yet."""
+
+    id: int
+    name: str
+    created: str
+    used: str | None
+
+
+class Passkeys:
+    """Everything that is asked of passkeys.
+
+    Args:
+        store: Where they are.
+        logins: Begins sessions.
+        clock: Says what time it is, in UTC.
+    """
+
+    def __init__(
+        self,
+        store: Store,
+        logins: Logins,
+        clock: Callable[[], datetime] = lambda: datetime.now(UTC),
+    ):
+        self._store, self._logins, self._clock = store, logins, clock
+        self._challenges = Challenges(waiting(store, clock, LASTS, "passkey"))
+
+    def of(self, person_id: int) -> list[Passkey]:
+        """The passkeys of a person, the oldest first."""
+        with self._store.read() as session:
+            rows = passkeys_of(session, person_id)
+        return [Passkey(row.id, row.name, row.created, row.used) for row in rows]
+
+    def begin(self, login: Login, password: str | None, site: PasskeySite) -> dict[str, Any]:
+        """What a browser needs to make a passkey (PublicKeyCredentialCreationOptionsJSON).
+
+        Raises:
+            InputError: That is not the password.
+            ConflictError: There are too many already.
+        """
+        require_password(self._store, login, password, self._clock())
+        with self._store.read() as session:
+            rows = passkeys_of(session, login.person_id)
+        _require_room(rows)
+        options = generate_registration_options(
+            rp_id=site.name,
+            rp_name=ISSUER,
+            user_id=_handle(login.person_id),
+            user_name=login.name,
+            challenge=self._challenges.make(_of_session(login)),
+            authenticator_selection=AuthenticatorSelectionCriteria(
+                resident_key=ResidentKeyRequirement.REQUIRED, user_verification=VERIFIED
+            ),
+            exclude_credentials=[
+                PublicKeyCredentialDescriptor(base64url_to_bytes(row.credential)) for row in rows
+            ],
+        )
+        return options_to_json_dict(options)
+
+    def make(
+        self, login: Login, name: str, credential: dict[str, Any], site: PasskeySite
+    ) -> tuple[Passkey, list[str]]:
+        """Keep the passkey that a browser has made; every other session ends.
+
+        Returns:
+            The passkey, and recovery codes where its person had none: nobody can be shown them again.
+
+        Raises:
+            InputError: It does not answer what this session was asked last, or is not for this site.
+            ConflictError: There are too many, or one of that name, or it is known already.
+        """
+        made = self._read_new(login, credential, site)
+        name, at = name.strip(), text_of(self._clock())
+        if not name:
+            raise InputError("a passkey needs a name", pointer="/name")
+        values = {
+            "person_id": login.person_id,
+            "credential": bytes_to_base64url(made.credential_id),
+            "public_key": bytes_to_base64url(made.credential_public_key),
+            "sign_count": made.sign_count,
+            "name": name,
+            "created": at,
+        }
+        with self._store.write() as session:
+            rows = passkeys_of(session, login.person_id)
+            _require_room(rows)
+            if name in {row.name for row in rows}:
+                raise ConflictError(f"you have a passkey {name} already", hint="Name it otherwise.")
+            if find_passkey(session, values["credential"]) is not None:
+                raise ConflictError("this passkey is known already")
+            number = insert_passkey(session, values)
+            codes = [] if count_recovery_codes(session, login.person_id) else new_codes()
+            if codes:
+                put_recovery_codes(session, login.person_id, hashes_of(codes))
+            delete_logins(session, login.person_id, but=login.id)
+            note(session, login.name, login.name, "passkey", login.role, passkey=name)
+        return Passkey(number, name, at, None), codes
+
+    def remove(self, login: Login, passkey_id: int, password: str | None) -> None:
+        """Stop accepting a passkey.
+
+        Raises:
+            InputError: That is not the password.
+            NotFoundError: There is none of that id, or it is another person's.
+            ConflictError: Everybody needs a second factor here, and it is the last.
+        """
+        require_password(self._store, login, password, self._clock())
+        with self._store.write() as session:
+            name = delete_passkey(session, passkey_id, login.person_id)
+            if name is None:
+                raise NotFoundError(f"you have no passkey {passkey_id}")
+            end_factor(session, login)
+            note(session, login.name, login.name, "no passkey", login.role, passkey=name)
+
+    def ask(self, asker: str, site: PasskeySite) -> dict[str, Any]:
+        """What a browser needs to log in with a passkey (PublicKeyCredentialRequestOptionsJSON).
+
+        Args:
+            asker: What this browser alone knows.
+            site: For whom.
+        """
+        options = generate_authentication_options(
+            rp_id=site.name,
+            challenge=self._challenges.make(_of_browser(asker)),
+            user_verification=VERIFIED,
+        )
+        return options_to_json_dict(options)
+
+    def log_in(
+        self,
+        asker: str,
+        credential: dict[str, Any],
+        site: PasskeySite,
+        *,
+        browser: str = "",
+        address: str = "",
+        before: str | None = None,
+    ) -> str:
+        """Begin a session of whose passkey it is; returns its token.
+
+        Raises:
+            NotLoggedInError: It is nobody's, does not answer what this browser was asked last, is not
+                for this site, was copied (its count goes back), or the account is disabled.
+        """
+        challenge = self._challenges.take(_of_browser(asker))
+        if challenge is None:
+            raise NotLoggedInError(LATE, hint="Try again.")
+        with self._store.read() as session:
+            row = find_passkey(session, str(credential.get("id")))
+            person = person_by_id(session, row.person_id) if row else None
+        if row is None or person is None:
+            raise NotLoggedInError(REFUSED, hint=AGAIN)
+
+        def require(session: Session) -> None:
+            # Read again: another login with it may have counted meanwhile, or it was taken away.
+            found = find_passkey(session, row.credential)
+            if found is None or found.person_id != row.person_id:
+                raise NotLoggedInError(REFUSED, hint=AGAIN)
+            count = _verified(found, credential, challenge, site)
+            use_passkey(session, found.id, count, text_of(self._clock()))
+
+        return self._logins.begin(
+            row.person_id, person.password, browser, address, before, require, Way.PASSKEY
+        )
+
+    def _read_new(self, login: Login, credential: dict[str, Any], site: PasskeySite) -> Any:
+        challenge = self._challenges.take(_of_session(login))
+        if challenge is None:
+            raise InputError(LATE, hint="Begin again.", pointer="/credential")
+        try:
+            return verify_registration_response(
+                credential=credential,
+                expected_challenge=challenge,
+                expected_rp_id=site.name,
+                expected_origin=site.origin,
+                require_user_verification=True,
+            )
+        except (
+            Exception
+        ) as error:  # What the library raises on any bytes is no part of its promise.
+            log.warning("a new passkey was refused", reason=str(error)[:200])
+            raise InputError(REFUSED, hint="Begin again.", pointer="/credential") from error
+
+
+def _verified(row: Any, credential: dict[str, Any], challenge: bytes, site: PasskeySite) -> int:
+    """How often the device says that it has signed; raises NotLoggedInError unless it has, this."""
+    try:
+        if base64url_to_bytes(credential["response"]["userHandle"]) != _handle(row.person_id):
+            raise ValueError("the passkey says that it is another person's")
+        return verify_authentication_response(
+            credential=credential,
+            expected_challenge=challenge,
+            expected_rp_id=site.name,
+            expected_origin=site.origin,
+            credential_public_key=base64url_to_bytes(row.public_key),
+            credential_current_sign_count=row.sign_count,
+            require_user_verification=True,
+        ).new_sign_count
+    except Exception as error:  # As above.
+        log.warning("a passkey was refused", passkey=row.id, reason=str(error)[:200])
+        raise NotLoggedInError(REFUSED, hint=AGAIN) from error
+
+
+def _require_room(rows: Any) -> None:
+    if len(rows) >= MOST:
+        raise ConflictError(f"you have {MOST} passkeys", hint="Take one away first.")
+
+
+def _handle(person_id: int) -> bytes:
+    """Under which name a device keeps the passkey of a person."""
+    return str(person_id).encode()
+
+
+def _of_session(login: Login) -> str:
+    return f"session {login.id}"
+
+
+def _of_browser(asker: str) -> str:
+    return f"browser {hash_of(asker)}"

@@ -1,0 +1,380 @@
+"""People, their roles in datasets, their second factors.
+
+What a request needs to know of its person, in one statement.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from sqlalchemy import (
+    ColumnElement,
+    Exists,
+    Select,
+    case,
+    delete,
+    exists,
+    func,
+    insert,
+    or_,
+    select,
+    update,
+)
+
+from app.db.dialects.statements import pairs_of
+from app.db.session import Session, now
+from app.features.batches.queries import OPEN
+from app.features.batches.tables import BatchGroupModel, BatchModel, BatchPersonModel
+from app.features.datasets.tables import DatasetModel
+from app.features.independent_annotations.queries import GOLD, INDEPENDENT
+from app.features.independent_annotations.tables import CopyDatasetModel, TakeModel
+from app.features.people.tables import (
+    DatasetRoleModel,
+    IdentityModel,
+    LoginModel,
+    OneTimeLinkModel,
+    PasskeyModel,
+    PersonModel,
+    RecoveryCodeModel,
+    SecondFactorModel,
+    TeamSettingModel,
+)
+
+_PEOPLE = select(*PersonModel.__table__.columns)
+_SEEN = (
+    select(func.max(LoginModel.seen))
+    .where(LoginModel.person_id == PersonModel.id)
+    .scalar_subquery()
+)
+
+
+def all_people(session: Session) -> Sequence[Any]:
+    """Every person by name, with when they were ``seen`` last in a session that still is."""
+    return session.execute(
+        _PEOPLE.add_columns(_SEEN.label("seen")).order_by(PersonModel.name)
+    ).all()
+
+
+def person_by_name(session: Session, name: str) -> Any | None:
+    """The person of a name."""
+    return session.execute(_PEOPLE.where(PersonModel.name == name)).one_or_none()
+
+
+def person_by_id(session: Session, person_id: int) -> Any | None:
+    """The person of an id."""
+    return session.execute(_PEOPLE.where(PersonModel.id == person_id)).one_or_none()
+
+
+def count_people(session: Session) -> int:
+    """How many accounts there are."""
+    return session.scalar(select(func.count()).select_from(PersonModel)) or 0
+
+
+def count_able(session: Session, role: str, *, but: int | None = None) -> int:
+    """How many people of a role can log in, one of them left out."""
+    statement = select(func.count()).where(
+        PersonModel.role == role,
+        PersonModel.disabled.is_(False),
+        or_(
+            PersonModel.password.is_not(None),
+            exists().where(IdentityModel.person_id == PersonModel.id),
+        ),
+    )
+    if but is not None:
+        statement = statement.where(PersonModel.id != but)
+    return session.scalar(statement) or 0
+
+
+def insert_person(session: Session, name: str, role: str, *, by: str) -> int:
+    """Insert a person; returns their id. Accounts are never deleted: the log names them."""
+    values = {"name": name, "role": role, "password": None, "disabled": False}
+    done = session.execute(
+        insert(PersonModel).returning(PersonModel.id),
+        {**values, "created": now(), "created_by": by},
+    )
+    return int(done.scalar_one())
+
+
+def update_person(session: Session, person_id: int, **values: Any) -> None:
+    """Write some columns of a person."""
+    session.execute(update(PersonModel).where(PersonModel.id == person_id).values(**values))
+
+
+def insert_link(
+    session: Session, token_hash: str, person_id: int | None, *, by: str, expires: str
+) -> None:
+    """Insert a link; those that the same person (or nobody) had before are no longer valid."""
+    forget_links(session, person_id)
+    values = {"token_hash": token_hash, "person_id": person_id, "created": now()}
+    session.execute(insert(OneTimeLinkModel), {**values, "created_by": by, "expires": expires})
+
+
+def find_link(session: Session, token_hash: str, at: str) -> Any | None:
+    """A link that is still good at a time."""
+    statement = select(*OneTimeLinkModel.__table__.columns).where(
+        OneTimeLinkModel.token_hash == token_hash, OneTimeLinkModel.expires > at
+    )
+    return session.execute(statement).one_or_none()
+
+
+def forget_links(session: Session, person_id: int | None) -> None:
+    """End every link of a person, or those of nobody."""
+    theirs = OneTimeLinkModel.person_id
+    whose = theirs.is_(None) if person_id is None else theirs == person_id
+    session.execute(delete(OneTimeLinkModel).where(whose))
+
+
+def people_with_links(session: Session, at: str) -> set[int]:
+    """Ids of the people who have a link that is good at a time."""
+    statement = select(OneTimeLinkModel.person_id).where(OneTimeLinkModel.expires > at)
+    return {found for found in session.scalars(statement) if found is not None}
+
+
+@dataclass(frozen=True)
+class Rights:
+    """What a person is in single datasets.
+
+    Attributes:
+        roles: Their role by the dataset's id.
+        copies: Of each dataset of copies that they may see, of which dataset it holds copies.
+        blind: The open batches of which they annotate copies without seeing what others make of the
+            groups: id of the batch, of its dataset, and whether something is left for them.
+    """
+
+    roles: dict[int, str]
+    copies: dict[int, int]
+    blind: tuple[tuple[int, int, bool], ...] = ()
+
+
+def with_rights(
+    statement: Select[*tuple[Any, ...]], leading: Collection[str]
+) -> Select[*tuple[Any, ...]]:
+    """A statement about people whose rows tell their rights, too.
+
+    Args:
+        statement: Selects from people, and from what each of them has.
+        leading: The roles that lead a dataset: who has one sees everybody's copies of its groups.
+    """
+    return statement.add_columns(
+        _roles().label("single"), _copies(leading).label("copies"), _blind().label("blind")
+    )
+
+
+def rights_in(row: Any) -> Rights:
+    """The rights that a row of such a statement tells."""
+    blind = ((batch, dataset, bool(waits)) for batch, dataset, waits in json.loads(row.blind))
+    return Rights(dict(json.loads(row.single)), dict(json.loads(row.copies)), tuple(blind))
+
+
+def rights_of(session: Session, person_id: int, leading: Collection[str]) -> Rights:
+    """The rights of one person; none where there is nobody of that id."""
+    statement = with_rights(select(PersonModel.id).where(PersonModel.id == person_id), leading)
+    row = session.execute(statement).one_or_none()
+    return Rights({}, {}) if row is None else rights_in(row)
+
+
+def _roles() -> ColumnElement[Any]:
+    mine = DatasetRoleModel.person_id == PersonModel.id
+    pairs = pairs_of(DatasetRoleModel.dataset_id, DatasetRoleModel.role)
+    return _list(select(pairs).where(mine))
+
+
+def _copies(leading: Collection[str]) -> ColumnElement[Any]:
+    """Their own, and those of what they lead: in that dataset, or where they have no other role
+    there, in all."""
+    table = CopyDatasetModel
+    named = select(DatasetRoleModel.dataset_id).where(DatasetRoleModel.person_id == PersonModel.id)
+    led = named.where(DatasetRoleModel.role.in_(leading))
+    everywhere = PersonModel.role.in_(leading) & table.of_id.not_in(named.correlate(PersonModel))
+    seen = or_(
+        table.person == PersonModel.name, table.of_id.in_(led.correlate(PersonModel)), everywhere
+    )
+    return _list(select(pairs_of(table.dataset_id, table.of_id)).where(seen))
+
+
+def _blind() -> ColumnElement[Any]:
+    """The batches that name them, those in which they have begun a copy, and what is left there."""
+    batch, take, group, part = BatchModel, TakeModel, BatchGroupModel, BatchPersonModel
+    here, mine = take.batch_id == batch.id, take.person == PersonModel.name
+    gold = batch.gold_every.is_not(None) | _there(here, take.kind == GOLD)
+    copies = batch.gold_every.is_not(None) | ((batch.verdicts > 1) & (batch.blind | gold))
+    named = (part.batch_id == batch.id, part.person_id == PersonModel.id)
+    annotators = _there(part.batch_id == batch.id, part.part == "annotator")
+    annotates = _there(*named, part.part == "annotator") | (_there(*named) & ~annotators)
+    asked = select(func.count()).where(
+        here, take.group_id == group.group_id, take.kind == INDEPENDENT
+    )
+    free = _there(
+        group.batch_id == batch.id,
+        group.settled.is_(None),
+        group.handed_in.is_(None),
+        ~_there(here, mine, take.group_id == group.group_id),
+        asked.correlate(BatchModel, BatchGroupModel).scalar_subquery() < batch.verdicts,
+    )
+    begun = _there(here, mine, take.handed_in.is_(None), take.settled.is_(None))
+    waits = case((free | begun, 1), else_=0)
+    found = select(pairs_of(batch.id, batch.dataset_id, waits))
+    return _list(found.where(batch.state == OPEN, copies, annotates | _there(here, mine)))
+
+
+def _there(*where: ColumnElement[bool]) -> Exists:
+    return exists().where(*where).correlate(BatchModel, BatchGroupModel, PersonModel)
+
+
+def _list(statement: Select[Any]) -> ColumnElement[Any]:
+    return statement.correlate(PersonModel).scalar_subquery()
+
+
+def all_dataset_roles(session: Session) -> Sequence[Any]:
+    """``person_id``, ``dataset_id``, ``dataset`` (its name) and ``role`` of everybody, by name."""
+    statement = (
+        select(
+            DatasetRoleModel.person_id,
+            DatasetRoleModel.dataset_id,
+            DatasetModel.name.label("dataset"),
+            DatasetRoleModel.role,
+        )
+        .join(DatasetModel, DatasetModel.id == DatasetRoleModel.dataset_id)
+        .order_by(DatasetModel.name)
+    )
+    return session.execute(statement).all()
+
+
+def members(session: Session, dataset_id: int, person_id: int | None = None) -> Sequence[Any]:
+    """``id``, ``name``, ``everywhere``, ``role`` (here, or None) of one person, or of all who are
+    not disabled."""
+    one = PersonModel.disabled.is_(False) if person_id is None else PersonModel.id == person_id
+    here = (DatasetRoleModel.person_id == PersonModel.id) & (
+        DatasetRoleModel.dataset_id == dataset_id
+    )
+    statement = (
+        select(
+            PersonModel.id,
+            PersonModel.name,
+            PersonModel.role.label("everywhere"),
+            DatasetRoleModel.role,
+        )
+        .outerjoin(DatasetRoleModel, here)
+        .where(one)
+        .order_by(PersonModel.name)
+    )
+    return session.execute(statement).all()
+
+
+def set_dataset_role(
+    session: Session, person_id: int, dataset_id: int, role: str | None, *, by: str
+) -> None:
+    """Give a person a role in a dataset; None: what they are everywhere counts there again."""
+    mine = (DatasetRoleModel.person_id == person_id) & (DatasetRoleModel.dataset_id == dataset_id)
+    session.execute(delete(DatasetRoleModel).where(mine))
+    if role is not None:
+        values = {"person_id": person_id, "dataset_id": dataset_id, "role": role}
+        session.execute(insert(DatasetRoleModel), {**values, "given": now(), "given_by": by})
+
+
+REQUIRED = "require_second_factor"
+_MINE = SecondFactorModel.__table__
+
+
+def find_second_factor(session: Session, person_id: int) -> Any | None:
+    """The second factor of a person, one that was not confirmed too."""
+    statement = select(*_MINE.c).where(SecondFactorModel.person_id == person_id)
+    return session.execute(statement).one_or_none()
+
+
+def put_second_factor(session: Session, person_id: int, salt: str, at: str) -> None:
+    """Begin with a second factor, in the place of one that was not confirmed."""
+    delete_second_factor(session, person_id)
+    values = {"salt": salt, "confirmed": False, "last_step": 0, "created": at}
+    session.execute(insert(SecondFactorModel), {"person_id": person_id, **values})
+
+
+def confirm_second_factor(session: Session, person_id: int, hashes: Sequence[str]) -> None:
+    """From now on it is asked for; the recovery codes of these hashes take its place once each."""
+    mine = SecondFactorModel.person_id == person_id
+    session.execute(update(SecondFactorModel).where(mine).values(confirmed=True))
+    put_recovery_codes(session, person_id, hashes)
+
+
+def put_recovery_codes(session: Session, person_id: int, hashes: Sequence[str]) -> None:
+    """The recovery codes of a person, in the place of those that they had."""
+    delete_recovery_codes(session, person_id)
+    rows = [{"person_id": person_id, "code_hash": code_hash} for code_hash in hashes]
+    session.execute(insert(RecoveryCodeModel), rows)
+
+
+def delete_recovery_codes(session: Session, person_id: int) -> None:
+    """Forget the recovery codes of a person."""
+    session.execute(delete(RecoveryCodeModel).where(RecoveryCodeModel.person_id == person_id))
+
+
+def use_step(session: Session, person_id: int, step: int) -> bool:
+    """Note that the code of a step of time was used; whether it is later than every one before."""
+    statement = (
+        update(SecondFactorModel)
+        .where(SecondFactorModel.person_id == person_id, SecondFactorModel.last_step < step)
+        .values(last_step=step)
+    )
+    return session.execute(statement.returning(SecondFactorModel.person_id)).first() is not None
+
+
+def use_recovery_code(session: Session, person_id: int, code_hash: str) -> bool:
+    """Take a recovery code; whether it was there."""
+    statement = delete(RecoveryCodeModel).where(
+        RecoveryCodeModel.person_id == person_id, RecoveryCodeModel.code_hash == code_hash
+    )
+    return session.execute(statement.returning(RecoveryCodeModel.id)).first() is not None
+
+
+def count_recovery_codes(session: Session, person_id: int) -> int:
+    """How many are left."""
+    mine = RecoveryCodeModel.person_id == person_id
+    return session.scalar(select(func.count()).where(mine)) or 0
+
+
+def delete_second_factor(session: Session, person_id: int) -> bool:
+    """Forget the authenticator of a person; whether there was one."""
+    statement = delete(SecondFactorModel).where(SecondFactorModel.person_id == person_id)
+    return session.execute(statement.returning(SecondFactorModel.person_id)).first() is not None
+
+
+def is_required(session: Session) -> bool:
+    """Whether everybody needs a second factor."""
+    found = session.scalar(select(TeamSettingModel.value).where(TeamSettingModel.name == REQUIRED))
+    return found == "on"
+
+
+def set_required(session: Session, on: bool) -> None:
+    """Let everybody need one, or not."""
+    session.execute(delete(TeamSettingModel).where(TeamSettingModel.name == REQUIRED))
+    values = {"name": REQUIRED, "value": "on" if on else "off"}
+    session.execute(insert(TeamSettingModel), values)
+
+
+def has_second_factor(session: Session, person_id: int) -> bool:
+    """Whether somebody has an authenticator that is confirmed, or a passkey."""
+    return bool(session.scalar(select(_theirs(person_id))))
+
+
+def _theirs(person_id: int | ColumnElement[int]) -> ColumnElement[bool]:
+    confirmed = SecondFactorModel.confirmed.is_(True)
+    return or_(
+        exists().where(SecondFactorModel.person_id == person_id, confirmed),
+        exists().where(PasskeyModel.person_id == person_id),
+    )
+
+
+def people_with_second_factor(session: Session) -> set[int]:
+    """Ids of the people who have one."""
+    confirmed = SecondFactorModel.confirmed.is_(True)
+    found = set(session.scalars(select(SecondFactorModel.person_id).where(confirmed)))
+    return found | set(session.scalars(select(PasskeyModel.person_id)))
+
+
+MUST_ENROL: ColumnElement[bool] = exists().where(
+    TeamSettingModel.name == REQUIRED, TeamSettingModel.value == "on"
+) & ~_theirs(PersonModel.__table__.c.id)
+"""Of a row of people: whether everybody needs a second factor, and they have none yet."""

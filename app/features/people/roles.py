@@ -1,0 +1,232 @@
+"""Roles: what each of them may do; and the names of people."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field, replace
+from enum import StrEnum
+
+from app.db.log import Entry, append
+from app.db.session import Session, now
+from app.errors import ForbiddenError, InputError
+from app.features.people.visibility_queries import COPIES
+from app.features.people.visibility_queries import EVERYTHING as EVERYTHING
+from app.features.people.visibility_queries import READER as READER
+from app.features.people.visibility_queries import Sight as Sight
+from app.features.people.visibility_queries import reads_blind as reads_blind
+from app.finite import quoted
+from app.soccer.actors import LOCAL_USER, person_of
+
+
+class Role(StrEnum):
+    """What somebody is in a dataset, or in all; each may do what those before it may.
+
+    ``none`` sees nothing there. ``admin`` is of the whole server, and of no single dataset.
+    """
+
+    NONE = "none"
+    VIEWER = "viewer"
+    ANNOTATOR = "annotator"
+    REVIEWER = "reviewer"
+    LEAD = "lead"
+    ADMIN = "admin"
+
+
+class Action(StrEnum):
+    """What a request does."""
+
+    ACCOUNT = "account"
+    """Their own sessions, password and tokens."""
+    DESCRIBE = "describe"
+    """What the server says of its addresses."""
+    READ = "read"
+    """Look at datasets, groups, pictures, versions and files, and ask what if."""
+    ANNOTATE = "annotate"
+    """Lines, balls, cameras of a group; taking edits back; saved views."""
+    REVIEW = "review"
+    """Verdicts, one by one and in bulk."""
+    EXPORT = "export"
+    """Write datasets as files."""
+    LEAD = "lead"
+    """What concerns a whole dataset: thresholds, versions, imports, predictions, evaluations."""
+    ADMINISTER = "administer"
+    """People, deleting a dataset, the figures of the service."""
+
+
+class Scope(StrEnum):
+    """What a token is for; it may that, and look, and never more than its person may."""
+
+    READ = "read"
+    ANNOTATE = "annotate"
+    REVIEW = "review"
+    EXPORT = "export"
+    LEAD = "lead"
+    ADMIN = "admin"
+
+
+_LOOK = frozenset({Action.DESCRIBE, Action.READ})
+SCOPES: Mapping[Scope, frozenset[Action]] = {
+    Scope.READ: _LOOK,
+    Scope.ANNOTATE: _LOOK | {Action.ANNOTATE},
+    Scope.REVIEW: _LOOK | {Action.REVIEW},
+    Scope.EXPORT: _LOOK | {Action.EXPORT},
+    Scope.LEAD: _LOOK | {Action.LEAD},
+    Scope.ADMIN: _LOOK | {Action.ADMINISTER},
+}
+"""What each scope allows. None allows ``Action.ACCOUNT``: a token makes no tokens, and sets no
+password."""
+_RANKS = tuple(Role)
+LEAST: Mapping[Action, Role] = {
+    Action.ACCOUNT: Role.NONE,
+    Action.DESCRIBE: Role.NONE,
+    Action.READ: Role.VIEWER,
+    Action.ANNOTATE: Role.ANNOTATOR,
+    Action.REVIEW: Role.REVIEWER,
+    Action.EXPORT: Role.REVIEWER,
+    Action.LEAD: Role.LEAD,
+    Action.ADMINISTER: Role.ADMIN,
+}
+"""The first role that may."""
+
+
+def may(role: Role, action: Action) -> bool:
+    """Whether a role lets somebody do that."""
+    return _RANKS.index(role) >= _RANKS.index(LEAST[action])
+
+
+def require(role: Role, action: Action, where: str = "") -> None:
+    """Raise ForbiddenError unless a role lets somebody do that; ``where`` it counts, in words."""
+    if not may(role, action):
+        raise ForbiddenError(
+            f"this needs the role {LEAST[action]}{where}; yours is {role}",
+            hint="An admin of this server can change your role, a lead that in their dataset.",
+        )
+
+
+def require_scope(scopes: Collection[Scope], action: Action) -> None:
+    """Raise ForbiddenError unless one of a token's scopes lets a script do that."""
+    if any(action in SCOPES[scope] for scope in scopes):
+        return
+    lacks = next((scope for scope, allowed in SCOPES.items() if action in allowed), None)
+    if lacks is None:
+        raise ForbiddenError(
+            "no token may do this", hint="It is done in the browser, by somebody who has logged in."
+        )
+    raise ForbiddenError(
+        f"this token lacks the scope {lacks}; it has {' and '.join(scopes)}",
+        hint="Make another one under Account, with that scope.",
+    )
+
+
+@dataclass(frozen=True)
+class DatasetRoles:
+    """The rights of a person.
+
+    Attributes:
+        everywhere: In every dataset that ``single`` does not name.
+        single: In one dataset, by its id; higher or lower than ``everywhere``.
+        limited: They are of a token for one dataset: nothing else of its person's is its own.
+        blind: Open batches of copies that they annotate, by the dataset: its originals are hidden
+            from them meanwhile.
+    """
+
+    everywhere: Role
+    single: Mapping[int, Role] = field(default_factory=dict)
+    limited: bool = False
+    blind: Mapping[int, frozenset[int]] = field(default_factory=dict)
+
+    @property
+    def is_admin(self) -> bool:
+        """Whether they may do everything in every dataset."""
+        return self.everywhere is Role.ADMIN
+
+    def role_in(self, dataset_id: int | None) -> Role:
+        """What they are in a dataset; of one that is yet to be made (None) what they are everywhere."""
+        if self.is_admin or dataset_id is None:
+            return self.everywhere
+        # Somebody's own copies are seen by those alone whom they are named for.
+        otherwise = Role.NONE if dataset_id > COPIES else self.everywhere
+        return self.single.get(dataset_id, otherwise)
+
+    @property
+    def highest(self) -> Role:
+        """The most that they are anywhere, for what belongs to no dataset; copies and practice, in
+        which everybody may judge, do not count."""
+        single = (role for key, role in self.single.items() if key <= COPIES)
+        return max((self.everywhere, *single), key=_RANKS.index)
+
+    def only(self, dataset_id: int) -> DatasetRoles:
+        """The same rights in one dataset, and none in any other."""
+        role = self.role_in(dataset_id)
+        return DatasetRoles(Role.NONE, {dataset_id: role}, limited=True, blind=self.blind)
+
+    def led(self) -> Sight:
+        """The datasets of which they are a lead, and nothing that is of none."""
+        if self.is_admin:
+            return EVERYTHING
+        all_but = may(self.everywhere, Action.LEAD)
+        named = {key for key, role in self.single.items() if may(role, Action.LEAD) != all_but}
+        return Sight(all_but, frozenset(named), "")
+
+    def sight(self, name: str) -> Sight:
+        """What somebody of that name sees."""
+        if self.is_admin:
+            return EVERYTHING
+        all_but = self.everywhere is not Role.NONE
+        named = {key for key, role in self.single.items() if (role is Role.NONE) == all_but}
+        copies = {
+            key for key, role in self.single.items() if key > COPIES and role is not Role.NONE
+        }
+        return Sight(all_but, frozenset(named), name, frozenset(copies))
+
+    def sight_of_whole(self, name: str) -> Sight:
+        """The same without the datasets of which some groups are hidden from them."""
+        sight = self.sight(name)
+        if self.is_admin or not self.blind:
+            return sight
+        hidden = frozenset(self.blind)
+        named = sight.datasets | hidden if sight.all_but else sight.datasets - hidden
+        return replace(sight, datasets=named)
+
+
+PERSON = "person"
+"""Kind of the log's entries about accounts."""
+_NAME = re.compile(r"[a-z0-9](?:[a-z0-9._-]{0,38}[a-z0-9])?")
+_TAKEN = frozenset({LOCAL_USER, "script", "everybody", "nobody"})
+
+
+def checked_name(said: str) -> str:
+    """The name of a person, as the log will remember them.
+
+    Raises:
+        InputError: It cannot be one.
+    """
+    name = said.strip().lower()
+    if not _NAME.fullmatch(name) or name in _TAKEN:
+        raise InputError(
+            f"{quoted(name)} cannot be the name of a person",
+            hint="Use up to 40 small letters, digits and . _ -, with a letter or digit at both ends;"
+            f" {', '.join(sorted(_TAKEN))} mean something else here.",
+            pointer="/name",
+        )
+    return name
+
+
+def require_no_token(actor: str) -> None:
+    """Raise ForbiddenError where a token asks: who may come in, and as what, is decided by people."""
+    if person_of(actor) != actor:
+        raise ForbiddenError(
+            "no token makes people or changes their rights",
+            hint="An admin does it in the browser, or touchline users on the machine.",
+        )
+
+
+def note(
+    session: Session, actor: str, name: str, did: str, role: str, **more: str | int | None
+) -> None:
+    """Write what became of an account into the log."""
+    body = {"person": name, "did": did, "role": str(role), **more}
+    dataset = more.get("dataset_id")
+    where = dataset if isinstance(dataset, int) else None
+    append(session, [Entry(PERSON, actor, now(), body, where)])

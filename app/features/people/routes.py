@@ -1,0 +1,215 @@
+"""People, and members of datasets."""
+
+from __future__ import annotations
+
+from fastapi import APIRouter, Request
+
+from app.db.store import Store
+from app.features.audit.audit_events import adopt, adopted_by
+from app.features.people import members
+from app.features.people import service as people
+from app.features.people.invitations import (
+    Invitation,
+    Post,
+    Wanted,
+    invite_many,
+    invite_one,
+    renew_one,
+)
+from app.features.people.login_schemas import AccessTokenList
+from app.features.people.schemas import (
+    InvitationDocument,
+    InvitationList,
+    InvitationReport,
+    MemberDocument,
+    MemberEdit,
+    MemberList,
+    NewLink,
+    NewUser,
+    UserDocument,
+    UserEdit,
+    UserList,
+    UserWithLink,
+)
+from app.features.people.service import Person
+from app.features.people.session_routes import Me
+from app.http.cursor import paged
+from app.http.deps import AppStore, DatasetPath, DryRun, Id
+from app.http.problem import responses
+from app.http.team import AppTeam, Team
+
+users_router = APIRouter(prefix="/users", tags=["users"])
+
+
+def _with_link(person: Person, row: Invitation) -> UserWithLink:
+    return UserWithLink(
+        user=UserDocument.model_validate(person),
+        link=row.link,
+        expires=row.expires,
+        mailed=row.mailed,
+        problem=row.problem,
+    )
+
+
+@users_router.get("", operation_id="listUsers", responses=responses(401, 409))
+@paged()
+def list_users(store: AppStore, team: AppTeam, _me: Me) -> UserList:
+    """Everybody with an account, disabled ones too."""
+    return _list(store, team)
+
+
+def _list(store: Store, team: Team) -> UserList:
+    by_mail = team.mail is not None and team.url is not None
+    return UserList(items=people.list_people(store), adopted_by=adopted_by(store), mail=by_mail)
+
+
+@users_router.post(
+    "",
+    operation_id="inviteUser",
+    status_code=201,
+    responses=responses(401, 409, 413, 415),
+)
+def invite_user(
+    new: NewUser, request: Request, store: AppStore, team: AppTeam, me: Me
+) -> UserWithLink:
+    """Make an account; the link with which its person chooses a password is shown this once.
+
+    With an `email`, and where the server sends mail, the link goes there and is not shown. Where it
+    cannot be sent, it is shown with the reason.
+    """
+    post = _post(team, request)
+    person, row = invite_one(store, new.name, new.role, new.email, post, actor=me.actor)
+    return _with_link(person, row)
+
+
+@users_router.post(
+    "/invitations",
+    operation_id="inviteUsers",
+    responses=responses(401, 409, 413, 415),
+)
+def invite_users(
+    wanted: InvitationList,
+    request: Request,
+    store: AppStore,
+    team: AppTeam,
+    me: Me,
+    dry_run: DryRun = False,
+) -> InvitationReport:
+    """Make many accounts at once, and report what became of each row; `dry_run` makes none.
+
+    A row that is refused keeps no other from being invited. Links go by mail or are shown, as by
+    `POST /users`.
+    """
+    rows = [Wanted(number, **one.model_dump()) for number, one in enumerate(wanted.people, 1)]
+    items = invite_many(store, rows, _post(team, request), actor=me.actor, dry_run=dry_run)
+    refused = sum(item.state == "refused" for item in items)
+    return InvitationReport(
+        items=[InvitationDocument.model_validate(item) for item in items],
+        dry_run=dry_run,
+        invited=len(items) - refused,
+        refused=refused,
+        mailed=sum(item.mailed for item in items),
+    )
+
+
+def _post(team: Team, request: Request) -> Post:
+    return Post(team.mail, team.url, team.base(request))
+
+
+@users_router.patch(
+    "/{user}",
+    operation_id="changeUser",
+    response_model=UserDocument,
+    responses=responses(401, 404, 409, 413, 415),
+)
+def change_user(user: Id, change: UserEdit, store: AppStore, _team: AppTeam, me: Me) -> Person:
+    """Give somebody another role, disable or enable them; who is disabled is logged out.
+
+    Nobody changes their own rights, and the last admin who can log in stays one.
+    """
+    return people.change_person(
+        store, user, actor=me.actor, role=change.role, disabled=change.disabled
+    )
+
+
+@users_router.post(
+    "/{user}/link",
+    operation_id="renewUserLink",
+    responses=responses(401, 404, 409, 413, 415),
+)
+def renew_link(
+    user: Id,
+    request: Request,
+    store: AppStore,
+    team: AppTeam,
+    me: Me,
+    new: NewLink | None = None,
+) -> UserWithLink:
+    """A new link with which somebody sets their password; earlier links are no longer valid.
+
+    Nobody makes one for themselves, and no token makes any. With an `email` it goes by mail, as that
+    of `POST /users` does.
+    """
+    email = None if new is None else new.email
+    return _with_link(*renew_one(store, user, email, _post(team, request), actor=me.actor))
+
+
+@users_router.post(
+    "/{user}/adoption",
+    operation_id="adoptLocalWork",
+    responses=responses(401, 404, 409),
+)
+def adopt_work(user: Id, store: AppStore, team: AppTeam, me: Me) -> UserList:
+    """Show what was done before there were accounts, under the name `local`, as somebody's; once.
+
+    The log is not changed: its entries keep their name, and this becomes an entry of its own.
+    """
+    adopt(store, user, actor=me.actor)
+    return _list(store, team)
+
+
+@users_router.get(
+    "/{user}/tokens", operation_id="listTokensOfUser", responses=responses(401, 404, 409)
+)
+@paged()
+def list_tokens(user: Id, store: AppStore, team: AppTeam, _me: Me) -> AccessTokenList:
+    """The tokens with which somebody's scripts ask."""
+    person = people.get_person(store, user)
+    return AccessTokenList(items=team.tokens.of_person(person.id))
+
+
+@users_router.delete(
+    "/{user}/tokens/{token}",
+    operation_id="endTokenOfUser",
+    status_code=204,
+    responses=responses(401, 404, 409),
+)
+def end_token(user: Id, token: Id, team: AppTeam, me: Me) -> None:
+    """End a token of somebody: whatever uses it is refused from now on."""
+    team.tokens.end(token, user, actor=me.actor)
+
+
+members_router = APIRouter(prefix="/datasets/{dataset}/members", tags=["users"])
+
+
+@members_router.get("", operation_id="listMembers", responses=responses(401, 404, 409))
+@paged()
+def list_members(dataset: DatasetPath, store: AppStore, _team: AppTeam, _me: Me) -> MemberList:
+    """Everybody who can log in, and what they are in the dataset."""
+    return MemberList(items=members.list_members(store, dataset))
+
+
+@members_router.put(
+    "/{user}",
+    operation_id="setMemberRole",
+    response_model=MemberDocument,
+    responses=responses(401, 404, 409, 413, 415),
+)
+def set_role(
+    dataset: DatasetPath, user: Id, change: MemberEdit, store: AppStore, _team: AppTeam, me: Me
+) -> members.Member:
+    """Give somebody a role in this dataset alone, up to lead; null takes it back.
+
+    Nobody changes their own rights, and nobody those of an admin.
+    """
+    return members.give_role(store, dataset, user, change.role, actor=me.actor)

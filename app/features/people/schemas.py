@@ -1,0 +1,370 @@
+"""People, their sessions, and links that are good once."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, StrictBool
+from pydantic.config import JsonDict
+
+from app.features.maintenance.schemas import BannerDocument
+from app.features.people.invitations import MOST
+from app.features.people.logins import Way
+from app.features.people.roles import Action, Role
+from app.http.documents import Document, ListDocument
+
+Name = Annotated[str, Field(min_length=1, max_length=200)]
+Password = Annotated[str, Field(min_length=1, max_length=200)]
+Code = Annotated[str, Field(min_length=1, max_length=40)]
+Token = Annotated[str, Field(min_length=1, max_length=200)]
+EXAMPLE: JsonDict = {
+    "password": "three plain words",
+    "token": "W7x1mO3pK0a5Qd9nXb2TfVw8Zs6LrEuHcYjGiNk4PoA",
+}
+
+
+class NewSession(BaseModel):
+    """Who somebody says they are."""
+
+    model_config = ConfigDict(
+        extra="forbid",
+        json_schema_extra={"examples": [{"name": "anna", "password": EXAMPLE["password"]}]},
+    )
+
+    name: Name
+    password: Password
+    code: Code | None = Field(
+        default=None,
+        description="Of the second factor, or a recovery code; asked for by 401 with the pointer "
+        "`/code` where somebody has one.",
+    )
+
+
+class PasswordOnly(BaseModel):
+    """One's own password, once more; whoever came by single sign-on just now needs none."""
+
+    model_config = ConfigDict(
+        extra="forbid", json_schema_extra={"examples": [{"password": EXAMPLE["password"]}]}
+    )
+
+    password: Password | None = None
+
+
+class CodeOnly(BaseModel):
+    """What the authenticator shows at this moment."""
+
+    model_config = ConfigDict(extra="forbid", json_schema_extra={"examples": [{"code": "123456"}]})
+
+    code: Code
+
+
+class SecondFactorDocument(Document):
+    """Whether more is asked for than one's password."""
+
+    on: bool = Field(description="There is an authenticator, or a passkey.")
+    required: bool = Field(description="Everybody needs a second factor here.")
+    codes_left: int = Field(description="Recovery codes that were not used yet.")
+    authenticator: bool = Field(description="There is an authenticator, which shows codes.")
+
+
+class EnrolmentDocument(Document):
+    """What an authenticator has to know; shown this once."""
+
+    secret: str
+    uri: str
+    picture: str = Field(description="The address as a QR code: a PNG, as a `data:` address.")
+
+
+class RecoveryCodes(Document):
+    """Codes that take the place of the second factor, each once; shown this once."""
+
+    codes: list[str]
+
+
+class TeamSettings(BaseModel):
+    """What counts for everybody."""
+
+    model_config = ConfigDict(
+        extra="forbid", json_schema_extra={"examples": [{"require_second_factor": True}]}
+    )
+
+    require_second_factor: StrictBool = Field(
+        description="Who has no second factor makes one before anything else."
+    )
+
+
+class PasswordEdit(BaseModel):
+    """One's own password, and the one that takes its place."""
+
+    model_config = ConfigDict(
+        extra="forbid",
+        json_schema_extra={"examples": [{"old": EXAMPLE["password"], "new": "three other words"}]},
+    )
+
+    old: Password
+    new: Password
+
+
+class LinkLook(BaseModel):
+    """The part of a link that follows its #."""
+
+    model_config = ConfigDict(
+        extra="forbid", json_schema_extra={"examples": [{"token": EXAMPLE["token"]}]}
+    )
+
+    token: Token
+
+
+class LinkUse(LinkLook):
+    """The password that somebody chooses; the first admin chooses a name, too."""
+
+    model_config = ConfigDict(extra="forbid", json_schema_extra={"examples": [EXAMPLE]})
+
+    password: Password
+    name: Name | None = None
+
+
+class LinkMeaning(Document):
+    """Whom a link is for."""
+
+    name: str | None = Field(description="Null: for the first admin, who chooses one.")
+    joined: bool = Field(description="They have a password already; the link gives another one.")
+
+
+class SingleRoleDocument(Document):
+    """What somebody is in one dataset, in place of what they are in all of them."""
+
+    id: int = Field(description="Of the dataset.")
+    dataset: str = Field(description="Its name.")
+    role: Role
+
+
+class WaysIn(Document):
+    """How people log in here."""
+
+    password: bool = Field(description="By name and password, or by a passkey.")
+    sign_on: str | None = Field(
+        description="By the provider of single sign-on, which people call so; null: there is none."
+    )
+
+
+class SessionDocument(Document):
+    """Who asks."""
+
+    team: bool = Field(description="People log in; else one person runs the server alone.")
+    name: str | None = Field(description="Null: nobody is logged in.")
+    role: Role | None = Field(description="In every dataset that `datasets` does not name.")
+    enrol: bool = Field(
+        default=False, description="They must make a second factor before anything else."
+    )
+    way: Way | None = Field(
+        default=None, description="How this session began; null: there is none."
+    )
+    ways: WaysIn | None = Field(
+        default=None, description="How people log in; told to whoever asks who they are."
+    )
+    moment: str | None = Field(
+        default=None,
+        description="How things stand, for `since` of the events: what comes after this answer is "
+        "told then. Null: nobody is logged in, or they have just come.",
+    )
+    maintenance: BannerDocument | None = Field(
+        default=None, description="The notice that everybody is shown; null: there is none."
+    )
+    may: list[Action] = Field(description="What the role lets them do.")
+    datasets: list[SingleRoleDocument] = Field(
+        default=[], description="Where they are something else."
+    )
+    allows: dict[Role, list[Action]] = Field(
+        default={}, description="What each role lets somebody do."
+    )
+
+
+class OpenSessionDocument(Document):
+    """A session of one's own."""
+
+    id: int
+    this: bool = Field(description="It is the one that asks.")
+    browser: str = Field(description="What the browser called itself.")
+    address: str
+    created: datetime
+    seen: datetime = Field(description="When it was used last, to some minutes.")
+    expires: datetime = Field(description="When it ends, however much it is used.")
+
+
+class OpenSessionList(ListDocument[OpenSessionDocument]):
+    """Sessions, the one that was used last first."""
+
+
+class NewUser(BaseModel):
+    """Somebody who shall have an account."""
+
+    model_config = ConfigDict(
+        extra="forbid", json_schema_extra={"examples": [{"name": "anna", "role": "reviewer"}]}
+    )
+
+    name: Annotated[str, Field(min_length=1, max_length=40)]
+    role: Role
+    email: Annotated[str, Field(max_length=320)] | None = Field(
+        default=None,
+        description="Where the link goes by mail, if the server sends mail. It is not stored.",
+    )
+
+
+class NewLink(BaseModel):
+    """Where another link for somebody goes."""
+
+    model_config = ConfigDict(
+        extra="forbid", json_schema_extra={"examples": [{"email": "anna@example.org"}]}
+    )
+
+    email: Annotated[str, Field(max_length=320)] | None = Field(
+        default=None,
+        description="Where the link goes by mail, if the server sends mail. It is not stored.",
+    )
+
+
+class InvitedPerson(BaseModel):
+    """A row of a list of people to invite; what is wrong with it, the report says."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    name: Annotated[str, Field(max_length=200)]
+    role: Annotated[str, Field(max_length=200)]
+    email: Annotated[str, Field(max_length=320)] | None = Field(
+        default=None, description="Where the link is sent, where mail is set up; it is not stored."
+    )
+
+
+class InvitationList(BaseModel):
+    """People who shall have an account."""
+
+    model_config = ConfigDict(
+        extra="forbid",
+        json_schema_extra={
+            "examples": [
+                {
+                    "people": [
+                        {"name": "anna", "role": "reviewer", "email": "anna@example.org"},
+                        {"name": "ben", "role": "annotator"},
+                    ]
+                }
+            ]
+        },
+    )
+
+    people: Annotated[list[InvitedPerson], Field(min_length=1, max_length=MOST)]
+
+
+class InvitationDocument(Document):
+    """What became of one row."""
+
+    row: int = Field(description="Which of the list, from 1.")
+    name: str
+    role: str
+    state: Literal["invited", "possible", "refused"] = Field(
+        description="`possible`: they would be invited, says a dry run."
+    )
+    link: str | None = Field(
+        description="For whoever invites to hand over, shown this once; null: it went by mail, or "
+        "there is none."
+    )
+    expires: datetime | None = Field(description="Until when the link is good.")
+    mailed: bool = Field(description="The mail server has taken the letter with the link.")
+    problem: str | None = Field(
+        description="Why the row was refused, or its letter not sent; the link is then shown."
+    )
+
+
+class InvitationReport(ListDocument[InvitationDocument]):
+    """What became of each row, in the order of the list."""
+
+    dry_run: bool = Field(description="Nothing was done.")
+    invited: int = Field(description="Accounts that were made, or would be.")
+    refused: int = Field(description="Rows that were refused.")
+    mailed: int = Field(description="Letters that the mail server has taken.")
+
+
+class UserEdit(BaseModel):
+    """What changes of an account."""
+
+    model_config = ConfigDict(
+        extra="forbid", json_schema_extra={"examples": [{"role": "lead"}, {"disabled": True}]}
+    )
+
+    role: Role | None = None
+    disabled: bool | None = None
+
+
+class UserDocument(Document):
+    """Somebody with an account."""
+
+    id: int
+    name: str
+    role: Role
+    disabled: bool
+    joined: bool = Field(description="They have chosen a password, or come by single sign-on.")
+    invited: bool = Field(description="A link waits for them with which they can.")
+    created: datetime
+    created_by: str
+    seen: datetime | None = Field(description="When a session was used last; null: none is open.")
+    second_factor: bool = Field(description="More is asked for than their password.")
+    tokens: int = Field(description="How many tokens of scripts they have.")
+    sign_on: str | None = Field(
+        default=None,
+        description="What their account of the provider is known by; null: none is linked.",
+    )
+    datasets: list[SingleRoleDocument] = Field(
+        default=[], description="In which datasets they are something else than `role`."
+    )
+
+
+class UserList(ListDocument[UserDocument]):
+    """Everybody, by name."""
+
+    adopted_by: str | None = Field(
+        default=None,
+        description="As whose that is shown which was done before there were accounts.",
+    )
+    mail: bool = Field(default=False, description="Invitations can go by mail here.")
+
+
+class UserWithLink(Document):
+    """Somebody, and the link to hand to them: it is shown this once."""
+
+    user: UserDocument
+    link: str | None = Field(description="Null: it went by mail.")
+    expires: datetime
+    mailed: bool = Field(
+        default=False, description="The mail server has taken the letter with the link."
+    )
+    problem: str | None = Field(
+        default=None, description="Why the letter was not sent; the link is then shown."
+    )
+
+
+class MemberEdit(BaseModel):
+    """What somebody shall be in a dataset."""
+
+    model_config = ConfigDict(
+        extra="forbid", json_schema_extra={"examples": [{"role": "reviewer"}, {"role": None}]}
+    )
+
+    role: Role | None = Field(
+        description="null: what they are everywhere counts here again; `admin` is of no dataset."
+    )
+
+
+class MemberDocument(Document):
+    """Somebody with an account, and what they are in a dataset."""
+
+    id: int
+    name: str
+    role: Role = Field(description="What they are here.")
+    everywhere: Role = Field(description="What they are where nothing else is said.")
+    single: Role | None = Field(description="What is said of this dataset; null: nothing.")
+
+
+class MemberList(ListDocument[MemberDocument]):
+    """Everybody who can log in, by name; those of role `none` do not see the dataset."""

@@ -1,0 +1,239 @@
+"""People: who has an account here, invited by an admin, never deleted, at most disabled."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime
+from typing import Any
+
+from app.db.session import Session, now
+from app.db.store import Store
+from app.errors import ConflictError, ForbiddenError, InputError, NotFoundError
+from app.features.people.links import Link, insert_new
+from app.features.people.login_queries import (
+    count_access_tokens,
+    delete_access_tokens,
+    delete_logins,
+    people_with_identity,
+)
+from app.features.people.members import SingleRole, single_roles
+from app.features.people.queries import (
+    all_people,
+    count_able,
+    count_people,
+    forget_links,
+    insert_person,
+    people_with_links,
+    people_with_second_factor,
+    person_by_id,
+    person_by_name,
+    update_person,
+)
+from app.features.people.roles import Role, checked_name, note, require_no_token
+from app.soccer.actors import person_of
+
+
+@dataclass(frozen=True)
+class Person:
+    """Somebody with an account.
+
+    Attributes:
+        joined: They have chosen a password, or come by single sign-on.
+        invited: A link waits for them with which they can.
+        seen: When a session of theirs was used last, in UTC; None: none is open.
+    """
+
+    id: int
+    name: str
+    role: Role
+    disabled: bool
+    joined: bool
+    invited: bool
+    created: str
+    created_by: str
+    seen: str | None
+    second_factor: bool
+    """A code is asked for after their password."""
+    tokens: int
+    """How many tokens of scripts they have."""
+    sign_on: str | None = None
+    """Their account at the provider of single sign-on, as people know it; None: they have none."""
+    datasets: tuple[SingleRole, ...] = ()
+    """In which datasets they are something else than ``role``."""
+
+    @property
+    def state(self) -> str:
+        """``active``, ``disabled``, ``invited``, or ``without link``: the last one is too old."""
+        if self.disabled:
+            return "disabled"
+        return "active" if self.joined else "invited" if self.invited else "without link"
+
+
+def list_people(store: Store) -> list[Person]:
+    """Everybody, by name."""
+    with store.read() as session:
+        waiting, single = people_with_links(session, now()), single_roles(session)
+        tokens, factors = count_access_tokens(session), people_with_second_factor(session)
+        ways = people_with_identity(session)
+        people = [_person(row, waiting, tokens, factors, ways) for row in all_people(session)]
+    return [replace(one, datasets=tuple(single.get(one.id, ()))) for one in people]
+
+
+def has_people(store: Store) -> bool:
+    """Whether this home belongs to a team."""
+    with store.read() as session:
+        return count_people(session) > 0
+
+
+def require_no_people(store: Store) -> None:
+    """Refuse to let everybody in where people have accounts.
+
+    Raises:
+        InputError: They have.
+    """
+    if has_people(store):
+        raise InputError(
+            "people have accounts here: without --team nobody would be asked who they are",
+            hint="Serve with --team; or with --alone, if only you can reach this machine.",
+        )
+
+
+def invite(store: Store, name: str, role: Role, *, actor: str) -> tuple[Person, Link]:
+    """Make an account, and the link with which its person chooses a password.
+
+    Raises:
+        ForbiddenError: A token asks.
+        InputError: The name cannot be one.
+        ConflictError: It is taken.
+    """
+    require_no_token(actor)
+    name = checked_name(name)
+    with store.write() as session:
+        if person_by_name(session, name) is not None:
+            raise ConflictError(
+                f"there is a {name} already", hint="A new link for them: reset their password."
+            )
+        person, link = insert_invited(session, name, role, actor=actor)
+        return _read(session, person), link
+
+
+def insert_invited(session: Session, name: str, role: Role, *, actor: str) -> tuple[int, Link]:
+    """Make the account of a checked name that nobody has, in the caller's transaction; id and link."""
+    person = insert_person(session, name, role, by=actor)
+    note(session, actor, name, "invited", role)
+    return person, insert_new(session, person, by=actor, at=datetime.now(UTC))
+
+
+def renew_link(store: Store, person_id: int, *, actor: str) -> tuple[Person, Link]:
+    """A new link for somebody; the password that they have stays good until they use it.
+
+    Raises:
+        NotFoundError: There is nobody of that id.
+        ForbiddenError: It is oneself, or a token asks.
+        ConflictError: They are disabled.
+    """
+    with store.write() as session:
+        person = _read(session, person_id)
+        if person_of(actor) != actor:
+            raise ForbiddenError(
+                "no token sets a password", hint="An admin makes the link in the browser."
+            )
+        if person.name == actor:
+            raise ForbiddenError(
+                "nobody makes a link for themselves", hint="Change the password under Account."
+            )
+        if person.disabled:
+            raise ConflictError(f"{person.name} is disabled", hint="Enable them first.")
+        note(session, actor, person.name, "link", person.role)
+        link = insert_new(session, person_id, by=actor, at=datetime.now(UTC))
+        return _read(session, person_id), link
+
+
+def change_person(
+    store: Store,
+    person_id: int,
+    *,
+    actor: str,
+    role: Role | None = None,
+    disabled: bool | None = None,
+) -> Person:
+    """Give somebody another role, disable or enable them; whoever is disabled is logged out.
+
+    Their tokens end with that, too, and for good.
+
+    Raises:
+        NotFoundError: There is nobody of that id.
+        ForbiddenError: It is oneself, or a token asks.
+        ConflictError: No admin would be left who can log in.
+    """
+    require_no_token(actor)
+    with store.write() as session:
+        person = _read(session, person_id)
+        if person.name == actor:
+            raise ForbiddenError(
+                "you cannot change your own role", hint="Another admin of this server can."
+            )
+        wanted = person.role if role is None else role
+        off = person.disabled if disabled is None else disabled
+        loses = person.role is Role.ADMIN and (off or wanted is not Role.ADMIN)
+        if loses and not count_able(session, Role.ADMIN, but=person_id):
+            raise ConflictError(
+                f"{person.name} is the last admin who can log in", hint="Make another one first."
+            )
+        if wanted is not person.role:
+            note(session, actor, person.name, "role", wanted)
+        if off is not person.disabled:
+            note(session, actor, person.name, "disabled" if off else "enabled", wanted)
+        update_person(session, person_id, role=wanted, disabled=off)
+        if off:
+            delete_logins(session, person_id)
+            delete_access_tokens(session, person_id)
+            forget_links(session, person_id)
+        return _read(session, person_id)
+
+
+def get_person(store: Store, person_id: int) -> Person:
+    """Somebody by their id; raises NotFoundError when there is nobody."""
+    with store.read() as session:
+        return _read(session, person_id)
+
+
+def find_person(store: Store, name: str) -> Person:
+    """Somebody by their name; raises NotFoundError when there is nobody."""
+    for person in list_people(store):
+        if person.name == name.strip().lower():
+            return person
+    raise NotFoundError(f"there is no {name}", hint="touchline users list shows everybody.")
+
+
+def _read(session: Session, person_id: int) -> Person:
+    row = person_by_id(session, person_id)
+    if row is None:
+        raise NotFoundError.person(person_id)
+    waiting, tokens = people_with_links(session, now()), count_access_tokens(session)
+    factors, ways = people_with_second_factor(session), people_with_identity(session)
+    return _person(row, waiting, tokens, factors, ways)
+
+
+def _person(
+    row: Any,
+    waiting: set[int],
+    tokens: Mapping[int, int],
+    factors: set[int],
+    ways: Mapping[int, str],
+) -> Person:
+    return Person(
+        row.id,
+        row.name,
+        Role(row.role),
+        row.disabled,
+        row.password is not None or row.id in ways,
+        row.id in waiting,
+        row.created,
+        row.created_by,
+        getattr(row, "seen", None),
+        row.id in factors,
+        tokens.get(row.id, 0),
+        ways.get(row.id),
+    )

@@ -1,0 +1,241 @@
+"""Sessions: who is logged in, logging in and out, and links with which one sets a password."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import structlog
+from fastapi import APIRouter, Depends, Request, Response
+
+from app.db.store import Store
+from app.errors import NotLoggedInError
+from app.features.maintenance.schemas import BannerDocument
+from app.features.maintenance.service import read_banner
+from app.features.people import links
+from app.features.people.logins import Login
+from app.features.people.members import read_single_roles
+from app.features.people.roles import SCOPES, Action, Role, may
+from app.features.people.schemas import (
+    LinkLook,
+    LinkMeaning,
+    LinkUse,
+    NewSession,
+    OpenSessionDocument,
+    OpenSessionList,
+    PasswordEdit,
+    SessionDocument,
+    SingleRoleDocument,
+    WaysIn,
+)
+from app.http.access import login_of
+from app.http.cursor import paged
+from app.http.deps import AppServices, AppStore, Id
+from app.http.headers import bearer_of
+from app.http.problem import responses
+from app.http.team import AppTeam, Team
+from app.soccer.actors import LOCAL_USER
+
+router = APIRouter(tags=["sessions"])
+log = structlog.get_logger("touchline.access")
+
+
+async def get_login(request: Request) -> Login:
+    """Who is logged in, on a route that the table lets nobody else reach.
+
+    Raises:
+        NotLoggedInError: Nobody is.
+    """
+    login = login_of(request.scope)
+    if login is None:
+        raise NotLoggedInError("nobody is logged in here", hint="Log in first.")
+    return login
+
+
+Me = Annotated[Login, Depends(get_login)]
+
+
+ALLOWS = {role: [action for action in Action if may(role, action)] for role in Role}
+
+
+def session_of(login: Login | None, store: Store) -> SessionDocument:
+    """What a server of a team says of who asks."""
+    if login is None:
+        return SessionDocument(team=True, name=None, role=None, may=[])
+    allows = ALLOWS
+    if login.token is not None:
+        scopes = frozenset[Action]().union(*(SCOPES[scope] for scope in login.token.scopes))
+        allows = {role: [item for item in ALLOWS[role] if item in scopes] for role in Role}
+    return SessionDocument(
+        team=True,
+        name=login.name,
+        role=login.role,
+        enrol=login.must_enrol,
+        way=login.way,
+        may=allows[login.role],
+        datasets=[SingleRoleDocument(**vars(one)) for one in read_single_roles(store, login.roles)],
+        allows=allows,
+    )
+
+
+@router.get("/session", operation_id="getSession", responses=responses(401, 429))
+def get_session(request: Request, services: AppServices) -> SessionDocument:
+    """Who asks; nobody, before they have logged in. With a token: whose it is, and what it may."""
+    team: Team | None = request.app.state.team
+    if team is None:
+        every = ALLOWS[Role.ADMIN]
+        return SessionDocument(
+            team=False,
+            name=LOCAL_USER,
+            role=Role.ADMIN,
+            moment=services.events.moment(),
+            maintenance=_banner(services.store),
+            may=every,
+            allows=ALLOWS,
+        )
+    bearer = bearer_of(request.scope)
+    login = team.login(request) if bearer is None else team.login_with(bearer, request)
+    found = session_of(login, services.store)
+    rules = team.sign_on and team.sign_on.rules
+    ways = WaysIn(password=not (rules and rules.only), sign_on=rules.label if rules else None)
+    moment = None if login is None or login.roles.blind else services.events.moment()
+    more = {"ways": ways, "moment": moment, "maintenance": _banner(services.store)}
+    return found.model_copy(update=more)
+
+
+def _banner(store: Store) -> BannerDocument | None:
+    banner = read_banner(store)
+    return None if banner is None else BannerDocument.model_validate(banner)
+
+
+@router.post("/session", operation_id="createSession", responses=responses(401, 409, 413, 415, 429))
+def log_in(
+    who: NewSession, request: Request, response: Response, store: AppStore, team: AppTeam
+) -> SessionDocument:
+    """Log in; the answer sets the cookie of a new session.
+
+    A name that nobody has gets the same answer as a wrong password, and takes as long. Whoever has a
+    second factor is asked for its code by a 401 whose pointer is `/code`: send all three then. 409
+    where people come by single sign-on alone.
+    """
+    team.require_passwords()
+    return _begin(team, store, request, response, who.name, who.password, who.code)
+
+
+def _begin(
+    team: Team,
+    store: Store,
+    request: Request,
+    response: Response,
+    name: str,
+    password: str,
+    code: str | None = None,
+) -> SessionDocument:
+    address = team.address(request)
+    team.count_try(request, name)
+    try:
+        token = team.logins.log_in(
+            name,
+            password,
+            code=code,
+            on_code=lambda: team.tries.count_code(name),
+            browser=request.headers.get("user-agent", ""),
+            address=address,
+            before=team.token(request),
+        )
+    except NotLoggedInError:
+        # Without the name: people type passwords into the wrong field.
+        log.warning("a login was refused", address=address)
+        raise
+    response.set_cookie(**team.cookie_values(token))
+    login = team.logins.find(token)
+    if login is None:
+        raise NotLoggedInError("the account was disabled meanwhile")
+    response.set_cookie(**team.device_values(login.name))
+    return session_of(login, store)
+
+
+@router.delete("/session", operation_id="deleteSession", responses=responses(409))
+def log_out(
+    request: Request, response: Response, store: AppStore, team: AppTeam
+) -> SessionDocument:
+    """Log out: the session ends on the server, and the cookie goes."""
+    login = team.login(request)
+    if login is not None:
+        team.logins.end(login, login.id)
+    response.set_cookie(**team.cookie_values(None))
+    return session_of(None, store)
+
+
+@router.put(
+    "/session/password",
+    operation_id="changePassword",
+    responses=responses(401, 409, 413, 415, 429),
+)
+def change_password(
+    change: PasswordEdit,
+    request: Request,
+    response: Response,
+    store: AppStore,
+    team: AppTeam,
+    me: Me,
+) -> SessionDocument:
+    """Give oneself another password; every session ends, and this browser gets a new one."""
+    team.require_passwords()
+    team.count_try(request, me.name)
+    token = team.logins.change_password(me, change.old, change.new)
+    response.set_cookie(**team.cookie_values(token))
+    return session_of(me, store)
+
+
+@router.get("/sessions", operation_id="listSessions", responses=responses(401, 409))
+@paged()
+def list_sessions(team: AppTeam, me: Me) -> OpenSessionList:
+    """One's own sessions, in this browser and others."""
+    items = [
+        OpenSessionDocument(this=item.id == me.id, **vars(item))
+        for item in team.logins.sessions(me)
+    ]
+    return OpenSessionList(items=items)
+
+
+@router.delete(
+    "/sessions", operation_id="deleteOtherSessions", status_code=204, responses=responses(401, 409)
+)
+def end_others(team: AppTeam, me: Me) -> None:
+    """End every session of one's own but this one."""
+    team.logins.end_others(me)
+
+
+@router.delete(
+    "/sessions/{session}",
+    operation_id="endSession",
+    status_code=204,
+    responses=responses(401, 404, 409),
+)
+def end_session(session: Id, team: AppTeam, me: Me) -> None:
+    """End a session of one's own."""
+    team.logins.end(me, session)
+
+
+@router.post("/links/look", operation_id="lookAtLink", responses=responses(404, 409, 413, 415, 429))
+def look_at_link(asked: LinkLook, request: Request, store: AppStore, team: AppTeam) -> LinkMeaning:
+    """Whom a link is for; 404 when it is not good any more."""
+    team.count_try(request)
+    return LinkMeaning(**vars(links.look(store, asked.token)))
+
+
+@router.post(
+    "/links/use", operation_id="useLink", responses=responses(401, 404, 409, 413, 415, 429)
+)
+def use_link(
+    chosen: LinkUse, request: Request, response: Response, store: AppStore, team: AppTeam
+) -> SessionDocument:
+    """Set the password that a link is for, and log in with it; the link is then no longer valid.
+
+    For whoever has a second factor the password is set, and the answer is the 401 whose pointer is
+    `/code`: log in with the new password and a code.
+    """
+    team.require_passwords()
+    team.count_try(request)
+    name = links.use(store, chosen.token, chosen.password, chosen.name)
+    return _begin(team, store, request, response, name, chosen.password)

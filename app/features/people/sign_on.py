@@ -1,0 +1,346 @@
+"""Single sign-on: who comes by an account of the provider that the operator trusts (OpenID Connect).
+
+An account becomes a person's by an act of theirs alone: they link it while they are logged in, or they
+follow a link that an admin gave them. Neither name nor e-mail address makes it anybody's.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import secrets
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass, replace
+from datetime import UTC, datetime, timedelta
+from hmac import compare_digest
+from typing import Any
+
+from app.db.session import Session, text_of
+from app.db.store import Store
+from app.errors import ConflictError, InputError, NotLoggedInError
+from app.features.people.devices import take_code, waiting
+from app.features.people.links import hash_of, look, new_token, take
+from app.features.people.login_queries import (
+    delete_logins,
+    find_identity,
+    put_identity,
+    use_identity,
+)
+from app.features.people.logins import ASK_CODE, LOST, WRONG_CODE, Login, Logins, Way
+from app.features.people.provider import LoginAsked, Provider
+from app.features.people.queries import (
+    has_second_factor,
+    insert_person,
+    person_by_id,
+    person_by_name,
+)
+from app.features.people.roles import checked_name, note
+from app.features.people.second_factor import require_password
+from app.features.people.sign_on_rules import SignOnRules, require_none, shown_of
+from app.finite import json_text
+
+LASTS = timedelta(minutes=10)
+"""So long somebody may take to log in at the provider."""
+LATE = "that took too long, was answered before, or began in another browser"
+FACTOR = "/factor"
+"""Pointer of a refusal that asks for the code of a second factor."""
+_OWN = re.compile(r"/(?![/\\])[!-\[\]-~]*")
+_LONGEST = 2000
+
+
+@dataclass(frozen=True)
+class _Begun:
+    """A login that somebody has begun.
+
+    Attributes:
+        browser: Hash of what their browser alone knows.
+        asked: What the provider was asked.
+        to: The page to which they go then.
+        link: The token of a link that they follow, and ``name``, which the first admin chooses.
+        session: Of whom an account is to be linked; None: somebody logs in.
+        claims: What the provider said, where only the code of a second factor is still missing.
+    """
+
+    browser: str
+    asked: LoginAsked
+    to: str
+    link: str | None = None
+    name: str | None = None
+    session: int | None = None
+    claims: Mapping[str, Any] | None = None
+
+    def text(self) -> bytes:
+        """As JSON."""
+        return json_text(asdict(self)).encode()
+
+    @staticmethod
+    def read(text: bytes) -> _Begun:
+        """What ``text`` made."""
+        values = json.loads(text)
+        return _Begun(**{**values, "asked": LoginAsked(**values["asked"])})
+
+
+@dataclass(frozen=True)
+class Entered:
+    """How it ended: the token of a new session, None where an account was linked; and the page to show."""
+
+    token: str | None
+    to: str
+
+
+class SignOn:
+    """Everything that is asked of single sign-on.
+
+    Args:
+        store: Where people are.
+        logins: Begins sessions.
+        rules: What the operator has said.
+        clock: Says what time it is, in UTC.
+    """
+
+    def __init__(
+        self,
+        store: Store,
+        logins: Logins,
+        rules: SignOnRules,
+        clock: Callable[[], datetime] = lambda: datetime.now(UTC),
+    ):
+        self.rules = rules
+        self._store, self._logins, self._clock = store, logins, clock
+        self._provider = Provider(rules, clock)
+        self._begun = waiting(store, clock, LASTS, "sign-on")
+
+    def begin(
+        self,
+        asker: str,
+        *,
+        redirect: str,
+        to: str = "/groups",
+        link: str | None = None,
+        name: str | None = None,
+    ) -> str:
+        """The address at the provider where somebody logs in.
+
+        Args:
+            asker: What this browser alone knows.
+            redirect: The page of ours to which the provider sends them back.
+            to: The page to which they go then.
+            link: The token of a link that they follow.
+            name: What the first admin wants to be called.
+
+        Raises:
+            InputError: ``to`` is no page of ours, or the name cannot be one.
+            NotFoundError: The link is not good.
+            ConflictError: The provider does not answer as it should.
+        """
+        if not _OWN.fullmatch(to) or len(to) > _LONGEST:
+            raise InputError("that is no page of this server", pointer="/to")
+        if link is not None and look(self._store, link).name is None:
+            name = checked_name(name or "")
+        return self._begin(asker, redirect, to, link=link, name=name)
+
+    def begin_link(self, asker: str, login: Login, password: str | None, *, redirect: str) -> str:
+        """The address where somebody who is logged in shows which account is theirs.
+
+        Raises:
+            InputError: That is not their password.
+            ConflictError: They have an account there already, or the provider does not answer.
+        """
+        require_password(self._store, login, password, self._clock())
+        with self._store.read() as session:
+            require_none(session, login.person_id, self.rules)
+        return self._begin(asker, redirect, "/account", session=login.id)
+
+    def finish(
+        self,
+        asker: str,
+        state: str,
+        code: str,
+        *,
+        factor: str | None = None,
+        issuer: str | None = None,
+        login: Login | None = None,
+        browser: str = "",
+        address: str = "",
+        before: str | None = None,
+        on_code: Callable[[str], None] = lambda _name: None,
+    ) -> Entered:
+        """What follows once somebody comes back from the provider.
+
+        Args:
+            asker: What this browser alone knows.
+            state: Which login it is.
+            code: What the provider gave for it.
+            factor: A code of their second factor, where the answer before asked for it.
+            issuer: Who says so (RFC 9207).
+            login: Who is logged in.
+            browser: What the browser calls itself.
+            address: Where it is.
+            before: The token of the session that the browser had, which ends.
+            on_code: Is called with their name before a code is looked at, to count it.
+
+        Raises:
+            NotLoggedInError: It is not the answer to what this browser was asked, the provider does not
+                vouch for it, or who that is may not come in; or a code is missing (``pointer`` is then
+                ``FACTOR``: ask again with the same state).
+            InputError: The same of an account that is to be linked.
+            NotFoundError: The link is not good any more.
+            ConflictError: The account is another person's, a name is taken, or the provider does not answer.
+        """
+        found = self._begun.take(hash_of(state))
+        begun = None if found is None else _Begun.read(found)
+        if begun is None or not compare_digest(begun.browser, hash_of(asker)):
+            raise NotLoggedInError(LATE, hint="Begin again.")
+        if issuer is not None and issuer != self.rules.issuer:
+            raise NotLoggedInError("another provider has answered", hint="Begin again.")
+        if begun.session is not None:
+            return self._link(begun, code, login)
+        claims = begun.claims or self._claims(begun, code)
+        person_id, password = self._person(begun, claims)
+        vouched = self.rules.is_vouched(claims)
+        if factor is not None and not vouched:
+            # In a transaction of its own, which another that writes would wait for.
+            on_code(self._name(person_id))
+
+        def require(session: Session) -> None:
+            # Read again: the account may have been taken away from them since.
+            if not _is_theirs(session, self.rules, claims, person_id):
+                raise NotLoggedInError(self._unknown(), hint=self._ask())
+            if not vouched and has_second_factor(session, person_id):
+                self._require_factor(session, person_id, factor)
+            use_identity(session, person_id, shown_of(claims), text_of(self._clock()))
+
+        try:
+            token = self._logins.begin(
+                person_id, password, browser, address, before, require, Way.SIGN_ON, vouched=vouched
+            )
+        except NotLoggedInError as error:
+            if error.pointer == FACTOR:
+                # Whoever followed a link has come by it; what is missing is asked for again.
+                waits = replace(begun, claims=claims, link=None)
+                self._begun.put(hash_of(state), waits.text())
+            raise
+        return Entered(token, begun.to)
+
+    def _begin(self, asker: str, redirect: str, to: str, **more: Any) -> str:
+        asked = LoginAsked(redirect, new_token(), new_token(), secrets.token_urlsafe(48))
+        address = self._provider.address(asked)
+        self._begun.put(hash_of(asked.state), _Begun(hash_of(asker), asked, to, **more).text())
+        return address
+
+    def _claims(self, begun: _Begun, code: str) -> Mapping[str, Any]:
+        claims = self._provider.claims(begun.asked, code)
+        self.rules.require_admitted(claims)
+        return claims
+
+    def _person(self, begun: _Begun, claims: Mapping[str, Any]) -> tuple[int, str | None]:
+        """Id of who that is, and the hash of the password that they have.
+
+        Raises:
+            NotLoggedInError: Nobody here, or somebody who is disabled.
+        """
+        with self._store.write() as session:
+            found = find_identity(session, self.rules.issuer, claims["sub"])
+            if begun.link is not None:
+                person_id = self._join(session, begun.link, begun.name, claims, found)
+            elif found is not None:
+                person_id = found.person_id
+            else:
+                person_id = self._make(session, claims)
+            person = person_by_id(session, person_id)
+            if person is None or person.disabled:
+                raise NotLoggedInError(
+                    "your account on this server is disabled", hint="An admin of it can say why."
+                )
+            return person_id, person.password
+
+    def _join(
+        self,
+        session: Session,
+        link: str,
+        name: str | None,
+        claims: Mapping[str, Any],
+        found: Any | None,
+    ) -> int:
+        """Whose a link is; the account is theirs from now on, and the password that they had is none."""
+        person_id = take(session, link, name, password=None)
+        if found is not None and found.person_id != person_id:
+            raise self._taken()
+        self._put(session, person_id, claims)
+        return person_id
+
+    def _make(self, session: Session, claims: Mapping[str, Any]) -> int:
+        """Somebody new, where the operator lets in whom nobody here knows."""
+        if self.rules.new_role is None:
+            raise NotLoggedInError(self._unknown(), hint=self._ask())
+        try:
+            name = checked_name(self.rules.name_for(claims))
+        except InputError:
+            raise NotLoggedInError(
+                f"{self.rules.label} gives you no name that can be one here", hint=self._ask()
+            ) from None
+        if person_by_name(session, name) is not None:
+            # It may be the same person, and it may not: a name shows nothing.
+            raise NotLoggedInError(
+                f"there is a {name} here already, who is not linked with this account",
+                hint="If that is you: log in otherwise, and link it under Account; or ask an admin for a link.",
+            )
+        person_id = insert_person(session, name, self.rules.new_role, by=name)
+        note(session, name, name, "came by single sign-on", self.rules.new_role)
+        self._put(session, person_id, claims)
+        return person_id
+
+    def _link(self, begun: _Begun, code: str, login: Login | None) -> Entered:
+        if login is None or login.id != begun.session or login.token is not None:
+            raise InputError(
+                "the session that wanted to link an account has ended", hint="Begin again."
+            )
+        try:
+            claims = self._claims(begun, code)
+        except NotLoggedInError as error:
+            raise InputError(error.message, hint=error.hint) from error
+        with self._store.write() as session:
+            require_none(session, login.person_id, self.rules)
+            if find_identity(session, self.rules.issuer, claims["sub"]) is not None:
+                raise self._taken()
+            self._put(session, login.person_id, claims)
+            delete_logins(session, login.person_id, but=login.id)
+        return Entered(None, begun.to)
+
+    def _put(self, session: Session, person_id: int, claims: Mapping[str, Any]) -> None:
+        shown, person = shown_of(claims), person_by_id(session, person_id)
+        assert person is not None
+        values = {"issuer": self.rules.issuer, "subject": claims["sub"], "shown": shown}
+        put_identity(session, {**values, "person_id": person_id, "created": text_of(self._clock())})
+        note(session, person.name, person.name, "single sign-on linked", person.role, account=shown)
+
+    def _name(self, person_id: int) -> str:
+        with self._store.read() as session:
+            person = person_by_id(session, person_id)
+        assert person is not None
+        return str(person.name)
+
+    def _require_factor(self, session: Session, person_id: int, factor: str | None) -> None:
+        if factor is None:
+            raise NotLoggedInError(ASK_CODE, hint=LOST, pointer=FACTOR)
+        if not take_code(session, self._store, person_id, factor, self._clock()):
+            raise NotLoggedInError(WRONG_CODE, hint=LOST, pointer=FACTOR)
+
+    def _unknown(self) -> str:
+        return f"nobody here is linked with the account that {self.rules.label} names"
+
+    def _ask(self) -> str:
+        return "An admin can send you a link; whoever has an account links it under Account."
+
+    def _taken(self) -> ConflictError:
+        return ConflictError(
+            f"the account that {self.rules.label} names is linked with another person here",
+            hint="Log out at the provider, and come with your own.",
+        )
+
+
+def _is_theirs(
+    session: Session, rules: SignOnRules, claims: Mapping[str, Any], person_id: int
+) -> bool:
+    found = find_identity(session, rules.issuer, claims["sub"])
+    return found is not None and found.person_id == person_id

@@ -1,0 +1,122 @@
+"""Policies: those that are shipped, the one that judges a dataset, and the change to another."""
+
+from __future__ import annotations
+
+from fastapi import APIRouter, Response
+
+from app.errors import InputError
+from app.features.jobs.schemas import JobDocument
+from app.features.policies.schemas import (
+    PolicyCatalogue,
+    PolicyChange,
+    PolicyStateDocument,
+    ShippedPolicyDocument,
+)
+from app.features.policies.service import read_policy
+from app.features.policies.text import CUSTOM, policy_from_yaml, policy_with, unknown_policy
+from app.features.solve.jobs import PolicyJob, request_policy
+from app.http.conflicts import current_state
+from app.http.cursor import paged
+from app.http.deps import Actor, AppServices, AppStore, DatasetPath, IfMatch
+from app.http.job_responses import job_address
+from app.http.problem import Responses, responses
+from app.http.respond import document, responds
+from app.soccer.policy import POLICIES, THRESHOLDS, Policy
+
+router = APIRouter(tags=["policies"])
+
+TAGGED = {"ETag": {"description": "The policy's state.", "schema": {"type": "string"}}}
+LOCATED = {"Location": {"description": "Of the job.", "schema": {"type": "string"}}}
+CHANGED: Responses = {
+    202: {
+        "description": "The job that solves what the policy left stale.",
+        "headers": {**TAGGED, **LOCATED},
+    }
+}
+
+
+@router.get("/policies", operation_id="listPolicies", responses=responses())
+@paged()
+def list_policies() -> PolicyCatalogue:
+    """The policies that come with the software, and what can be set in one."""
+    return PolicyCatalogue(
+        items=[ShippedPolicyDocument.of(policy) for policy in POLICIES.values()],
+        fields=THRESHOLDS,
+    )
+
+
+@router.get(
+    "/datasets/{dataset}/policy",
+    operation_id="getPolicy",
+    responses={**responses(404), 200: {"headers": TAGGED}},
+)
+def get_policy(dataset: DatasetPath, store: AppStore, response: Response) -> PolicyStateDocument:
+    """What judges the dataset, and what judged it before."""
+    policy = PolicyStateDocument.of(read_policy(store, dataset))
+    response.headers.update(_tagged(policy))
+    return policy
+
+
+def _judged(judged: PolicyJob) -> Response:
+    policy, job = PolicyStateDocument.of(judged.state), JobDocument.model_validate(judged.job)
+    job.result = {"policy": policy.model_dump(mode="json"), "to_solve": judged.to_solve}
+    return document(job, 202, {**_tagged(policy), **job_address(judged.job)})
+
+
+@router.put(
+    "/datasets/{dataset}/policy",
+    operation_id="setPolicy",
+    status_code=202,
+    response_model=JobDocument,
+    responses={**responses(404, 412, 413, 415, 428), **CHANGED},
+)
+@responds(_judged)
+def put_policy(
+    dataset: DatasetPath,
+    change: PolicyChange,
+    services: AppServices,
+    actor: Actor,
+    if_match: IfMatch,
+) -> PolicyJob:
+    """Judge the dataset by another policy.
+
+    What that leaves without a solution is stale and solved by the job; `result.policy` of the
+    answer is the policy as it is now, `result.to_solve` how many groups are solved again. Only another calibration part calibrates anything anew.
+    """
+    store = services.store
+    present = read_policy(store, dataset)
+    policy = wanted(change, present.policy)
+    with current_state(lambda: PolicyStateDocument.of(read_policy(store, dataset))):
+        return request_policy(
+            services.jobs, store, present.dataset_id, policy, if_match=if_match, actor=actor
+        )
+
+
+def wanted(change: PolicyChange, present: Policy) -> Policy:
+    """The policy that a request asks for.
+
+    Raises:
+        InputError: It asks for nothing, for two things, or for what cannot be.
+    """
+    if change.yaml is not None:
+        if change.name is not None or change.values is not None:
+            raise InputError(
+                "send a YAML text alone, without a name and without thresholds", pointer="/yaml"
+            )
+        try:
+            return policy_from_yaml(change.yaml)
+        except InputError as error:
+            raise InputError(error.message, hint=error.hint, pointer="/yaml") from error
+    if change.name is None and change.values is None:
+        raise InputError("name a policy, give thresholds, or send a YAML text")
+    if not change.values and change.name in POLICIES:
+        return POLICIES[change.name]
+    if not change.values and change.name != present.name:
+        raise unknown_policy(change.name or "", "it brings no values", pointer="/name")
+    # A shipped policy with another threshold is no longer the one of that name.
+    name = change.name or (CUSTOM if present.name in POLICIES else present.name)
+    return policy_with(present, change.values or {}, name=name, pointer="/values")
+
+
+def _tagged(policy: PolicyStateDocument) -> dict[str, str]:
+    return {"ETag": policy.etag, "Cache-Control": "private, no-cache"}

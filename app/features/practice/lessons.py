@@ -1,0 +1,307 @@
+"""Whether a practice group was answered rightly, and what it asks, hints at and says."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from app.features.groups.state import VerdictState
+from app.sample.practice import CLEAN
+from app.sample.scene import PlantedFault, SceneTruth, ViewTruth
+from app.soccer.group import Group, View, view_letter
+
+
+@dataclass(frozen=True)
+class LessonWords:
+    """The texts of one lesson; ``{view}`` stands for the letter of the view with the fault.
+
+    Attributes:
+        question: What to look for, without giving the answer away.
+        hint: Where to look, for somebody who is stuck.
+        fault: What was wrong, said once the group is judged.
+        best: What to do about it, and with which keys.
+    """
+
+    question: str
+    hint: str
+    fault: str
+    best: str
+
+
+WORDS = {
+    "clean": LessonWords(
+        question="Read the card with the result and compare it with the pictures. Would you let this group "
+        "into the dataset?",
+        hint="Look at the blue lines on the white paint and at the ball in the small pictures "
+        "below. When both fit in every view, nothing is wrong.",
+        fault="Nothing is wrong with this group: every line lies on its paint and the views agree "
+        "on one ball.",
+        best="Press A to accept it.",
+    ),
+    "wrong_label": LessonWords(
+        question="The field lines of one view do not fit. Find out why before you decide.",
+        hint="Compare the names: click a red line to read its marking. Is that "
+        "the line that you see?",
+        fault="In view {view} the line called “{marking}” is really “{true_marking}”.",
+        best="Press Enter: it gives the line its right name, as the card says. Then press A.",
+    ),
+    "swapped_sides": LessonWords(
+        question="Each view fits its own lines. Do they show the ball at the same place of the "
+        "pitch?",
+        hint="Look at the small pitch below: on which side does each camera stand, and which goal "
+        "do the views show? Replays are sometimes labelled from the other end.",
+        fault="In view {view} left and right are exchanged in every label.",
+        best="Press Enter: it swaps left and right in view {view}. Then press A.",
+    ),
+    "bad_point": LessonWords(
+        question="One click of an annotator went astray. Find it.",
+        hint="Follow the error lines: they lead from the line to each annotated point, and one is "
+        "much longer than the others.",
+        fault="In view {view} a point of “{marking}” lies beside its line.",
+        best="Press Enter to do what the card offers, Shift Enter for another way (or drag the "
+        "point onto the paint). Then press A.",
+    ),
+    "missing_ball": LessonWords(
+        question="The views are calibrated, and still there is no 3D ball. What is missing?",
+        hint="Look at the small ball pictures below: does every view have a ball? Where the rays "
+        "of the other views cross the picture is where to search.",
+        fault="Nobody marked the ball in view {view}, although it can be seen.",
+        best="Press Enter, click the ball on the dotted line in view {view}, then press A.",
+    ),
+    "undrawn_line": LessonWords(
+        question="This group fails because of its field lines, but no annotated line looks wrong. "
+        "What else counts?",
+        hint="Look for white paint that carries a thin dotted line and no points: it can be seen, "
+        "and nobody annotated it. Such lines count as missed.",
+        fault="In view {view} nobody annotated {markings}, although they can be seen.",
+        best="Press Enter: it leads to the line with its name chosen. Click two points on the "
+        "paint and press Escape. When the card says that the group passes, press A.",
+    ),
+    "not_synchronous": LessonWords(
+        question="Every view is calibrated and has a ball, and yet they do not meet in one point. "
+        "Look at the players.",
+        hint="Compare how the players stand around the ball in each view. Is it the same moment?",
+        fault="View {view} shows another moment: the ball had moved {amount:.1f} m.",
+        best="No edit can fix that. Press X, then Enter for “Not the same instant”; where two other "
+        "views agree you may leave view {view} out with Shift X instead, and accept the rest.",
+    ),
+    "tiny_baseline": LessonWords(
+        question="Everything fits, and still the group cannot be used. Where do the cameras stand?",
+        hint="Look at the small pitch below: how far are the cameras from each other? Two views "
+        "from one place say nothing about depth.",
+        fault="Both cameras stand at nearly one place: view {view} is beside the main camera.",
+        best="No edit can fix that. Press X, then Enter for “Duplicate view”.",
+    ),
+}
+"""By the kind of the lesson."""
+
+
+OPEN, MENDED, RIGHT, ALMOST, WRONG = "open", "mended", "right", "almost", "wrong"
+OFF_PX = 12.0
+"""An annotated point farther from the paint than this is a mistake; clicks are off by one or two."""
+BALL_OFF_SHARE, BALL_OFF_PX = 0.75, 6.0
+"""A ball farther from where it was is a mistake: a share of its diameter, and at least pixels."""
+_REASONS = {"not_synchronous": "not_same_instant", "tiny_baseline": "duplicate_view"}
+"""Lessons that no edit can mend, with the reason that says why."""
+
+
+@dataclass(frozen=True)
+class Feedback:
+    """What is said about an answer.
+
+    Attributes:
+        state: ``open`` (not answered), ``mended`` (edited rightly, not yet judged), ``right``,
+            ``almost`` or ``wrong``.
+        sentence: In words; None while the lesson is open.
+        best: What would have been best, once the lesson is judged; None before.
+    """
+
+    state: str
+    sentence: str | None = None
+    best: str | None = None
+
+
+def kind_of(truth: SceneTruth) -> str:
+    """The kind of a lesson: that of its fault, or ``clean``."""
+    return truth.faults[0].kind if truth.faults else CLEAN
+
+
+def judge(truth: SceneTruth, group: Group, verdict: VerdictState) -> Feedback:
+    """What to say about a practice group as it stands.
+
+    Args:
+        truth: Of the group, with its planted faults.
+        group: As it was edited.
+        verdict: The newest one; a stale one counts as none.
+    """
+    words = _Told(truth, group)
+    if verdict.state == "unreviewed" or verdict.stale:
+        return _before(truth, group, words)
+    if verdict.state == "deferred":
+        return words.say(ALMOST, "You put this group off. That is fine when you are not sure.")
+    if verdict.state == "accepted":
+        return _accepted(truth, group, words)
+    return _rejected(truth, verdict.reason, words)
+
+
+def _before(truth: SceneTruth, group: Group, words: _Told) -> Feedback:
+    kind = kind_of(truth)
+    if kind == CLEAN:
+        return Feedback(OPEN)
+    if _is_mended(truth, group):
+        return Feedback(MENDED, f"Right: {words.done} Press A to accept the group.")
+    if _turned_away(truth, group):
+        letter = view_letter(_place(group, _turned_away(truth, group)[0]))
+        return Feedback(
+            OPEN,
+            f"Look again: view {letter} was labelled rightly, and now its sides are exchanged. "
+            "Ctrl Z takes that back.",
+        )
+    return Feedback(OPEN)
+
+
+def _accepted(truth: SceneTruth, group: Group, words: _Told) -> Feedback:
+    kind = kind_of(truth)
+    if kind == CLEAN:
+        if _is_sound(truth, group):
+            return words.say(RIGHT, "")
+        return words.say(WRONG, "The group was sound, and an edit has spoilt it.")
+    if kind not in _REASONS and _is_mended(truth, group):
+        return words.say(RIGHT, "You fixed it.")
+    if kind != "tiny_baseline" and _is_left_out(truth, group):
+        if kind == "not_synchronous":
+            return words.say(RIGHT, "You left that view out, and the others agree.")
+        return words.say(
+            ALMOST, "Leaving the view out works, but it could be fixed, and it is lost now."
+        )
+    return words.say(WRONG, "The group was accepted with its fault.")
+
+
+def _rejected(truth: SceneTruth, reason: str | None, words: _Told) -> Feedback:
+    kind = kind_of(truth)
+    if kind == CLEAN:
+        return words.say(WRONG, "A good group was lost.")
+    if kind not in _REASONS:
+        return words.say(WRONG, "It could have been fixed, and a good group was lost.")
+    if reason == _REASONS[kind]:
+        return words.say(RIGHT, "The reason is the right one, too.")
+    return words.say(ALMOST, "It is right to reject this group, but another reason fits better.")
+
+
+class _Told:
+    """The sentences of a lesson, with letters and numbers put in."""
+
+    def __init__(self, truth: SceneTruth, group: Group):
+        self._words = WORDS[kind_of(truth)]
+        self._values = _values(truth.faults, group)
+
+    @property
+    def done(self) -> str:
+        """What was wrong, and that it no longer is."""
+        return f"the fault is fixed. {self.fault}"
+
+    @property
+    def fault(self) -> str:
+        """What was planted."""
+        return self._words.fault.format(**self._values)
+
+    def say(self, state: str, remark: str) -> Feedback:
+        """The feedback on a verdict."""
+        begins = {RIGHT: "Right:", ALMOST: "Nearly:", WRONG: "Look again:"}[state]
+        parts = [part for part in (remark, self.fault) if part]
+        first = parts[0][0].lower() + parts[0][1:] if parts[0].startswith(_PLAIN) else parts[0]
+        sentence = " ".join([begins, first, *parts[1:]])
+        return Feedback(state, sentence, self._words.best.format(**self._values))
+
+
+_PLAIN = ("You ", "The ", "It ", "A ", "Leaving ", "Nothing ")
+"""Beginnings that are written small behind a colon."""
+
+
+def _values(faults: Sequence[PlantedFault], group: Group) -> dict[str, object]:
+    if not faults:
+        return {}
+    first = faults[0]
+    return {
+        "view": view_letter(_place(group, first.view)),
+        "marking": first.marking,
+        "true_marking": first.true_marking,
+        "amount": first.amount or 0.0,
+        "markings": " and ".join(f"“{fault.marking}”" for fault in faults),
+    }
+
+
+def _place(group: Group, view: str) -> int:
+    return [item.key for item in group.views].index(view)
+
+
+def _is_mended(truth: SceneTruth, group: Group) -> bool:
+    """Whether the fault is gone and nothing else was spoilt."""
+    if kind_of(truth) in _REASONS or not _is_sound(truth, group):
+        return False
+    view = group.view(truth.faults[0].view)
+    if view is None or not view.included:
+        return False
+    if kind_of(truth) == "missing_ball":
+        return view.ball is not None and view.ball.center is not None
+    if kind_of(truth) == "undrawn_line":
+        # One line of two is enough for the gate, and the card then says that the group passes.
+        return any(fault.marking in view.station.lines for fault in truth.faults)
+    return True
+
+
+def _is_left_out(truth: SceneTruth, group: Group) -> bool:
+    """Whether the view with the fault is left out and two sound ones remain."""
+    faulty = {fault.view for fault in truth.faults}
+    used = [view for view in group.views if view.included]
+    with_ball = [view for view in used if view.ball is not None]
+    gone = not any(view.key in faulty for view in used)
+    return gone and len(with_ball) >= 2 and _is_sound(truth, group)
+
+
+def _is_sound(truth: SceneTruth, group: Group) -> bool:
+    """Whether all that is annotated in the views in use is where it was in truth."""
+    for view in group.views:
+        known = truth.view(view.key)
+        if not view.included or known is None:
+            continue
+        if lines_off(known, view, group) or _is_ball_off(known, view):
+            return False
+    return True
+
+
+def lines_off(truth: ViewTruth, view: View, group: Group) -> tuple[str, ...]:
+    """Markings of a view with a point that does not lie where the marking really is."""
+    off = []
+    for marking, points in view.station.lines.items():
+        curve = truth.camera.project(group.pitch.sample(marking, 0.1, 0.1))
+        curve = curve[np.isfinite(curve).all(axis=1)]
+        away = [
+            float(np.hypot(*(curve - np.array(point)).T).min()) if len(curve) else np.inf
+            for point in points
+        ]
+        if max(away) > OFF_PX:
+            off.append(marking)
+    return tuple(off)
+
+
+def _turned_away(truth: SceneTruth, group: Group) -> list[str]:
+    """Views without a fault of their own in which nearly no line is where it is named."""
+    faulty = {fault.view for fault in truth.faults}
+    turned = []
+    for view in group.views:
+        known = truth.view(view.key)
+        if known is None or view.key in faulty or not view.station.lines:
+            continue
+        if len(lines_off(known, view, group)) > 0.5 * len(view.station.lines):
+            turned.append(view.key)
+    return turned
+
+
+def _is_ball_off(truth: ViewTruth, view: View) -> bool:
+    if view.ball is None or view.ball.center is None:
+        return False
+    away = np.hypot(*np.subtract(view.ball.center, truth.ball_box.center))
+    return bool(away > max(BALL_OFF_PX, BALL_OFF_SHARE * truth.ball_diameter_px))

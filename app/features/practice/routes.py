@@ -1,0 +1,85 @@
+"""Practice: eight groups with known answers, and what was said to them."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from fastapi import APIRouter, Depends, Request
+
+from app.features.groups.submit import load
+from app.features.jobs.queries import Job
+from app.features.practice.schemas import LessonDocument, PracticeBody, PracticeDocument
+from app.features.practice.service import (
+    Practice,
+    PracticeLesson,
+    read_lesson,
+    read_practice,
+    request_practice,
+)
+from app.http.access import login_of
+from app.http.deps import Actor, AppServices, Id, Sees
+from app.http.job_responses import by_job, job_answer
+from app.http.problem import responses
+from app.http.respond import responds
+
+router = APIRouter(tags=["practice"])
+
+
+async def _person(request: Request) -> str | None:
+    """Whose practice it is; None where nobody logs in."""
+    login = login_of(request.scope)
+    return None if login is None else login.name
+
+
+Person = Annotated[str | None, Depends(_person)]
+
+
+@router.get(
+    "/practice",
+    operation_id="getPractice",
+    response_model=PracticeDocument,
+    responses=responses(),
+)
+def get_practice(services: AppServices, sight: Sees, person: Person) -> Practice:
+    """Every lesson and what has come of it; none until the practice is made.
+
+    Where people log in, each has lessons of their own.
+    """
+    return read_practice(services.store, services.settings, sight, person)
+
+
+@router.post(
+    "/practice",
+    operation_id="startPractice",
+    **by_job(409, 413, 415, 503),
+)
+@responds(job_answer)
+def start_practice(
+    request: PracticeBody, services: AppServices, actor: Actor, person: Person
+) -> Job:
+    """Make the dataset `practice`; sent again it changes nothing, with `again` it begins afresh.
+
+    Where people log in, the dataset is the person's own, `practice NAME`: they are a reviewer in
+    it, and only they and admins see it.
+
+    The job's result has `dataset`, `groups` and `first`, the id of the first lesson's group.
+    """
+    return request_practice(
+        services.jobs,
+        services.store,
+        services.settings,
+        again=request.again,
+        actor=actor,
+        person=person,
+    )
+
+
+@router.get(
+    "/groups/{group}/lesson",
+    operation_id="getLesson",
+    response_model=LessonDocument,
+    responses=responses(404),
+)
+def get_lesson(group: Id, services: AppServices) -> PracticeLesson:
+    """What a practice group asks, and whether it was answered rightly; 404 for other groups."""
+    return read_lesson(services.settings, load(services.store, group))

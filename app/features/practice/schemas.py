@@ -1,0 +1,53 @@
+"""Practice: lessons, what they ask, and what became of them."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import AliasPath, BaseModel, ConfigDict, Field
+
+from app.http.documents import Document
+
+LessonState = Literal["open", "mended", "right", "almost", "wrong"]
+
+
+class PracticeBody(BaseModel):
+    """How the practice begins."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    again: bool = Field(
+        default=False, description="Forget verdicts and edits of the lessons and begin again."
+    )
+
+
+class LessonDocument(Document):
+    """One practice group as a lesson."""
+
+    group: int
+    number: int = Field(description="From 1.")
+    total: int
+    title: str
+    question: str = Field(description="What to look for; does not give the answer away.")
+    hint: str = Field(description="Where to look, for somebody who is stuck.")
+    verdict: str
+    state: LessonState = Field(
+        validation_alias=AliasPath("feedback", "state"),
+        description="`mended`: edited rightly and not judged yet. Weighed against what the "
+        "generator planted, never against what the solver found.",
+    )
+    feedback: str | None = Field(
+        validation_alias=AliasPath("feedback", "sentence"),
+        description="Whether the answer was right, and why.",
+    )
+    best: str | None = Field(
+        validation_alias=AliasPath("feedback", "best"),
+        description="What would have been best, once the group is judged.",
+    )
+
+
+class PracticeDocument(Document):
+    """The practice dataset; no lessons until it is made."""
+
+    dataset: str
+    lessons: list[LessonDocument]

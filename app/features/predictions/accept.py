@@ -1,0 +1,300 @@
+"""Accept: predicted balls become annotations because a person says so.
+
+Each one is an edit of its group through the log, like any other, and its ball says which set it
+came from. Until then no solve has seen it.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from app.db.session import Session
+from app.db.store import Store
+from app.errors import ConflictError, InputError, NotFoundError, StaleRevisionError
+from app.evaluation.prediction_run import box_problem
+from app.features.datasets.service import read_dataset_head
+from app.features.groups.edit import SetBall, need_view
+from app.features.groups.state import GroupState, require_unchanged, said_of
+from app.features.groups.submit import load, submit
+from app.features.groups.view_queries import StoredView, dataset_views, find_view
+from app.features.predictions.queries import PredictedBox, PredictionSet, read_box, read_boxes
+from app.features.predictions.service import read_set
+from app.features.queue.query import parse_query
+from app.progress import TellProgress
+from app.soccer.annotation import BallAnnotation
+from app.soccer.frames import Box, ImageSize
+from app.soccer.group import View
+
+SHOWN = 20
+"""Views that a dry run shows."""
+TRIES = 3
+"""How often a group is taken up again that somebody else changes meanwhile."""
+
+
+@dataclass(frozen=True)
+class AcceptRequest:
+    """Which predictions to accept: the surest of each view.
+
+    Attributes:
+        set_id: The set.
+        query: Groups, as the queue's text has it; None: all of them.
+        views: Ids of views; None: all of them.
+        min_score: Less sure ones stay predictions.
+        replace: Also where somebody annotated another ball; otherwise only where there is none.
+    """
+
+    set_id: int
+    query: str | None = None
+    views: tuple[int, ...] | None = None
+    min_score: float = 0.0
+    replace: bool = False
+
+
+@dataclass(frozen=True)
+class Accepted:
+    """One view whose prediction is to be accepted, or why not."""
+
+    view_id: int
+    view: str
+    group_id: int
+    group: str
+    box: PredictedBox
+    why: str | None
+
+
+@dataclass(frozen=True)
+class AcceptPlan:
+    """What an acceptance would do.
+
+    Attributes:
+        changes: Views that get a ball.
+        refused: How many do not, by reason.
+    """
+
+    predictions: PredictionSet
+    changes: tuple[Accepted, ...]
+    refused: dict[str, int]
+
+    @property
+    def groups(self) -> int:
+        """How many groups change."""
+        return len({item.group_id for item in self.changes})
+
+
+@dataclass(frozen=True)
+class AcceptReport:
+    """What an acceptance did; ``refused`` also counts what changed meanwhile."""
+
+    views: int
+    groups: int
+    refused: dict[str, int]
+
+
+def plan_accept(store: Store, dataset: str | int, request: AcceptRequest) -> AcceptPlan:
+    """What ``accept`` would do; saves nothing.
+
+    Raises:
+        NotFoundError: There is no such dataset or set, or a view has no prediction.
+        InputError: The query cannot be understood.
+    """
+    with store.read() as session:
+        found = read_dataset_head(session, dataset)
+        predictions = read_set(session, request.set_id)
+        if predictions.dataset_id != found.id:
+            raise NotFoundError(f"dataset {found.name} has no set of predictions {request.set_id}")
+        boxes = read_boxes(session, request.set_id)
+        rows = [row for row in _views(session, found.id, request) if row.id in boxes]
+    wanted = set(request.views or ())
+    missing = wanted - {row.id for row in rows}
+    if missing:
+        raise NotFoundError(f"the set has no prediction for view {min(missing)}")
+    judged = [_judge(row, boxes[row.id], predictions.name, request) for row in rows]
+    return AcceptPlan(
+        predictions,
+        tuple(item for item in judged if item.why is None),
+        dict(Counter(item.why for item in judged if item.why is not None)),
+    )
+
+
+def accept(
+    store: Store,
+    dataset: str | int,
+    request: AcceptRequest,
+    *,
+    actor: str,
+    progress: TellProgress | None = None,
+) -> AcceptReport:
+    """Make an edit of every prediction that a person accepts; done again it changes nothing.
+
+    Args:
+        store: The database.
+        dataset: Name or id.
+        request: Which ones.
+        actor: Who accepts them.
+        progress: Called with groups done and in all; an error that it raises ends it, and what
+            was accepted before stays.
+
+    Raises:
+        As ``plan_accept``.
+    """
+    plan = plan_accept(store, dataset, request)
+    refused = Counter(plan.refused)
+    views = 0
+    changed: set[int] = set()
+    done: AcceptReport | None = None
+    groups = list(_by_group(plan.changes))
+    for number, (group_id, items) in enumerate(groups):
+        if progress is not None:
+            progress(number, plan.groups, "Accepting predictions.")
+        for item in items:
+            if item is groups[-1][1][-1]:
+                done = AcceptReport(views + 1, len(changed | {group_id}), dict(refused))
+            why = _accept(store, item, plan.predictions.name, request, actor, done)
+            if why is None:
+                views += 1
+                changed.add(group_id)
+            else:
+                refused[why] += 1
+                done = None
+    return done or AcceptReport(views, len(changed), dict(refused))
+
+
+def accept_box(
+    store: Store,
+    view_id: int,
+    prediction_id: int,
+    *,
+    if_match: str,
+    actor: str,
+    replace: bool = False,
+) -> GroupState:
+    """Make one prediction the ball of its view, however sure it is.
+
+    Args:
+        store: The database.
+        view_id: The view.
+        prediction_id: One of the boxes that were predicted for it.
+        if_match: ETag of the group's state that the person saw.
+        actor: Who accepts it.
+        replace: Also where the view has another ball.
+
+    Returns:
+        The group as it is then, solved.
+
+    Raises:
+        NotFoundError: The view has no such prediction.
+        InputError: The prediction cannot be a ball in this image.
+        ConflictError: The view has a ball, and it is not to be replaced.
+        StaleRevisionError: Somebody else changed the group first.
+    """
+    with store.read() as session:
+        view = find_view(session, view_id)
+        if view is None:
+            raise NotFoundError(f"there is no view {view_id}")
+        box = read_box(session, prediction_id)
+        if box is None or box.view_id != view_id:
+            # Whoever saw an older state is told so first.
+            require_unchanged(session, view.group_id, if_match, f"group {view.group_id}")
+            raise NotFoundError(f"view {view_id} has no prediction {prediction_id}")
+        if problem := _problem(box, view):
+            require_unchanged(session, view.group_id, if_match, f"group {view.group_id}")
+            raise InputError(f"the prediction {problem}")
+        name = read_set(session, box.set_id).name
+    edit = SetBall(view.key, accepted_ball(box, name))
+    if not replace:
+        _require_free(load(store, view.group_id), edit, if_match)
+    return submit(store, view.group_id, edit, if_match=if_match, actor=actor)
+
+
+def _require_free(state: GroupState, edit: SetBall, if_match: str) -> None:
+    """Refuse where the person saw a ball; of a state that they did not see ``submit`` judges."""
+    balls = need_view(state.group, edit.view).balls
+    if not balls or balls == (edit.ball,) or said_of(state.etag) != said_of(if_match):
+        return
+    raise ConflictError(
+        f"view {edit.view} has a ball already",
+        hint="Delete that ball first, or ask for replace=true.",
+    )
+
+
+def accepted_ball(box: PredictedBox, name: str) -> BallAnnotation:
+    """The annotation that a prediction becomes."""
+    place = Box(box.x, box.y, box.width, box.height)
+    return BallAnnotation(box=place, predicted_by=name)
+
+
+def _views(session: Session, dataset_id: int, request: AcceptRequest) -> list[StoredView]:
+    conditions = () if request.query is None else parse_query(request.query).conditions
+    return dataset_views(session, dataset_id, conditions, ids=request.views)
+
+
+def _judge(
+    row: StoredView, boxes: Sequence[PredictedBox], name: str, request: AcceptRequest
+) -> Accepted:
+    best = max(boxes, key=lambda box: (box.score, -box.id))
+    balls = row.balls
+    why = None
+    if best.score < request.min_score:
+        why = "below_score"
+    elif _problem(best, row) is not None:
+        why = "not_a_ball"
+    elif balls == [accepted_ball(best, name)]:
+        why = "the_same"
+    elif balls and not request.replace:
+        why = "annotated"
+    return Accepted(row.id, row.key, row.group_id, row.group, best, why)
+
+
+def _problem(box: PredictedBox, view: StoredView) -> str | None:
+    """Why a box cannot be a ball in its view."""
+    place = Box(box.x, box.y, box.width, box.height)
+    return box_problem(place, ImageSize(view.width, view.height))
+
+
+def _by_group(items: Sequence[Accepted]) -> Iterator[tuple[int, list[Accepted]]]:
+    groups: dict[int, list[Accepted]] = {}
+    for item in items:
+        groups.setdefault(item.group_id, []).append(item)
+    yield from groups.items()
+
+
+def _accept(
+    store: Store,
+    item: Accepted,
+    name: str,
+    request: AcceptRequest,
+    actor: str,
+    report: AcceptReport | None,
+) -> str | None:
+    """Submit one edit; why not, where the view is no longer as planned or the edit impossible.
+
+    The request is answered with the report, which only the last edit has.
+    """
+
+    def then(session: Session, _state: GroupState) -> None:
+        if report is not None:
+            session.respond(report)
+
+    edit = SetBall(item.view, accepted_ball(item.box, name))
+    for _ in range(TRIES):
+        try:
+            state = load(store, item.group_id)
+        except NotFoundError:
+            break
+        if not _still_fits(state, item, request):
+            break
+        try:
+            submit(store, item.group_id, edit, if_match=state.etag, actor=actor, then=then)
+        except StaleRevisionError:
+            continue
+        except InputError:
+            return "not_a_ball"
+        return None
+    return "changed_meanwhile"
+
+
+def _still_fits(state: GroupState, item: Accepted, request: AcceptRequest) -> bool:
+    view: View | None = state.group.view(item.view)
+    return view is not None and (request.replace or not view.balls)

@@ -1,0 +1,253 @@
+"""The command that measures predictions: evaluate."""
+
+from __future__ import annotations
+
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from app.features.predictions.commands import print_set
+from app.progress import TellProgress
+from app.soccer.choices import AnyPredictionFormat, BoxKind, LiveRule
+from app.soccer.frames import ImageSize
+from app.terminal.opened import opened_store
+from app.terminal.options import Dataset, Json, acting, parse_size
+from app.terminal.server import ServerPlace, connected, given_server
+from app.terminal.terminal import print_json, say, show_progress
+
+if TYPE_CHECKING:
+    from app.evaluation.table import Cell, Table
+    from app.features.predictions.sources import SourcesRequest
+
+commands = typer.Typer()
+
+
+BALLS, CAMERAS = "Predicted balls", "Predicted cameras"
+CAREFUL, TRUTH, RESULT = "Reference boxes", "The truth", "The result"
+
+
+def _size(panel: str, text: str, *names: str) -> Any:
+    """An option that is the size of images."""
+    return typer.Option(*names, parser=parse_size, metavar="WxH", rich_help_panel=panel, help=text)
+
+
+Predictions = Annotated[
+    str | None, typer.Argument(help="File, folder or zip of ball boxes, or the name of a set.")
+]
+Format = Annotated[
+    AnyPredictionFormat,
+    typer.Option("--format", rich_help_panel=BALLS, help="auto goes by the files' endings."),
+]
+Images = Annotated[
+    Path | None,
+    typer.Option(
+        exists=True,
+        rich_help_panel=BALLS,
+        help="COCO: the document that image numbers refer to.",
+    ),
+]
+Category = Annotated[
+    int | None,
+    typer.Option(
+        min=0, rich_help_panel=BALLS, help="The class that is the ball, where there are several."
+    ),
+]
+PixelSize = Annotated[
+    ImageSize | None,
+    _size(BALLS, "Size of the images that boxes in pixels refer to.", "--size"),
+]
+MinScore = Annotated[
+    float,
+    typer.Option(
+        min=0,
+        max=1,
+        rich_help_panel=BALLS,
+        help="Detections with a lower score take no part in localisation.",
+    ),
+]
+Cameras = Annotated[
+    Path | None,
+    typer.Option(
+        exists=True, rich_help_panel=CAMERAS, help="Folder or zip of SoccerNet camera JSON."
+    ),
+]
+CamerasSize = Annotated[
+    ImageSize | None,
+    _size(CAMERAS, "Size of the images of these cameras."),
+]
+Careful = Annotated[
+    str | None,
+    typer.Option(
+        rich_help_panel=CAREFUL,
+        help="Reference boxes, one a frame, which the dataset's are measured with: a file, folder or "
+        "zip, or the name of a set. Only the --careful options apply to them.",
+    ),
+]
+CarefulFormat = Annotated[
+    AnyPredictionFormat,
+    typer.Option(rich_help_panel=CAREFUL, help="As --format, of the reference boxes."),
+]
+CarefulSize = Annotated[
+    ImageSize | None,
+    _size(CAREFUL, "As --size, of the reference boxes."),
+]
+CarefulCategory = Annotated[
+    int | None,
+    typer.Option(min=0, rich_help_panel=CAREFUL, help="As --category, of the reference boxes."),
+]
+Version = Annotated[
+    str | None,
+    typer.Option(
+        rich_help_panel=TRUTH,
+        help="Name, id or hash of a frozen version; default: the dataset as it is now.",
+    ),
+]
+Groups = Annotated[
+    LiveRule,
+    typer.Option(rich_help_panel=TRUTH, help="Without a version: which groups take part."),
+]
+SplitName = Annotated[
+    str | None, typer.Option("--split", rich_help_panel=TRUTH, help="Frames of this split alone.")
+]
+Boxes = Annotated[
+    BoxKind, typer.Option(rich_help_panel=TRUTH, help="Which box of the dataset is the truth.")
+]
+Name = Annotated[str, typer.Option(rich_help_panel=RESULT, help="Name of the evaluation.")]
+Out = Annotated[
+    Path | None,
+    typer.Option(rich_help_panel=RESULT, help="Folder for tables and figures (CSV, JSON, PNG)."),
+]
+
+
+@commands.command()
+def evaluate(
+    dataset: Dataset,
+    predictions: Predictions = None,
+    format_: Format = "auto",
+    images: Images = None,
+    category: Category = None,
+    size: PixelSize = None,
+    min_score: MinScore = 0.0,
+    cameras: Cameras = None,
+    cameras_size: CamerasSize = None,
+    careful: Careful = None,
+    careful_format: CarefulFormat = "auto",
+    careful_size: CarefulSize = None,
+    careful_category: CarefulCategory = None,
+    version: Version = None,
+    groups: Groups = "passing",
+    split: SplitName = None,
+    boxes: Boxes = "optimized",
+    name: Name = "",
+    out: Out = None,
+    json_: Json = False,
+) -> None:
+    """Measure predictions against a dataset: AP, MAE, P_2m, boxes, cameras, sensitivity.
+
+    What was read is kept in the dataset as predictions, and the result as an evaluation.
+    """
+    if predictions is None and careful is None and cameras is None:
+        raise typer.BadParameter("name predictions, --cameras or --careful")
+    from app.features.predictions.evaluation_run import EvaluationRequest
+    from app.features.predictions.sources import PredictionSource, SourcesRequest
+
+    request = SourcesRequest(
+        EvaluationRequest(name=name, groups=groups, split=split, boxes=boxes, min_score=min_score),
+        PredictionSource(predictions, format_, images, category, size, cameras, cameras_size),
+        PredictionSource(careful, careful_format, None, careful_category, careful_size),
+        version,
+    )
+    request.check()
+    server = given_server()
+    run = _evaluate if server is None else partial(_evaluate_at, server)
+    with show_progress("Evaluating") as progress:
+        values, sets = run(dataset, request, out, progress)
+    if json_:
+        print_json({**values, "sets": [_set_values(item) for item in sets]})
+        return
+    for item in sets:
+        print_set(item)
+    _print_evaluation(values)
+
+
+_Values = dict[str, Any]
+
+
+def _evaluate(
+    dataset: str, request: SourcesRequest, out: Path | None, progress: TellProgress
+) -> tuple[_Values, list[_Values]]:
+    """The evaluation and the sets that were made or found for it, as plain values."""
+    from app.features.predictions.folder import evaluation_values, write_evaluation
+    from app.features.predictions.sources import evaluate_sources
+
+    with opened_store() as store:
+        done = evaluate_sources(store, dataset, request, actor=acting(), progress=progress)
+        if out is not None:
+            write_evaluation(store, done.evaluation, out)
+    return evaluation_values(done.evaluation), [vars(item) for item in done.sets]
+
+
+def _evaluate_at(
+    server: ServerPlace,
+    dataset: str,
+    request: SourcesRequest,
+    out: Path | None,
+    progress: TellProgress,
+) -> tuple[_Values, list[_Values]]:
+    """As ``_evaluate``, by a server."""
+    from app.terminal import remote_files
+
+    with connected(server) as client:
+        values, sets = remote_files.evaluate(client, dataset, request, progress)
+        if out is not None:
+            remote_files.write_evaluation(client, values, out)
+    return values, sets
+
+
+def _print_evaluation(values: _Values) -> None:
+    from app.features.predictions.evaluation import read_tables
+
+    for table in read_tables(values["tables"]):
+        say("")
+        _print_table(table)
+    pins = values["pins"]
+    version = pins["version_name"] or f"the dataset as it is ({pins['state'][:12]})"
+    say("")
+    say(
+        f"evaluation {values['id']}: {version}, policy {pins['policy_hash']}, "
+        f"solver {pins['solver_version']}, software {pins['software_version']}"
+    )
+
+
+def _print_table(table: Table) -> None:
+    """A table with its denominators; intervals of 95 % stand in brackets."""
+    say(f"{table.title}. {table.note}")
+    heads = [f"{item.label} [{item.unit}]" if item.unit else item.label for item in table.columns]
+    lines = [["", *heads]]
+    lines += [[row.label, *map(_number, row.cells)] for row in table.rows]
+    widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
+    for line in lines:
+        cells = (text.ljust(width) for text, width in zip(line, widths, strict=True))
+        say("  " + "  ".join(cells).rstrip())
+
+
+def _number(cell: Cell) -> str:
+    counts = f"{cell.count}" if cell.count == cell.of else f"{cell.count} of {cell.of}"
+    if cell.value is None:
+        return f"- (n {counts})"
+    spread = "" if cell.low is None else f" [{cell.low:.3g}, {cell.high:.3g}]"
+    return f"{cell.value:.3g}{spread} (n {counts})"
+
+
+def _set_values(found: _Values) -> _Values:
+    """What is printed of a set, with what could not be read of it."""
+    return {
+        "id": found["id"],
+        "name": found["name"],
+        "unknown": found["unknown"],
+        # Only what a detector of ours found has one.
+        "model": None,
+        **found["report"],
+    }

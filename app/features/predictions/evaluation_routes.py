@@ -1,0 +1,222 @@
+"""Evaluations: started, listed, read with their figures and frames, compared."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from typing import Annotated, Literal
+
+from fastapi import APIRouter, Query, Response
+from pydantic import BaseModel
+
+from app.errors import NotFoundError
+from app.evaluation.comparison import FIELDS
+from app.evaluation.figure import FIGURES, figure_csv, table_csv
+from app.evaluation.figure_png import figure_png
+from app.evaluation.result import NUMBERS
+from app.evaluation.table import TABLES
+from app.features.jobs.queries import Job
+from app.features.predictions import evaluation as review
+from app.features.predictions.evaluation_schemas import (
+    ComparisonDocument,
+    EvaluationBody,
+    EvaluationDocument,
+    EvaluationList,
+    FigureDocument,
+    FrameList,
+    TableDocument,
+)
+from app.features.predictions.jobs import request_evaluation
+from app.features.versions.service import version_called
+from app.finite import MAX_ID
+from app.http.cursor import paged, parse_cursor
+from app.http.deps import Actor, AppServices, AppStore, DatasetPath, Id
+from app.http.job_responses import by_job, job_answer
+from app.http.problem import Responses, responses
+from app.http.respond import no_content, responds
+
+router = APIRouter(tags=["evaluations"])
+
+FigureName = StrEnum("FigureName", list(FIGURES))  # type: ignore[misc]
+TableName = StrEnum("TableName", list(TABLES))  # type: ignore[misc]
+FrameField = StrEnum("FrameField", list(NUMBERS))  # type: ignore[misc]
+CompareField = StrEnum("CompareField", list(FIELDS))  # type: ignore[misc]
+SortField = StrEnum("SortField", [*NUMBERS, *(f"{name}-desc" for name in NUMBERS)])  # type: ignore[misc]
+PLACE_ERROR = CompareField("error_m")
+Limit = Annotated[int, Query(ge=1, le=review.MAX_PAGE)]
+Cursor = Annotated[str | None, Query(max_length=20, description="`next` of the page before.")]
+Bound = Annotated[float | None, Query(ge=-1e9, le=1e9, allow_inf_nan=False)]
+JSON_FILE, CSV_FILE, PNG_FILE = "application/json", "text/csv", "image/png"
+
+
+def _files(description: str, document: type[BaseModel], *others: str) -> Responses:
+    """What a route answers that gives a document as JSON, and as files of other types."""
+    content: dict[str, object] = {}
+    for kind in others:
+        text = {"type": "string"}
+        content[kind] = {"schema": text if kind == CSV_FILE else {**text, "format": "binary"}}
+    return {200: {"description": description, "model": document, "content": content}}
+
+
+FIGURE_FILES = _files(
+    "The figure: its values as JSON or CSV, or drawn as PNG.", FigureDocument, CSV_FILE, PNG_FILE
+)
+TABLE_FILES = _files(
+    "The table: as JSON, or as CSV with intervals and denominators.", TableDocument, CSV_FILE
+)
+
+
+@router.get(
+    "/datasets/{dataset}/evaluations", operation_id="listEvaluations", responses=responses(404)
+)
+@paged()
+def list_evaluations(dataset: DatasetPath, store: AppStore) -> EvaluationList:
+    """The evaluations of a dataset, the newest first."""
+    found = review.list_evaluations(store, dataset)
+    return EvaluationList(items=found)
+
+
+@router.post(
+    "/datasets/{dataset}/evaluations",
+    operation_id="startEvaluation",
+    **by_job(404, 409, 413, 415),
+)
+@responds(job_answer)
+def start_evaluation(
+    dataset: DatasetPath, request: EvaluationBody, services: AppServices, actor: Actor
+) -> Job:
+    """Evaluate predictions against a frozen version, or the dataset as it is now.
+
+    The job's result names the evaluation.
+    """
+    store, named = services.store, request.version
+    version = None if named is None else version_called(store, str(named), dataset)
+    wanted = request.value(version)
+    return request_evaluation(services.jobs, store, dataset, wanted, actor=actor)
+
+
+@router.get(
+    "/evaluations/{evaluation}",
+    operation_id="getEvaluation",
+    response_model=EvaluationDocument,
+    responses=responses(404),
+)
+def get_evaluation(evaluation: Id, store: AppStore) -> review.StoredEvaluation:
+    """One evaluation: what it pins, its tables, and the names of its figures."""
+    return review.get_evaluation(store, evaluation)
+
+
+@router.delete(
+    "/evaluations/{evaluation}",
+    operation_id="deleteEvaluation",
+    status_code=204,
+    responses=responses(404),
+)
+@responds(no_content)
+def delete_evaluation(evaluation: Id, store: AppStore, actor: Actor) -> None:
+    """Delete an evaluation; its predictions stay."""
+    review.remove_evaluation(store, evaluation, actor=actor)
+
+
+@router.get(
+    "/evaluations/{evaluation}/figures/{figure}.{ending}",
+    operation_id="getFigure",
+    response_class=Response,
+    responses={**responses(404), **FIGURE_FILES},
+)
+def get_figure(
+    evaluation: Id,
+    figure: FigureName,
+    ending: Literal["json", "csv", "png"],
+    store: AppStore,
+) -> Response:
+    """One figure of an evaluation; 404 where the evaluation has no such figure."""
+    found = review.get_figure(store, evaluation, str(figure))
+    name = f"touchline-{evaluation}-{figure}.{ending}"
+    if ending == "json":
+        return _json(FigureDocument.model_validate(found))
+    if ending == "csv":
+        return _csv(figure_csv(found), name)
+    shown = {"Content-Disposition": f'inline; filename="{name}"'}
+    return Response(figure_png(found), media_type=PNG_FILE, headers=shown)
+
+
+@router.get(
+    "/evaluations/{evaluation}/tables/{table}.{ending}",
+    operation_id="getTable",
+    response_class=Response,
+    responses={**responses(404), **TABLE_FILES},
+)
+def get_table(
+    evaluation: Id, table: TableName, ending: Literal["json", "csv"], store: AppStore
+) -> Response:
+    """One table of an evaluation; 404 where the evaluation has no such table."""
+    tables = {
+        item.name: item for item in review.tables_of(review.get_evaluation(store, evaluation))
+    }
+    found = tables.get(str(table))
+    if found is None:
+        raise NotFoundError(
+            f'evaluation {evaluation} has no table "{table}"', hint=f"It has {', '.join(tables)}."
+        )
+    if ending == "json":
+        return _json(TableDocument.model_validate(found))
+    return _csv(table_csv(found), f"touchline-{evaluation}-{table}.csv")
+
+
+@router.get(
+    "/evaluations/{evaluation}/frames",
+    operation_id="listEvaluationFrames",
+    response_model=FrameList,
+    responses=responses(404),
+)
+def list_frames(
+    evaluation: Id,
+    store: AppStore,
+    field: Annotated[
+        FrameField | None, Query(description="Frames with a value here, in [low, high).")
+    ] = None,
+    low: Bound = None,
+    high: Bound = None,
+    missing: Annotated[
+        bool, Query(description="Frames with a ball and without a value in `field` instead.")
+    ] = False,
+    match: Annotated[str | None, Query(max_length=500)] = None,
+    sort: Annotated[SortField | None, Query()] = None,
+    limit: Limit = 50,
+    cursor: Cursor = None,
+) -> review.FramePage:
+    """The frames behind a number: a row's `frames` are parameters of this address."""
+    query = review.FrameQuery(
+        None if field is None else str(field), low, high, missing, match, str(sort or "")
+    )
+    return review.list_frames(store, evaluation, query, limit, parse_cursor(cursor) or 0)
+
+
+@router.get(
+    "/evaluations/{evaluation}/compare",
+    operation_id="compareEvaluations",
+    responses=responses(404),
+)
+def compare_evaluations(
+    evaluation: Id,
+    store: AppStore,
+    other: Annotated[
+        int,
+        Query(alias="with", ge=1, le=MAX_ID, description="The evaluation to compare with."),
+    ],
+    field: Annotated[CompareField, Query(description="Compared frame by frame.")] = PLACE_ERROR,
+    limit: Limit = 50,
+    cursor: Cursor = None,
+) -> ComparisonDocument:
+    """How this evaluation differs from another of the same dataset; changes are this minus that."""
+    found = review.compare(store, other, evaluation, str(field))
+    return ComparisonDocument.of(found, limit, parse_cursor(cursor) or 0)
+
+
+def _json(document: BaseModel) -> Response:
+    return Response(document.model_dump_json(), media_type=JSON_FILE)
+
+
+def _csv(text: str, name: str) -> Response:
+    saved = {"Content-Disposition": f'attachment; filename="{name}"'}
+    return Response(text, media_type=f"{CSV_FILE}; charset=utf-8", headers=saved)

@@ -1,0 +1,335 @@
+"""An evaluation as it runs: over a pinned state of a dataset, with its reference boxes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+from app.db.json_columns import Json
+from app.db.session import Session, now
+from app.db.store import Store
+from app.errors import InputError, NotFoundError
+from app.evaluation.evaluate import Inputs, Options, evaluate
+from app.evaluation.frame import Detection, Frame
+from app.evaluation.result import Evaluation
+from app.evaluation.table import Table
+from app.features.datasets.service import DatasetHead, read_dataset_head
+from app.features.groups.view_queries import StoredView, dataset_views
+from app.features.predictions.evaluation import read_evaluation
+from app.features.predictions.evaluation_queries import StoredEvaluation, insert_evaluation
+from app.features.predictions.frames import (
+    LIVE_RULES,
+    Truth,
+    live_truth,
+    unknown_rule,
+    version_truth,
+)
+from app.features.predictions.queries import PredictionSet, read_boxes, read_predicted_cameras
+from app.features.predictions.service import read_set
+from app.features.solutions.codec import to_json
+from app.features.versions.service import Version, read_version
+from app.finite import quoted
+from app.progress import TellProgress
+from app.soccer.ball_boxes import BOX_KINDS
+from app.soccer.frames import Box
+
+LISTED = 5
+"""Frames that a refusal names; all are counted."""
+
+
+def careful_boxes(session: Session, careful: PredictionSet) -> dict[int, Box]:
+    """The reference box of each view, by its id.
+
+    Raises:
+        InputError: A frame has several; nobody can tell which one would be the truth.
+    """
+    found = read_boxes(session, careful.id)
+    several = {view for view, boxes in found.items() if len(boxes) > 1}
+    if several:
+        rows = dataset_views(session, careful.dataset_id)
+        names = [_frame_name(row) for row in rows if row.id in several]
+        more = f" and {len(names) - LISTED} more" if len(names) > LISTED else ""
+        raise InputError(
+            f'frames of the reference boxes "{careful.name}" have more than one box: '
+            f"{', '.join(names[:LISTED])}{more}",
+            hint="Keep the one box of each frame that is the ball.",
+            pointer="/careful",
+        )
+    return {view: Box(box.x, box.y, box.width, box.height) for view, (box,) in found.items()}
+
+
+def _frame_name(row: StoredView) -> str:
+    """A view as files of predictions call it."""
+    if row.shared:
+        return f"{row.key}/{row.group}"
+    return f"{row.match}/{row.key}" if row.match else f"{row.group}/{row.key}"
+
+
+WARNED = ("detection", "localization", "boxes")
+"""Tables whose numbers it flatters."""
+
+
+@dataclass(frozen=True)
+class AcceptedTruth:
+    """How many frames of a run have a ball that a person accepted from a prediction.
+
+    Attributes:
+        frames: From any set.
+        own: From the very set that is evaluated.
+        of: Frames with the box that is the truth.
+    """
+
+    frames: int
+    own: int
+    of: int
+
+    @staticmethod
+    def count(frames: Sequence[Frame], boxes: str, name: str | None) -> AcceptedTruth:
+        """Count over frames that have a box of that kind; ``name`` is that of the evaluated set."""
+        judged = [frame.predicted_by for frame in frames if boxes in frame.boxes]
+        return AcceptedTruth(
+            sum(map(bool, judged)),
+            sum(source == name for source in judged if source),
+            len(judged),
+        )
+
+    def warn(self, tables: Sequence[Table]) -> list[Table]:
+        """The tables, those that are flattered with a warning in their note."""
+        if not self.frames:
+            return list(tables)
+        own = f", {self.own} of them from the very set that is evaluated" if self.own else ""
+        warning = (
+            f"Warning: the ball of {self.frames} of {self.of} frames is an accepted "
+            f"prediction{own}; such a truth flatters what predicted it."
+        )
+        return [
+            replace(table, note=f"{table.note} {warning}".strip())
+            if table.name in WARNED
+            else table
+            for table in tables
+        ]
+
+
+MAX_NAME = 100
+_SET_PINS = ("id", "name", "digest", "source", "unknown")
+
+
+@dataclass(frozen=True)
+class EvaluationRequest:
+    """What to evaluate, and against which truth.
+
+    Attributes:
+        name: For people; empty: named after the predictions.
+        predictions: Set of ball boxes, cameras or both; None only where ``careful`` is given.
+        careful: Set whose boxes are careful ones, which the dataset's boxes are measured with.
+        version: Frozen version; None: the dataset as it is now.
+        groups: Without a version: ``passing``, ``accepted`` or ``all``.
+        split: Frames of this split alone; None: all.
+        boxes: Which box of the dataset is the truth, one of ``ball_boxes.BOX_KINDS``.
+        min_score: Detections below take no part in localisation.
+    """
+
+    name: str = ""
+    predictions: int | None = None
+    careful: int | None = None
+    version: int | None = None
+    groups: str = "passing"
+    split: str | None = None
+    boxes: str = "optimized"
+    min_score: float = 0.0
+
+    def check(self) -> None:
+        """Raise InputError where it says something impossible."""
+        if self.predictions is None and self.careful is None:
+            raise InputError("there is nothing to evaluate", pointer="/predictions")
+        if self.boxes not in BOX_KINDS:
+            raise InputError(
+                f"boxes must be one of {', '.join(BOX_KINDS)}, not {quoted(self.boxes)}",
+                pointer="/boxes",
+            )
+        if not 0 <= self.min_score <= 1:
+            raise InputError(
+                f"a score lies between 0 and 1, and min_score is {self.min_score:g}",
+                pointer="/min_score",
+            )
+        if len(self.name) > MAX_NAME:
+            raise InputError(f"a name has at most {MAX_NAME} characters", pointer="/name")
+        check_groups(self.groups, self.version)
+
+
+def check_groups(groups: str, version: int | str | None) -> None:
+    """Refuse a rule for groups beside a version, which has its own groups.
+
+    Raises:
+        InputError: There are both.
+    """
+    if version is not None and groups != EvaluationRequest.groups:
+        raise InputError(
+            f"a version has its own groups, so that groups {quoted(groups)} is not used",
+            hint="Leave the groups or the version out.",
+            pointer="/groups",
+        )
+
+
+def run_evaluation(
+    store: Store,
+    dataset: str | int,
+    request: EvaluationRequest,
+    *,
+    actor: str,
+    progress: TellProgress | None = None,
+) -> StoredEvaluation:
+    """Evaluate and keep the result; what it pins makes it repeatable.
+
+    Raises:
+        NotFoundError: There is no such dataset, set or version.
+        InputError: The request says something impossible, or no frame takes part.
+        ConflictError: Groups that might take part have no solution.
+    """
+    request.check()
+    with store.read() as session:
+        found = read_dataset_head(session, dataset)
+        if progress is not None:
+            progress(0, None, "Reading frames.")
+        truth = _truth(session, found, request)
+        sets = {
+            name: _own_set(session, found, identity, name)
+            for name in ("predictions", "careful")
+            if (identity := getattr(request, name)) is not None
+        }
+        inputs = _inputs(session, sets)
+    if not truth.frames:
+        raise _no_frames(found, request)
+    _require_common_frames(truth, inputs, sets)
+    options = Options(
+        boxes=request.boxes,
+        min_score=request.min_score,
+        ball_diameter_m=truth.policy.ball_diameter_m,
+        min_jac=truth.policy.min_jac,
+    )
+    result = evaluate(truth.frames, inputs, options, progress)
+    own = sets["predictions"].name if "predictions" in sets else None
+    accepted = AcceptedTruth.count(truth.frames, request.boxes, own)
+    values = {
+        "dataset_id": found.id,
+        "name": request.name or " and ".join(item.name for item in sets.values()),
+        "created": now(),
+        "actor": actor,
+        "prediction_set_id": request.predictions,
+        "careful_set_id": request.careful,
+        "version_id": request.version,
+        "pins": {**truth.pins, **_pins(request, options, sets)},
+        "counts": {
+            **result.counts,
+            "gone": truth.gone,
+            "accepted_predictions": accepted.frames,
+            **_set_counts(sets),
+        },
+        "tables": [to_json(table) for table in accepted.warn(result.tables)],
+    }
+    return _save(store, values, result)
+
+
+def check_evaluation(store: Store, dataset: str | int, request: EvaluationRequest) -> None:
+    """Refuse at once what ``run_evaluation`` would refuse for its sets or its version."""
+    request.check()
+    with store.read() as session:
+        found = read_dataset_head(session, dataset)
+        for name in ("predictions", "careful"):
+            if (identity := getattr(request, name)) is not None:
+                own = _own_set(session, found, identity, name)
+                if name == "careful":
+                    careful_boxes(session, own)
+        if request.version is not None:
+            _own_version(session, found, request.version)
+        elif request.groups not in LIVE_RULES:
+            raise unknown_rule(request.groups)
+
+
+def _truth(session: Session, dataset: DatasetHead, request: EvaluationRequest) -> Truth:
+    if request.version is None:
+        return live_truth(session, dataset, request.groups, request.split)
+    version = _own_version(session, dataset, request.version)
+    return version_truth(session, version, request.split)
+
+
+def _own_version(session: Session, dataset: DatasetHead, version_id: int) -> Version:
+    version = read_version(session, version_id)
+    if version.dataset_id != dataset.id:
+        raise NotFoundError(f"dataset {dataset.name} has no version {version_id}")
+    return version
+
+
+def _own_set(session: Session, dataset: DatasetHead, set_id: int, pointer: str) -> PredictionSet:
+    found = read_set(session, set_id)
+    if found.dataset_id != dataset.id:
+        raise InputError(
+            f'predictions "{found.name}" belong to another dataset', pointer=f"/{pointer}"
+        )
+    return found
+
+
+def _inputs(session: Session, sets: Mapping[str, PredictionSet]) -> Inputs:
+    predictions, careful = sets.get("predictions"), sets.get("careful")
+    detections = cameras = boxes = None
+    if predictions is not None:
+        if predictions.boxes or not predictions.cameras:
+            detections = {
+                view: [Detection(Box(b.x, b.y, b.width, b.height), b.score) for b in found]
+                for view, found in read_boxes(session, predictions.id).items()
+            }
+        if predictions.cameras:
+            cameras = read_predicted_cameras(session, predictions.id)
+    if careful is not None:
+        boxes = careful_boxes(session, careful)
+    return Inputs(detections, boxes, cameras)
+
+
+def _pins(
+    request: EvaluationRequest, options: Options, sets: Mapping[str, PredictionSet]
+) -> dict[str, Json]:
+    """What was asked for, beside what the truth pins."""
+    return {
+        "split": request.split,
+        "boxes": options.boxes,
+        "min_score": options.min_score,
+        "resamples": options.resamples,
+        "seed": options.seed,
+        **{name: {part: getattr(item, part) for part in _SET_PINS} for name, item in sets.items()},
+    }
+
+
+def _set_counts(sets: Mapping[str, PredictionSet]) -> dict[str, int]:
+    return {f"unknown_{name}_frames": item.unknown for name, item in sets.items()}
+
+
+def _no_frames(dataset: DatasetHead, request: EvaluationRequest) -> InputError:
+    of = f' in the split "{request.split}"' if request.split else ""
+    hint = "Groups take part when the policy passes them and nobody rejected them."
+    if request.groups == "accepted":
+        hint = "Nobody has accepted a group; evaluate the passing ones, or accept some."
+    return InputError(f'no group of "{dataset.name}" takes part{of}', hint=hint)
+
+
+def _require_common_frames(truth: Truth, inputs: Inputs, sets: Mapping[str, PredictionSet]) -> None:
+    """Refuse predictions of which none belongs to a frame that takes part: AP 0 would be false."""
+    frames = {frame.id for frame in truth.frames}
+    for name, predicted in (
+        ("predictions", {*(inputs.detections or {}), *(inputs.cameras or {})}),
+        ("careful", set(inputs.careful or {})),
+    ):
+        if predicted and not predicted & frames:
+            raise InputError(
+                f'none of the {len(predicted)} frames of "{sets[name].name}" is among the {len(frames)} '
+                "frames that take part",
+                hint="Name the split or the version that the predictions were made for.",
+                pointer=f"/{name}",
+            )
+
+
+def _save(store: Store, values: Mapping[str, Any], result: Evaluation) -> StoredEvaluation:
+    figures = {figure.name: to_json(figure) for figure in result.figures}
+    with store.write() as session:
+        identity = insert_evaluation(session, values, figures, result.frames)
+        return read_evaluation(session, identity)

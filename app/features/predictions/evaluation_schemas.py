@@ -1,0 +1,260 @@
+"""Evaluations: what to evaluate, and the tables, figures and frames that come of it."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
+
+from app.evaluation.comparison import Difference
+from app.evaluation.figure import Axis, Mark
+from app.evaluation.result import FrameResult
+from app.evaluation.table import Cell, Column, FrameRange, Row
+from app.features.predictions.evaluation import RunComparison, read_tables
+from app.features.predictions.evaluation_run import MAX_NAME, EvaluationRequest
+from app.features.versions.schemas import VersionId
+from app.finite import MAX_ID
+from app.http.documents import Document, ListDocument
+from app.soccer.choices import BoxKind, LiveRule
+
+SetId = Annotated[int, Field(strict=True, ge=1, le=MAX_ID)]
+
+
+class EvaluationBody(BaseModel):
+    """What to evaluate, and against what."""
+
+    model_config = ConfigDict(
+        extra="forbid",
+        json_schema_extra={"examples": [{"predictions": 3, "version": 1, "split": "test"}]},
+    )
+
+    name: Annotated[str, Field(max_length=MAX_NAME)] = ""
+    predictions: SetId | None = Field(default=None, description="Boxes, cameras or both.")
+    careful: SetId | None = Field(
+        default=None, description="Reference boxes, for the table of boxes (the paper's table 1)."
+    )
+    version: VersionId | None = Field(
+        default=None,
+        description="Id, name or hash of a frozen version; null: the dataset as it is now.",
+    )
+    groups: LiveRule = Field(
+        default="passing", description="Without a version: which groups take part."
+    )
+    split: Annotated[str, Field(max_length=50)] | None = Field(
+        default=None, description="Frames of this split alone."
+    )
+    boxes: BoxKind = Field(
+        default="optimized", description="Which box of the dataset is the truth."
+    )
+    min_score: Annotated[float, Field(ge=0, le=1)] = Field(
+        default=0.0, description="Detections with a lower score take no part in localisation."
+    )
+
+    @model_validator(mode="after")
+    def _something(self) -> EvaluationBody:
+        if self.predictions is None and self.careful is None:
+            raise ValueError("give predictions, reference boxes, or both")
+        return self
+
+    def value(self, version: int | None) -> EvaluationRequest:
+        """The request as the review floor takes it; ``version`` is the id of the one it names."""
+        return EvaluationRequest(**{**self.model_dump(), "version": version})
+
+
+class CellDocument(Document, shows=Cell):
+    """One number with its 95 % interval, computed from `count` of `of` items."""
+
+
+class ColumnDocument(Document, shows=Column):
+    """What a column holds; `better` is `higher`, `lower` or empty."""
+
+
+class FramesLink(Document, shows=FrameRange):
+    """The frames behind a number, as parameters of `/evaluations/{id}/frames`."""
+
+
+class RowDocument(Document, shows=Row):
+    """One line of a table, its cells in the order of the columns."""
+
+    cells: list[CellDocument]
+    frames: FramesLink | None
+
+
+class TableDocument(Document):
+    """A table; `note` says over what it was computed."""
+
+    name: str
+    title: str
+    note: str
+    columns: list[ColumnDocument]
+    rows: list[RowDocument]
+
+
+_HEADLINE = (
+    ("detection", "all", "ap_50"),
+    ("localization", "oracle", "mae_m"),
+    ("localization", "oracle", "mae_percent"),
+    ("localization", "oracle", "p_2m"),
+)
+
+
+def _headline(tables: list[Any]) -> dict[str, Cell | None]:
+    found = {table.name: table for table in read_tables(tables)}
+    return {
+        column: found[name].cell(row, column) for name, row, column in _HEADLINE if name in found
+    }
+
+
+class EvaluationRow(Document):
+    """A run in a list, with its headline numbers."""
+
+    id: int
+    name: str
+    dataset: str
+    created: datetime
+    actor: str
+    predictions: int | None = Field(validation_alias="prediction_set_id")
+    careful: int | None = Field(validation_alias="careful_set_id")
+    version: int | None = Field(validation_alias="version_id")
+    counts: dict[str, int]
+    headline: Annotated[dict[str, CellDocument], BeforeValidator(_headline)] = Field(
+        validation_alias="tables",
+        description="ap_50, mae_m, mae_percent and p_2m, those that the run has.",
+    )
+
+
+class EvaluationList(ListDocument[EvaluationRow]):
+    """The runs of a dataset, the newest first."""
+
+
+class EvaluationDocument(EvaluationRow):
+    """A run, complete but for its figures and frames."""
+
+    pins: dict[str, Any] = Field(
+        description="What makes it repeatable: version or digest of the state, policy, solver and "
+        "software version, digests of the predictions, seed."
+    )
+    tables: list[TableDocument]
+    figures: list[str] = Field(description="Names for `/evaluations/{id}/figures/{name}.json`.")
+
+
+class AxisDocument(Document, shows=Axis):
+    """What an axis shows; `low` and `high` fix its ends where they are not null."""
+
+
+class SeriesDocument(Document):
+    """One curve, or one set of points; `low`, `high` and `count` are empty where there are none."""
+
+    name: str
+    label: str
+    kind: Literal["line", "dashed", "points"]
+    x: list[float]
+    y: list[float]
+    low: list[float]
+    high: list[float]
+    count: list[int]
+    color: float | None = Field(description="What the colour stands for, see the panel's `color`.")
+    group_id: int | None
+    frames: list[FramesLink] = Field(
+        default=[], description="The frames behind each place; empty where they are not kept."
+    )
+
+
+class MarkDocument(Document, shows=Mark):
+    """A dashed line across a panel."""
+
+    axis: Literal["x", "y"]
+
+
+class PanelDocument(Document):
+    """One pair of axes with its curves."""
+
+    title: str
+    x: AxisDocument
+    y: AxisDocument
+    series: list[SeriesDocument]
+    marks: list[MarkDocument]
+    color: AxisDocument | None
+
+
+class FigureDocument(Document):
+    """A figure: panels side by side."""
+
+    name: str
+    title: str
+    note: str
+    panels: list[PanelDocument]
+
+
+class FrameDocument(Document, shows=FrameResult):
+    """One judged frame; null where a number does not exist."""
+
+    frame_id: int = Field(description="Id of the view, below 0 where it is gone.")
+    ball: bool = Field(description="Whether the frame shows a ball.")
+
+
+class FrameList(ListDocument[FrameDocument]):
+    """Frames behind a number; `next` is the cursor of the page after this one."""
+
+    next: Annotated[str, Field(coerce_numbers_to_str=True)] | None
+    total: int
+
+
+class DifferenceDocument(Document, shows=Difference):
+    """One number of both runs; `change` is the second minus the first."""
+
+    first: CellDocument | None
+    second: CellDocument | None
+    change: float | None
+
+
+class FrameDifferenceDocument(Document):
+    """One frame of both runs."""
+
+    first: FrameDocument
+    second: FrameDocument
+    change: float | None
+
+
+class ComparisonDocument(Document):
+    """Two runs of one dataset, number by number and frame by frame."""
+
+    first: EvaluationRow
+    second: EvaluationRow
+    same_truth: bool = Field(
+        description="Same frames, policy, solver, options and reference boxes: the numbers can be "
+        "compared."
+    )
+    differs: list[str] = Field(
+        description="Pins in which the runs differ: those of `same_truth`, and `software_version`."
+    )
+    numbers: list[DifferenceDocument]
+    field: str
+    shared: int = Field(description="Frames that both runs judged.")
+    better: int
+    worse: int
+    gained: int = Field(description="Frames that only the second run has a value for.")
+    lost: int
+    mean_change: float | None
+    frames: list[FrameDifferenceDocument] = Field(
+        description="Frames that differ: gained and lost ones, then the largest change first."
+    )
+    next: str | None
+    total: int
+
+    @staticmethod
+    def of(found: RunComparison, limit: int, offset: int) -> ComparisonDocument:
+        """The document of a comparison, with one page of its frames."""
+        frames = found.frames.frames
+        shown = frames[offset : offset + limit]
+        more = offset + len(shown) < len(frames)
+        return ComparisonDocument.model_validate(
+            {
+                **vars(found),
+                **vars(found.frames),
+                "frames": shown,
+                "next": str(offset + len(shown)) if more else None,
+                "total": len(frames),
+            }
+        )

@@ -1,0 +1,165 @@
+"""The jobs that evaluate predictions and accept them; a server that starts again takes them up."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import Any
+
+from app.db.json_columns import Json
+from app.db.store import Store
+from app.features.datasets.service import get_dataset_head
+from app.features.jobs.queries import Job
+from app.features.jobs.run import JobProgress, Work, run_job_in_worker
+from app.features.jobs.service import Jobs
+from app.features.predictions.accept import AcceptReport, AcceptRequest, accept, plan_accept
+from app.features.predictions.evaluation import list_evaluations
+from app.features.predictions.evaluation_queries import StoredEvaluation
+from app.features.predictions.evaluation_run import (
+    EvaluationRequest,
+    check_evaluation,
+    run_evaluation,
+)
+from app.progress import TellProgress
+
+EVALUATE, ACCEPT = "evaluate", "bulk"
+
+
+def request_evaluation(
+    jobs: Jobs, store: Store, dataset: str, request: EvaluationRequest, *, actor: str
+) -> Job:
+    """Evaluate, soon; what can be refused is refused at once.
+
+    Raises:
+        InputError, NotFoundError: As ``run_evaluation`` does.
+    """
+    found = get_dataset_head(store, dataset)
+    check_evaluation(store, found.id, request)
+    return jobs.submit(
+        EVALUATE,
+        f"Evaluate {request.name or 'predictions'} on {found.name}",
+        evaluation_work(store, found.id, request, actor),
+        dataset_id=found.id,
+        actor=actor,
+        request=asdict(request),
+    )
+
+
+def request_accept(
+    jobs: Jobs, store: Store, dataset: str, request: AcceptRequest, *, actor: str
+) -> Job:
+    """Accept predictions, soon.
+
+    Raises:
+        InputError, NotFoundError: As ``plan_accept`` does.
+    """
+    found = get_dataset_head(store, dataset)
+    plan = plan_accept(store, found.id, request)
+    return jobs.submit(
+        ACCEPT,
+        f"Accept {len(plan.changes)} predictions of {plan.predictions.name}",
+        accept_work(store, found.id, request, actor),
+        dataset_id=found.id,
+        actor=actor,
+        request={"accept": asdict(request)},
+    )
+
+
+def resume_evaluations(jobs: Jobs, store: Store) -> None:
+    """Let evaluations that an earlier server was at go on, and another process accept predictions
+    than the one that was asked."""
+
+    def work_of(job: Job) -> Work:
+        request, dataset_id = EvaluationRequest(**job.request), job.dataset_id or 0
+
+        def work(progress: JobProgress) -> Json:
+            # The server may have stopped between the result and the record of its job.
+            done = _evaluated_since(store, dataset_id, request, job.created)
+            if done is not None:
+                return evaluation_result(done)
+            return evaluation_work(store, dataset_id, request, job.actor)(progress)
+
+        return work
+
+    def accepting(job: Job) -> Work:
+        values = dict(job.request["accept"])
+        views = None if values["views"] is None else tuple(values["views"])
+        request = AcceptRequest(**{**values, "views": views})
+        return accept_work(store, job.dataset_id or 0, request, job.actor)
+
+    jobs.resumes(EVALUATE, work_of)
+    jobs.makes(ACCEPT, accepting)
+
+
+def evaluation_work(store: Store, dataset_id: int, request: EvaluationRequest, actor: str) -> Work:
+    """The work of evaluating; its result names the evaluation."""
+
+    def work(progress: JobProgress) -> Json:
+        return run_job_in_worker(
+            store,
+            "evaluating",
+            "the evaluation",
+            _evaluate,
+            dataset_id,
+            request,
+            actor,
+            dataset_id=dataset_id,
+            progress=progress,
+        )
+
+    return work
+
+
+def accept_work(store: Store, dataset_id: int, request: AcceptRequest, actor: str) -> Work:
+    """The work of accepting; its result counts what changed."""
+
+    def work(progress: JobProgress) -> Json:
+        return run_job_in_worker(
+            store,
+            "accepting",
+            "the acceptance",
+            _accept,
+            dataset_id,
+            request,
+            actor,
+            dataset_id=dataset_id,
+            progress=progress,
+        )
+
+    return work
+
+
+def _evaluate(
+    store: Store, dataset_id: int, request: EvaluationRequest, actor: str, progress: TellProgress
+) -> Json:
+    return evaluation_result(
+        run_evaluation(store, dataset_id, request, actor=actor, progress=progress)
+    )
+
+
+def _accept(
+    store: Store, dataset_id: int, request: AcceptRequest, actor: str, progress: TellProgress
+) -> Json:
+    return accept_result(accept(store, dataset_id, request, actor=actor, progress=progress))
+
+
+def evaluation_result(found: StoredEvaluation) -> dict[str, Any]:
+    """What the job of an evaluation leaves."""
+    return {"evaluation": found.id, "name": found.name, "counts": found.counts}
+
+
+def accept_result(report: AcceptReport) -> dict[str, Any]:
+    """What the job of an acceptance leaves."""
+    return {"changed": report.views, "groups": report.groups, "refused": dict(report.refused)}
+
+
+def _evaluated_since(
+    store: Store, dataset_id: int, request: EvaluationRequest, since: str
+) -> StoredEvaluation | None:
+    asked = (request.predictions, request.careful, request.version, request.split, request.boxes)
+    for item in list_evaluations(store, dataset_id):
+        pins = item.pins
+        sets = (item.prediction_set_id, item.careful_set_id, item.version_id)
+        same = (*sets, pins.get("split"), pins.get("boxes")) == asked
+        if item.created >= since and same:
+            return item
+    return None

@@ -1,0 +1,199 @@
+"""Predictions in the database: sets, their boxes and their cameras."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from sqlalchemy import ColumnElement, delete, func, insert, select
+
+from app.canonical import canonical
+from app.db.json_columns import Json, as_written, parse
+from app.db.session import Session
+from app.features.datasets.tables import ViewModel
+from app.features.groups.codecs import camera_from_json, camera_to_json
+from app.features.groups.digest import digest
+from app.features.groups.insert_queries import next_id
+from app.features.people.alias_queries import columns_shown
+from app.features.predictions.tables import (
+    PredictedCameraModel,
+    PredictionModel,
+    PredictionSetModel,
+)
+from app.geometry.camera import Camera
+
+_BATCH = 5000
+
+
+@dataclass(frozen=True)
+class PredictionSet:
+    """What one file or one run of a detector predicted.
+
+    Attributes:
+        format: ``coco``, ``yolo``, ``csv``, or ``detect`` for a detector of ours.
+        source: Name of the file or of the model.
+        frames: Frames with a box; ``boxes`` and ``cameras`` count those that have their frame.
+        unknown: Frames that the dataset does not have.
+        report: JSON; what could not be read, and where it comes from.
+    """
+
+    id: int
+    dataset_id: int
+    name: str
+    format: str
+    source: str
+    created: str
+    actor: str
+    digest: str
+    frames: int
+    boxes: int
+    cameras: int
+    unknown: int
+    report: Json
+
+
+@dataclass(frozen=True)
+class PredictedBox:
+    """One predicted ball: pixels of the view's annotated size."""
+
+    id: int
+    set_id: int
+    view_id: int
+    x: float
+    y: float
+    width: float
+    height: float
+    score: float
+
+
+Boxes = Mapping[int, Sequence[tuple[float, float, float, float, float]]]
+"""x, y, width, height and score of each ball by id of the view, in the order of the file."""
+
+
+def predictions_digest(keys: Mapping[int, str], boxes: Boxes, cameras: Mapping[int, Camera]) -> str:
+    """Digest of what was predicted, the same on every machine.
+
+    Args:
+        keys: A name of each view that does not depend on the database.
+        boxes: By id of the view.
+        cameras: By id of the view.
+    """
+    said = sorted((keys[view], [list(map(float, box)) for box in boxes[view]]) for view in boxes)
+    seen = sorted((keys[view], camera_to_json(cameras[view])) for view in cameras)
+    return digest([[list(item) for item in said], [list(item) for item in seen]])
+
+
+def insert_prediction_set(
+    session: Session, values: Mapping[str, Any], boxes: Boxes, cameras: Mapping[int, Camera]
+) -> int:
+    """Insert a set with everything that belongs to it; returns its id.
+
+    Args:
+        session: A write session.
+        values: Columns of the set but its id, ``report`` as a JSON value.
+        boxes: By id of the view.
+        cameras: By id of the view.
+    """
+    identity = next_id(session, PredictionSetModel)
+    row = {**values, "id": identity, "report": canonical(values["report"])}
+    session.execute(insert(PredictionSetModel), [row])
+    names = ("x", "y", "width", "height", "score")
+    rows = [
+        {"set_id": identity, "view_id": view, **dict(zip(names, box, strict=True))}
+        for view, found in boxes.items()
+        for box in found
+    ]
+    for start in range(0, len(rows), _BATCH):
+        session.execute(insert(PredictionModel), rows[start : start + _BATCH])
+    seen = [
+        {"set_id": identity, "view_id": view, "camera": canonical(camera_to_json(camera))}
+        for view, camera in cameras.items()
+    ]
+    for start in range(0, len(seen), _BATCH):
+        session.execute(insert(PredictedCameraModel), seen[start : start + _BATCH])
+    return identity
+
+
+def delete_prediction_set(session: Session, set_id: int) -> None:
+    """Delete a set with everything that belongs to it; nothing where there is none."""
+    session.execute(delete(PredictionSetModel).where(PredictionSetModel.id == set_id))
+
+
+def dataset_prediction_sets(session: Session, dataset_id: int) -> list[PredictionSet]:
+    """The sets of a dataset, the newest first."""
+    return _sets(session, PredictionSetModel.dataset_id == dataset_id)
+
+
+def read_prediction_sets(session: Session, ids: Collection[int]) -> list[PredictionSet]:
+    """Sets by their ids, the newest first; those that are not there are left out."""
+    return _sets(session, PredictionSetModel.id.in_(ids)) if ids else []
+
+
+def has_prediction_set(session: Session, dataset_id: int, name: str) -> bool:
+    """Whether a dataset has a set of that name."""
+    statement = select(PredictionSetModel.id).where(
+        PredictionSetModel.dataset_id == dataset_id, PredictionSetModel.name == name
+    )
+    return session.scalar(statement) is not None
+
+
+def read_boxes(session: Session, set_id: int) -> dict[int, list[PredictedBox]]:
+    """Every box of a set, by id of the view, as they came."""
+    found: dict[int, list[PredictedBox]] = {}
+    for box in _boxes(session, PredictionModel.set_id == set_id):
+        found.setdefault(box.view_id, []).append(box)
+    return found
+
+
+def read_view_boxes(session: Session, view_id: int) -> list[PredictedBox]:
+    """Every box of a view over all sets, the newest set first, the surest box first."""
+    found = _boxes(session, PredictionModel.view_id == view_id)
+    return sorted(found, key=lambda box: (-box.set_id, -box.score, box.id))
+
+
+def read_group_boxes(session: Session, group_id: int) -> list[PredictedBox]:
+    """Every box of a group: by view, then as ``read_view_boxes``."""
+    views = select(ViewModel.id, ViewModel.position).where(ViewModel.group_id == group_id)
+    places = {row.id: row.position for row in session.execute(views)}
+    found = _boxes(session, PredictionModel.view_id.in_(places))
+    return sorted(found, key=lambda box: (places[box.view_id], -box.set_id, -box.score, box.id))
+
+
+def read_box(session: Session, prediction_id: int) -> PredictedBox | None:
+    """A box by its id."""
+    return next(iter(_boxes(session, PredictionModel.id == prediction_id)), None)
+
+
+def count_prediction_sets(session: Session, dataset_id: int) -> int:
+    """How many sets a dataset has."""
+    model = PredictionSetModel
+    statement = select(func.count()).select_from(model).where(model.dataset_id == dataset_id)
+    return session.scalar(statement) or 0
+
+
+def read_predicted_cameras(session: Session, set_id: int) -> dict[int, Camera]:
+    """Every camera of a set, by id of the view."""
+    model = PredictedCameraModel
+    rows = session.execute(select(model.view_id, model.camera).where(model.set_id == set_id))
+    with as_written():
+        return {row.view_id: camera_from_json(parse(row.camera)) for row in rows}
+
+
+def _sets(session: Session, where: ColumnElement[bool]) -> list[PredictionSet]:
+    statement = (
+        select(*columns_shown(PredictionSetModel))
+        .where(where)
+        .order_by(PredictionSetModel.id.desc())
+    )
+    return [
+        PredictionSet(**{**row._mapping, "report": parse(row.report)})
+        for row in session.execute(statement)
+    ]
+
+
+def _boxes(session: Session, *where: Any) -> Iterable[PredictedBox]:
+    statement = (
+        select(*PredictionModel.__table__.columns).where(*where).order_by(PredictionModel.id)
+    )
+    return [PredictedBox(**row._mapping) for row in session.execute(statement)]

@@ -1,0 +1,199 @@
+"""Predictions: brought in, listed, thrown away, and accepted by a person."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from fastapi import APIRouter, Query, Response
+
+from app.config import Settings
+from app.features.groups.routes import CHANGED, CONFLICTS, group_answer, load_document_of_view
+from app.features.groups.schemas import GroupDocument
+from app.features.groups.state import GroupState
+from app.features.groups.submit import find_view
+from app.features.jobs.queries import Job
+from app.features.jobs.schemas import JobDocument
+from app.features.predictions import service as review
+from app.features.predictions.accept import AcceptReport, accept, accept_box, plan_accept
+from app.features.predictions.group_predictions import group_predictions
+from app.features.predictions.jobs import request_accept
+from app.features.predictions.reader import PredictionFiles, uploaded_files
+from app.features.predictions.schemas import (
+    AcceptBody,
+    AcceptOutcome,
+    GroupPredictionsDocument,
+    PredictionRequest,
+    PredictionSetDocument,
+    PredictionSetList,
+    ViewPrediction,
+    ViewPredictions,
+    size_of,
+)
+from app.http.conflicts import current_state
+from app.http.cursor import paged
+from app.http.deps import Actor, AppServices, AppStore, DatasetPath, DryRun, Id, IfMatch
+from app.http.job_responses import ACCEPTED, job_answer
+from app.http.problem import responses
+from app.http.respond import document, no_content, responds
+
+router = APIRouter(tags=["predictions"])
+
+LOCATION = {"Location": {"description": "Of the set.", "schema": {"type": "string"}}}
+
+
+@router.get(
+    "/datasets/{dataset}/predictions", operation_id="listPredictions", responses=responses(404)
+)
+@paged()
+def list_predictions(dataset: DatasetPath, store: AppStore) -> PredictionSetList:
+    """The sets of predictions of a dataset, the newest first."""
+    found = review.list_predictions(store, dataset)
+    return PredictionSetList(items=found)
+
+
+def _added(found: review.PredictionSet) -> Response:
+    headers = {"Location": f"/api/v1/predictions/{found.id}"}
+    return document(PredictionSetDocument.model_validate(found), 201, headers)
+
+
+@router.post(
+    "/datasets/{dataset}/predictions",
+    operation_id="addPredictions",
+    response_model=PredictionSetDocument,
+    status_code=201,
+    responses={
+        **responses(404, 409, 413, 415),
+        201: {"headers": LOCATION, "description": "The set, with what could not be read."},
+    },
+)
+@responds(_added)
+def add_predictions(
+    dataset: DatasetPath, request: PredictionRequest, services: AppServices, actor: Actor
+) -> review.PredictionSet:
+    """Read uploaded files into a new set of predictions, or find the set that they gave before.
+
+    What is wrong is left out and listed with file, record and field; frames that the dataset does
+    not have are counted and listed. 400 where nothing can be used, 413 where reading takes too
+    much memory or time, 503 while too many others are read. No solve reads predictions.
+    """
+    return review.add_predictions(
+        services.store,
+        dataset,
+        request.name,
+        _files(services.settings, request),
+        actor=actor,
+        read=services.predictions.read,
+    )
+
+
+def _accepted(found: AcceptReport | Job) -> Response:
+    return job_answer(found) if isinstance(found, Job) else document(AcceptOutcome.done(found))
+
+
+@router.post(
+    "/predictions/accept",
+    operation_id="acceptPredictions",
+    response_model=AcceptOutcome,
+    responses={
+        **responses(404, 409, 413, 415),
+        **ACCEPTED,
+        202: {**ACCEPTED[202], "model": JobDocument},
+        200: {
+            "description": "What a dry run found, or what was accepted in views that were named."
+        },
+    },
+)
+@responds(_accepted)
+def accept_predictions(
+    request: AcceptBody, services: AppServices, actor: Actor, dry_run: DryRun = False
+) -> AcceptReport | Job | Response:
+    """Make annotations of predictions, as edits in the log that can be undone.
+
+    Only the surest prediction of a view counts. Named views are changed at once (200); a query
+    makes a job (202), whose result has `changed`, `groups` and `refused`.
+    """
+    store, value = services.store, request.value()
+    if dry_run or request.dry_run:
+        return document(AcceptOutcome.planned(plan_accept(store, request.dataset, value)))
+    if request.views is not None:
+        return accept(store, request.dataset, value, actor=actor)
+    return request_accept(services.jobs, store, request.dataset, value, actor=actor)
+
+
+@router.get(
+    "/predictions/{predictions}",
+    operation_id="getPredictions",
+    response_model=PredictionSetDocument,
+    responses=responses(404),
+)
+def get_predictions(predictions: Id, store: AppStore) -> review.PredictionSet:
+    """One set of predictions."""
+    return review.get_predictions(store, predictions)
+
+
+@router.delete(
+    "/predictions/{predictions}",
+    operation_id="deletePredictions",
+    status_code=204,
+    responses=responses(404),
+)
+@responds(no_content)
+def delete_predictions(predictions: Id, store: AppStore, actor: Actor) -> None:
+    """Throw a set away; evaluations of it stay, and so do balls that were accepted from it."""
+    review.delete_predictions(store, predictions, actor=actor)
+
+
+@router.get(
+    "/views/{view}/predictions", operation_id="getViewPredictions", responses=responses(404)
+)
+@paged()
+def get_view_predictions(view: Id, store: AppStore) -> ViewPredictions:
+    """What was predicted for a view."""
+    find_view(store, view)
+    found = review.view_predictions(store, view)
+    return ViewPredictions(
+        items=[ViewPrediction.of(item, box) for item, boxes in found for box in boxes]
+    )
+
+
+@router.get(
+    "/groups/{group}/predictions", operation_id="getGroupPredictions", responses=responses(404)
+)
+@paged()
+def get_group_predictions(group: Id, store: AppStore) -> GroupPredictionsDocument:
+    """What was predicted for all views of a group, and where its accepted balls come from."""
+    return GroupPredictionsDocument.of(group_predictions(store, group))
+
+
+@router.post(
+    "/views/{view}/predictions/{prediction}/accept",
+    operation_id="acceptPrediction",
+    response_model=GroupDocument,
+    responses={**responses(*CONFLICTS), **CHANGED},
+)
+@responds(group_answer)
+def accept_prediction(
+    view: Id,
+    prediction: Id,
+    store: AppStore,
+    actor: Actor,
+    if_match: IfMatch,
+    replace: Annotated[
+        bool, Query(description="Also where the view has another ball; else that is a 409.")
+    ] = False,
+) -> GroupState:
+    """Make this very prediction the ball of its view: an edit that can be undone."""
+    with current_state(lambda: load_document_of_view(store, view)):
+        return accept_box(store, view, prediction, if_match=if_match, actor=actor, replace=replace)
+
+
+def _files(settings: Settings, request: PredictionRequest) -> PredictionFiles:
+    how = PredictionFiles(
+        None,
+        format=request.format,
+        category=request.category,
+        size=size_of(request.size),
+        cameras_size=size_of(request.cameras_size),
+    )
+    uploads = (request.upload, request.images_upload, request.cameras_upload)
+    return uploaded_files(settings, how, *uploads)

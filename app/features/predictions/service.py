@@ -1,0 +1,332 @@
+"""Predictions: what detectors and calibrators said, brought in, listed and thrown away.
+
+They are a third kind of data beside said and computed: no solve reads them. ``accept`` turns
+those that a person takes over into edits.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from itertools import count
+from pathlib import Path, PurePosixPath
+from typing import Any
+
+from app.canonical import canonical
+from app.db.json_columns import Json
+from app.db.session import Session, now
+from app.db.store import Store
+from app.errors import ConflictError, InputError, NotFoundError
+from app.evaluation.frame import Detection
+from app.evaluation.frame_names import FrameNames, NamedFrame
+from app.evaluation.prediction_files import ReadPredictedCameras
+from app.evaluation.prediction_run import ReadPredictions, listed
+from app.features.audit.audit_events import note_deed
+from app.features.datasets.service import read_dataset_head, require_name
+from app.features.groups.view_queries import dataset_views
+from app.features.predictions.queries import PredictedBox as PredictedBox
+from app.features.predictions.queries import PredictionSet as PredictionSet
+from app.features.predictions.queries import (
+    dataset_prediction_sets,
+    delete_prediction_set,
+    has_prediction_set,
+    insert_prediction_set,
+    predictions_digest,
+    read_prediction_sets,
+    read_view_boxes,
+)
+from app.features.predictions.reader import PredictionFiles, Read, read_files
+from app.finite import quoted
+from app.formats.file_tree import Limits
+from app.formats.report import Report
+from app.geometry.camera import Camera
+from app.object_store.address import unseal
+from app.soccer.frames import ImageSize
+from app.soccer.media import Media
+
+LISTED = 100
+"""Unknown frames and problems that a report names; all are counted."""
+
+
+def add_predictions(
+    store: Store,
+    dataset: str | int,
+    name: str | None,
+    files: PredictionFiles,
+    *,
+    actor: str,
+    read: Read = read_files,
+) -> PredictionSet:
+    """Read files into a new set.
+
+    Args:
+        store: The database.
+        dataset: Name or id.
+        name: Of the set; unique in its dataset. None: the set that came of the very same reading,
+            where there is one; else a new one under a free name after the file's.
+        files: What to read.
+        actor: Who brings them.
+        read: Reads the files, here or in another process.
+
+    Raises:
+        InputError: A file cannot be used, no box or camera belongs to a frame of the dataset, or
+            the name is impossible.
+        ConflictError: There is a set of that name.
+    """
+    if name is not None:
+        require_name(name, "a set of predictions", digits=True)
+    first = files.first
+    names = frame_names(store, dataset)
+    boxes, cameras = read(files, names, Limits.of(store.settings))
+    if not boxes.detections and not cameras.cameras and _is_for_another(boxes, cameras):
+        raise _nothing_known(boxes, cameras, names)
+    return save_predictions(
+        store,
+        dataset,
+        set_name(first) if name is None else name,
+        boxes.detections,
+        cameras.cameras,
+        names=names,
+        format=boxes.format if files.path is not None else "cameras",
+        source=first.name,
+        report=_report(boxes, cameras),
+        unknown=len(boxes.unknown) + len(cameras.unknown),
+        actor=actor,
+        reuse=name is None,
+    )
+
+
+def save_predictions(
+    store: Store,
+    dataset: str | int,
+    name: str,
+    detections: Mapping[int, Sequence[Detection]],
+    cameras: Mapping[int, Camera],
+    *,
+    names: FrameNames,
+    format: str,  # noqa: A002
+    source: str,
+    report: Json,
+    unknown: int = 0,
+    actor: str,
+    reuse: bool = False,
+) -> PredictionSet:
+    """Keep what was read, or found by a detector, as a new set.
+
+    With ``reuse`` the set that came of the very same reading is the answer where there is one, and
+    a name that is taken gets a number.
+
+    Raises:
+        ConflictError: There is a set of that name.
+    """
+    boxes = {
+        view: [(d.box.x, d.box.y, d.box.width, d.box.height, d.score) for d in found]
+        for view, found in detections.items()
+    }
+    keys = {i: f"{frame.group} {frame.view}" for i, frame in names.frames.items()}
+    values: dict[str, Any] = {
+        "name": name,
+        "format": format,
+        "source": source[:300],
+        "created": now(),
+        "actor": actor,
+        "digest": predictions_digest(keys, boxes, cameras),
+        "frames": len(boxes),
+        "boxes": sum(map(len, boxes.values())),
+        "cameras": len(cameras),
+        "unknown": unknown,
+        "report": report,
+    }
+    with store.write() as session:
+        found = read_dataset_head(session, dataset)
+        if reuse:
+            own = dataset_prediction_sets(session, found.id)
+            known = next((item for item in own if _same_reading(item, values)), None)
+            if known is not None:
+                session.respond(known)
+                return known
+            values["name"] = name = _free_name(name, {item.name for item in own})
+        require_free(session, found.id, name)
+        present = {row.id for row in dataset_views(session, found.id)}
+        identity = insert_prediction_set(
+            session,
+            {**values, "dataset_id": found.id},
+            # A view can have gone since its name was looked up.
+            {view: found for view, found in boxes.items() if view in present},
+            {view: camera for view, camera in cameras.items() if view in present},
+        )
+        made = read_set(session, identity)
+        session.respond(made)
+        return made
+
+
+def frame_names(store: Store, dataset: str | int) -> FrameNames:
+    """The frames of a dataset by every name that a file may give them."""
+    with store.read() as session:
+        rows = dataset_views(session, read_dataset_head(session, dataset).id)
+    return FrameNames.of(
+        NamedFrame(
+            id=row.id,
+            group=row.group,
+            view=row.key,
+            match=row.match,
+            size=ImageSize(row.width, row.height),
+            station=row.station if row.shared else "",
+            picture=_picture(row.media),
+        )
+        for row in rows
+    )
+
+
+def list_predictions(store: Store, dataset: str | int) -> list[PredictionSet]:
+    """The sets of a dataset, the newest first."""
+    with store.read() as session:
+        found = read_dataset_head(session, dataset)
+        return dataset_prediction_sets(session, found.id)
+
+
+def get_predictions(store: Store, set_id: int) -> PredictionSet:
+    """A set by its id.
+
+    Raises:
+        NotFoundError: There is none.
+    """
+    with store.read() as session:
+        return read_set(session, set_id)
+
+
+def find_predictions(store: Store, dataset: str | int, name: str) -> PredictionSet:
+    """The set of a dataset with that name or id.
+
+    Raises:
+        NotFoundError: There is none; the hint names those that there are.
+    """
+    known = list_predictions(store, dataset)
+    found = next((item for item in known if name in (item.name, str(item.id))), None)
+    if found is None:
+        names = ", ".join(item.name for item in known[:10])
+        raise NotFoundError(
+            f'there is no file and no set of predictions "{name}"',
+            hint=f"Sets: {names}." if names else None,
+        )
+    return found
+
+
+def delete_predictions(store: Store, set_id: int, *, actor: str) -> None:
+    """Throw a set away; evaluations of it stay, and so do balls that were accepted from it.
+
+    Raises:
+        NotFoundError: There is none.
+    """
+    with store.write() as session:
+        found = read_set(session, set_id)
+        delete_prediction_set(session, set_id)
+        note_deed(session, actor, "predictions deleted", found.dataset_id, name=found.name)
+        session.respond(None)
+
+
+def view_predictions(store: Store, view_id: int) -> list[tuple[PredictionSet, list[PredictedBox]]]:
+    """What was predicted for a view, by set, the newest set first."""
+    with store.read() as session:
+        boxes = read_view_boxes(session, view_id)
+        sets = read_prediction_sets(session, {box.set_id for box in boxes})
+    return [(item, [box for box in boxes if box.set_id == item.id]) for item in sets]
+
+
+def read_set(session: Session, set_id: int) -> PredictionSet:
+    """``get_predictions`` within a session."""
+    found = read_prediction_sets(session, [set_id])
+    if not found:
+        raise NotFoundError(f"there is no set of predictions {set_id}")
+    return found[0]
+
+
+def set_name(path: Path) -> str:
+    """A file's name as the name of a set: ASCII letters and digits, else ``-``.
+
+    Example:
+        >>> set_name(Path("runs/best model.json"))
+        'best-model'
+    """
+    return re.sub(r"[^A-Za-z0-9]", "-", path.stem).strip("-")[:80] or "predictions"
+
+
+def require_free(session: Session, dataset_id: int, name: str) -> None:
+    """Raise ConflictError where a dataset has a set of that name."""
+    if has_prediction_set(session, dataset_id, name):
+        raise ConflictError(
+            f'there is a set of predictions "{name}" already',
+            hint="Choose another name, or delete that one first.",
+        )
+
+
+def _same_reading(known: PredictionSet, values: Mapping[str, Any]) -> bool:
+    """Whether a set has the same boxes and cameras, from the same source with the same report."""
+    names = ("digest", "format", "source", "unknown")
+    same = all(getattr(known, name) == values[name] for name in names)
+    return same and canonical(known.report) == canonical(values["report"])
+
+
+def _free_name(name: str, taken: set[str]) -> str:
+    """The name, or with the first number that makes it free."""
+    return next(
+        found
+        for number in count(1)
+        if (found := name if number == 1 else f"{name}-{number}") not in taken
+    )
+
+
+def _is_for_another(boxes: ReadPredictions, cameras: ReadPredictedCameras) -> bool:
+    return bool(boxes.unknown or cameras.unknown or boxes.report.problems)
+
+
+def _nothing_known(
+    boxes: ReadPredictions, cameras: ReadPredictedCameras, names: FrameNames
+) -> InputError:
+    if boxes.report.problems and not boxes.unknown:
+        return boxes.report.problems[0]
+    unknown, reasons = boxes.unknown + cameras.unknown, {**boxes.reasons, **cameras.reasons}
+    first = sorted(unknown)
+    others = f" (also {', '.join(map(quoted, first[1:3]))})" if first[1:] else ""
+    return InputError(
+        f"none of the {len(unknown)} frames belongs to the dataset: {quoted(first[0], 80)} "
+        f"{reasons[first[0]]}{others}",
+        hint=f"Frames of the dataset are called {', '.join(map(quoted, names.examples()))}, with their match "
+        "before them where several have one of that name, or as an export calls them.",
+    )
+
+
+def _picture(media: Media | None) -> str:
+    """Name of the file of a picture with its last folder; empty where a view has none of its own."""
+    if media is None or media.frame is not None:
+        return ""
+    return "/".join(PurePosixPath(media.member or unseal(media.path)[0]).parts[-2:])
+
+
+def _report(boxes: ReadPredictions, cameras: ReadPredictedCameras) -> Json:
+    return {
+        "read": boxes.report.read,
+        "without_score": boxes.without_score,
+        "other_classes": boxes.report.counts["other classes"],
+        "unknown_boxes": sum(boxes.unknown.values()),
+        "unknown_frames": list(listed(boxes.unknown, boxes.reasons, LISTED)),
+        "unknown_cameras": list(listed(cameras.unknown, cameras.reasons, LISTED)),
+        **_problems(boxes.report, cameras.report),
+    }
+
+
+def _problems(*reports: Report) -> dict[str, Any]:
+    every = [problem for report in reports for problem in report.problems]
+    dropped = sum(report.dropped for report in reports)
+    return {
+        "problems": [
+            {
+                "file": Path(item.path).name,
+                "record": item.record,
+                "field": item.field,
+                "problem": item.problem,
+            }
+            for item in every[:LISTED]
+        ],
+        "more_problems": max(len(every) - LISTED, 0) + dropped,
+    }

@@ -1,0 +1,159 @@
+"""Changes: what others want to hear of, read from the log, whoever wrote it."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Collection, Iterable, Mapping
+from dataclasses import dataclass, replace
+
+from app.db.log import newest_entry
+from app.db.session import Session
+from app.db.store import Store
+from app.features.datasets.queries import dataset_names
+from app.features.groups.revision_queries import StoredChange, logged_changes, solved_groups
+from app.features.groups.state import read_etags
+from app.features.solutions.queries import newest_solution
+
+MANY = 200
+"""So many groups of one dataset at once are told as one change of the dataset."""
+FAR = 5000
+"""Who was away for more entries than this is told to read everything anew."""
+COMMENT = "comment"
+"""Kind of a change of what people say to each other about a group; the group is what it was."""
+EVERYTHING = "everything"
+"""Kind of a change of a dataset in which nothing can be taken to be as it was."""
+SOLVED = "solved"
+"""Kind of a change that nobody said: a solution arrived."""
+
+
+@dataclass(frozen=True)
+class Change:
+    """A group that is not what it was, or, without a group, a dataset.
+
+    Attributes:
+        id: Id of the last log entry that it tells of; None for what is not logged.
+        dataset: Its name; None where it is gone.
+        etag: Of the group as it is now.
+        kind: As in the log, or ``solved``.
+        actor: Who did it last; None where nobody did.
+    """
+
+    id: int | None
+    dataset_id: int
+    dataset: str | None
+    kind: str
+    actor: str | None
+    group_id: int | None = None
+    etag: str | None = None
+
+
+@dataclass(frozen=True)
+class News:
+    """What there is to tell at one moment.
+
+    Attributes:
+        entry: Id of the log's last entry; 0 for an empty log.
+        solution: Id of the last solution; 0 where there is none.
+        changes: By the entry after which they came.
+        solved: Groups that got a solution and are in none of the changes.
+    """
+
+    entry: int
+    solution: int
+    changes: Mapping[int, list[Change]]
+    solved: list[Change]
+
+
+def read_position(store: Store) -> int:
+    """Id of the log's last entry; 0 for an empty log."""
+    with store.read() as session:
+        return newest_entry(session)
+
+
+def read_moment(store: Store) -> tuple[int, int]:
+    """Ids of the log's last entry and of the last solution; 0 where there is none."""
+    with store.read() as session:
+        return newest_entry(session), newest_solution(session)
+
+
+def read_solved_since(store: Store, solution: int) -> list[Change]:
+    """Groups that got a solution after another one; datasets as a whole where they are many."""
+    with store.read() as session:
+        behind = newest_solution(session) - solution
+        if behind > FAR:
+            names = dataset_names(session)
+            return [Change(None, key, name, SOLVED, None) for key, name in names.items()]
+        return read_solved(session, solution) if behind > 0 else []
+
+
+def read_news(store: Store, places: Collection[int], solution: int | None) -> News:
+    """What has changed since some entries of the log, and since a solution (None: none is told)."""
+    with store.read() as session:
+        entry, newest = newest_entry(session), newest_solution(session)
+        changes = {place: read_changes(session, place) for place in places if place < entry}
+        solved: list[Change] = []
+        if solution is not None and newest > solution:
+            told = {item.group_id for items in changes.values() for item in items}
+            solved = read_solved(session, solution, told)
+    return News(entry, newest, changes, solved)
+
+
+def read_changes(session: Session, after: int) -> list[Change]:
+    """What has changed since an entry of the log, each group once, in the order of the log."""
+    newest = newest_entry(session)
+    if newest - after > FAR:
+        names = dataset_names(session)
+        return [Change(newest, key, name, EVERYTHING, None) for key, name in names.items()]
+    return _told(session, logged_changes(session, after))
+
+
+def read_solved(session: Session, after: int, known: Iterable[int | None] = ()) -> list[Change]:
+    """Groups that got a solution after another one; ``known`` are told of already."""
+    told = set(known)
+    found = [
+        StoredChange(None, dataset_id, SOLVED, None, group_id)
+        for dataset_id, group_id in solved_groups(session, after)
+        if group_id not in told
+    ]
+    return _told(session, found)
+
+
+def _told(session: Session, found: Iterable[StoredChange]) -> list[Change]:
+    """Changes with names and ETags; a dataset with too many of them is told as a whole."""
+    items = _merged(found)
+    sizes = Counter(item.dataset_id for item in items if item.group_id is not None)
+    items = _merged(
+        replace(item, group_id=None) if sizes[item.dataset_id] > MANY else item for item in items
+    )
+    names = dataset_names(session)
+    # Of a dataset that is gone there is one thing to tell.
+    ends = {item.dataset_id: item for item in items if item.dataset_id not in names}
+    items = [item for item in items if ends.get(item.dataset_id, item) is item]
+    etags = read_etags(session, [item.group_id for item in items if item.group_id is not None])
+    return [
+        Change(
+            item.id,
+            item.dataset_id,
+            names.get(item.dataset_id),
+            item.kind,
+            item.actor,
+            item.group_id,
+            None if item.group_id is None else etags[item.group_id],
+        )
+        for item in items
+        # A group that is gone by now is told of by its dataset's own entries.
+        if item.group_id is None or item.group_id in etags
+    ]
+
+
+def _merged(found: Iterable[StoredChange]) -> list[StoredChange]:
+    """The last change of each group, and the last one of each kind of each dataset, in order.
+
+    A comment stands beside the change of its group, which it does not hide.
+    """
+    last = {(item.dataset_id, item.group_id, _beside(item)): item for item in found}
+    return sorted(last.values(), key=lambda item: item.id or 0)
+
+
+def _beside(item: StoredChange) -> str:
+    return item.kind if item.group_id is None or item.kind == COMMENT else ""

@@ -1,0 +1,338 @@
+"""Query: the text in the queue's box, parsed into fixed fields and operators.
+
+    status:unreviewed jac<0.95 sigma>0.5 finding:low_parallax match:"league/2015" sort:value-desc
+
+``margin`` and ``value`` are shares of a gate's threshold: ``margin<0.1`` finds groups that fail,
+or pass by less than a tenth; ``sort:value`` lists first the groups that are closest to a gate's
+threshold, on either side.
+
+Terms must all hold; ``field:a,b`` means either; ``-field:a`` means not; a bare word is looked
+for in key and label; ``id:12,15`` names groups. There are no patterns: text is compared, never
+interpreted.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, replace
+from difflib import get_close_matches
+from hashlib import sha256
+
+from app.errors import InputError
+from app.features.batches.queries import place_in
+from app.features.queue import listing_queries as conditions
+from app.features.queue.fields import BY_NAME, FIELDS, ORDERS
+from app.features.queue.listing_queries import Condition, Order
+from app.finite import MAX_ID
+
+MAX_LENGTH = 1000
+MAX_LISTED_LENGTH = 100_000
+"""Of a query that comes in a body and lists groups one by one: about 15,000 ids."""
+MAX_TERMS = 30
+
+NUMBERS = {name: item.column for name, item in BY_NAME.items() if item.column}
+"""Fields that compare with < <= > >= = and with :, which is =, by the column that they mean;
+``none`` is where there is no number."""
+SORTS = NUMBERS | {order.name: order.column for order in ORDERS}
+"""What the queue can be sorted by, and the column of it."""
+
+_REVERSE = "sort:name-desc is the reverse."
+_TERM = re.compile(
+    r"""\s*(?P<minus>-)?
+        (?:(?P<field>[a-z_0-9]+)(?P<op><=|>=|<|>|=|:))?
+        (?:"(?P<quoted>[^"]*)"|(?P<plain>[^\s"]+))(?=\s|$)""",
+    re.VERBOSE,
+)
+
+
+@dataclass(frozen=True)
+class Query:
+    """A parsed query: conditions that must all hold, and a sort; that of ``batch`` without one.
+
+    ``text`` is what was asked.
+    """
+
+    conditions: tuple[Condition, ...] = field(default=())
+    sort: str = "number"
+    descending: bool = False
+    batch: int | None = None
+    text: str = ""
+
+    @property
+    def digest(self) -> str:
+        """Short digest of what was asked, whatever white space stands between the terms."""
+        return sha256(" ".join(self.text.split()).encode()).hexdigest()[:16]
+
+    @property
+    def order(self) -> Order:
+        """The order in which it lists groups."""
+        if self.batch is not None:
+            return Order(place_in(self.batch))
+        # "newest" says the direction itself.
+        return Order(SORTS[self.sort], self.descending != (self.sort == "newest"))
+
+
+@dataclass(frozen=True)
+class _Term:
+    field: str
+    op: str
+    value: str
+    pointer: str
+
+
+def parse_query(text: str, longest: int = MAX_LENGTH) -> Query:
+    """Parse a query.
+
+    Args:
+        text: The query.
+        longest: Most characters. Beyond ``MAX_LENGTH`` there may only be lists of ids.
+
+    Raises:
+        InputError: With a pointer ``/q/<position>`` to the term that cannot be understood.
+    """
+    found: list[Condition] = []
+    sort, descending, batch = "", False, None
+    for negative, term in _terms(text, longest):
+        if term.field:
+            _require_operator(term)
+        if term.field == "sort":
+            if negative:
+                raise InputError(
+                    "an order cannot be turned round with a minus",
+                    hint=_REVERSE,
+                    pointer=term.pointer,
+                )
+            sort, descending = _sort(term)
+        else:
+            condition = _condition(term)
+            if term.field == "batch" and not negative and "," not in term.value:
+                batch = int(term.value)
+            found.append(conditions.opposite(condition) if negative else condition)
+    return Query(tuple(found), sort or "number", descending, None if sort else batch, text)
+
+
+def _terms(text: str, longest: int) -> Iterator[tuple[bool, _Term]]:
+    if len(text) > longest:
+        raise InputError(f"a query has at most {longest} characters", pointer="/q")
+    place, count = 0, 0
+    while text[place:].strip():
+        pointer = f"/q/{place + len(text[place:]) - len(text[place:].lstrip())}"
+        found = _TERM.match(text, place)
+        count += 1
+        if found is None or count > MAX_TERMS:
+            problem = "the query has too many terms" if found else "a quote is not closed"
+            raise InputError(problem, pointer=pointer)
+        value = found["plain"] if found["quoted"] is None else found["quoted"]
+        if len(value) > MAX_LENGTH and found["field"] != "id":
+            problem = f"only a list of ids may be longer than {MAX_LENGTH} characters"
+            raise InputError(problem, pointer=pointer)
+        yield bool(found["minus"]), _Term(found["field"] or "", found["op"] or ":", value, pointer)
+        place = found.end()
+
+
+def _sort(term: _Term) -> tuple[str, bool]:
+    name = term.value.removesuffix("-desc")
+    if name not in SORTS:
+        raise InputError(
+            f'the queue cannot be sorted by "{term.value}"',
+            hint=f"Sorts: {', '.join(order.name for order in ORDERS)}, each also with -desc.",
+            pointer=term.pointer,
+        )
+    return name, term.value.endswith("-desc")
+
+
+def _require_operator(term: _Term) -> None:
+    """Refuse a field that there is not, and an operator that a field has not."""
+    field_ = BY_NAME.get(term.field)
+    if field_ is None:
+        nearest = get_close_matches(term.field, BY_NAME, n=1)
+        meant = f"; did you mean {nearest[0]}?" if nearest else ""
+        raise InputError(
+            f'the queue has no field "{term.field}"{meant}',
+            hint=f"Fields: {', '.join(item.name for item in FIELDS)}.",
+            pointer=term.pointer,
+        )
+    if term.op not in field_.operators:
+        raise InputError(
+            f"{term.field} cannot be compared with {term.op}; it has {' and '.join(field_.operators)}",
+            hint=f"For example {term.field}:{next(iter(field_.values), 'text')}.",
+            pointer=term.pointer,
+        )
+
+
+def _condition(term: _Term) -> Condition:
+    field_ = BY_NAME.get(term.field)
+    if field_ is not None and field_.name != term.field:
+        term = replace(term, field=field_.name)
+    if term.field in NUMBERS:
+        return _number(term)
+    if term.field == "takes" and term.value == "none":
+        return conditions.has_takes("=", 0)
+    if term.field == "takes":
+        return conditions.has_takes("=" if term.op == ":" else term.op, _value(term))
+    if term.field == "id":
+        return _listed_groups(term)
+    if term.field == "batch":
+        return conditions.is_in_batch(_id(term, text) for text in term.value.split(","))
+    if field_ is not None and field_.kind == "flag":
+        return conditions.is_flag(term.field, _choice(term, term.value) == "yes")
+    test = _TESTS[term.field]
+    # A bare word may hold commas; a field's value is a list of choices.
+    values = [term.value] if term.field == "" else term.value.split(",")
+    return conditions.either(test(term, value) for value in values)
+
+
+def _listed_groups(term: _Term) -> Condition:
+    return conditions.is_one_of(_id(term, text) for text in term.value.split(","))
+
+
+def _id(term: _Term, text: str) -> int:
+    what = "batch" if term.field == "batch" else "group"
+    digits = text.isascii() and text.isdigit() and len(text) <= len(str(MAX_ID))
+    if not digits or not 1 <= int(text) <= MAX_ID:
+        raise InputError(
+            f'"{text[:40]}" is not the id of a {what}',
+            hint=f"For example {term.field}:12,15,19; the id of a {what} stands in its address.",
+            pointer=term.pointer,
+        )
+    return int(text)
+
+
+def _number(term: _Term) -> Condition:
+    column = NUMBERS[term.field]
+    if term.value == "none":
+        return conditions.is_absent(column)
+    return conditions.compares(column, "=" if term.op == ":" else term.op, _value(term))
+
+
+def _value(term: _Term) -> float:
+    try:
+        value = float(term.value)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise InputError(
+            f'"{term.value}" is not a number',
+            hint=f"For example {term.field}<1.5, or {term.field}:none.",
+            pointer=term.pointer,
+        )
+    return value
+
+
+def _choice(term: _Term, value: str) -> str:
+    choices = BY_NAME[term.field].values
+    if value not in choices:
+        raise InputError(
+            f'{term.field} cannot be "{value}"',
+            hint=f"It is one of {', '.join(choices)}.",
+            pointer=term.pointer,
+        )
+    return value
+
+
+def _if_any(value: str, some: Condition) -> Condition:
+    """``some``; the opposite for ``none``."""
+    return conditions.opposite(some) if value == "none" else some
+
+
+def _status(term: _Term, value: str) -> Condition:
+    return conditions.compares("status", "=", _choice(term, value))
+
+
+def _finding(term: _Term, value: str) -> Condition:
+    column = "dismissed" if term.field == "dismissed" else "findings"
+    if value in ("any", "none"):
+        return conditions.compares(column, "=" if value == "none" else ">", "")
+    return conditions.lists(column, _choice(term, value))
+
+
+def _gate(term: _Term, value: str) -> Condition:
+    """The first failing gate; ``none`` for groups that pass, ``unsolved`` for neither."""
+    if value == "unsolved":
+        return conditions.is_flag("solved", False)
+    if value == "none":
+        return conditions.is_flag("passes", True)
+    return conditions.compares("gate", "=", _choice(term, value))
+
+
+def _pictures(term: _Term, value: str) -> Condition:
+    """Whether views have a picture: ``none`` of them, ``any``, or ``all``."""
+    choice = _choice(term, value)
+    if choice == "all":
+        return conditions.has_all_pictures()
+    return conditions.compares("pictures", "=" if choice == "none" else ">", 0)
+
+
+def _proposal(term: _Term, value: str) -> Condition:
+    """What was proposed for a view that has no camera yet."""
+    choice = _choice(term, value)
+    if choice in ("any", "none"):
+        return _if_any(choice, conditions.has_open_proposal())
+    return conditions.has_open_proposal(choice)
+
+
+def _comments(term: _Term, value: str) -> Condition:
+    """Whether people say something to each other about it, and whether that is settled."""
+    choice = _choice(term, value)
+    if choice in ("any", "none"):
+        return _if_any(choice, conditions.has_thread())
+    return conditions.has_thread(choice)
+
+
+def _annotations(term: _Term, value: str) -> Condition:
+    """What people's own annotations of it came to."""
+    choice = _choice(term, value)
+    if choice in ("any", "none"):
+        return _if_any(choice, conditions.has_takes(">", 0))
+    return conditions.came_to("open" if choice == "waiting" else choice)
+
+
+def _mentions(_term: _Term, value: str) -> Condition:
+    """Whom an open thread mentions."""
+    if value in ("any", "none"):
+        return _if_any(value, conditions.mentions())
+    return conditions.mentions(value.lower())
+
+
+def _view(_term: _Term, value: str) -> Condition:
+    """A view's key (``cam3``, ``7_1.png``), or how many views there are."""
+    if value.isascii() and value.isdigit():
+        return conditions.compares("views", "=", int(value[:9]))
+    return conditions.lists("view_keys", value)
+
+
+def _match(_term: _Term, value: str) -> Condition:
+    return conditions.contains("match", value)
+
+
+def _text(_term: _Term, value: str) -> Condition:
+    return conditions.either(
+        (conditions.contains("label", value), conditions.contains("key", value))
+    )
+
+
+def _exact(term: _Term, value: str) -> Condition:
+    if value in ("any", "none"):
+        missing = conditions.is_empty(term.field)
+        return missing if value == "none" else conditions.opposite(missing)
+    return conditions.is_text(term.field, value)
+
+
+_TESTS: dict[str, Callable[[_Term, str], Condition]] = {
+    "status": _status,
+    "finding": _finding,
+    "dismissed": _finding,
+    "gate": _gate,
+    "view": _view,
+    "pictures": _pictures,
+    "proposal": _proposal,
+    "comments": _comments,
+    "mentions": _mentions,
+    "annotations": _annotations,
+    "match": _match,
+    "label": _text,
+    "": _text,
+    **dict.fromkeys(("split", "key", "reviewer", "reason", "override"), _exact),
+}

@@ -1,0 +1,157 @@
+"""Documents of statistics, timeline and progress."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+from pydantic import BaseModel, Field, model_validator
+
+from app.features.groups.solution_schemas import XY, FixDocument, GuideDocument, Jac, OfferDocument
+from app.features.groups.suggested_edits import Influence
+from app.features.groups.suggestions import Remedy
+from app.features.queue.statistics import Measure, MeasureHistogram, MeasureSeries, Share, Timeline
+from app.http.documents import Document, ListDocument
+
+
+class SplitSeries(Document, shows=MeasureSeries):
+    """The bars of one split."""
+
+    unknown: int = Field(description="Groups that have no such number.")
+
+
+class StatisticsHistogram(Document, shows=Measure):
+    """How one number is spread over the groups that match."""
+
+    field: str = Field(description="Name of the field in queries.")
+    edges: list[float] = Field(description="One more than there are bars.")
+    open_low: bool = Field(description="The first bar also holds what lies below.")
+    open_high: bool = Field(description="The last bar also holds what lies beyond.")
+    log: bool = Field(
+        description="The bars are equally wide on a logarithmic scale, but the first: it holds 0 "
+        "and all that is smaller than the second edge.",
+    )
+    queries: list[str] = Field(description="For each bar, the query that finds its groups.")
+    series: list[SplitSeries]
+
+    @model_validator(mode="before")
+    @classmethod
+    def _with_measure(cls, value: Any) -> Any:
+        return (
+            {**vars(value), **vars(value.measure)} if isinstance(value, MeasureHistogram) else value
+        )
+
+
+class PositionsDocument(Document):
+    """Balls on the pitch; a cell is found by `x>=a x<b y>=c y<d`."""
+
+    x_edges: list[float] = Field(description="Metres along the length, from the centre mark.")
+    y_edges: list[float] = Field(description="Metres across, towards the main cameras.")
+    counts: list[list[int]] = Field(description="A row for each cell of y, in it one for each x.")
+    outside: int = Field(description="Balls that lie outside all cells.")
+
+
+class MatchShare(Document, shows=Share):
+    """Groups of a match in one split."""
+
+
+class SplitShare(Document):
+    """Groups of a split."""
+
+    split: str
+    groups: int
+    passing: int
+    accepted: int
+
+
+class StatisticsDocument(Document):
+    """Statistics over the groups that a query matches."""
+
+    groups: int
+    histograms: list[StatisticsHistogram]
+    positions: PositionsDocument
+    matches: list[MatchShare]
+    splits: list[SplitShare]
+
+
+Place = Annotated[list[float], Field(min_length=3, max_length=3)]
+"""x, y, z. No tuple: in lists the checkers of OpenAPI documents stumble over them."""
+
+
+class TimelineDocument(BaseModel):
+    """Groups in the order of their numbers; the values of one group stand at one index."""
+
+    total: int
+    id: list[int]
+    number: list[int]
+    frame: list[int | None] = Field(
+        description="Number of the video frame; null where the key of the group is none."
+    )
+    error_px: list[float | None] = Field(
+        description="The larger reprojection error of the best pair, with or without a ball."
+    )
+    passes: list[bool | None] = Field(description="null while the group is not solved.")
+    gate: list[str | None] = Field(description="The first failing gate.")
+    status: list[str]
+    stale: list[bool] = Field(description="Whether the inputs changed after the verdict.")
+    sigma_m: list[float | None]
+    point: list[Place | None] = Field(description="The 3D ball; pitch frame, metres, z down.")
+
+    @staticmethod
+    def of(timeline: Timeline) -> TimelineDocument:
+        """The document of a timeline."""
+        points = [None if point is None else list(point) for point in timeline.point]
+        values = {**vars(timeline), "point": points}
+        return TimelineDocument.model_construct(total=len(timeline.id), **values)
+
+
+class RemedyEdit(FixDocument):
+    """An edit as findings propose it, or a point moved."""
+
+    point: XY | None = Field(
+        description="Where `move_point` puts its point, or where the ball of `look_ball` would be."
+    )
+
+
+class RemedyDocument(Document):
+    """What the solver has tried out: an edit, or where a person should look and draw."""
+
+    gate: str = Field(description="The gate that fails now.")
+    view: str | None
+    sentence: str = Field(description='Reads on after "would pass if".')
+    edit: RemedyEdit
+    offers: list[OfferDocument] = Field(
+        description="Edits that carry it out; none where a person has to look or draw."
+    )
+    guide: GuideDocument | None = Field(
+        description="Where that person is led; null where edits are offered."
+    )
+    value: float | None = Field(description="The gate's value after the edit.")
+    passes: bool = Field(description="Whether the whole group would pass after the edit.")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _with_point(cls, value: Any) -> Any:
+        if isinstance(value, Remedy):
+            return {**vars(value), "edit": {**vars(value.fix), "point": value.point}}
+        return value
+
+
+class Remedies(ListDocument[RemedyDocument]):
+    """What would make a group pass, the gentlest first; empty when it passes."""
+
+
+class InfluenceDocument(Document, shows=Influence):
+    """What the camera would be without one marking."""
+
+    jac: Jac | None = Field(description="JaC of the view as it is, by gamma in per cent.")
+    jac_without: Jac | None = Field(
+        description="JaC of the other markings, with a camera that is calibrated without this one."
+    )
+    largest_px_without: float | None = Field(
+        description="Distance of its points from the marking, with a camera that is calibrated "
+        "without them."
+    )
+
+
+class Influences(ListDocument[InfluenceDocument]):
+    """The influence of every annotated marking of a view."""

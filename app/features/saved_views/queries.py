@@ -1,0 +1,44 @@
+"""Saved views in the database: queries of the queue under names."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from sqlalchemy import delete, insert, select
+
+from app.db.session import Session, now
+from app.features.groups.insert_queries import next_id
+from app.features.people.alias_queries import shown_actor
+from app.features.saved_views.tables import SavedViewModel
+
+_SAVED = select(
+    *(column for column in SavedViewModel.__table__.columns if column.name != "actor"),
+    shown_actor(SavedViewModel.actor, SavedViewModel.created).label("actor"),
+)
+
+
+def dataset_saved_views(session: Session, dataset_id: int) -> Sequence[Any]:
+    """The saved views of a dataset, by name."""
+    statement = _SAVED.where(SavedViewModel.dataset_id == dataset_id)
+    return session.execute(statement.order_by(SavedViewModel.name)).all()
+
+
+def find_saved_view(session: Session, view_id: int) -> Any | None:
+    """A saved view by its id."""
+    return session.execute(_SAVED.where(SavedViewModel.id == view_id)).one_or_none()
+
+
+def insert_saved_view(
+    session: Session, dataset_id: int, name: str, query: str, *, actor: str
+) -> int:
+    """Insert a saved view; returns its id."""
+    identity = next_id(session, SavedViewModel)
+    values = {"id": identity, "dataset_id": dataset_id, "name": name, "query": query}
+    session.execute(insert(SavedViewModel), [{**values, "actor": actor, "created": now()}])
+    return identity
+
+
+def delete_saved_view(session: Session, view_id: int) -> None:
+    """Delete a saved view; nothing where there is none."""
+    session.execute(delete(SavedViewModel).where(SavedViewModel.id == view_id))

@@ -1,0 +1,87 @@
+"""Saved views of the queue, and who has reviewed how much."""
+
+from __future__ import annotations
+
+from fastapi import APIRouter, Response
+
+from app.features.datasets.service import dataset_id
+from app.features.saved_views import service as saved_views
+from app.features.saved_views.schemas import (
+    NewSavedView,
+    ReviewerList,
+    SavedViewDocument,
+    SavedViewList,
+)
+from app.features.saved_views.service import SavedView
+from app.features.verdicts import service as reviewers
+from app.http.cursor import paged
+from app.http.deps import Actor, AppStore, DatasetPath, Id
+from app.http.problem import responses
+from app.http.respond import as_document, document, responds
+
+router = APIRouter(tags=["queue"])
+
+
+@router.get(
+    "/datasets/{dataset}/saved-views", operation_id="listSavedViews", responses=responses(404)
+)
+@paged()
+def list_saved_views(dataset: DatasetPath, store: AppStore) -> SavedViewList:
+    """Queries under names, each with the number of groups that match it now."""
+    found = saved_views.list_saved_views(store, dataset_id(store, dataset))
+    return SavedViewList(items=found)
+
+
+def _saved(view: SavedView) -> Response:
+    headers = {"Location": f"/api/v1/saved-views/{view.id}"}
+    return document(SavedViewDocument.model_validate(view), 201, headers)
+
+
+@router.post(
+    "/datasets/{dataset}/saved-views",
+    operation_id="createSavedView",
+    response_model=SavedViewDocument,
+    status_code=201,
+    responses={
+        **responses(404, 409, 413, 415),
+        201: {
+            "headers": {"Location": {"description": "Its address.", "schema": {"type": "string"}}},
+            "description": "The saved view.",
+        },
+    },
+)
+@responds(_saved)
+def save_view(dataset: DatasetPath, view: NewSavedView, store: AppStore, actor: Actor) -> SavedView:
+    """Keep a query under a name; 409 when the name is taken."""
+    return saved_views.save_view(store, dataset_id(store, dataset), view.name, view.q, actor=actor)
+
+
+@router.get(
+    "/saved-views/{view}",
+    operation_id="getSavedView",
+    response_model=SavedViewDocument,
+    responses=responses(404),
+)
+def get_saved_view(view: Id, store: AppStore) -> saved_views.SavedView:
+    """One saved view."""
+    return saved_views.get_view(store, view)
+
+
+@router.delete(
+    "/saved-views/{view}",
+    operation_id="deleteSavedView",
+    response_model=SavedViewDocument,
+    responses=responses(404),
+)
+@responds(as_document(SavedViewDocument.model_validate))
+def delete_saved_view(view: Id, store: AppStore) -> SavedView:
+    """Forget a saved view; the answer is what it was, so that it can be saved again."""
+    return saved_views.delete_view(store, view)
+
+
+@router.get("/datasets/{dataset}/reviewers", operation_id="listReviewers", responses=responses(404))
+@paged()
+def list_reviewers(dataset: DatasetPath, store: AppStore) -> ReviewerList:
+    """Who has judged how many groups."""
+    found = reviewers.list_reviewers(store, dataset_id(store, dataset))
+    return ReviewerList(items=found)

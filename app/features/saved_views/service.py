@@ -1,0 +1,122 @@
+"""Saved views: queries of the queue under names that everybody on the dataset sees."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from app.db.session import Session
+from app.db.store import Store
+from app.errors import ConflictError, InputError, NotFoundError
+from app.features.datasets.service import checked_title
+from app.features.people.visibility_queries import judges_in
+from app.features.queue.fields import asks_blind
+from app.features.queue.listing_queries import Listing
+from app.features.queue.query import parse_query
+from app.features.saved_views.queries import (
+    dataset_saved_views,
+    delete_saved_view,
+    find_saved_view,
+    insert_saved_view,
+)
+from app.soccer.actors import LOCAL_USER, person_of
+
+MAX_VIEWS = 200
+"""Of one dataset: a list that people read."""
+MAX_OWN = 40
+"""Of one person in one dataset: nobody takes all the room."""
+
+
+@dataclass(frozen=True)
+class SavedView:
+    """A query with its name; ``groups`` match it now."""
+
+    id: int
+    name: str
+    query: str
+    actor: str
+    created: str
+    groups: int
+
+
+def list_saved_views(store: Store, dataset_id: int) -> list[SavedView]:
+    """The saved views of a dataset, by name, each with the number of groups that match."""
+    with store.read() as session:
+        rows = dataset_saved_views(session, dataset_id)
+        return [_saved_view(row, _matching(session, row)) for row in rows if _is_told(row)]
+
+
+def save_view(store: Store, dataset_id: int, name: str, query: str, *, actor: str) -> SavedView:
+    """Keep a query under a name.
+
+    Raises:
+        InputError: There is no name, or the query cannot be understood.
+        ConflictError: The name is taken; nobody's view is replaced unseen.
+    """
+    name = checked_title(name, "a saved view")
+    parse_query(query)
+    with store.write() as session:
+        rows = dataset_saved_views(session, dataset_id)
+        names = [row.name for row in rows]
+        if name in names:
+            raise ConflictError(
+                f'there is a view "{name}" already', hint="Delete it, or choose another name."
+            )
+        if len(names) >= MAX_VIEWS:
+            raise ConflictError(
+                f"a dataset has at most {MAX_VIEWS} saved views", hint="Delete one first."
+            )
+        own = sum(person_of(row.actor) == person_of(actor) for row in rows)
+        if own >= MAX_OWN and person_of(actor) != LOCAL_USER:
+            raise ConflictError(
+                f"one person has at most {MAX_OWN} saved views in a dataset",
+                hint="Delete one of yours first.",
+            )
+        identity = insert_saved_view(session, dataset_id, name, query.strip(), actor=actor)
+        saved = _read(session, identity)
+        session.respond(saved)
+    return saved
+
+
+def get_view(store: Store, view_id: int) -> SavedView:
+    """A saved view; raises NotFoundError when there is none."""
+    with store.read() as session:
+        return _read(session, view_id)
+
+
+def delete_view(store: Store, view_id: int) -> SavedView:
+    """Forget a saved view; returns what it was.
+
+    Raises:
+        NotFoundError: There is none.
+    """
+    with store.write() as session:
+        view = _read(session, view_id)
+        delete_saved_view(session, view_id)
+        session.respond(view)
+    return view
+
+
+def _read(session: Session, view_id: int) -> SavedView:
+    row = find_saved_view(session, view_id)
+    if row is None or not _is_told(row):
+        raise NotFoundError(f"there is no saved view {view_id}")
+    return _saved_view(row, _matching(session, row))
+
+
+def _is_told(row: Any) -> bool:
+    """Whether whoever asks may know of a view: its number of groups answers its query."""
+    return judges_in(row.dataset_id) or not asks_blind(row.query)
+
+
+def _matching(session: Session, row: Any) -> int:
+    """How many groups match; none where a query of an older version is no longer understood."""
+    try:
+        conditions = parse_query(row.query).conditions
+    except InputError:
+        return 0
+    return Listing(session, row.dataset_id, conditions).count()
+
+
+def _saved_view(row: Any, groups: int) -> SavedView:
+    return SavedView(row.id, row.name, row.query, row.actor, row.created, groups)

@@ -1,0 +1,111 @@
+"""Commands on what is computed: solve, and the findings of it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from app.features.policies.commands import read_policy_option
+from app.plural import plural
+from app.terminal.opened import opened_store, opened_to_solve
+from app.terminal.options import POLICY_OR_FILE, Cluster, Dataset, Json, Workers, acting
+from app.terminal.server import ServerPlace, connected, given_server
+from app.terminal.terminal import (
+    INTERRUPTED,
+    complain,
+    held_interrupts,
+    print_json,
+    say,
+    show_progress,
+)
+
+if TYPE_CHECKING:
+    from app.soccer.policy import Policy
+
+commands = typer.Typer()
+
+
+@commands.command()
+def solve(
+    dataset: Dataset,
+    policy: Annotated[
+        str | None,
+        typer.Option(
+            metavar=POLICY_OR_FILE,
+            help="Judge the dataset by this policy from now on.",
+        ),
+    ] = None,
+    workers: Workers = None,
+    cluster: Cluster = None,
+    json_: Json = False,
+) -> None:
+    """Compute what is missing or out of date; Ctrl+C keeps what is done, and the next run goes on.
+
+    A server computes by itself: there it waits, and Ctrl+C leaves the job running.
+    """
+    server = given_server()
+    if server is not None:
+        if workers is not None or cluster is not None:
+            raise typer.BadParameter("a server solves with its own processes; leave out --workers")
+        chosen = None if policy is None else read_policy_option(policy)
+        _print_solved(*_solve_at(server, dataset, chosen), json_=json_)
+        return
+    from app.features.policies.service import change_policy
+    from app.features.solve.jobs import count_yield, left_undone, solve_fully
+
+    chosen = None if policy is None else read_policy_option(policy)
+    with opened_to_solve("Solving", workers, cluster) as (store, executor, progress):
+        if chosen is not None:
+            change_policy(store, dataset, chosen, if_match=None, actor=acting())
+        with held_interrupts() as interrupted:
+            report = solve_fully(store, dataset, executor, progress, interrupted, actor=acting())
+            left = left_undone(store, dataset) if interrupted() else None
+            if left is not None:
+                complain(f"stopped; {plural(report.solved, 'group is', 'groups are')} kept, {left}")
+                raise typer.Exit(INTERRUPTED)
+        count_yield(store, dataset, report, progress)
+    _print_solved(vars(report), report.sentence, json_=json_)
+
+
+def _solve_at(
+    server: ServerPlace, dataset: str, policy: Policy | None
+) -> tuple[Mapping[str, Any], str]:
+    from app.terminal import remote
+
+    with connected(server) as client, show_progress("Solving") as progress:
+        return remote.solve_values(client, dataset, policy, progress)
+
+
+def _print_solved(values: Mapping[str, Any], sentence: str, *, json_: bool) -> None:
+    if json_:
+        print_json(values)
+        return
+    say(sentence if values["total"] else "nothing to solve: every group is up to date")
+    for key, problem in values["failed"]:
+        say(f"  {key}: {problem}")
+
+
+@commands.command()
+def findings(dataset: Dataset, json_: Json = False) -> None:
+    """List what a person should look at."""
+    server = given_server()
+    if server is not None:
+        from app.terminal import remote
+
+        with connected(server) as client:
+            values = list(remote.finding_values(client, dataset))
+    else:
+        from app.features.findings.service import finding_values
+
+        with opened_store() as store:
+            values = list(finding_values(store, dataset))
+    if json_:
+        print_json(values)
+        return
+    for value in values:
+        place = " ".join(value[key] for key in ("group", "view") if value.get(key))
+        said = value.get("dismissed")
+        checked = "" if said is None else f" (checked by {said['by']}, fine)"
+        say(f"{value['kind']:20} {place}: {value['sentence']}{checked}")

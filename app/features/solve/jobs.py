@@ -1,0 +1,302 @@
+"""The jobs that solve what has no solution, and all that solving a dataset is."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import Executor
+from contextlib import nullcontext
+from dataclasses import dataclass
+from typing import TypeVar
+
+from app.db.json_columns import Json
+from app.db.session import Session
+from app.db.store import Store
+from app.features.datasets.queries import dataset_name, group_ids
+from app.features.datasets.service import get_dataset_head, list_datasets
+from app.features.jobs.queries import Job
+from app.features.jobs.records import Then
+from app.features.jobs.run import JobProgress, Work, counting
+from app.features.jobs.service import Jobs, Pool
+from app.features.match_estimates.noise import follow_noise, is_followed, noise_sample
+from app.features.pitches.service import (
+    DatasetPitches,
+    apply_pitches,
+    estimate_pitches,
+    stale_matches,
+)
+from app.features.policies.service import PolicyState, apply_policy
+from app.features.solutions.queries import unsolved_groups
+from app.features.solutions.service import SolveReport, solve_dataset, stale_groups
+from app.features.what_if.service import AT_ONCE, YieldStore
+from app.plural import plural
+from app.progress import TellProgress
+from app.soccer.actors import LOCAL_USER
+from app.soccer.pitch import Pitch
+from app.soccer.policy import Policy
+
+
+def solve_fully(
+    store: Store,
+    dataset: str | int,
+    executor: Executor | None,
+    progress: TellProgress,
+    stop: Callable[[], bool] = lambda: False,
+    *,
+    actor: str = LOCAL_USER,
+    follow: bool = True,
+) -> SolveReport:
+    """Solve what is stale, and estimate the pitches of matches; ``count_yield`` comes after it.
+
+    Where the policy says so the noise of clicks is estimated before: from some groups, so that
+    the others are solved once.
+
+    Args:
+        store: The database.
+        dataset: Name or id.
+        executor: Where chunks of groups, and matches, are worked on; None: here, one by one.
+        progress: Called with groups solved and in all; an error that it raises ends the run, and
+            nothing that was saved before is lost.
+        stop: Asked every now and then; once it says so, what is done is saved, and no more.
+        actor: Who solves it.
+        follow: Whether noise is estimated; an edit leaves it as it is.
+    """
+    ahead = SolveReport()
+    if follow and is_followed(store, dataset):
+        ahead = solve_dataset(store, dataset, executor, progress, stop, noise_sample)
+        if not stop() and follow_noise(store, dataset, actor):
+            ahead = SolveReport()
+    report = solve_dataset(store, dataset, executor, progress, stop).after(ahead)
+    total = report.total
+    if not stop():
+
+        def estimated(done: int, _total: int | None = None, _said: str = "") -> None:
+            report.estimated = done
+            # It stays at the groups that are solved, and can be ended all the same.
+            progress(total, total)
+
+        found = estimate_pitches(store, dataset, executor, estimated, stop)
+        report.proposed = len(found.proposals)
+    return report
+
+
+def left_undone(store: Store, dataset: str | int) -> str | None:
+    """What ``solve_fully`` would do now, as a sentence; None: nothing."""
+    groups, matches = len(stale_groups(store, dataset)), len(stale_matches(store, dataset))
+    if groups:
+        return f"{groups} are left to do"
+    many = plural(matches, "match", "matches")
+    return f"the pitch of {many} is left to estimate" if matches else None
+
+
+def count_yield(
+    store: Store, dataset: str | int, report: SolveReport, progress: TellProgress
+) -> None:
+    """Count what a dataset yields where many groups were solved, so that the first look finds it."""
+    if report.solved > AT_ONCE:
+        found = get_dataset_head(store, dataset)
+        progress(report.total, report.total, f"Counting what {found.name} yields.")
+        YieldStore(store).keep_up(found.id)
+
+
+KIND, EDITED = "solve", "edited"
+Changed = TypeVar("Changed")
+WORTH_A_POOL = 400
+"""Groups from which on starting processes costs less than it saves the requests."""
+MATCHES_WORTH_A_POOL = 4
+"""The same in matches whose pitch is estimated: that looks at all lines of a match."""
+MOSTLY = 0.5
+"""Of a dataset's groups: where more are stale, it was no edit that left them so."""
+NAMED = 20
+"""Groups whose solving broke that are named in a result; all are counted."""
+
+
+@dataclass(frozen=True)
+class PolicyJob:
+    """A dataset under another policy, the job that solves what that left stale, and how many groups
+    that are."""
+
+    state: PolicyState
+    job: Job
+    to_solve: int
+
+
+@dataclass(frozen=True)
+class PitchJob:
+    """The pitches of a dataset as they are now, and the job that solves what that left stale."""
+
+    state: DatasetPitches
+    job: Job
+
+
+def request_solve(
+    jobs: Jobs,
+    store: Store,
+    dataset_id: int,
+    *,
+    actor: str,
+    title: str | None = None,
+    edited: bool = False,
+    then: Then = Session.respond,
+) -> Job:
+    """Solve what is stale in a dataset, soon; one job a dataset waits at most.
+
+    ``edited``: by an edit, with which no noise is estimated anew.
+    """
+    with store.read() as session:
+        name = dataset_name(session, dataset_id)
+    return jobs.submit(
+        KIND,
+        title or f"Solve {name}",
+        solve_work(store, dataset_id, jobs.pool, actor=actor, edited=edited),
+        dataset_id=dataset_id,
+        actor=actor,
+        request={EDITED: True} if edited else None,
+        once=True,
+        then=then,
+    )
+
+
+def solve_after(
+    jobs: Jobs,
+    store: Store,
+    dataset_id: int,
+    change: Callable[[Session, Job], Changed],
+    *,
+    actor: str,
+) -> Changed:
+    """Change something of a dataset and solve what that leaves stale, soon: both, or neither.
+
+    Args:
+        jobs: Where the job is queued.
+        store: The database.
+        dataset_id: The dataset.
+        change: Makes the change, in the transaction of the job's record; the request is
+            answered with what it returns.
+        actor: Who says so.
+    """
+    changed: list[Changed] = []
+
+    def both(session: Session, job: Job) -> None:
+        changed.append(change(session, job))
+        session.respond(changed[0])
+
+    request_solve(jobs, store, dataset_id, actor=actor, then=both)
+    return changed[0]
+
+
+def request_policy(
+    jobs: Jobs, store: Store, dataset_id: int, policy: Policy, *, if_match: str, actor: str
+) -> PolicyJob:
+    """Judge a dataset by another policy, and solve what that leaves stale, soon.
+
+    Raises:
+        StaleRevisionError: Somebody else was faster.
+    """
+
+    def change(session: Session, job: Job) -> PolicyJob:
+        state = apply_policy(session, dataset_id, policy, if_match=if_match, actor=actor)
+        return PolicyJob(state, job, len(unsolved_groups(session, dataset_id)))
+
+    return solve_after(jobs, store, dataset_id, change, actor=actor)
+
+
+def request_pitches(
+    jobs: Jobs,
+    store: Store,
+    dataset_id: int,
+    wanted: dict[str, Pitch],
+    *,
+    if_match: str,
+    actor: str,
+) -> PitchJob:
+    """Give matches of a dataset another pitch, and solve what that leaves stale, soon.
+
+    Raises:
+        NotFoundError: There is no such match.
+        StaleRevisionError: Somebody else was faster.
+    """
+
+    def change(session: Session, job: Job) -> PitchJob:
+        state = apply_pitches(session, dataset_id, wanted, if_match=if_match, actor=actor)
+        return PitchJob(state, job)
+
+    return solve_after(jobs, store, dataset_id, change, actor=actor)
+
+
+def request_estimates(jobs: Jobs, store: Store, dataset: str | int, *, actor: str) -> Job:
+    """Estimate the pitches of a dataset's matches that are not estimated yet, soon.
+
+    That is a part of solving; where the dataset is being solved already, that job does it.
+
+    Raises:
+        NotFoundError: There is no such dataset.
+    """
+    found = get_dataset_head(store, dataset)
+    title = f"Estimate the pitches of {found.name}"
+    return request_solve(jobs, store, found.id, actor=actor, title=title)
+
+
+def resume_solving(jobs: Jobs, store: Store) -> None:
+    """Let solving that an earlier server was at go on."""
+
+    def work(job: Job) -> Work:
+        edited = bool(job.request and job.request.get(EDITED))
+        return solve_work(store, job.dataset_id or 0, jobs.pool, actor=job.actor, edited=edited)
+
+    jobs.resumes(KIND, work)
+
+
+def solve_leftovers(jobs: Jobs, store: Store, *, actor: str) -> None:
+    """Solve whatever an earlier run, of the server or of a command, left undone."""
+    for dataset in list_datasets(store):
+        if stale_groups(store, dataset.id):
+            request_solve(jobs, store, dataset.id, actor=actor)
+
+
+def solve_work(
+    store: Store,
+    dataset_id: int,
+    pool: Pool = nullcontext,
+    *,
+    actor: str = LOCAL_USER,
+    edited: bool = False,
+) -> Work:
+    """The work itself: what to do is found in the data when it starts."""
+
+    def work(progress: JobProgress) -> Json:
+        found = get_dataset_head(store, dataset_id)
+        progress(0, None, f"Solving {found.name}.")
+        stale, whole = len(stale_groups(store, dataset_id)), _group_count(store, dataset_id)
+        # A change of the policy may have met an edit's job that waited.
+        follow = not edited or stale > MOSTLY * whole
+        large = (
+            stale >= WORTH_A_POOL or len(stale_matches(store, dataset_id)) >= MATCHES_WORTH_A_POOL
+        )
+        with pool() if large else nullcontext() as executor:
+            told = counting(progress, "groups solved")
+            report = solve_fully(store, dataset_id, executor, told, actor=actor, follow=follow)
+        count_yield(store, dataset_id, report, progress)
+        progress(report.total, report.total, report.sentence)
+        return {"policy": found.policy.name, **_report(report)}
+
+    return work
+
+
+def _group_count(store: Store, dataset_id: int) -> int:
+    with store.read() as session:
+        return len(group_ids(session, dataset_id))
+
+
+def _report(report: SolveReport) -> Json:
+    named = [{"group": key, "problem": problem} for key, problem in report.failed[:NAMED]]
+    return {
+        "groups": report.total,
+        "solved": report.solved,
+        "passed": report.passed,
+        "failed": len(report.failed),
+        "failures": named,
+        "estimated": report.estimated,
+        "proposed": report.proposed,
+        "failing": dict(report.failing),
+        "advice": report.advice,
+    }

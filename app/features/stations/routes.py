@@ -1,0 +1,169 @@
+"""Stations: the lines of static cameras, edited once for every view that shares them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from typing import Annotated
+
+from fastapi import APIRouter, Query, Response
+
+from app.db.idempotency import without_response
+from app.errors import NotFoundError
+from app.features.groups.edit import SetStationCalibration, SetStationLines
+from app.features.groups.routes import CHANGED, CONFLICTS, group_answer, load_document
+from app.features.groups.schemas import GroupDocument, LinesEdit, StationEdit
+from app.features.groups.state import GroupState
+from app.features.groups.submit import solved
+from app.features.solve.jobs import request_solve
+from app.features.stations.schemas import StationDetail
+from app.features.stations.service import (
+    StationState,
+    load_station,
+    redo_station,
+    submit_station,
+    undo_station,
+)
+from app.finite import MAX_ID
+from app.http.conflicts import current_state
+from app.http.deps import Actor, AppServices, AppStore, Id, IfMatch
+from app.http.problem import Responses, responses
+from app.http.respond import responds
+from app.http.services import Services
+
+router = APIRouter(prefix="/stations", tags=["stations"])
+
+GroupOfStation = Annotated[
+    int | None,
+    Query(
+        ge=1,
+        le=MAX_ID,
+        description="The group to answer with; default: the first that the station takes part in.",
+    ),
+]
+STATION_CHANGED: Responses = {**responses(*CONFLICTS), **CHANGED}
+
+
+@router.get(
+    "/{station}",
+    operation_id="getStation",
+    responses={
+        **responses(404),
+        200: {"headers": {"ETag": {"description": "The station's.", "schema": {"type": "string"}}}},
+    },
+)
+def get_station(station: Id, store: AppStore, response: Response) -> StationDetail:
+    """A station with its lines and its own ETag."""
+    state = load_station(store, station)
+    response.headers["ETag"] = state.etag
+    return StationDetail.of(state)
+
+
+@router.patch(
+    "/{station}/lines",
+    operation_id="setStationLines",
+    response_model=GroupDocument,
+    responses=STATION_CHANGED,
+)
+@responds(group_answer)
+def patch_lines(
+    station: Id,
+    lines: LinesEdit,
+    services: AppServices,
+    actor: Actor,
+    if_match: IfMatch,
+    group: GroupOfStation = None,
+) -> GroupState:
+    """Change the lines of a static camera; If-Match takes the station's ETag.
+
+    The group that is answered is solved at once, the others in the background.
+    """
+    edit = SetStationLines(lines.points(), tuple(lines.proposed), tuple(lines.not_visible))
+    change = partial(submit_station, edit=edit)
+    return _change(services, station, group, change, if_match, actor)
+
+
+@router.patch(
+    "/{station}",
+    operation_id="changeStation",
+    response_model=GroupDocument,
+    responses=STATION_CHANGED,
+)
+@responds(group_answer)
+def patch_station(
+    station: Id,
+    change: StationEdit,
+    services: AppServices,
+    actor: Actor,
+    if_match: IfMatch,
+    group: GroupOfStation = None,
+) -> GroupState:
+    """Choose whether the given calibration counts or the lines; If-Match as for lines."""
+    edited = partial(submit_station, edit=SetStationCalibration(change.calibration))
+    return _change(services, station, group, edited, if_match, actor)
+
+
+@router.post(
+    "/{station}/undo",
+    operation_id="undoStation",
+    response_model=GroupDocument,
+    responses=STATION_CHANGED,
+)
+@responds(group_answer)
+def undo(
+    station: Id,
+    services: AppServices,
+    actor: Actor,
+    if_match: IfMatch,
+    group: GroupOfStation = None,
+) -> GroupState:
+    """Take the last edit of a static camera back; 409 when there is none."""
+    return _change(services, station, group, undo_station, if_match, actor)
+
+
+@router.post(
+    "/{station}/redo",
+    operation_id="redoStation",
+    response_model=GroupDocument,
+    responses=STATION_CHANGED,
+)
+@responds(group_answer)
+def redo(
+    station: Id,
+    services: AppServices,
+    actor: Actor,
+    if_match: IfMatch,
+    group: GroupOfStation = None,
+) -> GroupState:
+    """Do again what was undone last; 409 when there is nothing."""
+    return _change(services, station, group, redo_station, if_match, actor)
+
+
+def _change(
+    services: Services,
+    station: int,
+    group: int | None,
+    change: Callable[..., StationState],
+    if_match: str,
+    actor: str,
+) -> GroupState:
+    """Change a station with the group in view, and queue the others."""
+    store = services.store
+    shown = _shown_group(load_station(store, station), group)
+    with current_state(lambda: load_document(store, shown)):
+        state = change(store, station, if_match=if_match, actor=actor, shown=shown)
+    with without_response():
+        request_solve(services.jobs, store, state.dataset_id, actor=actor, edited=True)
+    return state.shown or solved(store, shown)
+
+
+def _shown_group(state: StationState, group: int | None) -> int:
+    """The group to answer with.
+
+    Raises:
+        NotFoundError: No view of that group is from the station.
+    """
+    chosen = group if group is not None else next(iter(state.groups), None)
+    if chosen is None or chosen not in state.groups:
+        raise NotFoundError(f"camera {state.station.key} has no view in that group")
+    return chosen

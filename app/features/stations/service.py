@@ -1,0 +1,279 @@
+"""Stations: the lines of a static camera, edited once for all views that share it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import NotRequired, TypedDict, Unpack
+
+from app.db.json_columns import Json
+from app.db.log import Entry, append
+from app.db.session import Session, now
+from app.db.store import Store
+from app.errors import ConflictError, NotFoundError
+from app.features.datasets.queries import dataset_name
+from app.features.groups.digest import group_inputs_hash
+from app.features.groups.edit import SetStationLines, StationEdit, with_station
+from app.features.groups.edit_codec import require_few_points, station_edit_from_json, step_to_json
+from app.features.groups.queries import StoredGroup
+from app.features.groups.revision_queries import refresh_inputs_hashes
+from app.features.groups.state import (
+    GroupState,
+    read_record,
+    read_state,
+    require_etag,
+    station_etag,
+)
+from app.features.groups.undo_stacks import next_step, read_station_stacks
+from app.features.groups.view_queries import (
+    StoredStation,
+    groups_of_station,
+    read_stations,
+    save_station,
+)
+from app.features.queue.queries import refresh_queue
+from app.features.solutions.queries import EncodedSolution, SolutionKey, insert_solutions
+from app.features.solutions.service import known_calibrations, solve_encoded
+from app.soccer.group import Group, Station
+from app.soccer.solution import Calibration
+
+
+@dataclass(frozen=True)
+class StationState:
+    """A station as it is now; ``groups`` are the ids of the groups that it takes part in.
+
+    ``shown`` is one of them as it was saved with a step of the station.
+    """
+
+    id: int
+    dataset_id: int
+    dataset: str
+    revision: int
+    etag: str
+    station: Station
+    groups: tuple[int, ...]
+    can_undo: bool
+    can_redo: bool
+    stored: StoredStation
+    shown: GroupState | None = None
+
+
+@dataclass(frozen=True)
+class _Change:
+    kind: str
+    body: Json
+    station: Station
+
+
+class _How(TypedDict):
+    """How a step is taken.
+
+    Attributes:
+        if_match: ETag of the station that it builds on.
+        actor: Who says so.
+        shown: One of its groups, which is solved and saved with it.
+    """
+
+    if_match: str
+    actor: str
+    shown: NotRequired[int | None]
+
+
+_Plan = Callable[[Session, StationState], _Change]
+_Trial = tuple[StoredGroup, Group, Mapping[str, Calibration]]
+
+
+def load_station(store: Store, station_id: int) -> StationState:
+    """A station as it is now.
+
+    Raises:
+        NotFoundError: There is no such station.
+    """
+    with store.read() as session:
+        return _read(session, station_id)
+
+
+def submit_station(
+    store: Store,
+    station_id: int,
+    edit: StationEdit,
+    **how: Unpack[_How],
+) -> StationState:
+    """Save an edit of a static camera; its groups are then stale until they are solved again.
+
+    ``recompute.solve_dataset`` solves them; the inputs hashes of all are in step already.
+
+    Args:
+        store: The database.
+        station_id: The station.
+        edit: What to change.
+        how: ETag of the station that the edit builds on (``if_match``), who says so (``actor``), the
+            group that is solved and saved with it (``shown``).
+
+    Raises:
+        StaleRevisionError: ``if_match`` is not the station's present ETag.
+        ConflictError: The station belongs to one view alone, which is where it is edited.
+        InputError: The edit says something impossible.
+    """
+
+    return _change(store, station_id, _plan_edit(edit), **how)
+
+
+def submit_stations(
+    store: Store,
+    edits: Sequence[tuple[StationState, StationEdit]],
+    *,
+    actor: str,
+    check: Callable[[Session], None] | None = None,
+) -> None:
+    """Save edits of several static cameras that belong together: all of them, or none.
+
+    Args:
+        store: The database.
+        edits: What each camera was when its edit was thought of, and the edit.
+        actor: Who says so.
+        check: Raises where what else they rest on has changed; nothing is saved then.
+
+    Raises:
+        StaleRevisionError: One of the cameras has changed since.
+    """
+
+    steps = [(state.id, _plan_edit(edit), state.etag) for state, edit in edits]
+    with store.write() as session:
+        if check is not None:
+            check(session)
+        _save_all(session, steps, actor)
+
+
+def undo_stations(store: Store, states: Sequence[StationState], *, actor: str) -> int:
+    """Take the last edit of several static cameras back, of all or none; returns how many."""
+    steps = [(state.id, _plan_step("undo"), state.etag) for state in states]
+    count = len(steps)
+    with store.write() as session:
+        _save_all(session, steps, actor)
+        session.respond(count)
+    return count
+
+
+def _save_all(session: Session, steps: Iterable[tuple[int, _Plan, str]], actor: str) -> None:
+    groups: set[int] = set()
+    for station_id, plan, etag in steps:
+        state, change = _planned(session, station_id, plan, etag)
+        if change.station != state.station:
+            _save(session, state, change, actor)
+            groups.update(state.groups)
+    refresh_queue(session, sorted(groups))
+
+
+def undo_station(store: Store, station_id: int, **how: Unpack[_How]) -> StationState:
+    """Take the last edit of a static camera back; raises ConflictError without one."""
+    return _change(store, station_id, _plan_step("undo"), **how)
+
+
+def redo_station(store: Store, station_id: int, **how: Unpack[_How]) -> StationState:
+    """Do again what undo took back last; raises ConflictError without such an edit."""
+    return _change(store, station_id, _plan_step("redo"), **how)
+
+
+def _change(
+    store: Store,
+    station_id: int,
+    plan: _Plan,
+    *,
+    if_match: str,
+    actor: str,
+    shown: int | None = None,
+) -> StationState:
+    with store.read() as session:
+        state, change = _planned(session, station_id, plan, if_match)
+        if change.station == state.station:
+            return state
+        trial = None if shown is None else _trial(session, shown, change.station)
+    solutions = [] if trial is None else [_solved(*trial)]
+    with store.write() as session:
+        # Planned once more: others may have edited it while the group was solved.
+        state, change = _planned(session, station_id, plan, if_match)
+        _save(session, state, change, actor)
+        insert_solutions(session, solutions)
+        refresh_queue(session, state.groups)
+        saved = None if shown is None else read_state(session, shown)
+        if saved is not None:
+            session.respond(saved)
+    return replace(load_station(store, station_id), shown=saved)
+
+
+def _planned(
+    session: Session, station_id: int, plan: _Plan, if_match: str
+) -> tuple[StationState, _Change]:
+    state = _read(session, station_id)
+    if not state.station.shared:
+        raise ConflictError(
+            f"station {state.station.key} belongs to one view",
+            hint="Edit the lines of that view instead.",
+        )
+    require_etag(state.etag, if_match, f"camera {state.station.key}")
+    return state, plan(session, state)
+
+
+def _trial(session: Session, group_id: int, station: Station) -> _Trial:
+    """A group with another station, and what is known of its calibrations."""
+    stored = read_record(session, group_id).stored
+    view = next(view for view in stored.group.views if view.station.key == station.key)
+    group = with_station(stored.group, view, station)
+    return stored, group, known_calibrations(session, [group], stored.policy)
+
+
+def _solved(
+    stored: StoredGroup, group: Group, known: Mapping[str, Calibration]
+) -> tuple[SolutionKey, EncodedSolution]:
+    key = SolutionKey(stored.id, group_inputs_hash(group), stored.policy.hash)
+    return key, solve_encoded(group, stored.policy, known)[1]
+
+
+def _save(session: Session, state: StationState, change: _Change, actor: str) -> None:
+    save_station(session, state.stored, change.station)
+    refresh_inputs_hashes(session, state.groups)
+    entry = Entry(change.kind, actor, now(), change.body, state.dataset_id, station_id=state.id)
+    append(session, [entry])
+
+
+def _read(session: Session, station_id: int) -> StationState:
+    stored = read_stations(session, [station_id]).get(station_id)
+    if stored is None:
+        raise NotFoundError(f"there is no station {station_id}")
+    stacks = read_station_stacks(session, station_id)
+    return StationState(
+        id=stored.id,
+        dataset_id=stored.dataset_id,
+        dataset=dataset_name(session, stored.dataset_id),
+        revision=stored.revision,
+        etag=station_etag(stored),
+        station=stored.station,
+        groups=tuple(groups_of_station(session, station_id)),
+        can_undo=stacks.can_undo,
+        can_redo=stacks.can_redo,
+        stored=stored,
+    )
+
+
+def _plan_edit(edit: StationEdit) -> _Plan:
+    def plan(_session: Session, state: StationState) -> _Change:
+        station = state.station
+        if isinstance(edit, SetStationLines):
+            require_few_points(f"camera {station.key}", station.lines, edit.lines)
+        body = step_to_json(edit, edit.inverse(station))
+        return _Change("station_edit", body, edit.apply(station))
+
+    return plan
+
+
+def _plan_step(kind: str) -> _Plan:
+    """Undo or redo."""
+
+    def plan(session: Session, state: StationState) -> _Change:
+        stacks = read_station_stacks(session, state.id)
+        body = next_step(session, stacks, kind, "for this camera")
+        station = station_edit_from_json(body["edit"]).apply(state.station)
+        return _Change(f"station_{kind}", body, station)
+
+    return plan

@@ -1,0 +1,29 @@
+"""Every table: what people said, its append-only log, and what was computed from it.
+
+``dataset``, ``station``, ``groups`` and ``view`` hold the present state of what was said; the
+``log`` can rebuild them. ``verdict``, ``dismissal`` and ``log`` only grow, ``solution`` and ``calibration`` are
+inserted and never changed (triggers see to it). ``queue`` is a projection of all of these, one
+row a group. Whoever imports one table has the whole schema in ``Base``.
+"""
+
+from __future__ import annotations
+
+from app.db import log as log
+from app.db.base import Base as Base
+from app.features.agreement import tables as agreement  # noqa: F401
+from app.features.batches import tables as batches  # noqa: F401
+from app.features.comments import tables as comments  # noqa: F401
+from app.features.datasets import tables as datasets  # noqa: F401
+from app.features.findings import tables as findings  # noqa: F401
+from app.features.independent_annotations import tables as independent_annotations  # noqa: F401
+from app.features.jobs import tables as jobs  # noqa: F401
+from app.features.paint import tables as paint  # noqa: F401
+from app.features.people import tables as people  # noqa: F401
+from app.features.pitches import tables as pitches  # noqa: F401
+from app.features.predictions import tables as predictions  # noqa: F401
+from app.features.queue import tables as queue  # noqa: F401
+from app.features.saved_views import tables as saved_views  # noqa: F401
+from app.features.solutions import tables as solutions  # noqa: F401
+from app.features.verdicts import tables as verdicts  # noqa: F401
+from app.features.versions import tables as versions  # noqa: F401
+from app.features.webhooks import tables as webhooks  # noqa: F401

@@ -1,0 +1,248 @@
+"""Undo and redo of verdicts that were given in bulk."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from app.db.log import Entry, append
+from app.db.session import Session, now
+from app.db.store import Store
+from app.errors import ConflictError, NotFoundError
+from app.features.queue.listing_queries import read_columns
+from app.features.solutions.queries import present_keys
+from app.features.verdicts.bulk import ASKED, BatchRun, Refusal, chunks, save_verdicts, sort_out
+from app.features.verdicts.queries import (
+    Spans,
+    StoredBulkVerdict,
+    StoredVerdict,
+    find_batch,
+    inputs_judged,
+    judged_between,
+    newest_between,
+    next_verdict_id,
+    read_verdicts,
+    update_batch,
+    with_span,
+)
+from app.features.verdicts.service import check_verdict
+
+
+@dataclass(frozen=True)
+class UndoReport:
+    """What undoing a batch did; ``kept`` are groups that somebody has judged since."""
+
+    batch: int
+    restored: int
+    kept: int
+
+
+def undo_batch(store: Store, batch_id: int, *, actor: str) -> UndoReport:
+    """Give every group of a batch the verdict back that it had before.
+
+    A group that somebody has judged since keeps that verdict.
+
+    Raises:
+        NotFoundError: There is no such batch.
+        ConflictError: It was taken back before.
+    """
+    with store.read() as session:
+        before = read_batch(session, batch_id).undo_spans or ()
+        restored = _restored(session, before)
+    known, number = _verdicts_in(before), 0
+    while True:
+        with store.write() as session:
+            batch = _standing(session, batch_id)
+            left = chunks(batch.spans)[number:]
+            # What another run has taken back is not taken back again: it is not the newest.
+            verdicts = _restore(session, batch, *left[0], actor) if left else []
+            spans = with_span(batch.undo_spans or (), [item.id for item in verdicts])
+            update_batch(session, batch_id, undo_spans=spans)
+            restored += len({item.group_id for item in verdicts})
+            known += len(verdicts)
+            number += 1
+            if len(left) <= 1:
+                if _verdicts_in(spans) != known:
+                    # Another run has been at it meanwhile.
+                    restored = _restored(session, spans)
+                report = UndoReport(batch_id, restored, batch.changed - restored)
+                _close(session, batch, report, actor)
+                session.respond(report)
+                return report
+
+
+def _restored(session: Session, spans: Spans) -> int:
+    """Of how many groups these verdicts are."""
+    return len({group for span in spans for group in judged_between(session, *span)})
+
+
+def _verdicts_in(spans: Spans) -> int:
+    return sum(last - first + 1 for first, last in spans)
+
+
+def _standing(session: Session, batch_id: int) -> StoredBulkVerdict:
+    """A batch that was not taken back, or not wholly.
+
+    Raises:
+        NotFoundError: There is no such batch.
+        ConflictError: It was taken back before.
+    """
+    batch = read_batch(session, batch_id)
+    if batch.undone is not None:
+        raise ConflictError(f"{batch.undone_by} has taken this batch back already")
+    return batch
+
+
+def _close(session: Session, batch: StoredBulkVerdict, report: UndoReport, actor: str) -> None:
+    """Say of a batch, and in the log, that it was taken back."""
+    at = now()
+    update_batch(session, batch.id, undone=at, undone_by=actor)
+    entry = Entry("verdict_batch_undo", actor, at, dict(vars(report)), batch.dataset_id)
+    append(session, [entry])
+
+
+def read_batch(session: Session, batch_id: int) -> StoredBulkVerdict:
+    """A batch by its id.
+
+    Raises:
+        NotFoundError: There is no such batch.
+    """
+    batch = find_batch(session, batch_id)
+    if batch is None:
+        raise NotFoundError(f"there is no batch of verdicts {batch_id}")
+    return batch
+
+
+def _restore(
+    session: Session, batch: StoredBulkVerdict, first: int, last: int, actor: str
+) -> list[StoredVerdict]:
+    """Take one chunk back; returns the verdicts that do it, of groups not judged since."""
+    at, number = now(), next_verdict_id(session)
+    again: list[StoredVerdict] = []
+    for verdicts in read_verdicts(session, judged_between(session, first, last)).values():
+        if first <= verdicts[0].id <= last:
+            again += _before(verdicts, batch.actor, at)
+    numbered = [replace(item, id=number + place) for place, item in enumerate(again)]
+    if numbered:
+        save_verdicts(session, batch.dataset_id, numbered, actor=actor, at=at)
+    return numbered
+
+
+def _before(verdicts: Sequence[StoredVerdict], judge: str, at: str) -> list[StoredVerdict]:
+    """Verdicts that put a group back: its judge's own last one, then the one that counted.
+
+    The newest verdict counts, so what counted before is said last.
+    """
+    newest, earlier = verdicts[0], verdicts[1:]
+    own = next((item for item in earlier if item.actor == judge), None)
+    taken_back = replace(
+        newest, at=at, state="unreviewed", reason=None, note=None, override=None, fixed=False
+    )
+    again = [taken_back if own is None else own]
+    if earlier and earlier[0] is not own:
+        again.append(earlier[0])
+    return again
+
+
+@dataclass(frozen=True)
+class RedoReport:
+    """What giving a batch again did.
+
+    Attributes:
+        batch: The new batch, which can be taken back like any other; None when nothing changed.
+        changed: Groups that have the verdict again.
+        kept: Groups that somebody has judged or edited since; they stay as they are.
+        refused: Groups that the verdict cannot be given to any more, and why.
+    """
+
+    batch: int | None
+    changed: int
+    kept: int
+    refused: tuple[Refusal, ...]
+
+
+def redo_batch(store: Store, batch_id: int, *, actor: str) -> RedoReport:
+    """Give the verdicts of a batch again after they were taken back.
+
+    A group keeps what it has when somebody judged it after the batch was taken back, or edited
+    it since the batch judged it: nobody has seen what the verdict would speak of. What a run that
+    was stopped has left over is given as the same batch, also under another key.
+
+    Raises:
+        NotFoundError: There is no such batch.
+        ConflictError: It was not taken back, or it was given again already, or somebody else has
+            begun to.
+    """
+    with store.read() as session:
+        batch = read_batch(session, batch_id)
+        verdict = check_verdict(batch.state, batch.reason, batch.note)
+        run = BatchRun(batch.dataset_id, batch.query, verdict, actor, batch_id)
+        begun = run.resume(session)
+    spans = _spans(batch) if begun is None else begun["left"]
+    refused: Counter[str] = Counter({} if begun is None else begun["refused"])
+    if not spans:
+        return _report(batch, run, refused)
+    for number, (first, last) in enumerate(spans, 1):
+        with store.write() as session:
+            run.batch = _begun(session, batch_id, actor)
+            ids = _unchanged(session, batch.spans, first, last)
+            rows = read_columns(session, ids, (), ASKED)
+            found = sort_out(session, batch.dataset_id, rows, verdict)
+            run.save(session, found.change)
+            refused.update({item.reason: item.groups for item in found.refused})
+            if run.batch is not None:
+                update_batch(session, batch_id, redone=run.batch)
+            if number < len(spans):
+                left = [list(span) for span in spans[number:]]
+                run.interrupt(session, {"left": left, "refused": dict(refused)})
+            else:
+                run.close(session)
+                report = _report(batch, run, refused)
+                session.respond(report)
+    return report
+
+
+def _report(batch: StoredBulkVerdict, run: BatchRun, refused: Counter[str]) -> RedoReport:
+    kept = batch.changed - run.changed - refused.total()
+    reasons = tuple(Refusal(reason, groups) for reason, groups in refused.items())
+    return RedoReport(run.batch, run.changed, kept, reasons)
+
+
+def _spans(batch: StoredBulkVerdict) -> Spans:
+    """First and last id of the verdicts that took a batch back, chunk by chunk."""
+    if batch.undone is None:
+        raise ConflictError("this batch was not taken back, so there is nothing to give again")
+    if batch.undo_spans is None:
+        raise ConflictError(
+            "this batch was taken back by an older version of Touchline, which kept no record "
+            "of the groups",
+            hint="Give the verdict once more in the queue.",
+        )
+    return chunks(batch.undo_spans)
+
+
+def _begun(session: Session, batch_id: int, actor: str) -> int | None:
+    """The batch that gives a batch again and is not complete; None where nobody has begun."""
+    redone = read_batch(session, batch_id).redone
+    if redone is None:
+        return None
+    again = read_batch(session, redone)
+    if again.done or again.is_taken_back:
+        raise ConflictError("the verdicts of this batch were given again already")
+    if again.actor != actor:
+        raise ConflictError(
+            f"{again.actor} has begun to give this batch again",
+            hint=f"Let {again.actor} finish it, or take back what was given.",
+        )
+    return again.id
+
+
+def _unchanged(session: Session, given: Spans, first: int, last: int) -> list[int]:
+    """Groups of one chunk that nobody has judged since it was taken back, or edited."""
+    ids = newest_between(session, first, last)
+    judged: dict[int, str] = {}
+    for start, end in given:
+        judged |= inputs_judged(session, start, end, ids)
+    keys = present_keys(session, ids)
+    return [group for group in ids if judged.get(group) == keys[group].inputs_hash]

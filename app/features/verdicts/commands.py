@@ -1,0 +1,98 @@
+"""The command that judges: one verdict for every group that a query matches."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import Annotated, Any
+
+import typer
+
+from app.soccer.choices import VerdictState
+from app.terminal.opened import opened_store
+from app.terminal.options import Dataset, Json, acting
+from app.terminal.server import connected, given_server
+from app.terminal.terminal import complain, print_json, print_values, say
+
+commands = typer.Typer()
+
+
+@commands.command()
+def verdict(
+    state: Annotated[VerdictState, typer.Argument(help="unreviewed takes a verdict back.")],
+    dataset: Dataset,
+    query: Annotated[
+        str,
+        typer.Option(
+            help='Which groups, as in the browser: "passes:yes sigma<0.1", "id:12,15"; "" is all.'
+        ),
+    ],
+    reason: Annotated[
+        str | None, typer.Option(help="Of a rejection, such as bad_field_lines.")
+    ] = None,
+    note: Annotated[
+        str | None,
+        typer.Option(help="Why; needed for groups that fail a gate or have no picture."),
+    ] = None,
+    expected: Annotated[
+        int | None, typer.Option(min=0, help="Judge nothing where another number would change.")
+    ] = None,
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="Dry run: report what would happen, change nothing.")
+    ] = False,
+    json_: Json = False,
+) -> None:
+    """Accept, reject or defer every group that a query matches; the browser can take it back.
+
+    Groups that cannot be accepted as they are stay as they are and are counted by reason.
+    """
+    from app.features.verdicts.service import check_verdict
+
+    check_verdict(state, reason, note)
+    server = given_server()
+    if server is not None:
+        from app.terminal import remote
+
+        body = {"q": query, "state": state, "reason": reason, "note": note, "expected": expected}
+        with connected(server) as client:
+            plan, report = remote.verdict_values(client, dataset, body, dry_run=dry_run)
+    else:
+        said = (query, state, reason, note)
+        plan, report = _judge_here(dataset, said, expected, dry_run=dry_run)
+    done = plan if report is None else report
+    values: dict[str, Any] = {"matches": plan["matches"]}
+    if report is None:
+        values["would_change"] = plan["would_change"]
+    else:
+        values |= {"changed": report["changed"], "batch": report["batch"]}
+    refused = {item["reason"]: item["groups"] for item in done["refused"]}
+    values |= {"dry_run": dry_run, "refused": refused}
+    sample = plan["sample"] if dry_run else []
+    if json_:
+        print_json({**values, "sample": sample})
+    else:
+        print_values(values, False)
+        for item in sample:
+            say(f"  {item['number']:6} {item['label'] or item['key']}")
+    if refused and not plan["would_change"]:
+        complain("no group was judged: each that matches was refused", "Say why in --note.")
+        raise typer.Exit(1)
+
+
+def _judge_here(
+    dataset: str,
+    said: tuple[str, str, str | None, str | None],
+    expected: int | None,
+    *,
+    dry_run: bool,
+) -> tuple[dict[str, Any], dict[str, Any] | None]:
+    """What the verdicts would do in a home, and what they did."""
+    from app.features.datasets.service import dataset_id
+    from app.features.verdicts.bulk import give_verdicts, plan_verdicts
+
+    with opened_store() as store:
+        found = dataset_id(store, dataset)
+        plan = plan_verdicts(store, found, *said)
+        if dry_run:
+            return asdict(plan), None
+        report = give_verdicts(store, found, *said, actor=acting(), expected=expected)
+    return asdict(plan), asdict(report)

@@ -1,0 +1,274 @@
+"""Verdicts: everyone's are kept, the newest counts.
+
+And batches of verdicts that were given at once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any, cast
+
+from sqlalchemy import Table, bindparam, case, func, insert, select, update
+
+from app.db.json_columns import parse
+from app.db.log import Entry, append
+from app.db.session import Session
+from app.features.batches.completion_queries import settle_judged
+from app.features.datasets.tables import GroupModel
+from app.features.groups.insert_queries import next_id
+from app.features.independent_annotations.submission_queries import judge_copy
+from app.features.people.alias_queries import shown_actor
+from app.features.people.visibility_queries import COPIES, seen_in
+from app.features.verdicts.tables import VerdictBatchModel, VerdictModel
+from app.finite import json_text
+
+
+@dataclass(frozen=True)
+class StoredVerdict:
+    """What one person decided on one state of a group, as ``VerdictModel`` has it."""
+
+    id: int
+    group_id: int
+    actor: str
+    at: str
+    state: str
+    reason: str | None
+    note: str | None
+    inputs_hash: str
+    policy_hash: str
+    fixed: bool
+    override: str | None
+
+
+_VERDICT = cast(Table, VerdictModel.__table__)
+_OF_GROUPS = (
+    select(*_VERDICT.columns)
+    .where(_VERDICT.c.group_id.in_(bindparam("ids", expanding=True)))
+    .order_by(_VERDICT.c.id.desc())
+)
+_SHOWN = [column for column in _VERDICT.columns if column.name != "actor"]
+_LAST_OF_EACH = (
+    select(*_SHOWN, shown_actor(_VERDICT.c.actor, _VERDICT.c.at).label("actor"))
+    .where(
+        _VERDICT.c.id.in_(
+            select(func.max(_VERDICT.c.id))
+            .where(_VERDICT.c.group_id.in_(bindparam("ids", expanding=True)))
+            .group_by(_VERDICT.c.group_id, _VERDICT.c.actor)
+        )
+    )
+    .order_by(_VERDICT.c.id.desc())
+)
+
+
+def read_verdicts(session: Session, group_ids: Sequence[int]) -> dict[int, list[StoredVerdict]]:
+    """All verdicts of groups, the newest first; groups without one are left out."""
+    return _by_group(session.execute(_OF_GROUPS, {"ids": list(group_ids)}))
+
+
+def read_last_verdicts(
+    session: Session, group_ids: Sequence[int]
+) -> dict[int, list[StoredVerdict]]:
+    """Like ``read_verdicts``, but of each person the last alone, under the name that is shown."""
+    return _by_group(session.execute(_LAST_OF_EACH, {"ids": list(group_ids)}))
+
+
+def _by_group(rows: Iterable[Any]) -> dict[int, list[StoredVerdict]]:
+    verdicts: dict[int, list[StoredVerdict]] = {}
+    for row in rows:
+        verdicts.setdefault(row.group_id, []).append(StoredVerdict(**row._mapping))
+    return verdicts
+
+
+def judged_between(session: Session, first: int, last: int) -> list[int]:
+    """Ids of the groups that the verdicts of a range of ids judge."""
+    statement = select(VerdictModel.group_id).where(VerdictModel.id.between(first, last))
+    return list(session.scalars(statement.order_by(VerdictModel.id)))
+
+
+def newest_between(session: Session, first: int, last: int) -> list[int]:
+    """Ids of the groups whose newest verdict is one of a range of ids."""
+    judged = select(VerdictModel.group_id).where(VerdictModel.id.between(first, last))
+    newest = func.max(VerdictModel.id)
+    statement = (
+        select(VerdictModel.group_id)
+        .where(VerdictModel.group_id.in_(judged))
+        .group_by(VerdictModel.group_id)
+        .having(newest.between(first, last))
+    )
+    return list(session.scalars(statement))
+
+
+def inputs_judged(
+    session: Session, first: int, last: int, group_ids: Sequence[int]
+) -> dict[int, str]:
+    """Inputs hash that the verdicts of a range of ids judged, by the group's id."""
+    statement = select(VerdictModel.group_id, VerdictModel.inputs_hash).where(
+        VerdictModel.id.between(first, last), VerdictModel.group_id.in_(group_ids)
+    )
+    return {row.group_id: row.inputs_hash for row in session.execute(statement)}
+
+
+def count_by_judge(session: Session, dataset_id: int, since: str) -> Sequence[Any]:
+    """Rows (actor, last, groups): everybody who judged a group of a dataset, when for the last
+    time, and how many groups since some time."""
+    recent = case((VerdictModel.at >= since, VerdictModel.group_id))
+    actor = shown_actor(VerdictModel.actor, VerdictModel.at)
+    statement = (
+        select(
+            actor.label("actor"),
+            func.max(VerdictModel.at).label("last"),
+            func.count(recent.distinct()).label("groups"),
+        )
+        .join(GroupModel, GroupModel.id == VerdictModel.group_id)
+        .where(GroupModel.dataset_id == dataset_id, *seen_in(dataset_id, GroupModel.id))
+        .group_by(actor)
+    )
+    return session.execute(statement).all()
+
+
+def next_verdict_id(session: Session) -> int:
+    """The id that the next verdict gets."""
+    return next_id(session, VerdictModel)
+
+
+def insert_verdicts(
+    session: Session, dataset_id: int, given: Sequence[StoredVerdict], *, actor: str, at: str
+) -> None:
+    """Insert verdicts on groups of a dataset, and log them under who gives them; work on these groups
+    that was given out is over by that, and a copy is submitted.
+
+    Raises:
+        ForbiddenError: A group is somebody else's copy.
+        ConflictError: A group is a copy that was submitted.
+    """
+    rows = [dict(vars(verdict)) for verdict in given]
+    session.execute(insert(_VERDICT), rows)
+    entries = []
+    for row in rows:
+        body = {name: value for name, value in row.items() if name not in ("id", "group_id")}
+        entries.append(Entry("verdict", actor, at, body, dataset_id, row["group_id"]))
+    append(session, entries)
+    if dataset_id <= COPIES:
+        states = {verdict.group_id: verdict.state for verdict in given}
+        settle_judged(session, states, actor=actor, at=at)
+        return
+    for row in rows:
+        judge_copy(session, row["group_id"], row["state"], actor=actor, at=at)
+
+
+def newest_verdict(session: Session) -> int:
+    """Id of the last verdict of any group; 0 where there is none."""
+    return session.scalar(select(func.max(VerdictModel.id))) or 0
+
+
+def judged_since(session: Session, dataset_id: int, after: int) -> list[int]:
+    """Ids of the groups of a dataset that somebody judged after a verdict, or took that back."""
+    statement = (
+        select(VerdictModel.group_id)
+        .join(GroupModel, GroupModel.id == VerdictModel.group_id)
+        .where(GroupModel.dataset_id == dataset_id, VerdictModel.id > after)
+    )
+    return list(session.scalars(statement))
+
+
+Spans = Sequence[tuple[int, int]]
+"""First and last id of the verdicts of each chunk."""
+
+_BATCHES = select(*VerdictBatchModel.__table__.columns)
+_SPANS = ("spans", "undo_spans")
+
+
+@dataclass(frozen=True)
+class StoredBulkVerdict:
+    """A bulk verdict as it is remembered.
+
+    Attributes:
+        log_id: The entry that closed it; None while it runs, or when it was killed.
+        undone: When it was taken back; ``redone`` is the batch that gave it again after that.
+        undo_spans: Of the verdicts that took it back; None where that is not known.
+    """
+
+    id: int
+    dataset_id: int
+    actor: str
+    at: str
+    query: str
+    state: str
+    reason: str | None
+    note: str | None
+    changed: int
+    spans: Spans
+    log_id: int | None
+    undone: str | None
+    undone_by: str | None
+    undo_spans: Spans | None
+    redone: int | None
+
+    @property
+    def done(self) -> bool:
+        """False while it runs, or when it was killed."""
+        return self.log_id is not None
+
+    @property
+    def is_taken_back(self) -> bool:
+        """Whether its verdicts have been taken back, or are being."""
+        return self.undone is not None or self.undo_spans is not None
+
+
+def read_batches(
+    session: Session, dataset_id: int, limit: int, before: int | None = None
+) -> list[StoredBulkVerdict]:
+    """The batches of a dataset, the newest first; only those before an id where there is one."""
+    model = VerdictBatchModel
+    statement = _BATCHES.where(model.dataset_id == dataset_id).order_by(model.id.desc())
+    if before is not None:
+        statement = statement.where(model.id < before)
+    return [_batch(row) for row in session.execute(statement.limit(limit))]
+
+
+def find_batch(session: Session, batch_id: int) -> StoredBulkVerdict | None:
+    """A batch by its id."""
+    row = session.execute(_BATCHES.where(VerdictBatchModel.id == batch_id)).one_or_none()
+    return None if row is None else _batch(row)
+
+
+def insert_batch(session: Session, **values: Any) -> int:
+    """Insert a batch, from fields of ``StoredBulkVerdict`` but its id; returns its id."""
+    identity = next_id(session, VerdictBatchModel)
+    session.execute(insert(VerdictBatchModel), [{**_row(values), "id": identity}])
+    return identity
+
+
+def update_batch(session: Session, batch_id: int, **values: Any) -> None:
+    """Change fields of a batch."""
+    mine = VerdictBatchModel.id == batch_id
+    session.execute(update(VerdictBatchModel).where(mine).values(_row(values)))
+
+
+def _batch(row: Any) -> StoredBulkVerdict:
+    spans = {name: parse(getattr(row, name) or "null") for name in _SPANS}
+    return StoredBulkVerdict(**{**row._mapping, **spans})
+
+
+def _row(values: dict[str, Any]) -> dict[str, Any]:
+    return {name: json_text(item) if name in _SPANS else item for name, item in values.items()}
+
+
+def with_span(spans: Spans, ids: Sequence[int]) -> Spans:
+    """Spans together with that of some ids in a row, which often go on where the last one ends."""
+    if not ids:
+        return spans
+    first, last = ids[0], ids[-1]
+    if spans and spans[-1][1] + 1 == first:
+        return [*spans[:-1], (spans[-1][0], last)]
+    return [*spans, (first, last)]
+
+
+def pieces(spans: Spans, most: int) -> list[tuple[int, int]]:
+    """The same ids in spans of at most so many."""
+    return [
+        (start, min(start + most - 1, last))
+        for first, last in spans
+        for start in range(first, last + 1, most)
+    ]

@@ -1,0 +1,195 @@
+"""Accept, reject with a reason, defer, or withdraw a verdict; and who has judged how much."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import get_args
+
+from app.db.session import Session, now
+from app.db.store import Store
+from app.errors import InputError
+from app.features.groups.queries import StoredGroup
+from app.features.groups.state import GroupState, require_said, require_unchanged
+from app.features.groups.submit import read_solved
+from app.features.queue.listing_queries import count_reviewed
+from app.features.queue.queries import update_verdict
+from app.features.verdicts.queries import (
+    StoredVerdict,
+    count_by_judge,
+    insert_verdicts,
+    next_verdict_id,
+)
+from app.soccer.choices import VerdictState
+from app.soccer.group import Group
+from app.soccer.reasons import REASONS, checked_note, require_words
+from app.soccer.solution import Solution
+
+STATES: tuple[str, ...] = get_args(VerdictState)
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """A verdict as it is given, checked."""
+
+    state: str
+    reason: str | None
+    note: str | None
+
+
+def set_verdict(
+    store: Store,
+    group_id: int,
+    state: str,
+    reason: str | None = None,
+    note: str | None = None,
+    *,
+    if_match: str,
+    actor: str,
+) -> GroupState:
+    """Save a person's verdict on a group as it is; the newest of all people's counts.
+
+    Accepting a group that fails a gate overrides the policy: it needs a note, which goes into
+    the export. So does accepting a ball that cannot be used (below the grass, known to metres
+    only), and a group without any picture: nobody can have looked at it.
+
+    Raises:
+        InputError: Unknown state or reason, or a note is missing.
+        StaleRevisionError: The group is not what the person saw.
+        ForbiddenError: It is somebody else's independent annotation.
+        ConflictError: It is an independent annotation that was submitted.
+    """
+    verdict = check_verdict(state, reason, note)
+    while True:
+        # Accepting weighs the gates, so they must be known.
+        record, solution = read_solved(store, group_id, needed=state == "accepted")
+        stored, what = record.stored, f"group {record.stored.group.key}"
+        override = _override(solution, verdict)
+        _require_usable(solution, verdict)
+        _require_seen(stored.group, verdict)
+        with store.write() as session:
+            policy_hash = require_unchanged(session, group_id, if_match, what)
+            require_said(session, group_id, record.said, if_match, what)
+            # Under another policy other gates may fail.
+            if policy_hash == stored.policy.hash:
+                given = _given(session, stored, verdict, override, actor)
+                insert_verdicts(session, stored.dataset_id, [given], actor=actor, at=given.at)
+                passes = None if solution is None else solution.passes
+                update_verdict(session, stored, given, passes)
+                after = replace(record, verdicts=(given, *record.verdicts)).state(solution)
+                session.respond(after)
+                return after
+
+
+def check_verdict(state: str, reason: str | None, note: str | None) -> Verdict:
+    """A verdict from what was sent.
+
+    Raises:
+        InputError: Unknown state or reason, or a note is missing or too long.
+    """
+    note = checked_note(note)
+    if state not in STATES:
+        known = ", ".join(STATES)
+        raise InputError(f'"{state}" is not a verdict; verdicts are {known}', pointer="/state")
+    if state != "rejected" and reason is not None:
+        raise InputError("only a rejection has a reason", pointer="/reason")
+    if state == "rejected" and reason not in REASONS:
+        known = ", ".join(REASONS)
+        raise InputError(f"a rejection needs a reason: {known}", pointer="/reason")
+    require_words(reason, note)
+    return Verdict(state, reason, note)
+
+
+def _override(solution: Solution | None, verdict: Verdict) -> str | None:
+    """The gate that an acceptance overrides, or None."""
+    if verdict.state != "accepted" or solution is None or solution.passes:
+        return None
+    gate = solution.first_failing
+    if verdict.note is None:
+        sentence = gate.sentence if gate is not None else "it fails"
+        raise InputError(
+            f"this group fails a gate ({sentence}); accepting it needs a note that says why",
+            hint="The note goes into the export as the reason of the override.",
+            pointer="/note",
+        )
+    return gate.name if gate is not None else "unknown"
+
+
+def _require_usable(solution: Solution | None, verdict: Verdict) -> None:
+    """Refuse a bare acceptance of a group whose ball nobody can use, though it passes."""
+    found = None if solution is None else solution.unusable_ball
+    if verdict.state == "accepted" and verdict.note is None and found is not None:
+        raise InputError(
+            f"the ball of this group cannot be used ({found.sentence.rstrip('.')}); accepting it "
+            "needs a note that says why",
+            hint="Correct the ball or leave a view out, or say in the note why it is right.",
+            pointer="/note",
+        )
+
+
+def _require_seen(group: Group, verdict: Verdict) -> None:
+    """Refuse a bare acceptance of a group that nobody can have looked at."""
+    seen = any(view.media is not None for view in group.views)
+    if verdict.state == "accepted" and verdict.note is None and not seen:
+        raise InputError(
+            "this group has no picture in any view, so nobody can have looked at it; accepting "
+            "it needs a note that says what it was judged by",
+            hint="Import it again with its frames, or say in the note why it is right.",
+            pointer="/note",
+        )
+
+
+def _given(
+    session: Session, stored: StoredGroup, verdict: Verdict, override: str | None, actor: str
+) -> StoredVerdict:
+    return StoredVerdict(
+        id=next_verdict_id(session),
+        group_id=stored.id,
+        actor=actor,
+        at=now(),
+        **vars(verdict),
+        inputs_hash=stored.inputs_hash,
+        policy_hash=stored.policy.hash,
+        fixed=stored.edited and verdict.state == "accepted" and override is None,
+        override=override,
+    )
+
+
+@dataclass(frozen=True)
+class Reviewer:
+    """One person's verdicts.
+
+    Attributes:
+        accepted: Groups whose verdict counts and is this person's, like ``rejected`` and
+            ``deferred``.
+        today: Groups that this person has judged since midnight UTC.
+        last: Time of this person's last verdict.
+    """
+
+    name: str
+    accepted: int
+    rejected: int
+    deferred: int
+    today: int
+    last: str
+
+
+def list_reviewers(store: Store, dataset_id: int) -> list[Reviewer]:
+    """Everybody who has judged a group of a dataset, the most active first."""
+    with store.read() as session:
+        people = count_by_judge(session, dataset_id, since=now()[:10])
+        counts = count_reviewed(session, dataset_id)
+    reviewers = [
+        Reviewer(
+            name=row.actor,
+            today=row.groups,
+            last=row.last,
+            **{
+                status: counts.get((row.actor, status), 0)
+                for status in ("accepted", "rejected", "deferred")
+            },
+        )
+        for row in people
+    ]
+    return sorted(
+        reviewers, key=lambda item: (-item.accepted - item.rejected - item.deferred, item.name)
+    )

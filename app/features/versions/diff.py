@@ -1,0 +1,245 @@
+"""Version diff: what changed from one frozen version to another, and the changelog from that."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from dataclasses import asdict, dataclass
+from statistics import median
+from typing import Any
+
+from app.db.json_columns import Json, parse
+from app.db.session import Session
+from app.db.store import Store
+from app.errors import InputError
+from app.features.groups.codecs import policy_to_json
+from app.features.versions.queries import said_rows
+from app.features.versions.service import Version, read_version
+from app.plural import plural
+
+NEW, GONE = "not in the dataset", "no longer in the dataset"
+
+
+@dataclass(frozen=True)
+class Passage:
+    """A group that came into the newer version, or that left it; ``why`` it was not in the older one, or is
+    not in the newer one."""
+
+    group: str
+    why: str
+
+
+@dataclass(frozen=True)
+class Move:
+    """A 3D ball that lies elsewhere; pitch frame, metres."""
+
+    group: str
+    metres: float
+    before: tuple[float, float, float]
+    after: tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class ChangedGroup:
+    """A group of both versions: ``what`` of annotations, verdict, split and ball is another."""
+
+    group: str
+    what: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Setting:
+    """A value of the policy, the solver or the split that differs."""
+
+    name: str
+    before: Json
+    after: Json
+
+
+@dataclass(frozen=True)
+class VersionDiff:
+    """Everything that differs; groups by match and key, moves by how far."""
+
+    older: Version
+    newer: Version
+    added: tuple[Passage, ...]
+    dropped: tuple[Passage, ...]
+    moved: tuple[Move, ...]
+    changed: tuple[ChangedGroup, ...]
+    settings: tuple[Setting, ...]
+    unchanged: int
+
+    def values(self, most: int | None = None) -> dict[str, Any]:
+        """Everything as plain values; each list with at most so many, all are counted."""
+        lists = {
+            name: [asdict(item) for item in getattr(self, name)[:most]]
+            for name in ("added", "dropped", "moved", "changed", "settings")
+        }
+        counts = {name: len(getattr(self, name)) for name in lists}
+        return {
+            "older": {"id": self.older.id, "name": self.older.name, "hash": self.older.hash},
+            "newer": {"id": self.newer.id, "name": self.newer.name, "hash": self.newer.hash},
+            "same": self.older.hash == self.newer.hash,
+            "counts": {**counts, "unchanged": self.unchanged},
+            "lines": changelog_lines(self),
+            **lists,
+        }
+
+
+def diff_versions(store: Store, older: int, newer: int) -> VersionDiff:
+    """What changed from one version to another of the same dataset.
+
+    Raises:
+        NotFoundError: There is no such version.
+        InputError: They belong to two datasets.
+    """
+    with store.read() as session:
+        return read_diff(session, read_version(session, older), read_version(session, newer))
+
+
+def read_diff(session: Session, older: Version, newer: Version) -> VersionDiff:
+    """``diff_versions`` within a session."""
+    if older.dataset_id != newer.dataset_id:
+        raise InputError("the two versions belong to two datasets", pointer="/against")
+    before, after = (
+        {row.key: row for row in said_rows(session, item.id)} for item in (older, newer)
+    )
+    both = [key for key, row in after.items() if row.member and _is_in(before, key)]
+    changes = (_change(before[key], after[key]) for key in both)
+    changed = [change for change in changes if change.what]
+    moved = [move for key in both if (move := _move(before[key], after[key])) is not None]
+    touched = {item.group for item in changed} | {item.group for item in moved}
+    return VersionDiff(
+        older=older,
+        newer=newer,
+        added=_passages(after, before, NEW),
+        dropped=_passages(before, after, GONE),
+        moved=tuple(sorted(moved, key=lambda item: -item.metres)),
+        changed=tuple(changed),
+        settings=tuple(_settings(older, newer)),
+        unchanged=len(both) - len(touched),
+    )
+
+
+def changelog(store: Store, version_id: int) -> list[str]:
+    """What changed since the version before, in sentences."""
+    with store.read() as session:
+        return read_changelog(session, read_version(session, version_id))
+
+
+def read_changelog(session: Session, version: Version) -> list[str]:
+    """``changelog`` within a session."""
+    if version.previous is None:
+        counts = version.counts
+        groups, balls = _groups(counts["groups"]), plural(counts["balls"], "ball")
+        return [f"First version: {groups}, {balls} in views."]
+    return changelog_lines(read_diff(session, read_version(session, version.previous), version))
+
+
+def changelog_lines(diff: VersionDiff) -> list[str]:
+    """A diff in sentences."""
+    lines = [f"Since {diff.older.name}:"]
+    for items, verb, when in ((diff.added, "added", "before"), (diff.dropped, "dropped", "now")):
+        if items:
+            lines.append(f"{_groups(len(items))} {verb} ({when}: {_whys(items)}).")
+    for what, count in sorted(Counter(w for item in diff.changed for w in item.what).items()):
+        lines.append(f"{_groups(count)} with {_CHANGES[what]}.")
+    if diff.moved:
+        metres = [item.metres for item in diff.moved]
+        lines.append(
+            f"{plural(len(metres), 'ball')} moved, by {median(metres):.3f} m in the median and "
+            f"{metres[0]:.3f} m at most."
+        )
+    lines += [
+        f"{item.name}: {_word(item.before)} before, {_word(item.after)} now."
+        for item in diff.settings
+    ]
+    return lines if len(lines) > 1 else [f"Nothing changed since {diff.older.name}."]
+
+
+_CHANGES = {
+    "annotations": "other annotations",
+    "verdict": "another verdict",
+    "split": "another split",
+    "ball": "a 3D ball that is there now or is gone",
+}
+
+
+def _is_in(rows: dict[str, Any], key: str) -> bool:
+    return key in rows and bool(rows[key].member)
+
+
+def _passages(there: dict[str, Any], elsewhere: dict[str, Any], absent: str) -> tuple[Passage, ...]:
+    """Members of one version that are none of the other."""
+    return tuple(
+        Passage(key, elsewhere[key].why if key in elsewhere else absent)
+        for key, row in there.items()
+        if row.member and not _is_in(elsewhere, key)
+    )
+
+
+def _word(value: Any) -> str:
+    """A setting as people write it: in words, and by name where it holds several values."""
+    if value is None:
+        return "not set"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, dict):
+        rest = [
+            f"{name.replace('_', ' ')} {_word(value[name])}" for name in value if name != "kind"
+        ]
+        kind, named = value.get("kind"), ", ".join(rest)
+        told = str(kind or "")
+        return (f"{told} ({named})" if told and rest else told or named) or "none"
+    if isinstance(value, list):
+        return ", ".join(map(_word, value)) or "none"
+    return str(value)
+
+
+def _change(before: Any, after: Any) -> ChangedGroup:
+    differ = {
+        "annotations": before.said != after.said,
+        "verdict": before.verdict != after.verdict,
+        "split": (before.split, before.splits) != (after.split, after.splits),
+        "ball": (before.ball is None) != (after.ball is None),
+    }
+    return ChangedGroup(after.key, tuple(name for name, differs in differ.items() if differs))
+
+
+def _move(before: Any, after: Any) -> Move | None:
+    if before.ball is None or after.ball is None or before.ball == after.ball:
+        return None
+    then, now = _point(before.ball), _point(after.ball)
+    return Move(after.key, math.dist(then, now), then, now)
+
+
+def _point(text: str) -> tuple[float, float, float]:
+    x, y, z = parse(text)
+    return x, y, z
+
+
+def _settings(older: Version, newer: Version) -> Iterable[Setting]:
+    pairs = [(_flat(policy_to_json(older.policy)), _flat(policy_to_json(newer.policy)))]
+    pairs.append(({"solver": older.solver_version}, {"solver": newer.solver_version}))
+    pairs.append(({"groups": older.groups}, {"groups": newer.groups}))
+    pairs.append(({"split": older.split.values()}, {"split": newer.split.values()}))
+    for before, after in pairs:
+        for name in sorted({*before, *after}):
+            if before.get(name) != after.get(name):
+                yield Setting(name, before.get(name), after.get(name))
+
+
+def _flat(policy: Json) -> dict[str, Json]:
+    part = {f"calibration.{name}": value for name, value in policy["calibration"].items()}
+    rest = {name: value for name, value in policy.items() if name != "calibration"}
+    return {f"policy {name}": value for name, value in {**rest, **part}.items()}
+
+
+def _whys(items: Sequence[Passage]) -> str:
+    counts = Counter(item.why for item in items)
+    return ", ".join(f"{count} {why}" for why, count in sorted(counts.items()))
+
+
+def _groups(count: int) -> str:
+    return plural(count, "group")

@@ -1,0 +1,416 @@
+"""Freeze: a dataset as it is now becomes a version that never changes.
+
+Content goes in first, in short transactions, under keys that follow from it; the rows and the
+version's own row come last, in one. Killed anywhere and started again it ends in the same state.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from app.canonical import canonical, digest_of
+from app.db.json_columns import Json, pack
+from app.db.log import Entry, append
+from app.db.session import Session, now
+from app.db.store import Store
+from app.errors import ConflictError, InputError
+from app.features.datasets.service import DatasetHead, licence_text, read_dataset_head, require_name
+from app.features.findings.queries import GroupDismissals
+from app.features.groups.codecs import policy_to_json
+from app.features.groups.queries import read_groups
+from app.features.queue.queries import read_noticed
+from app.features.solutions.queries import (
+    known_calibrations,
+    present_bodies,
+    read_calibration_bodies,
+)
+from app.features.versions.frozen_queries import (
+    CALIBRATION,
+    SOLUTION,
+    body_of,
+    frames_of,
+    freeze_said,
+    insert_frozen,
+    json_of,
+    known_frozen,
+)
+from app.features.versions.membership import RULES, Candidate, read_candidates, require_solved
+from app.features.versions.queries import BATCH, has_version, insert_version
+from app.features.versions.service import (
+    Version,
+    calibration_names,
+    next_name,
+    read_version,
+    version_hash,
+)
+from app.finite import quoted
+from app.formats.manifest import software_version
+from app.media.files import media_facts
+from app.progress import TellProgress
+from app.soccer.finding import Finding
+from app.soccer.group import Group
+from app.soccer.reasons import checked_note
+from app.soccer.solution import SOLVER_VERSION
+from app.soccer.split import Split, Splitter
+
+MAX_LICENCE = 100_000
+NO_SPLIT = "none"
+"""What counts call groups and views that are in no split, or in two."""
+
+
+@dataclass(frozen=True)
+class FreezeRequest:
+    """What to freeze.
+
+    Attributes:
+        name: Of the version; unique in its dataset. None: the next free of v1, v2, ...
+        note: What a reader of the list should know.
+        licence: Text under which the version is passed on; empty: the terms of its sources.
+        groups: ``accepted``: what people accepted and the policy passes, or a person overrode;
+            ``passing``: whatever the policy passes, unless a person rejected or deferred it.
+    """
+
+    name: str | None = None
+    note: str = ""
+    licence: str = ""
+    split: Split = field(default_factory=Split)
+    groups: str = "accepted"
+
+    def check(self) -> None:
+        """Raise InputError where it says something impossible."""
+        self.split.check()
+        if self.name is not None:
+            require_name(self.name, "a version")
+        if self.groups not in RULES:
+            raise InputError(
+                f'groups must be "{RULES[0]}" or "{RULES[1]}", not {quoted(self.groups)}',
+                pointer="/groups",
+            )
+        checked_note(self.note)
+        if len(self.licence) > MAX_LICENCE:
+            raise InputError(f"a licence has at most {MAX_LICENCE} characters", pointer="/licence")
+
+
+@dataclass(frozen=True)
+class FreezePlan:
+    """What a freeze would do: how many groups enter, in which split, and why the others do not."""
+
+    groups: int
+    splits: Mapping[str, int]
+    left_out: Mapping[str, int]
+    unsolved: int
+
+
+def plan_freeze(
+    store: Store, dataset: str | int, request: FreezeRequest, *, strict: bool = False
+) -> FreezePlan:
+    """What ``freeze`` would do; saves nothing.
+
+    Args:
+        store: The database.
+        dataset: Name or id.
+        request: What would be frozen.
+        strict: Refuse what ``freeze`` would refuse: no group, or groups that are not solved.
+    """
+    request.check()
+    with store.read() as session:
+        found = read_dataset_head(session, dataset)
+        _require_free(session, found, request.name)
+        candidates = read_candidates(session, found.id, request.groups)
+    if strict:
+        require_solved(candidates, found.name)
+        _require_some(found, candidates, request.groups)
+    splitter = Splitter.of(request.split, {item.match for item in candidates})
+    members = [item for item in candidates if item.why is None]
+    sides = Counter(
+        splitter.group(item.match, item.split, item.views) or NO_SPLIT for item in members
+    )
+    return FreezePlan(
+        groups=len(members),
+        splits=dict(sorted(sides.items())),
+        left_out=_reasons(candidates),
+        unsolved=sum(item.unsolved for item in candidates),
+    )
+
+
+def freeze(
+    store: Store,
+    dataset: str | int,
+    request: FreezeRequest,
+    *,
+    actor: str,
+    progress: TellProgress | None = None,
+) -> Version:
+    """Freeze a dataset as it is in one snapshot.
+
+    Args:
+        store: The database.
+        dataset: Name or id.
+        request: Name, note, licence, split, and which groups enter.
+        actor: Who freezes.
+        progress: Called after each batch; an error that it raises ends the freeze.
+
+    Raises:
+        InputError: The request says something impossible, or no group would be in the version.
+        ConflictError: The name is taken, or groups that would enter are not solved.
+    """
+    request.check()
+    with store.read() as session:
+        found = read_dataset_head(session, dataset)
+        _require_free(session, found, request.name)
+        candidates = read_candidates(session, found.id, request.groups)
+        require_solved(candidates, found.name)
+        _require_some(found, candidates, request.groups)
+        run = _Run(store, session, found, request, candidates, progress)
+        rows = run.rows()
+    values = run.values(rows, actor)
+    with store.write() as session:
+        _require_free(session, found, request.name)
+        name = request.name or next_name(session, found.id)
+        return _save(session, {**values, "name": name}, rows)
+
+
+class _Run:
+    """One freeze under way: rows of the version, and content brought into the database."""
+
+    def __init__(
+        self,
+        store: Store,
+        session: Session,
+        dataset: DatasetHead,
+        request: FreezeRequest,
+        candidates: Sequence[Candidate],
+        progress: TellProgress | None,
+    ):
+        self._store, self._session, self._dataset = store, session, dataset
+        self._request, self._candidates, self._progress = request, candidates, progress
+        self._splitter = Splitter.of(request.split, {item.match for item in candidates})
+        self._views: dict[str, int] = {}
+        self._balls: dict[str, int] = {}
+        self._cameras: set[str] = set()
+
+    def rows(self) -> list[dict[str, Any]]:
+        """The rows of all groups, in their order; content is frozen on the way."""
+        rows: list[dict[str, Any]] = []
+        for start in range(0, len(self._candidates), BATCH):
+            batch = self._candidates[start : start + BATCH]
+            members = self._members([item.id for item in batch if item.why is None])
+            for position, item in enumerate(batch, start):
+                member = members.get(item.id, {})
+                dismissed = member.pop("dismissed", [])
+                rows.append({**_row(item, position, dismissed), **member})
+            if self._progress is not None:
+                self._progress(start + len(batch), len(self._candidates))
+        self._require_cameras()
+        return rows
+
+    def values(self, rows: Sequence[Mapping[str, Any]], actor: str) -> dict[str, Any]:
+        """Columns of the version itself."""
+        request, dataset = self._request, self._dataset
+        return {
+            "dataset_id": dataset.id,
+            "note": checked_note(request.note) or "",
+            "licence": request.licence.strip() or licence_text(self._matches(rows)),
+            "created": now(),
+            "actor": actor,
+            "hash": version_hash(dataset.policy, SOLVER_VERSION, rows),
+            "groups": request.groups,
+            "policy": canonical(policy_to_json(dataset.policy)),
+            "policy_hash": dataset.policy.hash,
+            "solver_version": SOLVER_VERSION,
+            "software_version": software_version(),
+            "split": canonical(request.split.values()),
+            "counts": canonical(self._counts(rows)),
+        }
+
+    def _matches(self, rows: Sequence[Mapping[str, Any]]) -> set[str]:
+        return {row["match"] for row in rows if row["member"]}
+
+    def _members(self, ids: Sequence[int]) -> dict[int, dict[str, Any]]:
+        """What the rows of members hold besides what every row has."""
+        if not ids:
+            return {}
+        stored = read_groups(self._session, ids)
+        solutions = present_bodies(self._session, ids, self._dataset.policy.hash)
+        noticed, dismissals = read_noticed(self._session, ids)
+        texts: dict[str, str] = {}
+        bodies: dict[str, bytes] = {}
+        names: set[str] = set()
+        rows = {}
+        for number, item in stored.items():
+            said, body = freeze_said(item.group), solutions[number]
+            key, solved = SOLUTION + digest_of(body), json_of(body)
+            texts.update(said.texts)
+            bodies[key] = body
+            names |= calibration_names(solved)
+            rows[number] = self._member(item.group, said.key, key, solved)
+            if number in dismissals:
+                own = [Finding(one.kind, one.sentence, view=one.view) for one in noticed[number]]
+                found = [*(_finding(value) for value in solved["findings"]), *own]
+                rows[number]["dismissed"] = _dismissed(found, dismissals[number])
+        self._keep(texts, bodies, names)
+        return rows
+
+    def _member(self, group: Group, said: str, solution: str, solved: Json) -> dict[str, Any]:
+        views = [view.key for view in group.views]
+        splits = self._splitter.views(views)
+        split = self._splitter.group(group.match, group.split, views)
+        self._cameras.update(views)
+        for view in solved["views"]:
+            side = (splits or {}).get(view["view"], split) or NO_SPLIT
+            self._views[side] = self._views.get(side, 0) + 1
+            # As ``soccer.ball_boxes.has_ball_3d``: what every format counts as a ball.
+            ball = solved["ball"] is not None and view["included"]
+            self._balls[side] = self._balls.get(side, 0) + bool(ball)
+        frames = frames_of(group, _facts(group))
+        return {
+            "split": split,
+            "splits": None if splits is None else canonical(splits),
+            "said": said,
+            "solution": solution,
+            "ball": canonical(solved["ball"]["point"]) if solved["ball"] else None,
+            "frames": None if frames is None else pack(frames),
+        }
+
+    def _keep(self, texts: Mapping[str, str], bodies: Mapping[str, bytes], names: set[str]) -> None:
+        """Bring what is not frozen yet into the database, in a transaction of its own."""
+        known = known_frozen(self._session, self._dataset.id, {*texts, *bodies, *names})
+        fresh: dict[str, bytes | None] = dict.fromkeys(names - known)
+        fresh |= {key: body for key, body in bodies.items() if key not in known}
+        fresh |= {key: body_of(text) for key, text in texts.items() if key not in known}
+        if fresh:
+            with self._store.write() as session:
+                gone = self._gone(session, names - known)
+                insert_frozen(session, self._dataset.id, {**fresh, **gone})
+
+    def _gone(self, session: Session, names: set[str]) -> dict[str, bytes]:
+        """Calibrations that somebody deleted since the snapshot, as they are in it."""
+        keys = {name.removeprefix(CALIBRATION) for name in names}
+        gone = keys - known_calibrations(session, keys)
+        bodies = read_calibration_bodies(self._session, gone) if gone else {}
+        return {CALIBRATION + key: body for key, body in bodies.items()}
+
+    def _require_cameras(self) -> None:
+        split = self._request.split
+        if split.kind == "camera" and not self._cameras & set(split.test_cameras):
+            names = ", ".join(split.test_cameras)
+            raise InputError(
+                f"no view of the version is from a test camera ({names})",
+                pointer="/split/test_cameras",
+            )
+
+    def _counts(self, rows: Sequence[Mapping[str, Any]]) -> Json:
+        members = [row for row in rows if row["member"]]
+        groups: dict[str, int] = {}
+        for row in members:
+            side = row["split"] or NO_SPLIT
+            groups[side] = groups.get(side, 0) + 1
+        splits = {
+            side: {
+                "groups": groups.get(side, 0),
+                "views": self._views.get(side, 0),
+                "balls": self._balls.get(side, 0),
+            }
+            for side in sorted({*groups, *self._views})
+        }
+        return {
+            "groups": len(members),
+            "views": sum(self._views.values()),
+            "balls": sum(self._balls.values()),
+            "overrides": sum(bool(item.overrides) for item in self._candidates),
+            "splits": splits,
+            "left_out": _reasons(self._candidates),
+        }
+
+
+def _row(item: Candidate, position: int, dismissed: Json) -> dict[str, Any]:
+    """What every row has; that of a member is completed.
+
+    Findings that people dismissed are a part of what they decided; a group without any has the
+    verdict, and the version the hash, that it always had.
+    """
+    verdict = item.verdict
+    if dismissed:
+        nothing = dict.fromkeys(("reason", "note", "override"))
+        verdict = {**({"state": "unreviewed", **nothing} if verdict is None else verdict)}
+        verdict["dismissed"] = dismissed
+    nothing = dict.fromkeys(("splits", "said", "solution", "ball", "frames"))
+    return {
+        **nothing,
+        "position": position,
+        "key": item.key,
+        "match": item.match,
+        "member": item.why is None,
+        "why": item.why,
+        "split": item.split,
+        "verdict": None if verdict is None else canonical(verdict),
+    }
+
+
+def _finding(value: Json) -> Finding:
+    """A finding as far as a dismissal asks, from the body of a solution."""
+    names = ("kind", "sentence", "view", "marking", "suggested", "number")
+    return Finding(**{name: value.get(name) for name in names})
+
+
+def _dismissed(findings: Sequence[Finding], dismissals: GroupDismissals) -> Json:
+    """What of a group's findings was dismissed, without people and times."""
+    pairs = zip(findings, dismissals.of(findings), strict=True)
+    return [
+        {
+            "kind": finding.kind,
+            "view": finding.view,
+            "marking": finding.marking,
+            "suggested": finding.suggested,
+            "number": finding.number,
+            "note": said.note,
+        }
+        for finding, said in pairs
+        if said is not None
+    ]
+
+
+def _facts(group: Group) -> dict[str, dict[str, int]]:
+    return {view.key: media_facts(view.media) for view in group.views if view.media is not None}
+
+
+def _reasons(candidates: Iterable[Candidate]) -> dict[str, int]:
+    counts: dict[str, int] = {}
+    for item in candidates:
+        if item.why is not None:
+            counts[item.why] = counts.get(item.why, 0) + 1
+    return dict(sorted(counts.items()))
+
+
+def _require_free(session: Session, dataset: DatasetHead, name: str | None) -> None:
+    if name is not None and has_version(session, dataset.id, name):
+        raise ConflictError(
+            f'"{dataset.name}" has a version "{name}" already',
+            hint="A version never changes; choose another name.",
+        )
+
+
+def _require_some(dataset: DatasetHead, candidates: Sequence[Candidate], rule: str) -> None:
+    if any(item.why is None for item in candidates):
+        return
+    reasons = ", ".join(f"{count} {reason}" for reason, count in _reasons(candidates).items())
+    hint = None
+    if rule == "accepted":
+        hint = "Accept groups first, or freeze with groups=passing what the policy alone passes."
+    raise InputError(
+        f'no group of "{dataset.name}" enters the version ({reasons or "it has no groups"})',
+        hint=hint,
+    )
+
+
+def _save(
+    session: Session, values: Mapping[str, Any], rows: Sequence[Mapping[str, Any]]
+) -> Version:
+    identity = insert_version(session, values, rows)
+    body = {"version": identity, "name": values["name"], "hash": values["hash"]}
+    entry = Entry("freeze", values["actor"], values["created"], body, values["dataset_id"])
+    append(session, [entry])
+    return read_version(session, identity)

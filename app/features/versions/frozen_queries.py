@@ -1,0 +1,284 @@
+"""Frozen content: what versions keep, each thing once a dataset, under its own digest."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, cast
+
+import msgspec
+from sqlalchemy import ColumnElement, Table, exists, func, insert, or_, select, tuple_
+from zlib_ng import zlib_ng
+
+from app.canonical import canonical, digest_of
+from app.db.json_columns import Json, inflate, look_through, parse
+from app.db.session import Session
+from app.features.groups.codecs import (
+    group_head_to_json,
+    positions_from_json,
+    station_from_json,
+    station_to_json,
+    view_from_json,
+    view_to_json,
+)
+from app.features.solutions.queries import read_calibration_bodies
+from app.features.solutions.tables import CalibrationModel
+from app.features.versions.tables import FrozenModel, VersionGroupModel, VersionModel
+from app.soccer.frames import ImageSize
+from app.soccer.group import Group, Station, View
+from app.soccer.media import Media
+from app.soccer.paint_evidence import reading_from_json
+from app.soccer.pitch import Pitch
+
+SAID, STATION, SOLUTION, CALIBRATION = "said:", "station:", "solution:", "calibration:"
+PAINT = "paint:"
+
+_FROZEN = cast(Table, FrozenModel.__table__)
+Frames = Mapping[str, Mapping[str, Any]]
+"""By view: ``path``, ``member``, ``frame``, ``flipped``, and the frame's size and checksum."""
+
+
+@dataclass(frozen=True)
+class FrozenSaid:
+    """What was said about a group: its key, and texts by key that belong with it."""
+
+    key: str
+    texts: Mapping[str, str]
+
+
+def freeze_said(group: Group) -> FrozenSaid:
+    """A group as canonical JSON without media; a shared station is a text of its own, and so is what
+    was read of a picture's paint."""
+    texts = {PAINT + reading.digest: reading.text for reading in group.paint.values()}
+    views = []
+    for view in group.views:
+        station = _station(view.station)
+        if view.station.shared:
+            text = canonical(station)
+            station = STATION + digest_of(text.encode())
+            texts[station] = text
+        value = view_to_json(view, station)
+        del value["media"]
+        views.append(value)
+    text = canonical({**group_head_to_json(group), "views": views})
+    key = SAID + digest_of(text.encode())
+    return FrozenSaid(key, {**texts, key: text})
+
+
+def _station(station: Station) -> Json:
+    # Whether the frames are mirrored is about the frames, not about what was said.
+    return {name: value for name, value in station_to_json(station).items() if name != "flipped"}
+
+
+class OutlineStation(msgspec.Struct):
+    """What names the files of a frozen station."""
+
+    key: str
+    size: tuple[int, int]
+    shared: bool
+
+
+class OutlineView(msgspec.Struct):
+    """The same of a view; a shared station stands as its key."""
+
+    key: str
+    station: str | OutlineStation
+
+
+class FrozenOutline(msgspec.Struct):
+    """The same of a group."""
+
+    key: str
+    match: str
+    split: str
+    views: list[OutlineView]
+
+
+for _kind in (FrozenOutline, OutlineStation):
+    look_through(_kind)
+
+
+def named_texts(said: Json) -> set[str]:
+    """Keys of the shared stations and readings of paint that a frozen group names."""
+    stations = {view["station"] for view in said["views"] if isinstance(view["station"], str)}
+    return stations | {PAINT + digest for digest in said.get("paint", {}).values()}
+
+
+def thaw_group(said: Json, texts: Mapping[str, Json], frames: Frames | None = None) -> Group:
+    """Back from ``freeze_said``, with media where ``frames`` has them.
+
+    Args:
+        said: The frozen group.
+        texts: What it names, by key.
+        frames: Where pictures lie.
+    """
+    known = frames or {}
+    views = tuple(_thaw_view(view, texts, known.get(view["key"])) for view in said["views"])
+    paint = said.get("paint", {}).items()
+    return Group(
+        key=said["key"],
+        views=views,
+        match=said["match"],
+        pitch=Pitch(*said["pitch"]),
+        split=said["split"],
+        label=said["label"],
+        positions=positions_from_json(said.get("positions")),
+        paint={view: reading_from_json(texts[PAINT + digest]) for view, digest in paint},
+    )
+
+
+def thaw_outline(
+    said: FrozenOutline, stations: Mapping[str, OutlineStation], frames: Frames | None = None
+) -> Group:
+    """What names the files of a frozen group: no lines, no cameras, no balls, no paint."""
+    views = []
+    for value in said.views:
+        named, known = value.station, (frames or {}).get(value.key, {})
+        found = stations[named] if isinstance(named, str) else named
+        flipped = known.get("flipped", False)
+        station = Station(found.key, ImageSize(*found.size), shared=found.shared, flipped=flipped)
+        media = None
+        if "path" in known:
+            media = Media(known["path"], known["member"], known["frame"])
+        views.append(View(value.key, station, media=media))
+    return Group(said.key, tuple(views), said.match, split=said.split)
+
+
+def _thaw_view(
+    value: Mapping[str, Any], stations: Mapping[str, Json], frame: Mapping[str, Any] | None
+) -> View:
+    said = value["station"]
+    known = frame or {}
+    station = stations[said] if isinstance(said, str) else said
+    media = None
+    if "path" in known:
+        media = [known["path"], known["member"], known["frame"]]
+    whole = station_from_json({**station, "flipped": known.get("flipped", False)})
+    return view_from_json({**value, "media": media}, whole)
+
+
+def frames_of(group: Group, facts: Mapping[str, Mapping[str, int]]) -> Frames | None:
+    """Where the frames of a group lie; None where nothing is known of them.
+
+    Args:
+        group: The group.
+        facts: Size and checksum by view, of frames that are there.
+    """
+    frames: dict[str, dict[str, Any]] = {}
+    for view in group.views:
+        value: dict[str, Any] = {"flipped": True} if view.station.flipped else {}
+        if view.media is not None:
+            media = view.media
+            value |= {"path": media.path, "member": media.member, "frame": media.frame}
+            value |= {"facts": dict(facts.get(view.key, {}))}
+        if value:
+            frames[view.key] = value
+    return frames or None
+
+
+def known_frozen(session: Session, dataset_id: int, keys: Iterable[str]) -> set[str]:
+    """Those of the keys that are there already."""
+    statement = select(FrozenModel.key).where(
+        FrozenModel.dataset_id == dataset_id, FrozenModel.key.in_(list(keys))
+    )
+    return set(session.scalars(statement))
+
+
+def insert_frozen(session: Session, dataset_id: int, bodies: Mapping[str, bytes | None]) -> None:
+    """Insert content; what is there already stays (a trigger sees to it).
+
+    The body of a calibration is None: it stays where it is for as long as it is there.
+    """
+    if bodies:
+        rows = [
+            {"dataset_id": dataset_id, "key": key, "body": body} for key, body in bodies.items()
+        ]
+        session.execute(insert(_FROZEN), rows)
+
+
+def read_frozen(session: Session, dataset_id: int, keys: Iterable[str]) -> dict[str, bytes]:
+    """Content by key; unknown keys are left out."""
+    statement = select(FrozenModel.key, FrozenModel.body).where(
+        FrozenModel.dataset_id == dataset_id, FrozenModel.key.in_(list(keys))
+    )
+    bodies = {row.key: row.body for row in session.execute(statement)}
+    elsewhere = {key.removeprefix(CALIBRATION) for key, body in bodies.items() if body is None}
+    found = read_calibration_bodies(session, elsewhere) if elsewhere else {}
+    bodies |= {CALIBRATION + key: body for key, body in found.items()}
+    return {key: body for key, body in bodies.items() if body is not None}
+
+
+def fitting_key(key: str, body: bytes) -> str:
+    """The key that content has by its digest; ``key`` itself, where it is that of a calibration.
+
+    Raises:
+        DamagedError: The content cannot be read.
+    """
+    prefix = key.partition(":")[0] + ":"
+    if prefix == CALIBRATION:
+        return key
+    # A solution is frozen as it was stored, everything else under the digest of its text.
+    return prefix + digest_of(body if prefix == SOLUTION else inflate(body))
+
+
+def text_of(body: bytes) -> str:
+    """The text of frozen JSON."""
+    return inflate(body).decode()
+
+
+def json_of(body: bytes) -> Json:
+    """The value of frozen JSON."""
+    return parse(inflate(body))
+
+
+def body_of(text: str) -> bytes:
+    """Frozen JSON of a text."""
+    return zlib_ng.compress(text.encode())
+
+
+_BATCH = 200
+
+
+def frozen_batches(session: Session) -> Iterator[Sequence[Any]]:
+    """Rows (dataset_id, key, body) of all frozen content, in batches that fit into memory."""
+    place = tuple_(FrozenModel.dataset_id, FrozenModel.key)
+    statement = (
+        select(FrozenModel.dataset_id, FrozenModel.key, FrozenModel.body)
+        .order_by(FrozenModel.dataset_id, FrozenModel.key)
+        .limit(_BATCH)
+    )
+    rows = session.execute(statement).all()
+    while rows:
+        yield rows
+        after = tuple_(rows[-1].dataset_id, rows[-1].key)
+        rows = session.execute(statement.where(place > after)).all()
+
+
+def lost_calibrations(session: Session) -> list[str]:
+    """Keys of frozen calibrations whose body is neither there nor where the solver keeps it."""
+    kept = CalibrationModel.key == func.replace(FrozenModel.key, CALIBRATION, "")
+    statement = (
+        select(FrozenModel.key)
+        .outerjoin(CalibrationModel, kept)
+        .where(FrozenModel.body.is_(None), CalibrationModel.key.is_(None))
+        .order_by(FrozenModel.key)
+    )
+    return list(session.scalars(statement))
+
+
+def members_without_content(session: Session, version_id: int) -> list[str]:
+    """Keys of the members of a version whose annotations or solution are not there."""
+    group = VersionGroupModel
+    statement = (
+        select(group.key)
+        .join(VersionModel, VersionModel.id == group.version_id)
+        .where(group.version_id == version_id, group.member)
+        .where(or_(~_is_there(group.said), ~_is_there(group.solution)))
+        .order_by(group.position)
+    )
+    return list(session.scalars(statement))
+
+
+def _is_there(key: Any) -> ColumnElement[bool]:
+    mine = FrozenModel.dataset_id == VersionModel.dataset_id
+    return exists().where(mine, FrozenModel.key == key)

@@ -1,0 +1,169 @@
+"""The jobs that freeze a dataset and verify a version; a server that starts again takes them up."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from app.db.json_columns import Json
+from app.db.store import Store
+from app.errors import OverloadedError
+from app.features.datasets.service import get_dataset_head
+from app.features.jobs.queries import DONE, Job
+from app.features.jobs.run import JobProgress, Work, run_job_in_worker
+from app.features.jobs.service import Jobs
+from app.features.versions.freeze import FreezeRequest, freeze, plan_freeze
+from app.features.versions.service import FREEZE, Version, get_version, list_versions
+from app.features.versions.verify import keep_failure, verify_and_keep
+from app.progress import TellProgress
+from app.soccer.split import Split
+from app.worker_process import WorkerEnded
+
+VERIFY = "verify"
+MOST_LOOKED_AT = 1000
+"""Jobs that are done, of those a server looks through that starts again."""
+
+
+def request_freeze(
+    jobs: Jobs, store: Store, dataset: str, request: FreezeRequest, *, actor: str
+) -> Job:
+    """Freeze a dataset, soon; what can be refused is refused at once.
+
+    Raises:
+        InputError, ConflictError: As ``freeze`` does.
+    """
+    found = get_dataset_head(store, dataset)
+    plan_freeze(store, found.id, request, strict=True)
+    return jobs.submit(
+        FREEZE,
+        f"Freeze {found.name} as {_called(request)}",
+        freeze_work(store, found.id, request, actor),
+        dataset_id=found.id,
+        actor=actor,
+        request=_request_values(request),
+    )
+
+
+def request_verify(jobs: Jobs, store: Store, version_id: int, *, actor: str) -> Job:
+    """Verify a version, soon."""
+    version = get_version(store, version_id)
+    return jobs.submit(
+        VERIFY,
+        f"Verify {version.name} of {version.dataset}",
+        verify_work(store, version_id, actor),
+        dataset_id=version.dataset_id,
+        actor=actor,
+        request={"version": version_id},
+    )
+
+
+def resume_versions(jobs: Jobs, store: Store) -> None:
+    """Let freezing and verifying that an earlier server was at go on."""
+
+    def freezing(job: Job) -> Work:
+        values = dict(job.request)
+        request = FreezeRequest(**{**values, "split": Split.of(values["split"])})
+        dataset_id = job.dataset_id or 0
+
+        def work(progress: JobProgress) -> Json:
+            # The server may have stopped between the version and the record of its job.
+            done = _frozen_by(jobs, store, job, request)
+            if done is not None:
+                return version_result(done)
+            return freeze_work(store, dataset_id, request, job.actor)(progress)
+
+        return work
+
+    jobs.resumes(FREEZE, freezing)
+    jobs.resumes(VERIFY, lambda job: verify_work(store, job.request["version"], job.actor))
+
+
+def freeze_work(store: Store, dataset_id: int, request: FreezeRequest, actor: str) -> Work:
+    """The work of freezing; its result names the version."""
+
+    def work(progress: JobProgress) -> Json:
+        progress(0, None, f"Freezing {_called(request)}.")
+        return run_job_in_worker(
+            store,
+            "freezing",
+            "the freeze",
+            _freeze,
+            dataset_id,
+            request,
+            actor,
+            dataset_id=dataset_id,
+            progress=progress,
+        )
+
+    return work
+
+
+def verify_work(store: Store, version_id: int, actor: str) -> Work:
+    """The work of verifying; its result is the report, which the version keeps, too."""
+
+    def work(progress: JobProgress) -> Json:
+        version = get_version(store, version_id)
+        progress(0, None, f"Verifying {version.name}.")
+        try:
+            return run_job_in_worker(
+                store,
+                "verifying",
+                "the verification",
+                _verify,
+                version_id,
+                actor,
+                dataset_id=version.dataset_id,
+                progress=progress,
+            )
+        except OverloadedError as error:
+            # A process that ended did not come to keeping it; one that never began says nothing.
+            if isinstance(error.__cause__, WorkerEnded):
+                keep_failure(store, version_id, error.message, actor=actor)
+            raise
+
+    return work
+
+
+def version_result(version: Version) -> dict[str, Any]:
+    """What the job of a freeze leaves."""
+    return {
+        "version": version.id,
+        "name": version.name,
+        "hash": version.hash,
+        "counts": dict(version.counts),
+    }
+
+
+def _freeze(
+    store: Store, dataset_id: int, request: FreezeRequest, actor: str, progress: TellProgress
+) -> Json:
+    return version_result(freeze(store, dataset_id, request, actor=actor, progress=progress))
+
+
+def _verify(store: Store, version_id: int, actor: str, progress: TellProgress) -> Json:
+    report = verify_and_keep(store, version_id, progress=progress, actor=actor)
+    return {"version_id": version_id, **report.values()}
+
+
+def _request_values(request: FreezeRequest) -> Json:
+    return {**vars(request), "split": request.split.values()}
+
+
+def _called(request: FreezeRequest) -> str:
+    return request.name or "the next version"
+
+
+def _frozen_by(jobs: Jobs, store: Store, job: Job, request: FreezeRequest) -> Version | None:
+    """The version that a job has made already; None: it has made none."""
+    dataset_id = job.dataset_id or 0
+    done = jobs.find(dataset_id=dataset_id, kinds=(FREEZE,), states=(DONE,), limit=MOST_LOOKED_AT)
+    others = {other.result["version"] for other in done}
+    asked = (job.actor, request.groups, request.split)
+    made = [
+        version
+        for version in list_versions(store, dataset_id)
+        if version.created >= job.created
+        and version.id not in others
+        and request.name in (None, version.name)
+        and (version.actor, version.groups, version.split) == asked
+    ]
+    return made[-1] if made else None

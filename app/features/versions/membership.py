@@ -1,0 +1,215 @@
+"""Which groups of a dataset enter a version, and the manifest that says so."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any, get_args
+
+from app.db.json_columns import Json
+from app.db.session import Session
+from app.db.store import Store
+from app.errors import ConflictError
+from app.features.groups.codecs import policy_to_json
+from app.features.versions.diff import read_changelog
+from app.features.versions.queries import candidate_rows, version_verdicts
+from app.features.versions.service import Version, read_version
+from app.plural import plural
+from app.soccer.choices import VersionRule
+from app.soccer.policy import Policy
+
+RULES: tuple[str, ...] = get_args(VersionRule)
+UNSOLVED = "not solved"
+_DIGITS = re.compile(r"(\d+)")
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A group that may enter a version.
+
+    Attributes:
+        split: As its dataset gives it.
+        views: Keys of its views.
+        why: Why it does not; None: it does.
+        verdict: State, reason, note and override; None where nobody decided.
+        unsolved: It might enter, and nobody knows while it has no solution.
+    """
+
+    id: int
+    key: str
+    match: str
+    split: str
+    views: tuple[str, ...]
+    why: str | None
+    verdict: Json
+    unsolved: bool
+
+    @property
+    def overrides(self) -> bool:
+        """Whether the group enters although a gate fails."""
+        return self.why is None and self.verdict is not None and bool(self.verdict["override"])
+
+
+def read_candidates(session: Session, dataset_id: int, rule: str) -> list[Candidate]:
+    """Every group of a dataset, by match and key: an order that no machine changes."""
+    found = [_candidate(row, rule) for row in candidate_rows(session, dataset_id)]
+    return sorted(found, key=lambda item: (item.match, natural(item.key), item.key))
+
+
+def natural(key: str) -> list[str | int]:
+    """Sorts 7_2 before 7_10, and frame 99 before 100."""
+    parts: list[str | int] = list(_DIGITS.split(key))
+    parts[1::2] = [int(part) for part in parts[1::2]]
+    return parts
+
+
+def require_solved(candidates: Sequence[Candidate], dataset: str) -> None:
+    """Raise ConflictError where groups that might enter have no solution of this solver."""
+    count = sum(item.unsolved for item in candidates)
+    if count:
+        groups = plural(count, "group waits", "groups wait")
+        raise ConflictError(
+            f"{groups} to be solved and might enter the version",
+            hint=f'The server solves them when it starts; touchline solve --dataset "{dataset}" '
+            "does it now.",
+        )
+
+
+def _candidate(row: Any, rule: str) -> Candidate:
+    why = _accepted(row) if rule == "accepted" else _passing(row)
+    return Candidate(
+        id=row.group_id,
+        key=row.key,
+        match=row.match,
+        split=row.split,
+        views=tuple(row.view_keys.strip(",").split(",")),
+        why=why,
+        verdict=_verdict(row),
+        unsolved=why == UNSOLVED,
+    )
+
+
+def _verdict(row: Any) -> Json:
+    if row.status == "unreviewed":
+        return None
+    return {
+        "state": f"{row.status} (stale)" if row.stale else row.status,
+        "reason": row.reason,
+        "note": row.note,
+        "override": row.override,
+    }
+
+
+def _accepted(row: Any) -> str | None:
+    if row.status != "accepted":
+        return _decided(row) or "unreviewed"
+    if row.stale:
+        return "changed after its verdict"
+    return _judged(row)
+
+
+def _passing(row: Any) -> str | None:
+    if row.status in ("rejected", "deferred"):
+        return _decided(row)
+    return _judged(row)
+
+
+def _decided(row: Any) -> str | None:
+    if row.status == "rejected":
+        return f"rejected: {row.reason}"
+    return "deferred" if row.status == "deferred" else None
+
+
+def _judged(row: Any) -> str | None:
+    if not row.solved:
+        return UNSOLVED
+    # An override speaks of the gate that failed then, of no other that fails now.
+    overridden = row.status == "accepted" and not row.stale and row.override == row.gate
+    return None if row.passes or overridden else f"fails {row.gate}"
+
+
+def version_manifest(store: Store, version_id: int) -> dict[str, Json]:
+    """Everything about a version but the files of one format.
+
+    Raises:
+        NotFoundError: There is no such version.
+    """
+    with store.read() as session:
+        version = read_version(session, version_id)
+        verdicts, overrides = _verdicts(session, version_id)
+        return {
+            "dataset": version.dataset,
+            "version": version.name,
+            "date": version.created,
+            "counts": dict(version.counts),
+            "settings": version_settings(version),
+            "licence": version.licence,
+            "verdicts": verdicts,
+            "overrides": overrides,
+            **version_stamp(session, version),
+        }
+
+
+def version_settings(version: Version) -> dict[str, Json]:
+    """Policy and solver as they were frozen, which groups entered, and how they are split."""
+    return {
+        **policy_settings(version.policy, version.solver_version),
+        "groups": version.groups,
+        "split": version.split.values(),
+    }
+
+
+def policy_settings(policy: Policy, solver_version: str) -> dict[str, Json]:
+    """What judged and what computed."""
+    return {
+        "policy": policy_to_json(policy),
+        "policy_hash": policy.hash,
+        "solver_version": solver_version,
+    }
+
+
+def version_stamp(session: Session, version: Version) -> dict[str, Json]:
+    """Hash, note, counts and changelog of a version, and who is not in it and why."""
+    return {
+        "frozen": {
+            "hash": version.hash,
+            "note": version.note,
+            "created": version.created,
+            "software_version": version.software_version,
+            "counts": dict(version.counts),
+            "changelog": read_changelog(session, version),
+            "rejected": list(_rejected(session, version.id)),
+            **_dismissed(session, version.id),
+        }
+    }
+
+
+def _dismissed(session: Session, version_id: int) -> dict[str, Json]:
+    """Findings of its groups that people had checked; nothing of a version without any."""
+    found = [
+        {"group": key, **one}
+        for key, verdict in version_verdicts(session, version_id, member=True)
+        for one in (verdict or {}).get("dismissed", ())
+    ]
+    return {"dismissed": found} if found else {}
+
+
+def _rejected(session: Session, version_id: int) -> Iterator[dict[str, Json]]:
+    for key, verdict in version_verdicts(session, version_id, member=False):
+        if verdict is not None and verdict["state"].startswith("rejected"):
+            yield {"group": key, "reason": verdict["reason"], "note": verdict["note"]}
+
+
+def _verdicts(session: Session, version_id: int) -> tuple[dict[str, int], list[Json]]:
+    counts: Counter[str] = Counter()
+    overrides: list[Json] = []
+    for key, said in version_verdicts(session, version_id, member=True):
+        verdict = {"state": "unreviewed"} if said is None else said
+        counts[verdict["state"]] += 1
+        if verdict.get("override"):
+            gate, note = verdict["override"], verdict["note"]
+            reason = f"overrides {gate}: {note}"
+            overrides.append({"group": key, "gate": gate, "reason": reason})
+    return dict(sorted(counts.items())), overrides

@@ -1,0 +1,240 @@
+"""Frozen versions: their own rows, those of their groups, and what came of verifying them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, cast
+
+from sqlalchemy import Table, func, insert, select
+
+from app.canonical import canonical
+from app.db.dialects.statements import insert_or_replace
+from app.db.json_columns import Json, parse, unpack
+from app.db.session import Session, now
+from app.db.store import Store
+from app.features.datasets.tables import DatasetModel
+from app.features.groups.insert_queries import next_id
+from app.features.people.alias_queries import columns_shown
+from app.features.queue.tables import QueueModel
+from app.features.solutions.queries import is_solved
+from app.features.verdicts.tables import VerdictModel
+from app.features.versions.tables import VersionCheckModel, VersionGroupModel, VersionModel
+from app.soccer.solution import SOLVER_VERSION
+
+BATCH = 200
+_GROUPS = cast(Table, VersionGroupModel.__table__)
+_VERSIONS = select(*columns_shown(VersionModel), DatasetModel.name.label("dataset")).join(
+    DatasetModel, DatasetModel.id == VersionModel.dataset_id
+)
+
+
+@dataclass(frozen=True)
+class VersionGroup:
+    """One row of a version: a group that is in it, or the reason why it is not."""
+
+    position: int
+    key: str
+    match: str
+    member: bool
+    why: str | None
+    split: str
+    splits: Mapping[str, str] | None
+    verdict: Json
+    said: str | None
+    solution: str | None
+    ball: tuple[float, float, float] | None
+    frames: Mapping[str, Mapping[str, Any]] | None
+
+
+def all_versions(session: Session) -> Sequence[Any]:
+    """The versions of every dataset, newest first, each with the name of its ``dataset``."""
+    return session.execute(_VERSIONS.order_by(VersionModel.id.desc())).all()
+
+
+def dataset_versions(session: Session, dataset_id: int) -> Sequence[Any]:
+    """The versions of a dataset, newest first, each with the name of its ``dataset``."""
+    statement = _VERSIONS.where(VersionModel.dataset_id == dataset_id)
+    return session.execute(statement.order_by(VersionModel.id.desc())).all()
+
+
+def version_row(session: Session, version_id: int) -> Any | None:
+    """One version with the name of its ``dataset``."""
+    return session.execute(_VERSIONS.where(VersionModel.id == version_id)).one_or_none()
+
+
+def has_version(session: Session, dataset_id: int, name: str) -> bool:
+    """Whether a dataset has a version of that name."""
+    statement = select(VersionModel.id).where(
+        VersionModel.dataset_id == dataset_id, VersionModel.name == name
+    )
+    return session.scalar(statement) is not None
+
+
+def insert_version(
+    session: Session, values: Mapping[str, Any], rows: Sequence[Mapping[str, Any]]
+) -> int:
+    """Insert a version with its groups; returns its id."""
+    identity = next_id(session, VersionModel)
+    previous = session.scalar(
+        select(func.max(VersionModel.id)).where(VersionModel.dataset_id == values["dataset_id"])
+    )
+    session.execute(insert(_GROUPS), [{**row, "version_id": identity} for row in rows])
+    # Its own row comes last: from here on nothing can be added to the version.
+    session.execute(insert(VersionModel), [{**values, "id": identity, "previous": previous}])
+    return identity
+
+
+def read_rows(
+    session: Session, version_id: int, *, members: bool = False
+) -> Iterator[VersionGroup]:
+    """The rows of a version in their order, in batches."""
+    rows = read_page(session, version_id, -1, BATCH, members=members)
+    while rows:
+        yield from rows
+        rows = read_page(session, version_id, rows[-1].position, BATCH, members=members)
+
+
+def read_page(
+    session: Session, version_id: int, after: int, limit: int, *, members: bool = False
+) -> list[VersionGroup]:
+    """The next rows of a version after a position."""
+    model = VersionGroupModel
+    where = [model.member.is_(True)] if members else []
+    statement = (
+        select(*model.__table__.columns)
+        .where(model.version_id == version_id, model.position > after, *where)
+        .order_by(model.position)
+        .limit(limit)
+    )
+    return [_row(row) for row in session.execute(statement)]
+
+
+def said_rows(session: Session, version_id: int) -> Iterator[Any]:
+    """What was said of each group of a version, as its hash and its differences need it."""
+    model = VersionGroupModel
+    columns = (model.key, model.member, model.why, model.split, model.splits, model.verdict)
+    statement = select(*columns, model.said, model.ball).where(model.version_id == version_id)
+    yield from session.execute(statement.order_by(model.position))
+
+
+def version_verdicts(
+    session: Session, version_id: int, *, member: bool
+) -> Iterator[tuple[str, Json]]:
+    """Key and verdict of the groups that are in a version, or of those that are not."""
+    model = VersionGroupModel
+    statement = (
+        select(model.key, model.verdict)
+        .where(model.version_id == version_id, model.member.is_(member))
+        .order_by(model.position)
+    )
+    for key, verdict in session.execute(statement):
+        yield key, None if verdict is None else parse(verdict)
+
+
+def version_matches(session: Session, version_id: int) -> set[str]:
+    """The matches that a version has groups of, members or not."""
+    model = VersionGroupModel
+    statement = select(model.match).where(model.version_id == version_id).distinct()
+    return set(session.scalars(statement))
+
+
+def candidate_rows(session: Session, dataset_id: int) -> Sequence[Any]:
+    """Every group of a dataset as it is judged, with what its newest verdict says."""
+    newest = (
+        select(VerdictModel.group_id, func.max(VerdictModel.id).label("id"))
+        .join(QueueModel, QueueModel.group_id == VerdictModel.group_id)
+        .where(QueueModel.dataset_id == dataset_id)
+        .group_by(VerdictModel.group_id)
+        .subquery()
+    )
+    names = (
+        "group_id",
+        "key",
+        "match",
+        "split",
+        "view_keys",
+        "status",
+        "stale",
+        "passes",
+        "gate",
+    )
+    statement = (
+        select(
+            *(getattr(QueueModel, name) for name in names),
+            is_solved().label("solved"),
+            VerdictModel.reason,
+            VerdictModel.note,
+            VerdictModel.override,
+        )
+        .outerjoin(newest, newest.c.group_id == QueueModel.group_id)
+        .outerjoin(VerdictModel, VerdictModel.id == newest.c.id)
+        .where(QueueModel.dataset_id == dataset_id)
+    )
+    return session.execute(statement).all()
+
+
+def _row(row: Any) -> VersionGroup:
+    ball = None if row.ball is None else parse(row.ball)
+    return VersionGroup(
+        position=row.position,
+        key=row.key,
+        match=row.match,
+        member=row.member,
+        why=row.why,
+        split=row.split,
+        splits=None if row.splits is None else parse(row.splits),
+        verdict=None if row.verdict is None else parse(row.verdict),
+        said=row.said,
+        solution=row.solution,
+        ball=None if ball is None else (ball[0], ball[1], ball[2]),
+        frames=None if row.frames is None else unpack(row.frames),
+    )
+
+
+@dataclass(frozen=True)
+class Verification:
+    """The last time that a version was computed once more.
+
+    Attributes:
+        at: When it ended.
+        actor: Who asked for it.
+        solver_version: Of the solver that computed.
+        report: As ``VerifyReport.values`` has it; None where nothing came of it.
+        problem: Why nothing came of it, else None.
+    """
+
+    at: str
+    actor: str
+    solver_version: str
+    report: Json
+    problem: str | None
+
+
+def keep_verification(
+    store: Store, version_id: int, *, actor: str, report: Json = None, problem: str | None = None
+) -> None:
+    """Keep what came of verifying a version, in the place of what came of it before."""
+    values = {
+        "version_id": version_id,
+        "at": now(),
+        "actor": actor,
+        "solver_version": SOLVER_VERSION,
+        "report": None if report is None else canonical(report),
+        "problem": problem,
+    }
+    statement = insert_or_replace(VersionCheckModel)
+    with store.write() as session:
+        session.execute(statement, [values], execution_options={"render_nulls": True})
+
+
+def read_verifications(session: Session, versions: list[int]) -> dict[int, Verification]:
+    """The last verification of versions, by id; those that nobody verified are left out."""
+    model = VersionCheckModel
+    statement = select(*model.__table__.columns).where(model.version_id.in_(versions))
+    return {row.version_id: _verification(row) for row in session.execute(statement)}
+
+
+def _verification(row: Any) -> Verification:
+    report = None if row.report is None else parse(row.report)
+    return Verification(row.at, row.actor, row.solver_version, report, row.problem)

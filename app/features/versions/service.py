@@ -1,0 +1,302 @@
+"""Versions: a dataset as it was frozen, listed and read back; and the hash of one."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import count
+from typing import Any
+
+from app.canonical import canonical
+from app.db.json_columns import Json, inflate, parse, parse_as
+from app.db.session import Session
+from app.db.store import Store
+from app.errors import InputError, NotFoundError, StorageError
+from app.features.datasets.service import read_dataset_head
+from app.features.groups.codecs import policy_from_json
+from app.features.jobs.queries import OPEN, read_jobs
+from app.features.people.ownership import MIN_HASH, versions_called
+from app.features.solutions.queries import decode_camera, decode_solution
+from app.features.versions.frozen_queries import (
+    CALIBRATION,
+    FrozenOutline,
+    OutlineStation,
+    json_of,
+    named_texts,
+    read_frozen,
+    thaw_group,
+    thaw_outline,
+)
+from app.features.versions.queries import Verification as Verification
+from app.features.versions.queries import (
+    VersionGroup,
+    all_versions,
+    dataset_versions,
+    read_verifications,
+    version_row,
+)
+from app.finite import quoted
+from app.soccer.group import Group
+from app.soccer.policy import Policy, digested_values
+from app.soccer.solution import Solution
+from app.soccer.split import Split
+
+FREEZE = "freeze"
+"""Kind of the jobs that freeze."""
+
+
+@dataclass(frozen=True)
+class Version:
+    """A frozen version.
+
+    Attributes:
+        hash: The same on every machine for the same annotations, verdicts, split, policy and
+            solver version.
+        groups: Which groups entered: ``accepted`` or ``passing``.
+        counts: Groups, views and balls; the same by split; why groups are not in it.
+        previous: Id of the version frozen before, or None.
+    """
+
+    id: int
+    dataset_id: int
+    dataset: str
+    name: str
+    note: str
+    licence: str
+    created: str
+    actor: str
+    hash: str
+    groups: str
+    policy: Policy
+    solver_version: str
+    software_version: str
+    split: Split
+    counts: Mapping[str, Any]
+    previous: int | None
+    verified: Verification | None = None
+    """What came of verifying it the last time; None: nobody has."""
+
+
+@dataclass(frozen=True)
+class FrozenGroup:
+    """A group of a version with its content: the group as it was said, and the solution."""
+
+    row: VersionGroup
+    group: Group
+    solution: Solution
+
+
+def list_versions(store: Store, dataset: str | int) -> list[Version]:
+    """The versions of a dataset, newest first."""
+    with store.read() as session:
+        found = read_dataset_head(session, dataset)
+        return _versions(session, dataset_versions(session, found.id))
+
+
+def get_version(store: Store, version_id: int) -> Version:
+    """A version by its id.
+
+    Raises:
+        NotFoundError: There is none.
+    """
+    with store.read() as session:
+        return read_version(session, version_id)
+
+
+def find_version(store: Store, dataset: str | int, version: str) -> Version:
+    """A version of a dataset by its name, its id, or the first eight or more digits of its hash.
+
+    Raises:
+        NotFoundError: There is none.
+        InputError: The digits fit several versions that differ.
+    """
+    found = list_versions(store, dataset)
+    for item in found:
+        if version in (item.name, str(item.id)):
+            return item
+    fitting = [item for item in found if len(version) >= MIN_HASH and item.hash.startswith(version)]
+    if len({item.hash for item in fitting}) > 1:
+        raise InputError(f'several versions have a hash that starts with "{version}"')
+    if not fitting:
+        known = ", ".join(item.name for item in found[:10])
+        raise NotFoundError(
+            f'there is no version "{version}" of this dataset',
+            hint=f"There are: {known}." if known else "Freeze one first.",
+        )
+    return fitting[0]
+
+
+def version_called(store: Store, version: str, dataset: str | None = None) -> int:
+    """Id of the version that an address names: by its id, or by its name or hash.
+
+    Args:
+        store: The database.
+        version: Its id, its name, or the first eight or more digits of its hash.
+        dataset: Name or id of its dataset, where several have a version of that name.
+
+    Raises:
+        NotFoundError: There is none.
+        InputError: Versions of several datasets are called so.
+    """
+    if dataset is not None:
+        return find_version(store, dataset, version).id
+    with store.read() as session:
+        found = _versions(session, all_versions(session))
+    fitting: list[Version] = versions_called(found, version)
+    if not fitting:
+        raise NotFoundError(f"there is no version {quoted(version)}")
+    if len(fitting) > 1:
+        names = ", ".join(dict.fromkeys(item.dataset for item in fitting))
+        raise InputError(
+            f"several versions are called {quoted(version)} (of {names})",
+            hint="Name it by its id, or name its dataset, too: ?dataset=NAME.",
+            pointer="/version",
+        )
+    return fitting[0].id
+
+
+def newest_version(store: Store, dataset: str | int) -> Version:
+    """The version of a dataset that was frozen last.
+
+    Raises:
+        NotFoundError: Nothing was frozen yet.
+    """
+    found = list_versions(store, dataset)
+    if not found:
+        raise NotFoundError(f'"{dataset}" has no version yet', hint="Freeze one first.")
+    return found[0]
+
+
+def next_name(session: Session, dataset_id: int) -> str:
+    """The next of v1, v2, ... that no version has, and that no waiting freeze was asked to give."""
+    jobs = read_jobs(session, dataset_id=dataset_id, kinds=(FREEZE,), states=OPEN)
+    names = {row.name for row in dataset_versions(session, dataset_id)}
+    names |= {job.request["name"] for job in jobs}
+    return next(name for number in count(1) if (name := f"v{number}") not in names)
+
+
+def read_version(session: Session, version_id: int) -> Version:
+    """``get_version`` within a session."""
+    row = version_row(session, version_id)
+    if row is None:
+        raise NotFoundError(f"there is no version {version_id}")
+    return _versions(session, [row])[0]
+
+
+def thaw(session: Session, version: Version, rows: Sequence[VersionGroup]) -> list[FrozenGroup]:
+    """Members of a version with their content, calibrations without their markings; at most a few
+    hundred.
+
+    Raises:
+        StorageError: Content is missing.
+    """
+    bodies = _frozen(session, version, {row.solution or "" for row in rows})
+    solved = [json_of(bodies[row.solution or ""]) for row in rows]
+    names = {name for value in solved for name in calibration_names(value)}
+    more = _frozen(session, version, names)
+    calibrations = {name.removeprefix(CALIBRATION): decode_camera(more[name]) for name in names}
+    groups = thaw_groups(session, version, rows)
+    return [
+        FrozenGroup(row, group, decode_solution(value, calibrations))
+        for row, group, value in zip(rows, groups, solved, strict=True)
+    ]
+
+
+def thaw_groups(session: Session, version: Version, rows: Sequence[VersionGroup]) -> list[Group]:
+    """Members of a version as they were annotated; at most a few hundred.
+
+    Raises:
+        StorageError: Content is missing.
+    """
+    bodies = _frozen(session, version, {row.said or "" for row in rows})
+    said = [json_of(bodies[row.said or ""]) for row in rows]
+    shared = {key for value in said for key in named_texts(value)}
+    more = _frozen(session, version, shared)
+    texts = {key: json_of(more[key]) for key in shared}
+    return [thaw_group(value, texts, row.frames) for row, value in zip(rows, said, strict=True)]
+
+
+def thaw_outlines(session: Session, version: Version, rows: Sequence[VersionGroup]) -> list[Group]:
+    """The same without what was annotated: what names the files of the groups.
+
+    Raises:
+        StorageError: Content is missing.
+    """
+    bodies = _frozen(session, version, {row.said or "" for row in rows})
+    said = [parse_as(inflate(bodies[row.said or ""]), FrozenOutline) for row in rows]
+    shared = {view.station for one in said for view in one.views if isinstance(view.station, str)}
+    more = _frozen(session, version, shared)
+    stations = {key: parse_as(inflate(more[key]), OutlineStation) for key in shared}
+    return [thaw_outline(one, stations, row.frames) for row, one in zip(rows, said, strict=True)]
+
+
+def _frozen(session: Session, version: Version, keys: set[str]) -> Mapping[str, bytes]:
+    found = read_frozen(session, version.dataset_id, keys)
+    require_frozen(keys, found)
+    return found
+
+
+def calibration_names(solved: Json) -> set[str]:
+    """Keys of the frozen calibrations that a frozen solution names."""
+    return {CALIBRATION + view["calibration_key"] for view in solved["views"]}
+
+
+def require_frozen(keys: set[str], found: Mapping[str, bytes]) -> None:
+    """Raise StorageError where content that a version names is not there."""
+    missing = keys - found.keys()
+    if missing:
+        raise StorageError(
+            f"{len(missing)} frozen parts of the version are missing, {sorted(missing)[0]} first",
+            hint="Restore the database from a backup.",
+        )
+
+
+def _versions(session: Session, rows: Sequence[Any]) -> list[Version]:
+    verified = read_verifications(session, [row.id for row in rows])
+    return [replace(_version(row), verified=verified.get(row.id)) for row in rows]
+
+
+def _version(row: Any) -> Version:
+    values = dict(row._mapping)
+    del values["policy_hash"]
+    return Version(
+        **{
+            **values,
+            "policy": policy_from_json(parse(row.policy)),
+            "split": Split.of(parse(row.split)),
+            "counts": parse(row.counts),
+        }
+    )
+
+
+HASH_FORMAT = 1
+"""Of what the hash covers; part of it."""
+
+
+def version_hash(policy: Policy, solver_version: str, rows: Iterable[Mapping[str, Any]]) -> str:
+    """The hash of a version: SHA-256 over what it says, in an order that the keys give.
+
+    Covers annotations, verdicts, splits, every value of the policy but its name, and the solver
+    version; not media, ids, times, people or machines.
+
+    Args:
+        policy: What judges the dataset.
+        solver_version: What computed it.
+        rows: In order of ``position``, as the table has them.
+    """
+    values = digested_values(policy)
+    digest = hashlib.sha256()
+    _add(digest, [HASH_FORMAT, values, solver_version])
+    for row in rows:
+        if row["member"] or row["verdict"] is not None:
+            verdict = None if row["verdict"] is None else json.loads(row["verdict"])
+            splits = None if row["splits"] is None else json.loads(row["splits"])
+            side = [row["split"], splits] if row["member"] else None
+            _add(digest, [row["key"], row["said"], side, verdict])
+    return digest.hexdigest()
+
+
+def _add(digest: Any, value: Json) -> None:
+    digest.update(canonical(value).encode() + b"\n")

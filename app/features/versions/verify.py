@@ -1,0 +1,360 @@
+"""Verify: a frozen version computed once more from scratch, and compared bit for bit."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import Executor
+from contextlib import suppress
+from dataclasses import asdict, dataclass, field
+from itertools import islice
+from typing import Any
+
+from app.db.json_columns import Json
+from app.db.session import Session
+from app.db.store import Store
+from app.errors import DamagedError, JobCancelled, ReviewError, StorageError
+from app.features.file_tools.score import fan_out
+from app.features.solutions.queries import decode_calibration, encode_calibration, encode_solution
+from app.features.versions.frozen_queries import (
+    CALIBRATION,
+    fitting_key,
+    json_of,
+    named_texts,
+    read_frozen,
+    text_of,
+    thaw_group,
+)
+from app.features.versions.queries import (
+    VersionGroup,
+    keep_verification,
+    read_page,
+    said_rows,
+    version_matches,
+)
+from app.features.versions.service import Version, calibration_names, read_version, version_hash
+from app.plural import plural
+from app.progress import TellProgress
+from app.soccer.group import Group
+from app.soccer.policy import Policy
+from app.soccer.solution import SOLVER_VERSION, Calibration
+from app.soccer.split import Splitter
+from app.solving.calibrate import calibrate_station, calibration_key
+from app.solving.solve import solve
+
+CHUNK = 40
+"""Groups a task."""
+NAMED = 200
+"""Differences that a report names; all are counted."""
+UNEXPECTED = "something went wrong inside the server; its log says what"
+_A_GROUP = 10
+"""Of them, in one group."""
+
+
+@dataclass(frozen=True)
+class VersionDifference:
+    """Something that is not as it was frozen.
+
+    Attributes:
+        group: Key of the group; None: the version itself.
+        place: Where, ``ball.point.0``.
+        frozen: What the version has there.
+        now: What came out this time.
+    """
+
+    group: str | None
+    place: str
+    frozen: Json
+    now: Json
+
+
+@dataclass
+class VerifyReport:
+    """What came of it; ``differences`` are the first ones, ``different`` counts all of them."""
+
+    version: str
+    hash: str
+    groups: int
+    solver_version: str
+    equal: int = 0
+    different: int = 0
+    differences: list[VersionDifference] = field(default_factory=list)
+    solver_version_now: str = SOLVER_VERSION
+
+    @property
+    def ok(self) -> bool:
+        """Whether everything came out as it was frozen."""
+        return not self.different and self.equal == self.groups
+
+    def values(self) -> dict[str, Any]:
+        """Everything as plain values."""
+        values = {name: value for name, value in vars(self).items() if name != "differences"}
+        found = [asdict(item) for item in self.differences]
+        return {"ok": self.ok, **values, "differences": found, "sentence": self.sentence}
+
+    @property
+    def sentence(self) -> str:
+        """The outcome in one sentence."""
+        if self.ok:
+            groups = f"All {self.groups:,} groups" if self.groups != 1 else "The group"
+            return f"{groups} and the hash came out as they were frozen."
+        why = ""
+        if self.solver_version != self.solver_version_now:
+            why = (
+                f"; the version was computed by solver {self.solver_version}, "
+                f"this is solver {self.solver_version_now}"
+            )
+        return f"{self.groups - self.equal:,} of {plural(self.groups, 'group')} came out differently{why}."
+
+    def add(self, found: Sequence[VersionDifference]) -> None:
+        """Count differences, and keep the first."""
+        self.different += len(found)
+        self.differences += found[: max(NAMED - len(self.differences), 0)]
+
+
+@dataclass(frozen=True)
+class VerifyTask:
+    """A chunk of frozen groups on its way to a worker: plain bytes, so that it travels anywhere.
+
+    ``frozen`` are bodies by key, ``known`` the calibrations of static cameras, computed anew.
+    """
+
+    rows: tuple[VersionGroup, ...]
+    frozen: Mapping[str, bytes]
+    known: Mapping[str, bytes]
+    policy: Policy
+    splitter: Splitter
+
+
+def verify(
+    store: Store,
+    version_id: int,
+    executor: Executor | None = None,
+    progress: TellProgress | None = None,
+) -> VerifyReport:
+    """Compute a version from its frozen annotations and compare all of it.
+
+    Checked are that every frozen part is there, the digest of every frozen part, the hash of the version, its split, and each
+    solution and calibration: every number of them, bit for bit.
+
+    Args:
+        store: The database.
+        version_id: The version.
+        executor: Where chunks are solved; None: here.
+        progress: Called after each chunk; an error that it raises ends the run.
+
+    Raises:
+        NotFoundError: There is no such version.
+    """
+    with store.read() as session:
+        version = read_version(session, version_id)
+        report = VerifyReport(
+            version.name, version.hash, int(version.counts["groups"]), version.solver_version
+        )
+        report.add(list(_version_differences(session, version)))
+        matches = version_matches(session, version.id)
+    done = 0
+    for results in fan_out(verify_task, _Tasks(store, version, matches), executor):
+        for found in results:
+            report.add(found)
+            report.equal += not found
+        done += len(results)
+        if progress is not None:
+            progress(done, report.groups)
+    return report
+
+
+def verify_and_keep(
+    store: Store,
+    version_id: int,
+    executor: Executor | None = None,
+    progress: TellProgress | None = None,
+    *,
+    actor: str,
+) -> VerifyReport:
+    """``verify``, with what comes of it kept with the version.
+
+    Raises what ``verify`` raises; a failure is kept as such, a cancelled run leaves what was
+    kept before.
+    """
+    with store.read() as session:
+        read_version(session, version_id)
+    try:
+        report = verify(store, version_id, executor, progress)
+    except JobCancelled:
+        raise
+    except Exception as error:
+        problem = error.message if isinstance(error, ReviewError) else UNEXPECTED
+        keep_failure(store, version_id, problem, actor=actor)
+        raise
+    keep_verification(store, version_id, actor=actor, report=report.values())
+    return report
+
+
+def keep_failure(store: Store, version_id: int, problem: str, *, actor: str) -> None:
+    """Keep with a version why nothing came of verifying it; what is damaged takes no word of it."""
+    with suppress(DamagedError):
+        keep_verification(store, version_id, actor=actor, problem=problem)
+
+
+def verify_task(task: VerifyTask) -> list[list[VersionDifference]]:
+    """The differences of each group of a task; runs in a worker."""
+    known = {key: decode_calibration(body) for key, body in task.known.items()}
+    return [list(islice(_differences(row, task, known), _A_GROUP)) for row in task.rows]
+
+
+def _version_differences(session: Session, version: Version) -> Iterator[VersionDifference]:
+    """What of the version's own row does not follow from its groups."""
+    names = ("key", "member", "split", "splits", "verdict", "said")
+    rows = ({name: getattr(row, name) for name in names} for row in said_rows(session, version.id))
+    found = version_hash(version.policy, version.solver_version, rows)
+    if found != version.hash:
+        yield VersionDifference(None, "hash", version.hash, found)
+
+
+class _Tasks:
+    """The tasks of one verification, made as workers become free.
+
+    Each is read in a transaction of its own: what is frozen does not change in between.
+    """
+
+    def __init__(self, store: Store, version: Version, matches: set[str]):
+        self._store, self._version = store, version
+        self._splitter = Splitter.of(version.split, matches)
+        self._shared: dict[str, bytes] = {}
+
+    def __iter__(self) -> Iterator[VerifyTask]:
+        after = -1
+        while True:
+            with self._store.read() as session:
+                rows = read_page(session, self._version.id, after, CHUNK, members=True)
+                frozen = self._frozen(session, rows)
+            if not rows:
+                return
+            after = rows[-1].position
+            yield self._task(tuple(rows), frozen)
+
+    def _frozen(self, session: Session, rows: Sequence[VersionGroup]) -> dict[str, bytes]:
+        """Everything that a chunk consists of."""
+        wanted = {key for row in rows for key in (row.said, row.solution) if key}
+        frozen = read_frozen(session, self._version.dataset_id, wanted)
+        more = {name for row in rows for name in _named_parts(row, frozen)}
+        return frozen | read_frozen(session, self._version.dataset_id, more)
+
+    def _task(self, rows: tuple[VersionGroup, ...], frozen: Mapping[str, bytes]) -> VerifyTask:
+        sound = (row for row in rows if not _missing(row, frozen))
+        said = (json_of(frozen[row.said or ""]) for row in sound)
+        known = self._known([thaw_group(value, _texts(value, frozen)) for value in said])
+        policy = self._version.policy
+        return VerifyTask(rows, frozen, known, policy, self._splitter)
+
+    def _known(self, groups: Sequence[Group]) -> dict[str, bytes]:
+        """Calibrations of the static cameras of groups, each computed once."""
+        policy, keys = self._version.policy.calibration, set()
+        for group in groups:
+            for station in (view.station for view in group.views if view.station.shared):
+                key = calibration_key(station, group.pitch, policy)
+                keys.add(key)
+                if key not in self._shared:
+                    found = calibrate_station(station, group.pitch, policy)
+                    self._shared[key] = encode_calibration(found)
+        return {key: self._shared[key] for key in keys}
+
+
+def _named_parts(row: VersionGroup, frozen: Mapping[str, bytes]) -> set[str]:
+    """Keys that the annotations and the solution of a group name, as far as those are there."""
+    names: set[str] = set()
+    if row.said is not None and row.said in frozen:
+        names |= named_texts(json_of(frozen[row.said]))
+    if row.solution is not None and row.solution in frozen:
+        names |= calibration_names(json_of(frozen[row.solution]))
+    return names
+
+
+def _missing(row: VersionGroup, frozen: Mapping[str, bytes]) -> list[str]:
+    """Keys of frozen parts that a group needs and that are not there."""
+    wanted = {key for key in (row.said, row.solution) if key} | _named_parts(row, frozen)
+    return sorted(wanted - frozen.keys())
+
+
+def _texts(said: Json, frozen: Mapping[str, bytes]) -> dict[str, Json]:
+    return {key: json_of(frozen[key]) for key in named_texts(said)}
+
+
+def _differences(
+    row: VersionGroup, task: VerifyTask, known: Mapping[str, Calibration]
+) -> Iterator[VersionDifference]:
+    missing = _missing(row, task.frozen)
+    if missing:
+        yield from (VersionDifference(row.key, "missing", key, None) for key in missing)
+        return
+    try:
+        yield from _frozen_differences(row, task)
+        said = json_of(task.frozen[row.said or ""])
+        group = thaw_group(said, _texts(said, task.frozen))
+        yield from _split_differences(row, group, task.splitter)
+        yield from _solution_differences(row, group, task, known)
+    except Exception as error:
+        # One broken group must not hide what the others say.
+        yield VersionDifference(row.key, "error", None, f"{type(error).__name__}: {error}")
+
+
+def _frozen_differences(row: VersionGroup, task: VerifyTask) -> Iterator[VersionDifference]:
+    """Parts that are not what their key says."""
+    said, solution = row.said or "", row.solution or ""
+    for key in (said, *named_texts(json_of(task.frozen[said])), solution):
+        found = fitting_key(key, task.frozen[key])
+        if found != key:
+            yield VersionDifference(row.key, "digest", key, found)
+
+
+def _split_differences(
+    row: VersionGroup, group: Group, splitter: Splitter
+) -> Iterator[VersionDifference]:
+    views = [view.key for view in group.views]
+    split = splitter.group(group.match, group.split, views)
+    for place, frozen, now in (
+        ("split", row.split, split),
+        ("splits", row.splits, splitter.views(views)),
+    ):
+        if frozen != now:
+            yield VersionDifference(row.key, place, frozen, now)
+
+
+def _solution_differences(
+    row: VersionGroup, group: Group, task: VerifyTask, known: Mapping[str, Calibration]
+) -> Iterator[VersionDifference]:
+    encoded = encode_solution(group, solve(group, task.policy, known))
+    pairs = [("", task.frozen[row.solution or ""], encoded.body)]
+    for key, body in sorted(encoded.calibrations.items()):
+        frozen = task.frozen.get(CALIBRATION + key)
+        if frozen is None:
+            yield VersionDifference(row.key, "calibration", None, key)
+        else:
+            pairs.append(("calibration.", frozen, body))
+    for place, then, now in pairs:
+        # Texts, not bytes: another zlib may pack the same text in another way.
+        if text_of(then) != text_of(now):
+            yield from _unequal(row.key, place, _parsed(then), _parsed(now))
+    point = json_of(encoded.body)["ball"]
+    if row.ball != (tuple(point["point"]) if point else None):
+        yield VersionDifference(row.key, "ball", row.ball, point and point["point"])
+
+
+def _parsed(body: bytes) -> Json:
+    try:
+        return json.loads(text_of(body))
+    except ValueError as error:
+        raise StorageError("a frozen part is damaged") from error
+
+
+def _unequal(group: str, place: str, then: Json, now: Json) -> Iterator[VersionDifference]:
+    """Leaves at which two JSON values differ."""
+    if isinstance(then, dict) and isinstance(now, dict) and then.keys() == now.keys():
+        for name in then:
+            yield from _unequal(group, f"{place}{name}.", then[name], now[name])
+    elif isinstance(then, list) and isinstance(now, list) and len(then) == len(now):
+        for index, (one, other) in enumerate(zip(then, now, strict=True)):
+            yield from _unequal(group, f"{place}{index}.", one, other)
+    elif repr(then) != repr(now):
+        yield VersionDifference(group, place.rstrip("."), then, now)

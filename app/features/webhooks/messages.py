@@ -1,0 +1,170 @@
+"""What webhooks are told, and the signature of it."""
+
+from __future__ import annotations
+
+import hashlib
+import hmac
+import secrets
+from base64 import b64encode
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from datetime import datetime
+from enum import StrEnum
+from itertools import groupby
+from typing import Any
+
+from standardwebhooks import Webhook
+
+from app.canonical import canonical
+from app.config import Settings
+from app.db.home import WEBHOOKS, installation_key
+from app.db.json_columns import Json
+from app.db.session import Session
+from app.features.jobs.queries import DONE, FAILED
+from app.features.webhooks import queries as webhook_outbox
+from app.features.webhooks.queries import entries_since, jobs_ended_since
+
+
+class Kind(StrEnum):
+    """What a message tells of."""
+
+    CHANGED = "group.changed"
+    """Lines, balls or cameras of groups were changed, or that was taken back."""
+    JUDGED = "group.judged"
+    """Groups were accepted, rejected, deferred, or are not judged any more."""
+    COMMENTED = "group.commented"
+    """Somebody said something about a group, or a thread was settled; the message has no text."""
+    DATASET = "dataset.changed"
+    """What concerns a whole dataset: an import, thresholds, static cameras, pitches, positions."""
+    GIVEN_OUT = webhook_outbox.GIVEN_OUT
+    """A batch was made."""
+    HANDED_ON = webhook_outbox.HANDED_ON
+    """A batch has other people."""
+    DONE = webhook_outbox.DONE
+    """The work on the last group of a batch is over."""
+    STALLED = webhook_outbox.STALLED
+    """Nobody does anything in a batch any more, or its due day is over."""
+    DISPUTED = webhook_outbox.DISPUTED
+    """Annotations of a group do not agree: somebody has to decide."""
+    HANDED_BACK = webhook_outbox.HANDED_BACK
+    """Somebody has work back that they had handed in; the message does not say why."""
+    FROZEN = "version.frozen"
+    JOB_DONE = "job.done"
+    JOB_FAILED = "job.failed"
+    PING = "ping"
+    """Somebody tries whether messages arrive; every webhook gets it."""
+
+
+CHOSEN = tuple(kind for kind in Kind if kind is not Kind.PING)
+"""Kinds that a webhook asks for."""
+MOST = 500
+"""Entries of the log in one message."""
+_OF_LOG = {
+    "edit": Kind.CHANGED,
+    "undo": Kind.CHANGED,
+    "redo": Kind.CHANGED,
+    "verdict": Kind.JUDGED,
+    "dismissal": Kind.JUDGED,
+    "comment": Kind.COMMENTED,
+    "freeze": Kind.FROZEN,
+}
+_OF_JOBS = {DONE: Kind.JOB_DONE, FAILED: Kind.JOB_FAILED}
+
+
+@dataclass(frozen=True)
+class Message:
+    """One thing to tell; ``id`` is the same however often it is sent.
+
+    ``log_id``, or ``ended`` and ``job_id``, are up to where the log or the jobs are told with it.
+    """
+
+    id: str
+    kind: Kind
+    body: str
+    log_id: int = 0
+    ended: str = ""
+    job_id: int = 0
+
+
+def read_messages(session: Session, webhook: Any, dataset: str) -> list[Message]:
+    """What has happened since a webhook was told last, its kinds and others."""
+    entries = entries_since(session, webhook.dataset_id, webhook.log_id, MOST)
+    place = (webhook.jobs_until, webhook.job_id)
+    jobs = jobs_ended_since(session, webhook.dataset_id, *place, _OF_JOBS)
+    return [*_of_log(webhook.id, dataset, entries), *_of_jobs(webhook.id, dataset, jobs)]
+
+
+def ping(webhook_id: int, dataset: str, at: str, actor: str) -> Message:
+    """A message that says nothing."""
+    stamp = "".join(letter for letter in at if letter.isdigit())
+    body = _body(Kind.PING, at, {"dataset": dataset, "actor": actor})
+    return Message(f"msg_{webhook_id}_ping{stamp}", Kind.PING, body)
+
+
+def _of_log(webhook_id: int, dataset: str, entries: Sequence[Any]) -> Iterator[Message]:
+    """Entries of one kind by one person that follow each other become one message."""
+
+    def what(row: Any) -> tuple[Kind, str]:
+        kind = _OF_LOG.get(row.kind.removeprefix("station_"), Kind.DATASET)
+        return (
+            kind if row.group_id is not None or kind is Kind.FROZEN else Kind.DATASET
+        ), row.actor
+
+    for (kind, actor), rows in groupby(entries, what):
+        found = list(rows)
+        first, last = found[0].id, found[-1].id
+        told = {
+            "dataset": dataset,
+            "actor": actor,
+            "entries": [
+                {"id": row.id, "kind": row.kind, "at": row.at, "group": row.group_id}
+                for row in found
+            ],
+        }
+        yield Message(
+            f"msg_{webhook_id}_log{first}-{last}",
+            kind,
+            _body(kind, found[-1].at, told),
+            log_id=last,
+        )
+
+
+def _of_jobs(webhook_id: int, dataset: str, jobs: Sequence[Any]) -> Iterator[Message]:
+    for row in jobs:
+        kind = _OF_JOBS[row.state]
+        told = {
+            "dataset": dataset,
+            "actor": row.actor,
+            "job": {"id": row.id, "kind": row.kind, "title": row.title, "state": row.state},
+        }
+        body = _body(kind, row.ended, told)
+        name = f"msg_{webhook_id}_job{row.id}"
+        yield Message(name, kind, body, ended=row.ended, job_id=row.id)
+
+
+def _body(kind: Kind, at: str, data: Json) -> str:
+    return canonical({"type": str(kind), "timestamp": at, "data": data})
+
+
+def new_salt() -> str:
+    """What makes a secret another one."""
+    return secrets.token_hex(16)
+
+
+def secret_of(settings: Settings, salt: str) -> str:
+    """The secret of a webhook, as the specification writes it (``whsec_``).
+
+    Raises:
+        StorageError: The disk refuses the key.
+    """
+    made = hmac.digest(installation_key(settings, WEBHOOKS), salt.encode(), hashlib.sha256)
+    return f"whsec_{b64encode(made).decode()}"
+
+
+def sign(secret: str, message: str, at: datetime, body: str) -> dict[str, str]:
+    """Headers of a message (standardwebhooks.com)."""
+    return {
+        "webhook-id": message,
+        "webhook-timestamp": str(int(at.timestamp())),
+        "webhook-signature": Webhook(secret).sign(message, at, body),
+    }

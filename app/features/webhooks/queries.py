@@ -1,0 +1,301 @@
+"""Webhooks: who is told, what waits to be sent, written in the transaction that it tells of.
+
+How sending went.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, cast
+
+from sqlalchemy import ColumnElement, delete, func, select, tuple_, update
+
+from app.canonical import canonical
+from app.db.dialects.statements import insert
+from app.db.json_columns import Json, parse
+from app.db.log import DEEDS, LogModel
+from app.db.session import Session, now
+from app.features.batches.queries import batch_of, count_work, people_of
+from app.features.datasets.queries import dataset_name
+from app.features.jobs.tables import JobModel
+from app.features.webhooks.tables import DeliveryModel, WebhookModel
+
+WAITING, DELIVERED, FAILED = "waiting", "delivered", "failed"
+"""States of a delivery."""
+_TOLD_APART = ("work",)
+"""Kinds of entries of which ``app.features.webhooks.queries`` tells."""
+_WEBHOOKS = select(*WebhookModel.__table__.columns)
+_DELIVERIES = select(*DeliveryModel.__table__.columns)
+
+
+def webhooks_of(session: Session, dataset_id: int) -> Sequence[Any]:
+    """Every webhook of a dataset, in the order in which they were made."""
+    mine = WebhookModel.dataset_id == dataset_id
+    return session.execute(_WEBHOOKS.where(mine).order_by(WebhookModel.id)).all()
+
+
+def webhook_of(session: Session, dataset_id: int, webhook_id: int) -> Any | None:
+    """A webhook of a dataset."""
+    where = (WebhookModel.id == webhook_id, WebhookModel.dataset_id == dataset_id)
+    return session.execute(_WEBHOOKS.where(*where)).one_or_none()
+
+
+def webhooks_on(session: Session) -> Sequence[Any]:
+    """Every webhook that is told."""
+    return session.execute(_WEBHOOKS.where(WebhookModel.off.is_(None))).all()
+
+
+def insert_webhook(
+    session: Session, dataset_id: int, url: str, kinds: Iterable[str], *, salt: str, by: str
+) -> int:
+    """Insert a webhook, which is told what happens from now on; returns its id."""
+    at = now()
+    values = {
+        "dataset_id": dataset_id,
+        "url": url,
+        "kinds": canonical(sorted(kinds)),
+        "salt": salt,
+        "created": at,
+        "created_by": by,
+        "log_id": session.scalar(select(func.max(LogModel.id))) or 0,
+        "jobs_until": at,
+        "job_id": 0,
+    }
+    done = session.execute(insert(WebhookModel).returning(WebhookModel.id), values)
+    return int(done.scalar_one())
+
+
+def update_webhook(session: Session, webhook_id: int, values: dict[str, Any]) -> None:
+    """Change columns of a webhook."""
+    session.execute(update(WebhookModel).where(WebhookModel.id == webhook_id).values(values))
+
+
+def delete_webhook(session: Session, webhook_id: int) -> None:
+    """Delete a webhook with all that it was told."""
+    session.execute(delete(WebhookModel).where(WebhookModel.id == webhook_id))
+
+
+def entries_since(session: Session, dataset_id: int, log_id: int, most: int) -> Sequence[Any]:
+    """Rows (id, kind, actor, at, group_id) of a dataset's log after an entry, in order."""
+    columns = (LogModel.id, LogModel.kind, LogModel.actor, LogModel.at, LogModel.group_id)
+    where = (
+        LogModel.id > log_id,
+        LogModel.dataset_id == dataset_id,
+        LogModel.kind.not_in((*DEEDS, *_TOLD_APART)),
+    )
+    return session.execute(select(*columns).where(*where).order_by(LogModel.id).limit(most)).all()
+
+
+def jobs_ended_since(
+    session: Session, dataset_id: int, ended: str, job_id: int, states: Iterable[str]
+) -> Sequence[Any]:
+    """Rows (id, kind, title, state, actor, ended) of a dataset's jobs that ended after another one."""
+    columns = (
+        JobModel.id,
+        JobModel.kind,
+        JobModel.title,
+        JobModel.state,
+        JobModel.actor,
+        JobModel.ended,
+    )
+    later = tuple_(JobModel.ended, JobModel.id) > tuple_(ended, job_id)
+    where = (JobModel.dataset_id == dataset_id, later, JobModel.state.in_(states))
+    order = (JobModel.ended, JobModel.id)
+    return session.execute(select(*columns).where(*where).order_by(*order)).all()
+
+
+def insert_delivery(session: Session, webhook_id: int, message: str, kind: str, body: str) -> bool:
+    """Insert a message that is to be sent at once; False where the webhook has it already."""
+    at = now()
+    values = {
+        "webhook_id": webhook_id,
+        "message": message,
+        "kind": kind,
+        "body": body,
+        "created": at,
+        "state": WAITING,
+        "attempts": 0,
+        "next_at": at,
+    }
+    statement = insert(DeliveryModel).values(values).on_conflict_do_nothing()
+    done = session.execute(statement)
+    return bool(cast(Any, done).rowcount)
+
+
+def due_deliveries(session: Session, at: str, most: int, most_each: int) -> Sequence[Any]:
+    """Deliveries whose time has come, with ``url`` and ``salt`` of their webhooks; oldest first.
+
+    Args:
+        at: The time.
+        most: So many at most.
+        most_each: So many of one webhook.
+    """
+    turn = func.row_number().over(
+        partition_by=DeliveryModel.webhook_id, order_by=(DeliveryModel.next_at, DeliveryModel.id)
+    )
+    due = (
+        _DELIVERIES.add_columns(WebhookModel.url, WebhookModel.salt, turn.label("turn"))
+        .join(WebhookModel, WebhookModel.id == DeliveryModel.webhook_id)
+        .where(DeliveryModel.next_at <= at, WebhookModel.off.is_(None))
+        .subquery()
+    )
+    order = (due.c.turn, due.c.next_at, due.c.id)
+    statement = select(due).where(due.c.turn <= most_each).order_by(*order).limit(most)
+    return session.execute(statement).all()
+
+
+def next_due(session: Session) -> str | None:
+    """When the next delivery is to be tried; None: none waits."""
+    return session.scalar(
+        select(func.min(DeliveryModel.next_at))
+        .join(WebhookModel, WebhookModel.id == DeliveryModel.webhook_id)
+        .where(WebhookModel.off.is_(None))
+    )
+
+
+def deliveries_of(
+    session: Session, webhook_id: int, before: int | None, most: int
+) -> Sequence[Any]:
+    """What a webhook was told, newest first, from below an id."""
+    where = [DeliveryModel.webhook_id == webhook_id]
+    if before is not None:
+        where.append(DeliveryModel.id < before)
+    statement = _DELIVERIES.where(*where).order_by(DeliveryModel.id.desc()).limit(most)
+    return session.execute(statement).all()
+
+
+def delivery_of(session: Session, webhook_id: int, delivery_id: int) -> Any | None:
+    """A delivery of a webhook."""
+    where = (DeliveryModel.id == delivery_id, DeliveryModel.webhook_id == webhook_id)
+    return session.execute(_DELIVERIES.where(*where)).one_or_none()
+
+
+def waiting_of_kind(session: Session, webhook_id: int, kind: str) -> Any | None:
+    """A delivery of that kind that is still to be sent."""
+    where = (
+        DeliveryModel.webhook_id == webhook_id,
+        DeliveryModel.kind == kind,
+        DeliveryModel.next_at.is_not(None),
+    )
+    return session.execute(_DELIVERIES.where(*where).limit(1)).one_or_none()
+
+
+def update_delivery(session: Session, delivery_id: int, values: dict[str, Any]) -> None:
+    """Change columns of a delivery."""
+    session.execute(update(DeliveryModel).where(DeliveryModel.id == delivery_id).values(values))
+
+
+def count_deliveries(session: Session, webhook_ids: Sequence[int]) -> dict[tuple[int, str], int]:
+    """How many deliveries of some webhooks are in each state."""
+    key = (DeliveryModel.webhook_id, DeliveryModel.state)
+    statement = select(*key, func.count()).where(DeliveryModel.webhook_id.in_(webhook_ids))
+    return {(row[0], row[1]): row[2] for row in session.execute(statement.group_by(*key))}
+
+
+def arrived_since(session: Session, webhook_id: int, at: str) -> bool:
+    """Whether a webhook took anything since a time."""
+    statement = select(DeliveryModel.id).where(
+        DeliveryModel.webhook_id == webhook_id,
+        DeliveryModel.state == DELIVERED,
+        DeliveryModel.tried >= at,
+    )
+    return session.scalar(statement.limit(1)) is not None
+
+
+def has_old_deliveries(session: Session, before: str) -> bool:
+    """Whether anything arrived or was given up before a time."""
+    return session.scalar(select(DeliveryModel.id).where(*_over(before)).limit(1)) is not None
+
+
+def forget_deliveries(session: Session, before: str) -> int:
+    """Delete what arrived or was given up before a time; returns how many."""
+    gone = session.execute(delete(DeliveryModel).where(*_over(before)))
+    return int(cast(Any, gone).rowcount)
+
+
+def _over(before: str) -> tuple[ColumnElement[bool], ...]:
+    return DeliveryModel.next_at.is_(None), DeliveryModel.created < before
+
+
+GIVEN_OUT = "batch.given_out"
+HANDED_ON = "batch.handed_on"
+DONE = "batch.done"
+STALLED = "batch.stalled"
+DISPUTED = "group.disputed"
+HANDED_BACK = "group.handed_back"
+
+
+def listeners(session: Session, dataset_id: int, kind: str) -> list[int]:
+    """Ids of the webhooks of a dataset that are told of a kind."""
+    table = WebhookModel
+    on = (table.dataset_id == dataset_id, table.off.is_(None))
+    rows = session.execute(select(table.id, table.kinds).where(*on).order_by(table.id))
+    return [row.id for row in rows if kind in parse(row.kinds)]
+
+
+def announce(
+    session: Session,
+    dataset_id: int,
+    kind: str,
+    event: str,
+    *,
+    actor: str,
+    at: str,
+    batch_id: int | None = None,
+    also: Mapping[str, Json] | None = None,
+) -> int:
+    """Write a message down for each webhook that wants to hear of it; returns for how many.
+
+    Args:
+        session: The write session of what happened: both are there, or neither.
+        dataset_id: In which dataset.
+        kind: Of the message.
+        event: Names what happened: a webhook is told once of each.
+        actor: Who did it.
+        at: When.
+        batch_id: The batch that it is about, as it is then.
+        also: What else is told.
+    """
+    hooks = listeners(session, dataset_id, kind)
+    if not hooks:
+        return 0
+    told: dict[str, Json] = {"dataset": dataset_name(session, dataset_id), "actor": actor}
+    if batch_id is not None:
+        told["batch"] = batch_told(session, batch_id)
+    body = canonical({"type": kind, "timestamp": at, "data": {**told, **(also or {})}})
+    return sum(insert_delivery(session, hook, f"msg_{hook}_{event}", kind, body) for hook in hooks)
+
+
+def announce_batch(session: Session, batch_id: int, kind: str, *, actor: str, at: str) -> int:
+    """``announce`` what became of a batch at a time; nothing where it is gone."""
+    row = batch_of(session, batch_id)
+    if row is None:
+        return 0
+    event = f"batch{batch_id}_{kind.partition('.')[2]}{stamp(at)}"
+    return announce(session, row.dataset_id, kind, event, actor=actor, at=at, batch_id=batch_id)
+
+
+def batch_told(session: Session, batch_id: int) -> dict[str, Any] | None:
+    """What a message says of a batch; None where it is gone."""
+    row = batch_of(session, batch_id)
+    if row is None:
+        return None
+    count = count_work(session, [batch_id]).get(batch_id)
+    people = [(one.part, one.name) for one in people_of(session, [batch_id])]
+    return {
+        "id": row.id,
+        "name": row.name,
+        "due": row.due,
+        "verdicts": row.verdicts,
+        "blind": bool(row.blind),
+        "annotators": [name for part, name in people if part == "annotator"],
+        "reviewers": [name for part, name in people if part == "reviewer"],
+        "groups": count.groups if count else 0,
+        "handed_in": count.handed_in if count else 0,
+        "settled": count.settled if count else 0,
+    }
+
+
+def stamp(at: str) -> str:
+    """A time as a part of a message's id."""
+    return "".join(letter for letter in at if letter.isdigit())

@@ -1,0 +1,121 @@
+"""Webhooks: addresses that are told what happens in a dataset, signed as standardwebhooks.com says."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from fastapi import APIRouter, Query
+
+from app.features.webhooks import service as webhooks
+from app.features.webhooks.messages import CHOSEN
+from app.features.webhooks.schemas import (
+    DeliveryDocument,
+    DeliveryList,
+    NewWebhook,
+    WebhookDocument,
+    WebhookEdit,
+    WebhookList,
+    WebhookWithSecret,
+)
+from app.features.webhooks.service import Delivery, Webhook
+from app.http.cursor import Before, Cursor, first_below, paged
+from app.http.deps import Actor, AppStore, DatasetPath, Id
+from app.http.problem import responses
+
+router = APIRouter(prefix="/datasets/{dataset}/webhooks", tags=["webhooks"])
+
+
+def _with_secret(made: tuple[Webhook, str]) -> WebhookWithSecret:
+    webhook, secret = made
+    return WebhookWithSecret(webhook=WebhookDocument.model_validate(webhook), secret=secret)
+
+
+@router.get("", operation_id="listWebhooks", responses=responses(404))
+@paged()
+def list_webhooks(dataset: DatasetPath, store: AppStore) -> WebhookList:
+    """Who is told what happens in a dataset."""
+    items = webhooks.list_webhooks(store, dataset)
+    return WebhookList(items=items, allowed=store.settings.webhooks, kinds=list(CHOSEN))
+
+
+@router.post(
+    "",
+    operation_id="makeWebhook",
+    status_code=201,
+    responses=responses(404, 409, 413, 415),
+)
+def make_webhook(
+    dataset: DatasetPath, new: NewWebhook, store: AppStore, actor: Actor
+) -> WebhookWithSecret:
+    """Tell an address what happens from now on; the secret is shown this once."""
+    return _with_secret(webhooks.make_webhook(store, dataset, new.url, new.kinds, actor=actor))
+
+
+@router.patch(
+    "/{webhook}",
+    operation_id="changeWebhook",
+    response_model=WebhookDocument,
+    responses=responses(404, 409, 413, 415),
+)
+def change_webhook(
+    dataset: DatasetPath, webhook: Id, change: WebhookEdit, store: AppStore, actor: Actor
+) -> Webhook:
+    """Another address, other kinds of message, or on and off."""
+    return webhooks.change_webhook(
+        store, dataset, webhook, url=change.url, kinds=change.kinds, on=change.on, actor=actor
+    )
+
+
+@router.delete(
+    "/{webhook}", operation_id="deleteWebhook", status_code=204, responses=responses(404)
+)
+def delete_webhook(dataset: DatasetPath, webhook: Id, store: AppStore, actor: Actor) -> None:
+    """Tell an address nothing more, and forget what it was told."""
+    webhooks.remove_webhook(store, dataset, webhook, actor=actor)
+
+
+@router.post("/{webhook}/secret", operation_id="renewWebhookSecret", responses=responses(404))
+def renew_secret(
+    dataset: DatasetPath, webhook: Id, store: AppStore, actor: Actor
+) -> WebhookWithSecret:
+    """Another secret; what is sent from now on is signed with it."""
+    return _with_secret(webhooks.renew_secret(store, dataset, webhook, actor=actor))
+
+
+@router.post(
+    "/{webhook}/ping",
+    operation_id="pingWebhook",
+    status_code=201,
+    response_model=DeliveryDocument,
+    responses=responses(404, 409),
+)
+def ping_webhook(dataset: DatasetPath, webhook: Id, store: AppStore, actor: Actor) -> Delivery:
+    """Send a message of the kind `ping`, to see whether messages arrive."""
+    return webhooks.send_ping(store, dataset, webhook, actor=actor)
+
+
+@router.get("/{webhook}/deliveries", operation_id="listWebhookDeliveries", responses=responses(404))
+def list_deliveries(
+    dataset: DatasetPath,
+    webhook: Id,
+    store: AppStore,
+    limit: Annotated[int, Query(ge=1, le=200)] = 50,
+    cursor: Cursor = None,
+    before: Before = None,
+) -> DeliveryList:
+    """What a webhook was told in the last 30 days, newest first."""
+    start = first_below(cursor, before)
+    found = webhooks.list_deliveries(store, dataset, webhook, before=start, most=limit + 1)
+    more = str(found[limit - 1].id) if len(found) > limit else None
+    return DeliveryList(items=found[:limit], next=more)
+
+
+@router.post(
+    "/{webhook}/deliveries/{delivery}",
+    operation_id="sendWebhookDeliveryAgain",
+    response_model=DeliveryDocument,
+    responses=responses(404, 409),
+)
+def send_again(dataset: DatasetPath, webhook: Id, delivery: Id, store: AppStore) -> Delivery:
+    """Send a message once more, at once."""
+    return webhooks.send_again(store, dataset, webhook, delivery)

@@ -1,0 +1,351 @@
+"""Sends messages to allowed addresses, and tries again where nobody answered."""
+
+from __future__ import annotations
+
+import asyncio
+import ssl
+import threading
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime, timedelta
+from functools import cache
+from typing import Any
+from urllib.parse import SplitResult, urlsplit
+
+import httpx
+import structlog
+
+from app.db.json_columns import parse
+from app.db.session import Session, text_of
+from app.db.store import Store
+from app.errors import ConflictError, InputError, ReviewError
+from app.features.batches.progress import tell_stalls
+from app.features.datasets.queries import dataset_names
+from app.features.webhooks.messages import Message, read_messages, secret_of, sign
+from app.features.webhooks.queries import (
+    DELIVERED,
+    FAILED,
+    arrived_since,
+    due_deliveries,
+    insert_delivery,
+    next_due,
+    update_delivery,
+    update_webhook,
+    webhooks_on,
+)
+
+_PORTS = {"http": 80, "https": 443}
+LONGEST = 2000
+"""Characters of an address."""
+
+
+@dataclass(frozen=True)
+class Address:
+    """What of an address decides whom it reaches."""
+
+    scheme: str
+    host: str
+    port: int
+    path: str
+
+    def is_below(self, other: Address) -> bool:
+        """Whether it is another one, or leads on from it."""
+        same = (self.scheme, self.host, self.port) == (other.scheme, other.host, other.port)
+        folder = other.path if other.path.endswith("/") else other.path + "/"
+        return same and (self.path == other.path or self.path.startswith(folder))
+
+
+def read_address(text: str, pointer: str | None = None) -> Address:
+    """An address as it will be used.
+
+    Raises:
+        InputError: It is none of http or https, names a user, or could lead elsewhere than it says.
+    """
+    try:
+        parts = urlsplit(text)
+        port = parts.port
+    except ValueError:
+        raise _refusal(text, pointer) from None
+    if len(text) > LONGEST or not _is_plain(text, parts):
+        raise _refusal(text, pointer)
+    host = (parts.hostname or "").removesuffix(".")
+    if not all(host.split(".")):
+        raise _refusal(text, pointer)
+    return Address(parts.scheme, host, port or _PORTS[parts.scheme], parts.path or "/")
+
+
+def require_allowed(text: str, allowed: Iterable[str], pointer: str | None = None) -> None:
+    """Raise unless the operator lets the server send to an address.
+
+    Raises:
+        InputError: It is no address, or none that is allowed.
+        ConflictError: None is allowed at all.
+    """
+    address, places = read_address(text, pointer), [read_address(item) for item in allowed]
+    if not places:
+        raise ConflictError(
+            "this server sends nothing to other addresses",
+            hint="Its operator allows some by the setting TOUCHLINE_WEBHOOKS.",
+        )
+    if not any(address.is_below(place) for place in places):
+        raise InputError(
+            "the operator of this server does not allow that address",
+            hint=f"It may begin with: {', '.join(sorted(allowed))}",
+            pointer=pointer,
+        )
+
+
+def _is_plain(text: str, parts: SplitResult) -> bool:
+    # Some servers cut parameters off a segment (RFC 3986, 3.3): "..;x" is ".." to them.
+    decoded = parts.path.lower().replace("%2e", ".").replace("%3b", ";")
+    segments = [segment.partition(";")[0] for segment in decoded.split("/")]
+    return (
+        text.isascii()
+        and text.isprintable()
+        and parts.scheme in _PORTS
+        and bool(parts.hostname)
+        and parts.username is None
+        and not parts.fragment
+        and "\\" not in text
+        and " " not in text
+        and "%2f" not in text.lower()
+        and not {".", ".."} & set(segments)
+    )
+
+
+def _refusal(text: str, pointer: str | None) -> InputError:
+    return InputError(
+        f"{text[:100]!r} is no address that messages can be sent to",
+        hint="Like https://hooks.example.org/touchline: http or https, without user, # and dots.",
+        pointer=pointer,
+    )
+
+
+log = structlog.get_logger("touchline.webhooks")
+
+AGAIN = tuple(
+    timedelta(seconds=5) if minutes == 0 else timedelta(minutes=minutes)
+    for minutes in (0, 5, 30, 120, 300, 600, 840, 1200, 1440)
+)
+"""How long to wait after each try that failed, as standardwebhooks.com recommends; then it is given up."""
+SECONDS = 15.0
+"""So long a receiver may take for all of its answer."""
+TOGETHER, OF_ONE = 32, 4
+"""Messages that are under way at a time, and of them to one webhook: a slow one holds up others for
+``SECONDS`` at most."""
+GLANCE_SECONDS = 0.1
+"""Between two looks whether the server stops."""
+LOOK_SECONDS = 1.0
+"""At least so long between two looks at the log."""
+STALLS_SECONDS = 300.0
+"""Between two looks whether a batch has stalled."""
+POLL_SECONDS = 30.0
+"""At most so long, for what other processes have done."""
+GONE = 410
+"""By this answer a receiver says that it wants nothing more."""
+
+
+@dataclass(frozen=True)
+class Attempt:
+    """What came of one try: ``problem`` is None where it arrived."""
+
+    status: int | None
+    problem: str | None
+
+
+class WebhookSender:
+    """A thread that follows the log, and a few that send.
+
+    Args:
+        store: Where webhooks are and what they are told of.
+        clock: Says what time it is, in UTC.
+        leads: Whether it is this process that sends; asked at every look.
+    """
+
+    def __init__(
+        self,
+        store: Store,
+        clock: Callable[[], datetime] = lambda: datetime.now(UTC),
+        leads: Callable[[], bool] = lambda: True,
+    ):
+        self._leads = leads
+        self._store, self._clock = store, clock
+        self._wake, self._closing = threading.Event(), threading.Event()
+        self._thread: threading.Thread | None = None
+        self._stalls_at: datetime | None = None
+
+    def start(self) -> None:
+        """Begin to follow the log."""
+        self._store.listen(self._wake.set)
+        self._thread = threading.Thread(target=self._follow, name="webhooks", daemon=True)
+        self._thread.start()
+
+    def wake(self) -> None:
+        """Look soon."""
+        self._wake.set()
+
+    def stop(self) -> None:
+        """Tell it to end; what waits is sent by the next server."""
+        self._closing.set()
+        self._wake.set()
+
+    def close(self, seconds: float = SECONDS) -> None:
+        """Stop, and wait so long for it."""
+        self.stop()
+        if self._thread is not None:
+            self._thread.join(seconds)
+
+    def look(self) -> int:
+        """Write down what webhooks have not been told yet; returns how many messages that makes."""
+        with self._store.read() as session:
+            rows = webhooks_on(session)
+            names = dataset_names(session) if rows else {}
+            found = [(row, read_messages(session, row, names[row.dataset_id])) for row in rows]
+        if not any(messages for _, messages in found):
+            return 0
+        with self._store.write() as session:
+            still = {row.id: row for row in webhooks_on(session)}
+            return sum(
+                _tell(session, row, messages)
+                for row, messages in found
+                # Who was changed meanwhile is told at the next look.
+                if messages and still.get(row.id) == row
+            )
+
+    def look_for_stalls(self) -> int:
+        """Write down which batches have stalled, now and then; returns how many messages that makes."""
+        at, last = self._clock(), self._stalls_at
+        if last is not None and (at - last).total_seconds() < STALLS_SECONDS:
+            return 0
+        self._stalls_at = at
+        return tell_stalls(self._store, at)
+
+    def send(self) -> int:
+        """Send what is due, as much as goes at a time; returns how many tries came to an end.
+
+        What is still under way when the server stops is sent again by the next one.
+        """
+        now = self._clock()
+        with self._store.read() as session:
+            due = due_deliveries(session, text_of(now), TOGETHER, OF_ONE)
+        answers = asyncio.run(self._try_all(due)) if due else []
+        if answers:
+            with self._store.write() as session:
+                for row, answer in answers:
+                    self._note(session, row, answer)
+        return len(answers)
+
+    async def _try_all(self, due: Sequence[Any]) -> list[tuple[Any, Attempt]]:
+        async with httpx.AsyncClient(
+            timeout=SECONDS, follow_redirects=False, trust_env=False, verify=_trusted()
+        ) as client:
+            tries = {asyncio.ensure_future(self._try(client, row)): row for row in due}
+            left = set(tries)
+            while left and not self._closing.is_set():
+                _, left = await asyncio.wait(left, timeout=GLANCE_SECONDS)
+            for task in left:
+                task.cancel()
+            await asyncio.gather(*left, return_exceptions=True)
+        return [(row, task.result()) for task, row in tries.items() if task not in left]
+
+    def _follow(self) -> None:
+        while not self._closing.is_set():
+            self._wake.clear()
+            wait = POLL_SECONDS
+            try:
+                if self._leads():
+                    wait = self._followed()
+            except ReviewError as error:
+                log.warning("webhooks could not be told", error=str(error))
+            except Exception:
+                log.exception("webhooks could not be told")
+            self._closing.wait(LOOK_SECONDS)
+            self._wake.wait(wait)
+
+    def _followed(self) -> float:
+        """Tell and send all that can be; seconds until the next look."""
+        self.look()
+        self.look_for_stalls()
+        while not self._closing.is_set() and self.send():
+            pass
+        return self._pause()
+
+    def _pause(self) -> float:
+        """Seconds until something waits to be sent again."""
+        with self._store.read() as session:
+            due = next_due(session)
+        if due is None:
+            return POLL_SECONDS
+        seconds = (datetime.fromisoformat(due) - self._clock()).total_seconds()
+        return min(max(seconds, 0.0), POLL_SECONDS)
+
+    async def _try(self, client: httpx.AsyncClient, row: Any) -> Attempt:
+        """One try; whatever goes wrong with one address is its own answer."""
+        try:
+            async with asyncio.timeout(SECONDS):
+                status = await self._post(client, row)
+        except ReviewError as error:
+            return Attempt(None, error.message)
+        except (TimeoutError, httpx.TimeoutException):
+            return Attempt(None, f"no answer within {SECONDS:.0f} s")
+        except httpx.HTTPError as error:
+            return Attempt(None, f"it could not be reached: {error}"[:300])
+        except Exception as error:
+            log.exception("a message could not be sent", webhook=row.webhook_id)
+            return Attempt(None, f"it could not be sent: {error}"[:300])
+        if 200 <= status < 300:
+            return Attempt(status, None)
+        redirected = " (redirects are not followed)" if 300 <= status < 400 else ""
+        return Attempt(status, f"it answered {status}{redirected}")
+
+    async def _post(self, client: httpx.AsyncClient, row: Any) -> int:
+        settings = self._store.settings
+        require_allowed(row.url, settings.webhooks)
+        headers = sign(secret_of(settings, row.salt), row.message, self._clock(), row.body)
+        headers["Content-Type"] = "application/json"
+        async with client.stream("POST", row.url, content=row.body, headers=headers) as answer:
+            return answer.status_code
+
+    def _note(self, session: Session, row: Any, answer: Attempt) -> None:
+        now = self._clock()
+        tried = {"attempts": row.attempts + 1, "tried": text_of(now), "status": answer.status}
+        values: dict[str, Any] = {**tried, "problem": answer.problem, "next_at": None}
+        if answer.problem is None:
+            values["state"] = DELIVERED
+        elif row.attempts < len(AGAIN) and answer.status != GONE:
+            values["next_at"] = text_of(now + AGAIN[row.attempts])
+        else:
+            values["state"] = FAILED
+        update_delivery(session, row.id, values)
+        if values.get("state") == FAILED:
+            self._turn_off(session, row, answer)
+
+    def _turn_off(self, session: Session, row: Any, answer: Attempt) -> None:
+        """Tell nobody any more who wants nothing, or has taken nothing for as long as one tries."""
+        if answer.status == GONE:
+            update_webhook(
+                session, row.webhook_id, {"off": "it answered 410: it wants no further messages"}
+            )
+        elif not arrived_since(session, row.webhook_id, row.created):
+            reason = f"nothing arrived since {row.created[:16].replace('T', ' ')} UTC"
+            update_webhook(session, row.webhook_id, {"off": reason})
+
+
+@cache
+def _trusted() -> ssl.SSLContext:
+    """Certificates of public authorities, read once: that takes some 20 ms of a processor."""
+    return httpx.create_ssl_context(trust_env=False)
+
+
+def _tell(session: Session, row: Any, messages: Sequence[Message]) -> int:
+    wanted = set(parse(row.kinds))
+    made = 0
+    for message in messages:
+        if message.kind in wanted:
+            made += insert_delivery(session, row.id, message.id, message.kind, message.body)
+    logged = max((message.log_id for message in messages), default=0)
+    ended = max((message.ended, message.job_id) for message in messages)
+    until, job = max((row.jobs_until, row.job_id), ended)
+    told = {"log_id": max(row.log_id, logged), "jobs_until": until, "job_id": job}
+    update_webhook(session, row.id, told)
+    return made

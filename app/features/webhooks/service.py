@@ -1,0 +1,244 @@
+"""Webhooks: addresses that a dataset's leads want to be told what happens in it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from app.canonical import canonical
+from app.db.json_columns import parse
+from app.db.log import newest_entry
+from app.db.session import Session, now
+from app.db.store import Store
+from app.errors import ConflictError, InputError, NotFoundError
+from app.features.audit.audit_events import note_deed
+from app.features.datasets.queries import dataset_name
+from app.features.datasets.service import dataset_id
+from app.features.webhooks.messages import CHOSEN, Kind, new_salt, ping, secret_of
+from app.features.webhooks.queries import (
+    DELIVERED,
+    FAILED,
+    WAITING,
+    count_deliveries,
+    delete_webhook,
+    deliveries_of,
+    delivery_of,
+    insert_delivery,
+    insert_webhook,
+    update_delivery,
+    update_webhook,
+    waiting_of_kind,
+    webhook_of,
+    webhooks_of,
+)
+from app.features.webhooks.sender import require_allowed
+
+MOST = 20
+"""Webhooks of one dataset."""
+OFF = "somebody turned it off"
+
+
+@dataclass(frozen=True)
+class Webhook:
+    """An address that is told.
+
+    Attributes:
+        off: Why nothing is sent to it any more; None: it is.
+        waiting, delivered, failed: Messages that wait, have arrived, and were given up.
+    """
+
+    id: int
+    url: str
+    kinds: list[Kind]
+    off: str | None
+    created: str
+    created_by: str
+    waiting: int
+    delivered: int
+    failed: int
+
+
+@dataclass(frozen=True)
+class Delivery:
+    """A message to a webhook, and how its sending goes.
+
+    Attributes:
+        message: Its id, the same however often it is sent.
+        next_at: When it is tried (again); None: never.
+        status: What the receiver answered last.
+        problem: Why the last try failed.
+    """
+
+    id: int
+    message: str
+    kind: str
+    body: str
+    created: str
+    state: str
+    attempts: int
+    next_at: str | None
+    tried: str | None
+    status: int | None
+    problem: str | None
+
+
+def list_webhooks(store: Store, dataset: str) -> list[Webhook]:
+    """The webhooks of a dataset."""
+    with store.read() as session:
+        return _all(session, dataset_id(store, dataset))
+
+
+def make_webhook(
+    store: Store, dataset: str, url: str, kinds: Iterable[Kind], *, actor: str
+) -> tuple[Webhook, str]:
+    """A webhook that is told what happens from now on, and its secret, which is shown this once.
+
+    Raises:
+        InputError: The operator does not allow the address, or no kind is asked for.
+        ConflictError: The operator allows none, or the dataset has as many as it may.
+    """
+    require_allowed(url, store.settings.webhooks, "/url")
+    number, salt = dataset_id(store, dataset), new_salt()
+    secret = secret_of(store.settings, salt)
+    with store.write() as session:
+        if len(webhooks_of(session, number)) >= MOST:
+            raise ConflictError(f"this dataset has {MOST} webhooks", hint="Delete one of them.")
+        made = insert_webhook(session, number, url, _chosen(kinds), salt=salt, by=actor)
+        note_deed(session, actor, "webhook made", number, url=url)
+        return _one(session, number, made), secret
+
+
+def change_webhook(
+    store: Store,
+    dataset: str,
+    webhook_id: int,
+    *,
+    url: str | None = None,
+    kinds: Iterable[Kind] | None = None,
+    on: bool | None = None,
+    actor: str,
+) -> Webhook:
+    """Another address, other kinds, or on and off; what happened while it was off is not told.
+
+    Raises:
+        NotFoundError: The dataset has none of that id.
+    """
+    if url is not None:
+        require_allowed(url, store.settings.webhooks, "/url")
+    number = dataset_id(store, dataset)
+    with store.write() as session:
+        found = _one(session, number, webhook_id)
+        values: dict[str, Any] = {}
+        if url is not None:
+            values["url"] = url
+        if kinds is not None:
+            values["kinds"] = canonical(_chosen(kinds))
+        if on is not None and on != (found.off is None):
+            values |= _turned_on(session) if on else {"off": OFF}
+        if values:
+            update_webhook(session, webhook_id, values)
+            did = "webhook turned off" if on is False else "webhook changed"
+            note_deed(session, actor, did, number, url=url or found.url)
+        return _one(session, number, webhook_id)
+
+
+def renew_secret(store: Store, dataset: str, webhook_id: int, *, actor: str) -> tuple[Webhook, str]:
+    """Another secret in place of the one that was; what is sent from now on is signed with it."""
+    number, salt = dataset_id(store, dataset), new_salt()
+    secret = secret_of(store.settings, salt)
+    with store.write() as session:
+        found = _one(session, number, webhook_id)
+        update_webhook(session, webhook_id, {"salt": salt})
+        note_deed(session, actor, "webhook's secret renewed", number, url=found.url)
+        return _one(session, number, webhook_id), secret
+
+
+def remove_webhook(store: Store, dataset: str, webhook_id: int, *, actor: str) -> None:
+    """Tell an address nothing more, and forget what it was told."""
+    number = dataset_id(store, dataset)
+    with store.write() as session:
+        found = _one(session, number, webhook_id)
+        delete_webhook(session, webhook_id)
+        note_deed(session, actor, "webhook deleted", number, url=found.url)
+
+
+def list_deliveries(
+    store: Store, dataset: str, webhook_id: int, *, before: int | None = None, most: int = 50
+) -> list[Delivery]:
+    """What a webhook was told, newest first, from below an id."""
+    number = dataset_id(store, dataset)
+    with store.read() as session:
+        _one(session, number, webhook_id)
+        return [_delivery(row) for row in deliveries_of(session, webhook_id, before, most)]
+
+
+def send_again(store: Store, dataset: str, webhook_id: int, delivery_id: int) -> Delivery:
+    """Send a message once more, at once; its tries are counted anew."""
+    number = dataset_id(store, dataset)
+    with store.write() as session:
+        _require_on(_one(session, number, webhook_id))
+        if delivery_of(session, webhook_id, delivery_id) is None:
+            raise NotFoundError(f"this webhook has no delivery {delivery_id}")
+        update_delivery(session, delivery_id, {"state": WAITING, "attempts": 0, "next_at": now()})
+        return _delivery(delivery_of(session, webhook_id, delivery_id))
+
+
+def send_ping(store: Store, dataset: str, webhook_id: int, *, actor: str) -> Delivery:
+    """Send a message that says nothing, to see whether messages arrive; one that waits is sent now."""
+    number = dataset_id(store, dataset)
+    with store.write() as session:
+        _require_on(_one(session, number, webhook_id))
+        waiting = waiting_of_kind(session, webhook_id, Kind.PING)
+        if waiting is not None:
+            update_delivery(session, waiting.id, {"next_at": now()})
+            return _delivery(delivery_of(session, webhook_id, waiting.id))
+        message = ping(webhook_id, dataset_name(session, number), now(), actor)
+        insert_delivery(session, webhook_id, message.id, message.kind, message.body)
+        return _delivery(deliveries_of(session, webhook_id, None, 1)[0])
+
+
+def _require_on(webhook: Webhook) -> None:
+    if webhook.off is not None:
+        raise ConflictError(f"nothing is sent there: {webhook.off}", hint="Turn it on first.")
+
+
+def _turned_on(session: Session) -> Mapping[str, Any]:
+    return {"off": None, "log_id": newest_entry(session), "jobs_until": now()}
+
+
+def _chosen(kinds: Iterable[Kind]) -> list[str]:
+    chosen = sorted({str(kind) for kind in kinds})
+    if not chosen or Kind.PING in chosen:
+        raise InputError(
+            "a webhook wants one kind of message at least",
+            hint=f"Kinds are {', '.join(CHOSEN)}.",
+            pointer="/kinds",
+        )
+    return chosen
+
+
+def _one(session: Session, dataset: int, webhook_id: int) -> Webhook:
+    row = webhook_of(session, dataset, webhook_id)
+    if row is None:
+        raise NotFoundError(f"this dataset has no webhook {webhook_id}")
+    return _webhook(row, count_deliveries(session, [webhook_id]))
+
+
+def _all(session: Session, dataset: int) -> list[Webhook]:
+    rows = webhooks_of(session, dataset)
+    counts = count_deliveries(session, [row.id for row in rows])
+    return [_webhook(row, counts) for row in rows]
+
+
+def _webhook(row: Any, counts: Mapping[tuple[int, str], int]) -> Webhook:
+    waiting, delivered, failed = (
+        counts.get((row.id, state), 0) for state in (WAITING, DELIVERED, FAILED)
+    )
+    kinds = [Kind(kind) for kind in parse(row.kinds)]
+    made = (row.created, row.created_by)
+    return Webhook(row.id, row.url, kinds, row.off, *made, waiting, delivered, failed)
+
+
+def _delivery(row: Any) -> Delivery:
+    return Delivery(**{name: getattr(row, name) for name in Delivery.__dataclass_fields__})

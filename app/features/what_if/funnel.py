@@ -1,0 +1,186 @@
+"""Yields: what a policy lets through, gate by gate, and what another one would."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar
+
+from app.features.what_if.block_results import each, noise_of
+from app.features.what_if.counts import DISTANCES, FINDINGS, Leak, Tally, leaks, sum_of
+from app.features.what_if.service import Block, Snapshot, YieldStore
+from app.features.what_if.table import JAC_STEPS
+from app.geometry.arrays import IntArray
+from app.soccer.policy import BOXES, CALIBRATION, PITCH, THRESHOLDS, Policy
+from app.soccer.solution import GAMMAS_PERCENT, GATES
+
+UNSOLVED = "unsolved"
+"""Step of the funnel before the gates: groups that nobody has solved yet."""
+WITHOUT_EFFECT = frozenset({BOXES, PITCH})
+"""Subjects of thresholds that decide about boxes and new imports, and about no gate."""
+ANSWERED = tuple(
+    threshold for threshold in THRESHOLDS if threshold.subject not in WITHOUT_EFFECT | {CALIBRATION}
+)
+"""Thresholds that the table answers for: gates and the findings about the ball."""
+
+
+@dataclass(frozen=True)
+class FunnelStep:
+    """One step of the funnel: how many groups are left after it, and how many it dropped."""
+
+    gate: str
+    left: int
+    dropped: int
+
+
+@dataclass(frozen=True)
+class ThresholdCurve:
+    """Groups with the ball in two views or more that qualify, against the JaC threshold."""
+
+    gamma_percent: float
+    groups: tuple[int, ...]
+    thresholds: ClassVar = JAC_STEPS
+
+
+@dataclass(frozen=True)
+class FunnelPart:
+    """Groups of one split, one bin of distance or with one finding, and how many pass."""
+
+    name: str
+    groups: int
+    passing: int
+    low: float | None = None
+    high: float | None = None
+
+
+@dataclass(frozen=True)
+class Yield:
+    """What a policy lets through.
+
+    Attributes:
+        funnel: Every group by its first failing gate; the steps lead from all to passing.
+        given_not_measured: Groups whose cameras are given and have no lines to measure JaC.
+        gained: Groups that pass and do not under the present policy; ``lost`` the reverse.
+        needs_solving: Fields whose effect only solving again can tell; they are as before here.
+    """
+
+    policy: Policy
+    groups: int
+    passing: int
+    unsolved: int
+    funnel: tuple[FunnelStep, ...]
+    given_not_measured: int
+    curves: tuple[ThresholdCurve, ...]
+    splits: tuple[FunnelPart, ...]
+    distances: tuple[FunnelPart, ...]
+    findings: tuple[FunnelPart, ...]
+    leakage: tuple[Leak, ...]
+    gained: int
+    lost: int
+    needs_solving: tuple[str, ...]
+
+
+def get_yield(
+    yields: YieldStore, dataset_id: int, values: Mapping[str, Any] | None = None
+) -> Yield:
+    """What a dataset's policy lets through, or what it would with other values.
+
+    Args:
+        yields: The tables.
+        dataset_id: The dataset.
+        values: Fields of ``Policy`` that shall differ; ``calibration`` is a mapping of its own.
+
+    Raises:
+        NotFoundError: There is no such dataset.
+    """
+    snapshot = yields.snapshot(dataset_id)
+    policy = _changed(snapshot.policy, values or {})
+    unanswered = needs_solving(snapshot.policy, policy)
+    same = all(item.value(policy) == item.value(snapshot.policy) for item in ANSWERED)
+
+    def tally(block: Block) -> Tally:
+        return block.tally if same else block.tally_under(policy)
+
+    # Who tries another noise judges every group anew; else threads would wait for each other.
+    side_by_side = noise_of(policy) != noise_of(snapshot.policy)
+    total = sum_of((each if side_by_side else map)(tally, snapshot.blocks))
+    return _answer(snapshot, policy, total, unanswered)
+
+
+def needs_solving(present: Policy, asked: Policy) -> tuple[str, ...]:
+    """Names of thresholds that differ and that the table cannot answer for."""
+    return tuple(
+        item.name
+        for item in THRESHOLDS
+        if item.subject == CALIBRATION and item.value(present) != item.value(asked)
+    )
+
+
+def _changed(policy: Policy, values: Mapping[str, Any]) -> Policy:
+    values = dict(values)
+    calibration = replace(policy.calibration, **values.pop("calibration", {}))
+    return replace(policy, **{**values, "calibration": calibration})
+
+
+def _answer(snapshot: Snapshot, policy: Policy, total: Tally, unanswered: tuple[str, ...]) -> Yield:
+    return Yield(
+        policy=policy,
+        groups=snapshot.solved + snapshot.unsolved,
+        passing=total.passing,
+        unsolved=snapshot.unsolved,
+        funnel=_funnel(snapshot, total.dropped, policy),
+        given_not_measured=total.unmeasured,
+        curves=tuple(
+            ThresholdCurve(gamma, tuple(counts.tolist()))
+            for gamma, counts in zip(GAMMAS_PERCENT, total.curves, strict=True)
+        ),
+        splits=_splits(snapshot, total),
+        distances=_distances(snapshot, total),
+        findings=tuple(
+            FunnelPart(kind, groups, passing)
+            for kind, (groups, passing) in zip(FINDINGS, total.findings.tolist(), strict=True)
+        ),
+        leakage=leaks(snapshot.places),
+        gained=total.gained,
+        lost=total.lost,
+        needs_solving=unanswered,
+    )
+
+
+def _funnel(snapshot: Snapshot, dropped: IntArray, policy: Policy) -> tuple[FunnelStep, ...]:
+    """Gates that the policy asks for, in order, after the groups that are not solved."""
+    inactive = {
+        "agreement": policy.min_agreement is None,
+        "parallax": policy.min_parallax_degrees is None,
+        "sigma": policy.max_sigma_m is None,
+        "chi_square": policy.min_p_value is None,
+    }
+    left, steps = snapshot.solved, []
+    if snapshot.unsolved:
+        steps.append(FunnelStep(UNSOLVED, left, snapshot.unsolved))
+    for place, gate in enumerate(GATES):
+        if not inactive.get(gate, False):
+            left -= int(dropped[place])
+            steps.append(FunnelStep(gate, left, int(dropped[place])))
+    return tuple(steps)
+
+
+def _splits(snapshot: Snapshot, total: Tally) -> tuple[FunnelPart, ...]:
+    everyone: Counter[str] = Counter()
+    for (_, split), groups in snapshot.places.items():
+        everyone[split] += groups
+    return tuple(
+        FunnelPart(split, groups, total.splits[split]) for split, groups in sorted(everyone.items())
+    )
+
+
+def _distances(snapshot: Snapshot, total: Tally) -> tuple[FunnelPart, ...]:
+    """By distance of the ball; groups that have none under the policy stand apart, last."""
+    groups, passing = total.distances.tolist()
+    groups[-1] += snapshot.unsolved
+    ends: list[float | None] = [*DISTANCES[1:], None, None]
+    return tuple(
+        FunnelPart("", groups[bin_], passing[bin_], low, ends[bin_])
+        for bin_, low in enumerate([*DISTANCES, None])
+    )

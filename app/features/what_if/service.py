@@ -1,0 +1,332 @@
+"""The tables of datasets, kept in step with the database as groups change, and their check."""
+
+from __future__ import annotations
+
+import threading
+from collections import Counter, OrderedDict
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+
+import structlog
+
+from app.config import Settings
+from app.db.check import Check
+from app.db.session import Session
+from app.db.store import Store
+from app.errors import NotFoundError, OverloadedError, ReviewError
+from app.features.datasets.queries import dataset_names, find_dataset, policy_of
+from app.features.groups.revision_queries import count_changes, count_groups
+from app.features.what_if.block_results import Judged, each
+from app.features.what_if.blocks import Gathered
+from app.features.what_if.cache import (
+    ARRAYS,
+    KeptBlock,
+    forget_table,
+    keep_judged,
+    kept_judged,
+    map_arrays,
+)
+from app.features.what_if.counts import Tally, tally_of
+from app.features.what_if.table import EMPTY, YieldTable, join
+from app.geometry.arrays import BoolArray
+from app.plural import plural
+from app.soccer.policy import Policy
+from app.soccer.solution import SOLVER_VERSION
+
+MAX_BYTES = 512 * 1024 * 1024
+"""What all tables together may hold in memory; beyond it the one that was asked for longest ago
+goes. Files that are mapped do not count: the system takes their memory back when it needs it."""
+AT_ONCE = 20_000
+"""Groups that are read while somebody waits; of more, who asks is told how far they are."""
+PATIENCE_SECONDS = 5.0
+"""How long who asks waits for others who read at the moment."""
+FAR_BEHIND = 2000
+"""Changes from which on it is worth a look whether another process has followed them."""
+
+log = structlog.get_logger("touchline.yields")
+
+
+@dataclass(frozen=True)
+class Block:
+    """A block of a table, and what the present policy makes of it."""
+
+    block: KeptBlock
+    judged: Judged
+
+    @cached_property
+    def tally(self) -> Tally:
+        """What is counted of its groups under the present policy."""
+        judgement = self.judged.judgement
+        return tally_of(self.table, self.live, self.judged.policy, judgement, judgement)
+
+    def tally_under(self, policy: Policy) -> Tally:
+        """What is counted of them under another one."""
+        judgement = self.judged.under(policy)
+        return tally_of(self.table, self.live, policy, self.judged.judgement, judgement, self.tally)
+
+    @property
+    def table(self) -> YieldTable:
+        """Its groups, those among them that do not count any more."""
+        return self.block.table
+
+    @property
+    def live(self) -> BoolArray | slice:
+        """Chooses the rows of those that count."""
+        return slice(None) if self.block.live is None else self.block.live
+
+    @cached_property
+    def places(self) -> Counter[tuple[str, str]]:
+        """How many groups that count lie in each match and split."""
+        return self.table.count_places(self.block.live)
+
+
+@dataclass(frozen=True)
+class Snapshot:
+    """A dataset's table with what is computed from it, all of one state.
+
+    Attributes:
+        policy: The present one.
+        blocks: The groups that are solved.
+        bare: The others.
+    """
+
+    policy: Policy
+    blocks: tuple[Block, ...]
+    bare: YieldTable
+
+    @cached_property
+    def solved(self) -> int:
+        """How many groups are solved."""
+        return sum(part.block.groups for part in self.blocks)
+
+    @property
+    def unsolved(self) -> int:
+        """How many are not."""
+        return self.bare.groups
+
+    @cached_property
+    def table(self) -> YieldTable:
+        """The groups that are solved, in one table."""
+        return join([EMPTY, *(part.block.only_live for part in self.blocks)])
+
+    @property
+    def nbytes(self) -> int:
+        """Memory that it holds, without what is mapped from files."""
+        loose = sum(part.table.nbytes for part in self.blocks if not part.block.name)
+        return loose + sum(part.judged.nbytes for part in self.blocks) + self.bare.nbytes
+
+    @cached_property
+    def places(self) -> Counter[tuple[str, str]]:
+        """How many groups lie in each match and split, solved or not."""
+        total = self.bare.count_places()
+        for part in self.blocks:
+            total.update(part.places)
+        return total
+
+
+@dataclass
+class _Kept:
+    """A dataset's groups, and the snapshot that was made of them last."""
+
+    lock: threading.Lock = field(default_factory=threading.Lock)
+    gathered: Gathered | None = None
+    version: int | None = None
+    snapshot: Snapshot | None = None
+    read: tuple[int, int] = (0, 0)
+    """How many groups are read, and how many are left: for who asks meanwhile."""
+
+
+class YieldStore:
+    """The tables of the datasets that somebody asked about."""
+
+    def __init__(self, store: Store):
+        self._store = store
+        self._lock = threading.Lock()
+        self._kept: OrderedDict[int, _Kept] = OrderedDict()
+
+    def snapshot(self, dataset_id: int) -> Snapshot:
+        """The table of a dataset as it is now; what has changed since the last look is read.
+
+        Raises:
+            NotFoundError: There is no such dataset.
+            OverloadedError: So many groups have changed that a thread reads them first.
+        """
+        kept = self._of(dataset_id)
+        if not kept.lock.acquire(timeout=PATIENCE_SECONDS):
+            raise _not_yet(kept)
+        try:
+            snapshot = self._tried(dataset_id, kept, AT_ONCE)
+        finally:
+            kept.lock.release()
+        if snapshot is None:
+            error = _not_yet(kept)
+            work = threading.Thread(target=self._caught_up, args=(dataset_id,), daemon=True)
+            work.start()
+            raise error
+        self._forget()
+        return snapshot
+
+    def keep_up(self, dataset_id: int) -> None:
+        """Bring a table in step, however much has changed, before somebody asks.
+
+        Raises:
+            NotFoundError: There is no such dataset.
+        """
+        kept = self._of(dataset_id)
+        with kept.lock:
+            self._tried(dataset_id, kept, None)
+        self._forget()
+
+    def keep_large_up(self) -> None:
+        """Bring those tables in step that would let somebody wait."""
+        with self._store.read() as session:
+            names = dataset_names(session)
+            large = [number for number in names if count_groups(session, number) > AT_ONCE]
+        for dataset_id in large:
+            self._caught_up(dataset_id)
+
+    def _caught_up(self, dataset_id: int) -> None:
+        try:
+            self.keep_up(dataset_id)
+        except ReviewError as error:
+            log.warning("a yield table stays behind", error=error.message)
+        except Exception:
+            log.exception("a yield table stays behind")
+
+    def _of(self, dataset_id: int) -> _Kept:
+        with self._lock:
+            kept = self._kept.setdefault(dataset_id, _Kept())
+            self._kept.move_to_end(dataset_id)
+        return kept
+
+    def _folder(self, dataset_id: int) -> Path:
+        return self._store.settings.yields / str(dataset_id)
+
+    def _tried(self, dataset_id: int, kept: _Kept, most: int | None) -> Snapshot | None:
+        try:
+            return self._refreshed(dataset_id, kept, most)
+        except NotFoundError:
+            with self._lock:
+                self._kept.pop(dataset_id, None)
+            forget_table(self._folder(dataset_id))
+            raise
+
+    def _refreshed(self, dataset_id: int, kept: _Kept, most: int | None) -> Snapshot | None:
+        """The snapshot as of now; None where more groups than ``most`` would have to be read."""
+        while True:
+            with self._store.read() as session:
+                policy = read_policy(session, dataset_id)
+                gathered = self._gathered(session, dataset_id, kept, policy)
+                left = gathered.left(session)
+                kept.read = gathered.groups, left
+                if most is not None and left > most:
+                    return None
+                if gathered.step(session):
+                    continue
+                if not gathered.is_whole(session):
+                    # Groups went without a mark, as when the log is replayed.
+                    folder, calibration = gathered.folder, gathered.calibration
+                    kept.gathered = Gathered.begin(session, folder, dataset_id, calibration)
+                    kept.snapshot = None
+                    continue
+            break
+        old = kept.snapshot
+        if old is None or kept.version != gathered.version or old.policy != policy:
+            kept.snapshot = self._judged(gathered, policy, old)
+            kept.version = gathered.version
+        return kept.snapshot
+
+    def _gathered(self, session: Session, dataset_id: int, kept: _Kept, policy: Policy) -> Gathered:
+        """The groups as they were looked at last, here or by another process."""
+        calibration, folder = (
+            f"{policy.calibration_hash} {SOLVER_VERSION}",
+            self._folder(dataset_id),
+        )
+        known = kept.gathered
+        if known is not None and known.calibration != calibration:
+            known = None
+        if known is None or count_changes(session, dataset_id, known.mark) > FAR_BEHIND:
+            found = Gathered.load(session, folder, dataset_id, calibration)
+            if found is not None and (known is None or found.mark > known.mark):
+                known = found
+        if known is None:
+            known = Gathered.begin(session, folder, dataset_id, calibration)
+        if known is not kept.gathered:
+            kept.gathered, kept.snapshot = known, None
+        return known
+
+    def _judged(self, gathered: Gathered, policy: Policy, old: Snapshot | None) -> Snapshot:
+        """The snapshot of groups under a policy; what was judged before no longer is."""
+        before = {id(part.table): part for part in old.blocks} if old is not None else {}
+
+        def judged_block(block: KeptBlock) -> Block:
+            known = before.get(id(block.table))
+            if known is not None and known.judged.policy.hash == policy.hash:
+                return known if known.block is block else Block(block, known.judged)
+            if known is None:
+                judged = kept_judged(gathered.folder, block, policy)
+                if judged is not None:
+                    return Block(block, judged)
+            table = block.table
+            if known is not None:
+                judged = known.judged.moved(policy)
+            else:
+                judged = Judged.by(table.facts, table.jac, policy)
+            if block.name:
+                judged.complete()
+                keep_judged(gathered.folder, block, judged)
+            return Block(block, judged)
+
+        return Snapshot(policy, tuple(each(judged_block, gathered.blocks)), gathered.bare)
+
+    def _forget(self) -> None:
+        with self._lock:
+            sizes = {
+                key: kept.snapshot.nbytes
+                for key, kept in self._kept.items()
+                if kept.snapshot is not None
+            }
+            for key in list(sizes)[:-1]:
+                if sum(sizes.values()) <= MAX_BYTES:
+                    return
+                del self._kept[key], sizes[key]
+
+
+def read_policy(session: Session, dataset_id: int) -> Policy:
+    """The present policy of a dataset; raises NotFoundError when there is none."""
+    row = find_dataset(session, dataset_id)
+    if row is None:
+        raise NotFoundError.dataset(dataset_id)
+    return policy_of(row.policy)
+
+
+def _not_yet(kept: _Kept) -> OverloadedError:
+    done, left = kept.read
+    return OverloadedError(
+        f"the yield is being counted: {done:,} groups are read, about {left:,} are left",
+        hint="Ask again in a few seconds.",
+    )
+
+
+def examine_yields(settings: Settings) -> Check:
+    """Read every file of the cache; one that a server deletes meanwhile is none any more."""
+    files = [path for ending in ARRAYS for path in sorted(settings.yields.glob(f"*/*{ending}"))]
+    damaged = [path for path in files if not _is_sound(path)]
+    if damaged:
+        more = "" if len(damaged) == 1 else f" and {plural(len(damaged) - 1, 'other')}"
+        sentence = f"{damaged[0].relative_to(settings.home)}{more} cannot be read as written"
+        mend = f"Stop the server and delete {settings.yields}: yields are counted anew."
+        return Check("yields", False, sentence, mend)
+    count = plural(len(files), "file")
+    return Check("yields", True, f"{count} in the cache, each as it was written")
+
+
+def _is_sound(path: Path) -> bool:
+    try:
+        map_arrays(path, whole=True)
+    except FileNotFoundError:
+        return True
+    except (OSError, ValueError, KeyError, TypeError):
+        return False
+    return True

@@ -1,0 +1,236 @@
+"""StatisticsStore: what statistics count, a row a group, kept in step with the database.
+
+29 bytes a group lie in memory and in the cache. A look reads again what has changed since the last
+one: groups that the database has marked, and groups that somebody has judged.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import structlog
+
+from app.db.log import entry_hash, newest_entry
+from app.db.session import Session
+from app.db.store import Store
+from app.errors import NotFoundError
+from app.features.datasets.queries import dataset_names
+from app.features.groups.revision_queries import changed_ids, count_groups, newest_change
+from app.features.queue.listing_queries import columns_from, read_columns
+from app.features.queue.statistics import COLUMNS, Counted, Statistics, counted, statistics_of
+from app.features.verdicts.queries import judged_since, newest_verdict
+from app.features.what_if.cache import map_arrays, write_arrays
+from app.features.what_if.service import AT_ONCE, read_policy
+from app.geometry.arrays import IntArray
+from app.soccer.solution import SOLVER_VERSION
+
+FORMAT = 1
+BATCH, CHUNK = 20_000, 500
+"""Groups that are read at once: in order, or by their ids."""
+WORTH_KEEPING = 500
+"""From so many groups on they are written to the cache."""
+FLUSH = 1000
+"""So many changes are followed in memory before they are written."""
+_ARRAYS = ("split", "match", "passes", "accepted", "cell", "bins")
+
+log = structlog.get_logger("touchline.statistics")
+
+
+@dataclass(frozen=True, eq=False)
+class _Kept:
+    """Groups in order of their ids, as of a moment.
+
+    Attributes:
+        policy: What judged them, and the solver's version.
+        change: The last change of a group that is followed.
+        verdict: The last verdict that is.
+        entry: Number and hash of the log's last entry then.
+        noted: Changes that the cache does not know of.
+    """
+
+    policy: str
+    change: int
+    verdict: int
+    entry: tuple[int, str]
+    group_id: IntArray
+    counted: Counted
+    noted: int = 0
+
+
+class StatisticsStore:
+    """The statistics of whole datasets that somebody asked about."""
+
+    def __init__(self, store: Store):
+        self._store = store
+        self._lock = threading.Lock()
+        self._locks: dict[int, threading.Lock] = {}
+        self._kept: dict[int, _Kept] = {}
+
+    def statistics(self, dataset_id: int) -> Statistics:
+        """The statistics of all groups of a dataset as it is now.
+
+        Raises:
+            NotFoundError: There is no such dataset.
+        """
+        with self._lock:
+            lock = self._locks.setdefault(dataset_id, threading.Lock())
+        with lock:
+            try:
+                found = self._refreshed(dataset_id)
+            except NotFoundError:
+                self._kept.pop(dataset_id, None)
+                self._file(dataset_id).unlink(missing_ok=True)
+                raise
+        return statistics_of(found.counted)
+
+    def keep_large_up(self) -> None:
+        """Read those datasets that would let somebody wait."""
+        with self._store.read() as session:
+            names = dataset_names(session)
+            large = [number for number in names if count_groups(session, number) > AT_ONCE]
+        for dataset_id in large:
+            try:
+                self.statistics(dataset_id)
+            except Exception:
+                log.exception("statistics stay behind")
+
+    def _file(self, dataset_id: int) -> Path:
+        return self._store.settings.yields / "statistics" / f"{dataset_id}.counted"
+
+    def _refreshed(self, dataset_id: int) -> _Kept:
+        with self._store.read() as session:
+            policy = f"{read_policy(session, dataset_id).hash} {SOLVER_VERSION}"
+            kept = self._kept.get(dataset_id) or _load(session, self._file(dataset_id))
+            if kept is not None and kept.policy == policy:
+                kept = _followed(session, dataset_id, kept)
+            if (
+                kept is None
+                or kept.policy != policy
+                or len(kept.group_id) != count_groups(session, dataset_id)
+            ):
+                kept = replace(_gathered(session, dataset_id, policy), noted=FLUSH)
+        if kept.noted >= FLUSH and len(kept.group_id) >= WORTH_KEEPING:
+            _keep(self._file(dataset_id), kept)
+            kept = replace(kept, noted=0)
+        self._kept[dataset_id] = kept
+        return kept
+
+
+def _gathered(session: Session, dataset_id: int, policy: str) -> _Kept:
+    """Every group."""
+    ids, parts = [], []
+    for rows in _batches(session, dataset_id):
+        ids.append(np.array([row[0] for row in rows], np.int64))
+        parts.append(counted([row[1:] for row in rows]))
+    return _Kept(
+        policy,
+        **_moment(session),
+        group_id=np.concatenate(ids or [np.zeros(0, np.int64)]),
+        counted=_join(parts) if parts else counted([]),
+    )
+
+
+def _batches(session: Session, dataset_id: int) -> Iterator[Sequence[Any]]:
+    after = 0
+    while rows := columns_from(session, dataset_id, ("group_id", *COLUMNS), after, BATCH):
+        yield rows
+        after = rows[-1].group_id
+
+
+def _moment(session: Session) -> dict[str, Any]:
+    number = newest_entry(session)
+    return {
+        "change": newest_change(session),
+        "verdict": newest_verdict(session),
+        "entry": (number, entry_hash(session, number) or ""),
+    }
+
+
+def _followed(session: Session, dataset_id: int, kept: _Kept) -> _Kept:
+    """What has changed, read again; groups that are gone show in the number of those left."""
+    changed = set(changed_ids(session, dataset_id, kept.change))
+    ids = sorted(changed | set(judged_since(session, dataset_id, kept.verdict)))
+    moment = _moment(session)
+    if not ids:
+        return replace(kept, **moment)
+    rows = [
+        row
+        for start in range(0, len(ids), CHUNK)
+        for row in read_columns(session, ids[start : start + CHUNK], (), ("group_id", *COLUMNS))
+    ]
+    new = np.array([row[0] for row in rows], np.int64)
+    stays = ~np.isin(kept.group_id, np.array(ids, np.int64))
+    group_id = np.concatenate([kept.group_id[stays], new])
+    joined = _join([_only(kept.counted, stays), counted([row[1:] for row in rows])])
+    order = np.argsort(group_id, kind="stable")
+    return _Kept(
+        kept.policy,
+        **moment,
+        group_id=group_id[order],
+        counted=_only(joined, order),
+        noted=kept.noted + len(ids),
+    )
+
+
+def _only(found: Counted, chosen: Any) -> Counted:
+    return replace(found, **{name: getattr(found, name)[..., chosen] for name in _ARRAYS})
+
+
+def _join(parts: Sequence[Counted]) -> Counted:
+    splits = sorted({name for part in parts for name in part.splits})
+    matches = sorted({name for part in parts for name in part.matches})
+    joined = {
+        name: np.concatenate([getattr(part, name) for part in parts], axis=-1) for name in _ARRAYS
+    }
+    joined["split"] = np.concatenate([_coded(part.splits, part.split, splits) for part in parts])
+    joined["match"] = np.concatenate([_coded(part.matches, part.match, matches) for part in parts])
+    return Counted(tuple(splits), tuple(matches), **joined)
+
+
+def _coded(before: Sequence[str], codes: Any, names: Sequence[str]) -> Any:
+    places = {name: place for place, name in enumerate(names)}
+    return np.array([places[name] for name in before], np.int32)[codes] if len(codes) else codes
+
+
+def _keep(file: Path, kept: _Kept) -> None:
+    about = {
+        "format": FORMAT,
+        "policy": kept.policy,
+        "change": kept.change,
+        "verdict": kept.verdict,
+        "entry": kept.entry,
+        "splits": kept.counted.splits,
+        "matches": kept.counted.matches,
+    }
+    arrays = {name: getattr(kept.counted, name) for name in _ARRAYS}
+    try:
+        write_arrays(file, about, {"group_id": kept.group_id, **arrays})
+    except OSError as error:
+        log.warning("statistics cannot be kept", error=str(error))
+
+
+def _load(session: Session, file: Path) -> _Kept | None:
+    """What the cache holds; None where it holds nothing that this database could have said."""
+    try:
+        found = map_arrays(file, whole=True)
+        about, arrays = found.about, dict(found.arrays)
+        number, digest = about["entry"]
+        if about["format"] != FORMAT or about["change"] > newest_change(session):
+            return None
+        if number and entry_hash(session, number) != digest:
+            return None
+        group_id = arrays.pop("group_id")
+        held = Counted(tuple(about["splits"]), tuple(about["matches"]), **arrays)
+        return _Kept(
+            about["policy"], about["change"], about["verdict"], (number, digest), group_id, held
+        )
+    except FileNotFoundError:
+        return None
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        log.warning("statistics cannot be read, and are counted anew", error=str(error))
+        return None

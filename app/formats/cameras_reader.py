@@ -1,0 +1,309 @@
+"""Cameras, read: one a file (``camera_00002.json``), or several in one, as many tools write them."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from pathlib import PurePosixPath
+from typing import Any, NamedTuple
+
+from app.errors import DatasetFormatError
+from app.formats.camera_arrays import cameras_of_arrays, opencv_storage
+from app.formats.camera_json import COVARIANCE, camera_from_json, covariance_from_json
+from app.formats.camera_matrix import camera_from_matrices, holds_matrices
+from app.formats.corner_origin import HALF
+from app.formats.fields import stated_size
+from app.formats.file_tree import DEFAULT_LIMITS, FileTree, Limits, Root
+from app.formats.json_document import is_camera, json_kind
+from app.formats.json_text import read_json, read_json_lines
+from app.formats.match_info import place_of, read_match_info
+from app.formats.report import Report
+from app.formats.sn_calibration import CAMERAS, LINES
+from app.formats.synloc import camera_from_synloc, images_of, is_synloc
+from app.formats.trees import opened_tree
+from app.geometry.camera import Camera
+from app.soccer.frames import ImageSize
+
+_FILE = re.compile(r"(?:camera_)?(.+)\.(?:json|jsonl|ndjson|npz|ya?ml)", re.ASCII | re.IGNORECASE)
+_ENDINGS = ".json, .jsonl, .npz, .yml"
+_IMAGE = re.compile(r"\.(?:png|jpe?g|webp|bmp|tiff?)", re.ASCII | re.IGNORECASE)
+_ABSOLUTE = re.compile(r"/|[A-Za-z]:/")
+
+_NO_CAMERAS = (
+    "manifest.json", "match_info.json", "findings.json", "calibrate.json", "leave_one_out.json",
+    "propose.json", "snap.json",
+)  # fmt: skip
+_WRAPPERS = (
+    "cam_params",
+    "camera",
+    "camera_params",
+    "camera_parameters",
+    "calibration",
+    "parameters",
+)
+"""Fields in which tools keep the camera beside what else they say of it (PnLCalib: cam_params)."""
+_NAMES = (
+    "file_name", "filename", "image_ids", "image_id", "image_name", "image_path", "image", "img",
+    "path", "view", "frame", "frame_id", "name", "id",
+)  # fmt: skip
+"""Fields that name the image of a camera, those that say most first (TVCalib: image_ids)."""
+_ANY_SIZE = ImageSize(1920, 1080)
+"""What a covariance says is right or wrong whatever the size."""
+_TVCALIB = ("aov_radian", "loss_ndc_total")
+_CAMERA_FIELDS = ("tilt_degrees", "roll_degrees", "y_focal_length", "radial_distortion")
+_MEANT = (
+    "; a camera is SoccerNet's object (pan_degrees, tilt_degrees, roll_degrees, position_meters, "
+    "x_focal_length, y_focal_length, principal_point), or K, R and t (docs/formats.md#cameras)"
+)
+
+
+def read_cameras(
+    path: Root,
+    report: Report,
+    limits: Limits = DEFAULT_LIMITS,
+    sizes: dict[str, ImageSize] | None = None,
+    covariances: dict[str, Any] | None = None,
+) -> dict[str, Camera]:
+    """Every camera below ``path``, by key.
+
+    ``path`` is a folder or zip of ``camera_<stem>.json``, one such file, or a file with several:
+    ``{"cam1": {...}, ...}`` (also inside ``{"cameras": {...}}``, also double-encoded), a list or JSON
+    lines whose objects name their image, numpy's ``.npz`` with K, R and t of each frame, or a COCO
+    file of SynLoc. A camera is SoccerNet's object, also within PnLCalib's ``cam_params``, or matrices
+    (``camera_matrix``). The key is the stem of the file or the image, with
+    ``<league>/<season>/<match>/`` before it where it lies that deep. In an export as
+    sn-calibration ``match_info.json`` says where each frame came from: that is its key. ``sizes``
+    takes the size of the images of each camera whose file states it, ``covariances`` what a file
+    says of how well its camera is known (for ``covariance_from_json``).
+    """
+    with opened_tree(path, report, limits) as tree:
+        if tree is None:
+            return {}
+        names = tree.names()
+        files = _camera_files(names)
+        if names and not files:
+            endings = sorted({PurePosixPath(name).suffix.lower() or "no ending" for name in names})
+            report.note(
+                str(path), None, None, f"holds no camera files ({_ENDINGS}), but {_some(endings)}"
+            )
+        places = _places(tree, names)
+        cameras = cameras_of(tree, files, report, places, limits, sizes, covariances)
+    report.imported += len(cameras)
+    return cameras
+
+
+def cameras_of(
+    tree: FileTree,
+    names: Sequence[str],
+    report: Report,
+    places: Mapping[str, str] | None = None,
+    limits: Limits = DEFAULT_LIMITS,
+    sizes: dict[str, ImageSize] | None = None,
+    covariances: dict[str, Any] | None = None,
+) -> dict[str, Camera]:
+    """The cameras of some files of a tree, by key: that of ``places``, or made from the name."""
+    cameras: dict[str, Camera] = {}
+    stated = _Stated({} if sizes is None else sizes, {} if covariances is None else covariances)
+    known = places or {}
+    stems = Counter(_key(name, deep=False) for name in names)
+    for name in names:
+        deep = stems[_key(name, deep=False)] > 1
+        _read_file(tree, name, known.get(name) or _key(name, deep), cameras, stated, report, limits)
+    return cameras
+
+
+class _Stated(NamedTuple):
+    """What files say beside their cameras, by key."""
+
+    sizes: dict[str, ImageSize]
+    covariances: dict[str, Any]
+
+
+def _places(tree: FileTree, names: list[str]) -> dict[str, str]:
+    """Where the frames of an export as sn-calibration came from, by the files of their cameras."""
+    found = {}
+    # What is wrong with the file is no matter of cameras.
+    for image, record in read_match_info(tree, names, Report()).items():
+        lines, place = PurePosixPath(image), place_of(record)
+        if place is not None and lines.parts[0] == LINES:
+            file = PurePosixPath(CAMERAS, *lines.parts[1:-1], f"camera_{lines.name}.json")
+            found[str(file)] = place
+    return found
+
+
+def _some(endings: Sequence[str]) -> str:
+    return ", ".join(endings[:5]) + (" and others" if len(endings) > 5 else "")
+
+
+def _camera_files(names: Iterable[str]) -> list[str]:
+    """Camera files; where none is called ``camera_...``, every file of such an ending may be one."""
+    names = [name for name in names if _FILE.fullmatch(PurePosixPath(name).name)]
+    named = [name for name in names if PurePosixPath(name).name.startswith("camera_")]
+    return named or [name for name in names if PurePosixPath(name).name not in _NO_CAMERAS]
+
+
+def _key(name: str, deep: bool) -> str:
+    place = PurePosixPath(name)
+    found = _FILE.fullmatch(place.name)
+    stem = found.group(1) if found else place.stem
+    folders = place.parts[:-1]
+    keep = folders if deep else folders[-3:] if len(folders) >= 3 else ()
+    return "/".join((*keep, stem))
+
+
+def _read_file(
+    tree: FileTree,
+    name: str,
+    key: str,
+    cameras: dict[str, Camera],
+    stated: _Stated,
+    report: Report,
+    limits: Limits,
+) -> None:
+    shown = tree.shown(name)
+    try:
+        items = _items(tree.read_bytes(name), name, key, shown, report, limits)
+    except DatasetFormatError as error:
+        report.read += 1
+        report.skip(error)
+        return
+    stems = Counter(_record_key(record, deep=False) for record, _ in items if record)
+    for record, item in items:
+        report.read += 1
+        called = key if record is None else record
+        if record is not None:
+            called = _record_key(record, deep=stems[_record_key(record, deep=False)] > 1)
+        try:
+            camera = _camera(item, shown, record)
+            covariance = _covariance(item, camera, shown, record)
+            if called in cameras:
+                problem = f'is a second camera called "{called}"; the first one is used'
+                raise DatasetFormatError(shown, record, None, problem)
+            cameras[called] = camera
+            if isinstance(item, dict) and (size := stated_size(item)) is not None:
+                stated.sizes[called] = size
+            if covariance is not None:
+                stated.covariances[called] = covariance
+        except DatasetFormatError as error:
+            report.skip(error)
+
+
+def _covariance(item: Any, camera: Camera, shown: str, record: str | None) -> Any:
+    """What a file says of how well its camera is known, checked; None where it says nothing."""
+    value = _inner(item)
+    found = value.get(COVARIANCE) if isinstance(value, dict) else None
+    try:
+        covariance_from_json({COVARIANCE: found}, camera, _ANY_SIZE)
+    except ValueError as error:
+        raise DatasetFormatError(shown, record, COVARIANCE, str(error)) from error
+    return found
+
+
+def _record_key(record: str, deep: bool) -> str:
+    """Key of a camera that is named in a file: as ``_key`` of the image's place."""
+    name = record.replace("\\", "/")
+    place = PurePosixPath(name)
+    if not _IMAGE.fullmatch(place.suffix):
+        return record
+    place = place.with_suffix("")
+    if _ABSOLUTE.match(name):
+        return place.name
+    folders = place.parts[:-1]
+    keep = folders if deep else folders[-3:] if len(folders) >= 3 else ()
+    return "/".join((*keep, place.name))
+
+
+_Items = list[tuple[str | None, Any]]
+"""Camera objects of a file, each with its name; None: it is called like the file."""
+
+
+def _items(
+    content: bytes, name: str, key: str, shown: str, report: Report, limits: Limits
+) -> _Items:
+    ending = PurePosixPath(name).suffix.lower()
+    if ending == ".npz":
+        return cameras_of_arrays(content, key, shown, limits)
+    if ending in (".yml", ".yaml"):
+        return [(None, opencv_storage(content, shown))]
+    try:
+        value = read_json(content, shown, double_encoded=True, nan="keep")
+    except DatasetFormatError:
+        lines = read_json_lines(content, shown, report)
+        if lines is None:
+            raise
+        value = lines
+    several = _several(value, shown)
+    if several is not None:
+        return several
+    # A camera file is called like its view; any other may say the name of its image inside.
+    own = None if PurePosixPath(name).name.startswith("camera_") else _image_name(value)
+    return [(own, value)]
+
+
+def _several(value: Any, shown: str) -> _Items | None:
+    """The cameras by name when the file holds several, else None."""
+    if isinstance(value, dict) and isinstance(value.get("cameras"), (dict, list)):
+        value = value["cameras"]
+    elif not isinstance(value, (dict, list)) or is_camera(value) or is_camera(_inner(value)):
+        return None
+    elif isinstance(value, dict) and (images := images_of(value)) is not None:
+        return list(images.items())
+    if isinstance(value, list):
+        if not any(map(is_camera, map(_inner, value))):
+            return None
+        return [_named(item, number) for number, item in enumerate(value)]
+    if not any(map(is_camera, map(_inner, value.values()))) and json_kind(value)[:5] == "holds":
+        raise DatasetFormatError(shown, None, None, json_kind(value))
+    if not any(isinstance(item, dict) for item in value.values()):
+        return None
+    return [(name, item) for name, item in value.items() if not name.startswith("_")]
+
+
+def _inner(value: Any) -> Any:
+    """The camera within what a tool says of it; the value itself where it is none."""
+    if isinstance(value, dict) and not is_camera(value):
+        for name in _WRAPPERS:
+            if is_camera(value.get(name)):
+                return value[name]
+    return value
+
+
+def _named(item: Any, number: int) -> tuple[str | None, Any]:
+    return _image_name(item) or f"camera {number}", item
+
+
+def _image_name(value: Any) -> str | None:
+    """How a camera object names its image; None where it does not."""
+    if not isinstance(value, dict):
+        return None
+    for field in _NAMES:
+        name = value.get(field)
+        if isinstance(name, list) and len(name) == 1:
+            name = name[0]
+        if isinstance(name, str) and name.strip():
+            return name.strip()
+        if isinstance(name, int) and not isinstance(name, bool):
+            return str(name)
+    return None
+
+
+def _camera(item: Any, shown: str, record: str | None) -> Camera:
+    if is_synloc(item):
+        return camera_from_synloc(item, shown, record)
+    value = item["cam_params"] if isinstance(item, dict) and "cam_params" in item else _inner(item)
+    if isinstance(value, dict) and "pan_degrees" not in value:
+        if holds_matrices(value):
+            return camera_from_matrices(value, shown, record)
+        known = {"position_meters", "x_focal_length", "lens", *_CAMERA_FIELDS}
+        if not known & value.keys():
+            raise DatasetFormatError(shown, record, None, f"{json_kind(value)}{_MEANT}")
+    elif isinstance(value, list):
+        raise DatasetFormatError(shown, record, None, json_kind(value))
+    camera = camera_from_json(value, shown, record)
+    if isinstance(item, dict) and any(name in item for name in _TVCALIB):
+        # TVCalib's middle of W x H is (W / 2, H / 2), ours ((W - 1) / 2, (H - 1) / 2).
+        x, y = camera.principal_point
+        camera = replace(camera, principal_point=(x - HALF, y - HALF))
+    return camera

@@ -1,0 +1,362 @@
+"""COCO, read: our own files as they were said, anybody's as images with boxes and points."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from pathlib import PurePosixPath
+from typing import Any
+
+from app.errors import DatasetFormatError, UnsafePathError
+from app.formats.camera_json import camera_from_json
+from app.formats.coco import CAMERA, CORNER, ORIGIN, OUTSIDE, PREFIX, STATE
+from app.formats.coco_annotation import NoPlaceError, ball_of, box_of, is_occluded
+from app.formats.coco_categories import Categories, Category
+from app.formats.coco_frames import Frame, FrameFile, groups_of, split_of_folders
+from app.formats.coco_joins import Annotation, Joined, spelt
+from app.formats.corner_origin import box_from_corner
+from app.formats.file_tree import DEFAULT_LIMITS, FileTree, Limits, Root
+from app.formats.frame_names import UNASSIGNED
+from app.formats.json_document import is_gamestate, json_kind
+from app.formats.json_text import read_json
+from app.formats.picture_finder import Home, PictureFinder, picture_parts, split_in
+from app.formats.record_ids import id_text
+from app.formats.report import Report
+from app.formats.safe_path import check_name
+from app.formats.synloc import camera_from_synloc, is_synloc
+from app.formats.trees import opened_tree
+from app.formats.view_groups import PlacedView, ViewGroups
+from app.formats.view_state import StateReader
+from app.geometry.camera import Camera
+from app.plural import plural
+from app.soccer.annotation import BallAnnotation, Extras
+from app.soccer.frames import Box
+from app.soccer.group import Group, View
+from app.soccer.media import Media
+
+_OURS = ("manifest.json", "findings.json", "propose.json", "calibrate.json")
+"""JSON files that lie in folders of exports and are no labels."""
+_TASK = re.compile(
+    r"(?:instances|person_keypoints|keypoints|captions|stuff|panoptic|image_info)_(.+)"
+)
+"""Names of files of one set of images: what is before it says the task."""
+
+
+def read_coco(
+    root: Root,
+    report: Report,
+    *,
+    calibration: str = "given",
+    limits: Limits = DEFAULT_LIMITS,
+    ball_category: str = "",
+) -> Iterator[Group]:
+    """The images of every COCO file below ``root``.
+
+    Images with the field ``touchline`` come back as the groups that they were; a box that
+    somebody has changed since is the new annotation. Of any other file images with one
+    ``group_id`` are a group, whose views are called as ``view`` says; an image without is a group
+    of one view, keyed by its file name. Boxes of other categories are kept beside the ball. A
+    ``camera`` as SoccerNet spells it, and one of SynLoc, is the view's given camera.
+
+    Args:
+        root: Folder, zip or one JSON file.
+        report: Takes what had to be left out, and which category was taken for the ball.
+        calibration: What counts for a view that has a camera and lines (images of others).
+        limits: Caps on what is read.
+        ball_category: Name or id of the category of others that is the ball; empty: by its name.
+    """
+    with opened_tree(root, report, limits) as tree:
+        if tree is None:
+            return
+        names = tree.names()
+        finder, groups = PictureFinder(names), ViewGroups(report)
+        files: list[_File] = []
+        for name in names:
+            place = PurePosixPath(name)
+            if place.suffix.lower() != ".json" or place.name in _OURS:
+                continue
+            value = _value(tree, name, report, limits)
+            if value is not None:
+                file = _File(tree, name, finder, value, report, ball_category)
+                files.append(file)
+                for view in file.views():
+                    yield from groups.add(view, tree.shown(name))
+                file.close()
+        yield from groups.rest()
+        foreign = [file.frames for file in files if file.frames.frames]
+        yield from groups_of(foreign, tree, names, calibration, report)
+        _tell_balls(files, report)
+        if not files:
+            report.note(str(root), None, None, "holds no COCO file (images and annotations)")
+
+
+def _value(tree: FileTree, name: str, report: Report, limits: Limits) -> dict[str, Any] | None:
+    """A file with a list of images; None for any other, which is said."""
+    shown = tree.shown(name)
+    try:
+        content = tree.read_bytes(name)
+        value = read_json(content, shown, max_bytes=limits.file_bytes, report=report)
+    except DatasetFormatError as error:
+        report.skip(error)
+        return None
+    if isinstance(value, dict) and isinstance(value.get("images"), list):
+        if not is_gamestate(value.get("annotations")):
+            return value
+        report.note(shown, None, None, json_kind(value))
+        return None
+    report.remark(f"{shown}: is no COCO file (it has no list of images) and was not read")
+    return None
+
+
+def _tell_balls(files: list[_File], report: Report) -> None:
+    """Which category of each foreign file was taken for the ball, or that it brought none."""
+    some = any(file.categories.balls for file in files)
+    foreign = [file for file in files if file.frames.frames]
+    for file in [file for file in foreign if not file.captions] or foreign:
+        file.categories.tell(alone=not some)
+
+
+class _File:
+    """One file on its way to views (images of ours) and frames (of others)."""
+
+    def __init__(
+        self,
+        tree: FileTree,
+        name: str,
+        finder: PictureFinder,
+        value: Mapping[str, Any],
+        report: Report,
+        ball_category: str,
+    ):
+        self.path, self._tree, self._finder = tree.shown(name), tree, finder
+        self._value, self._report = value, report
+        place = PurePosixPath(name)
+        stem = place.stem.removeprefix(PREFIX).removeprefix(OUTSIDE)
+        task = _TASK.fullmatch(place.stem)
+        subset = stem if task is None else task[1]
+        split = "" if stem == UNASSIGNED else split_in(stem) or split_of_folders(place.parts[:-1])
+        folder = "" if str(place.parent) == "." else str(place.parent)
+        known = task is not None or bool(split_in(stem))
+        self._home = Home(folder, subset if known and subset != "default" else "", split)
+        self.frames = FrameFile(self.path, self._home, [])
+        annotations = self._listed("annotations")
+        self.categories = Categories(
+            self._listed("categories"), annotations, self.path, report, ball_category
+        )
+        self._joined = Joined(value["images"], annotations, self.path, report)
+        self.captions = self._joined.captions
+
+    def close(self) -> None:
+        """Let go of everything but the frames: the next file may be as large."""
+        self._value, self._joined = {}, Joined([], [], self.path, self._report)
+
+    def _listed(self, name: str) -> list[Any]:
+        """A list that need not be there."""
+        found = self._value.get(name)
+        if found is not None and not isinstance(found, list):
+            self._report.note(self.path, None, name, "is not a list; left out")
+        return found if isinstance(found, list) else []
+
+    def _note(self, record: str, field: str | None, problem: str) -> None:
+        self._report.note(self.path, record, field, problem)
+
+    def views(self) -> Iterator[PlacedView]:
+        """Images of ours as views; those of others become ``frames``.
+
+        What is wrong with one is reported and leaves it out.
+        """
+        for index, item in enumerate(self._value["images"]):
+            record = f"images[{index}]"
+            self._report.read += 1
+            try:
+                image = StateReader(item, self.path, record)
+                if STATE in image.value:
+                    yield self._ours(image, index)
+                else:
+                    self.frames.frames.append(self._theirs(image, index))
+            except DatasetFormatError as error:
+                self._report.skip(self._with_annotations(error, index))
+
+    def _with_annotations(self, error: DatasetFormatError, index: int) -> DatasetFormatError:
+        """Why an image is left out, with how many annotations go with it."""
+        count = len(self._joined.of_image[index])
+        if not count:
+            return error
+        problem = f"{error.problem}; left out with {plural(count, 'annotation')}"
+        return DatasetFormatError(error.path, error.record, error.field, problem)
+
+    def _ours(self, image: StateReader, index: int) -> PlacedView:
+        state = StateReader(image.value[STATE], self.path, image.record)
+        view = state.view(image.size(), Extras())
+        changed = self._changed(index, view, state.value.get(ORIGIN) == CORNER)
+        media = self._media(image.text("file_name", ""))
+        view = replace(view, balls=changed, media=media)
+        return PlacedView(state.head(), state.count("position"), view)
+
+    def _changed(self, index: int, view: View, from_corner: bool) -> tuple[BallAnnotation, ...]:
+        """The balls, with the boxes that somebody changed or added after they were written.
+
+        Args:
+            index: Of the image, whose annotations are looked at.
+            view: As it was when it was written.
+            from_corner: Whether boxes are measured from the corner of the first pixel; those of
+                our files of before are in our own frame.
+        """
+        annotations = self._joined.of_image[index]
+        added = self._added(annotations, from_corner)
+        if not view.balls:
+            return tuple(added)
+        # A tool that drops fields that it does not know hands the written box on as a new one.
+        written = any("written_bbox" in item for _, item in annotations)
+        if written or not any(ball.box for ball in view.balls):
+            for record in added.values():
+                self._note(record, "bbox", "adds a ball to a view that has one; left out")
+        if len(view.balls) != 1:
+            return view.balls
+        for record, item in annotations:
+            if item.get("bbox") != item.get("written_bbox", item.get("bbox")):
+                box = self._box(item, record)
+                if box is not None:
+                    box = box_from_corner(box) if from_corner else box
+                    return (replace(view.balls[0], box=box, point=None),)
+        return view.balls
+
+    def _added(self, annotations: list[Annotation], from_corner: bool) -> dict[BallAnnotation, str]:
+        """The balls that were added since, each with its place in the file; the rest is reported."""
+        balls: dict[BallAnnotation, str] = {}
+        for record, item in annotations:
+            if "written_bbox" in item:
+                continue
+            category = self.categories.find(item.get("category_id"))
+            if category is None or not category.ball:
+                shown = spelt(item.get("category_id")) if category is None else category.shown
+                problem = f"is {shown}: of boxes added to an export only the ball is read; left out"
+                self._note(record, "category_id", problem)
+            elif not self._is_crowd(item, record) and (box := self._box(item, record)) is not None:
+                box = box_from_corner(box) if from_corner else box
+                ball = BallAnnotation(box=box, occluded=is_occluded(item))
+                if ball in balls:
+                    self._note(record, "bbox", "puts a second ball at the same place; left out")
+                balls.setdefault(ball, record)
+        return balls
+
+    def _box(self, item: Mapping[str, Any], record: str) -> Box | None:
+        try:
+            return StateReader.box(item.get("bbox"))
+        except ValueError as error:
+            self._note(record, "bbox", f"{error}; left out")
+            return None
+
+    def _media(self, name: str) -> Media | None:
+        """The frame of an image of ours, where it lies in the tree."""
+        place = self._finder.find(picture_parts(name), self._home).place
+        return None if place is None else self._tree.media(place)
+
+    def _theirs(self, image: StateReader, index: int) -> Frame:
+        parts = picture_parts(image.text("file_name"))
+        key = self._key(image, parts)
+        group, view = self._placed(image, key)
+        split = self._home.split or split_of_folders(parts[:-1])
+        frame = Frame(
+            self.path, image.record, parts, key, group, view, image.size(), split,
+            self._camera(image), named=image.value.get("view") is not None,
+        )  # fmt: skip
+        for record, item in self._joined.of_image[index]:
+            self._add(frame, item, record)
+        return frame
+
+    def _key(self, image: StateReader, parts: tuple[str, ...]) -> str:
+        """Key of an image: its name; of one on another machine the last part, where that is enough."""
+        text = image.text("file_name")
+        key = "/".join(parts)
+        try:
+            if not parts:
+                check_name(text)
+                raise image.error("file_name", "is no name of a file")
+            if not _is_relative(text) and self._joined.is_alone(parts[-1]):
+                key = parts[-1]
+            return check_name(key)
+        except UnsafePathError as error:
+            raise image.error("file_name", error.message) from error
+
+    def _add(self, frame: Frame, item: Mapping[str, Any], record: str) -> None:
+        """One annotation of a frame: its ball, or the box of something else."""
+        category = self.categories.find(item.get("category_id"))
+        if category is None:
+            shown = spelt(item["category_id"]) if "category_id" in item else "missing"
+            problem = f"is {shown}, which no category of the file has; kept as a box without class"
+            self._note(record, "category_id", problem)
+        try:
+            if category is not None and category.ball:
+                self._add_ball(frame, item, category, record)
+            else:
+                name = "" if category is None else category.name.lower()
+                frame.boxes.append(_shown(name, item, box_of(item)))
+        except NoPlaceError as error:
+            self._note(record, error.field, f"{error.problem}; left out")
+
+    def _add_ball(
+        self, frame: Frame, item: Mapping[str, Any], category: Category, record: str
+    ) -> None:
+        if self._is_crowd(item, record):
+            return
+        ball = ball_of(item, category.keypoints)
+        if ball in frame.balls:
+            self._note(record, "bbox", "puts a second ball at the same place; left out")
+            return
+        frame.balls.append(ball)
+        self.categories.count(category)
+
+    def _is_crowd(self, item: Mapping[str, Any], record: str) -> bool:
+        """Whether an annotation is a crowd, which is reported: it is not one ball."""
+        crowd = item.get("iscrowd") in (1, "1")
+        if crowd:
+            self._note(record, "iscrowd", "is 1: a crowd is not one ball; left out")
+        return crowd
+
+    def _camera(self, image: StateReader) -> Camera | None:
+        """The camera that a file of somebody else gives; one that is none is reported."""
+        given = image.value.get(CAMERA)
+        try:
+            if is_synloc(image.value):
+                return camera_from_synloc(image.value, self.path, image.record)
+            return None if given is None else camera_from_json(given, self.path, image.record)
+        except DatasetFormatError as error:
+            of_camera = [] if is_synloc(image.value) else [CAMERA]
+            field = ".".join([*of_camera, *filter(None, [error.field])])
+            self._note(image.record, field, f"{error.problem}; left out")
+            return None
+
+    def _placed(self, image: StateReader, key: str) -> tuple[str | None, str]:
+        """Group and name of a view; no group where the file says none."""
+        group, view = image.value.get("group_id"), image.value.get("view")
+        if group is None or isinstance(group, bool) or not isinstance(group, str | int | float):
+            return None, key
+        if view is None:
+            view = PurePosixPath(key).name
+        if isinstance(view, bool) or not isinstance(view, str | int | float):
+            raise image.error("view", "is no name of a view")
+        return _safe(image, "group_id", group), _safe(image, "view", view)
+
+
+def _safe(image: StateReader, field: str, value: str | float) -> str:
+    text = value if isinstance(value, str) else id_text(value) or ""
+    try:
+        return str(PurePosixPath(check_name(text)))
+    except UnsafePathError as error:
+        raise image.error(field, error.message) from error
+
+
+def _is_relative(name: str) -> bool:
+    """Whether a name leads to a file below a folder, whichever that is."""
+    try:
+        return bool(check_name(name.replace("\\", "/"))) and "://" not in name and "?" not in name
+    except UnsafePathError:
+        return False
+
+
+def _shown(category: str, item: Mapping[str, Any], box: Box) -> Mapping[str, Any]:
+    """A box of another category in the shape that all datasets show."""
+    corners = {"x1": box.x, "y1": box.y, "x2": box.x + box.width, "y2": box.y + box.height}
+    return {"class": category or None, "ID": str(item.get("id", "")), "points": corners}

@@ -1,0 +1,226 @@
+"""Export formats: which writer writes which format, and what each has room for."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import get_args
+
+from app.errors import InputError
+from app.formats.cameras_writer import camera_claims, write_camera_files
+from app.formats.coco_writer import write_coco
+from app.formats.export_names import Claims, ExportNames, Outline, frame_claims
+from app.formats.export_record import ExportRecord
+from app.formats.format_names import ExportFormat
+from app.formats.frame_names import FrameName, flat_frame, match_frame
+from app.formats.gamestate import sequence_claims, sequence_frame
+from app.formats.gamestate_writer import write_gamestate
+from app.formats.issia import FramePersons
+from app.formats.issia_3d_writer import write_issia_3d
+from app.formats.issia_writer import write_issia
+from app.formats.manifest import SOFTWARE, software_version
+from app.formats.parquet_writer import write_parquet
+from app.formats.sn_calibration import line_claims, line_frame
+from app.formats.sn_calibration_writer import write_sn_calibration
+from app.formats.soccernet_v3_writer import labels_frame, write_soccernet_v3
+from app.formats.soccernet_v3d_writer import write_soccernet_v3d
+from app.formats.view_files import PutText
+from app.formats.yolo_writer import write_yolo
+from app.plural import plural
+from app.soccer.group import Group
+
+FORMATS: tuple[str, ...] = get_args(ExportFormat)
+CONTENT = {
+    "cameras": ("cameras", "camera"),
+    "issia-3d": ("groups", "ball"),
+    "sn-calibration": ("frames", "frame"),
+    "gamestate": ("images", "image"),
+    "yolo": ("labels", "view that a detector may learn from"),
+}
+"""What a format consists of: the name of its count, and the word for one."""
+WITHOUT_LENSES = ("soccernet-v3d", "issia", "issia-3d", "sn-calibration")
+"""Formats whose cameras are SoccerNet's: they have no place for a wide lens."""
+LAYOUTS: Mapping[str, FrameName] = {
+    "gamestate": sequence_frame,
+    "sn-calibration": line_frame,
+    "soccernet-v3": labels_frame,
+    "soccernet-v3d": labels_frame,
+    "yolo": flat_frame,
+}
+"""Where a format looks for the frames of its views, unless beside the labels of a match."""
+CLAIMS: Mapping[str, Claims] = {
+    "cameras": camera_claims,
+    "gamestate": sequence_claims,
+    "sn-calibration": line_claims,
+}
+"""The names that a format makes of a view, unless that of its frame alone."""
+PRESCRIBED = ("soccernet-v3", "soccernet-v3d", "yolo")
+"""Formats that prescribe the names, or whose names hold that of the group: no view has another."""
+
+USERS: Mapping[str, tuple[str, ...]] = {
+    "boxes": ("soccernet-v3d", "coco", "yolo", "parquet"),
+    "images": tuple(name for name in FORMATS if name != "touchline"),
+    "views": ("coco", "yolo"),
+}
+"""Which formats use an option; any other would ignore it, so it is refused there. Detectors learn from
+those that use ``views``: they hold no ball that other views do not confirm, unless asked."""
+
+
+@dataclass(frozen=True)
+class WriteOptions:
+    """What a writer is told besides its groups.
+
+    Attributes:
+        format: One of ``FORMATS``.
+        everything: Whether groups and views that failed a gate take part.
+        boxes: Which ball box is written.
+        every_view: Whether training data hold views in which the 3D ball does not hold.
+        provenance: Where the groups come from, by the names of ``parquet.PROVENANCE``.
+        spare: People of frames that are no view of a group.
+    """
+
+    format: str
+    everything: bool = False
+    boxes: str = "optimized"
+    every_view: bool = False
+    provenance: Mapping[str, str | None] = field(default_factory=dict)
+    spare: Iterable[FramePersons] = ()
+
+
+def write_format(
+    root: Path,
+    records: Iterable[ExportRecord],
+    options: WriteOptions,
+    put: PutText | None = None,
+) -> dict[str, int]:
+    """Write a format's files below an existing folder; returns its counts.
+
+    Args:
+        root: Existing folder.
+        records: Groups; few are in memory at a time.
+        options: What the writer is told.
+        put: Takes the files of single views; below the folder by default.
+
+    Raises:
+        InputError: A group does not fit the format, or one of its cameras does not.
+    """
+    if options.format in WITHOUT_LENSES:
+        records = _with_plain_lenses(records, options.format)
+    everything, boxes = options.everything, options.boxes
+    counts = {"groups": 0}
+    groups = _groups(records, counts)
+    match options.format:
+        case "soccernet-v3d":
+            return write_soccernet_v3d(root, records, everything=everything, boxes=boxes)
+        case "soccernet-v3":
+            write_soccernet_v3(root, groups)
+            return counts
+        case "issia-3d":
+            return write_issia_3d(root, records, everything=everything)
+        case "issia":
+            return write_issia(root, groups, options.spare)
+        case "cameras":
+            return write_camera_files(root, records, put)
+        case "sn-calibration":
+            return write_sn_calibration(root, records, put)
+        case "gamestate":
+            return write_gamestate(root, records)
+        case "coco":
+            info = {"description": options.provenance.get("dataset"), "software": _software()}
+            return write_coco(
+                root,
+                records,
+                everything=everything,
+                boxes=boxes,
+                every_view=options.every_view,
+                info=info,
+            )
+        case "yolo":
+            return write_yolo(root, records, put, boxes=boxes)
+        case _:
+            return write_parquet(
+                root,
+                records,
+                everything=everything,
+                boxes=boxes,
+                provenance=options.provenance,
+            )
+
+
+def _groups(records: Iterable[ExportRecord], counts: dict[str, int]) -> Iterator[Group]:
+    for record in records:
+        counts["groups"] += 1
+        yield record.group
+
+
+def _with_plain_lenses(
+    records: Iterable[ExportRecord],
+    format: str,  # noqa: A002
+) -> Iterator[ExportRecord]:
+    """The records; a wide lens would be written as none, and be wrong by hundreds of pixels."""
+    for record in records:
+        for view in record.group.views:
+            # issia holds what was given, all others what was computed.
+            camera = view.station.given if format == "issia" else record.camera(view)
+            if camera is not None and camera.is_wide:
+                raise InputError(
+                    f"{format} has no place for the {camera.lens} lens of view {view.key} of group"
+                    f" {record.group.key}",
+                    hint="Export cameras, coco, parquet or touchline, which hold every lens.",
+                )
+        yield record
+
+
+def used_options(format: str) -> list[str]:  # noqa: A002
+    """The options that a format uses, of ``USERS``."""
+    return [name for name in USERS if format in USERS[name]]
+
+
+def frame_layout(format: str) -> FrameName:  # noqa: A002
+    """Where a format looks for the frames of its views."""
+    return LAYOUTS.get(format, match_frame)
+
+
+def export_names(format: str, outlines: Iterable[Outline]) -> ExportNames:  # noqa: A002
+    """By which keys a format calls the files of the views that will be exported."""
+    if format in PRESCRIBED:
+        return ExportNames(lambda group, view, split: {})
+    glue = "_" if format == "gamestate" else "/"
+    return ExportNames(CLAIMS.get(format, frame_claims), outlines, glue)
+
+
+def box_settings(format: str, boxes: str) -> dict[str, str]:  # noqa: A002
+    """Which kind of ball box the files hold, for a format that has a choice."""
+    if "boxes" not in used_options(format):
+        return {}
+    # optimized_d is defined around the centre of the annotated box.
+    own = {"ball_bbox": "annotated"} if format == "soccernet-v3d" else {}
+    return {"boxes": boxes, **own}
+
+
+def view_settings(format: str, every_view: bool) -> dict[str, str]:  # noqa: A002
+    """Which views a detector learns from, for a format that leaves some out."""
+    return {"views": "all" if every_view else "valid"} if "views" in used_options(format) else {}
+
+
+def lacking(format: str, counts: Mapping[str, int]) -> str | None:  # noqa: A002
+    """What the files of a format still lack before they can be used; None: nothing.
+
+    YOLO trains on the pictures beside its labels; every other format is of use without them.
+    """
+    missing = counts.get("images_missing", 0)
+    if format != "yolo" or not missing:
+        return None
+    images = plural(missing, "image is", "images are")
+    return f"{images} not in this export; frames.csv names their places"
+
+
+def missing_sentence(format: str, counts: Mapping[str, int]) -> dict[str, str]:  # noqa: A002
+    """What a manifest says of frames that a format needs and that were not copied."""
+    sentence = lacking(format, counts)
+    return {} if sentence is None else {"missing_images": sentence}
+
+
+def _software() -> str:
+    return f"{SOFTWARE} {software_version()}"

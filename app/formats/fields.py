@@ -1,0 +1,165 @@
+"""Fields of records: read with a clear error, written exactly.
+
+And the size that a record declares.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from app.finite import quoted
+from app.soccer.frames import MAX_PIXEL, MAX_SIDE, ImageSize
+
+_NUMBER = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d{1,3})?", re.ASCII)
+
+
+def number(value: Any) -> float:
+    """A finite number; files also spell it as text.
+
+    Raises:
+        ValueError: Anything else, a truth value and a blank among it.
+    """
+    # Nearly all are, and an export asks for each corner of each box.
+    if type(value) is float and math.isfinite(value):
+        return value
+    if isinstance(value, bool) or not isinstance(value, (int, float, str)):
+        raise ValueError(f"is {_kind(value)}, not a number")
+    if isinstance(value, str):
+        return _number_of_text(value)
+    try:
+        result = float(value)
+    except OverflowError:
+        raise ValueError("is too large for a number") from None
+    if not math.isfinite(result):
+        raise ValueError(f"is {value}, not a finite number")
+    return result
+
+
+def _number_of_text(text: str) -> float:
+    stripped = text.strip()
+    if not stripped:
+        raise ValueError("is blank")
+    if len(stripped) > 400 or not _NUMBER.fullmatch(stripped):
+        raise ValueError(f"is {quoted(stripped, 40)}, not a number")
+    result = float(stripped)
+    if not math.isfinite(result):
+        raise ValueError("is too large for a number")
+    return result
+
+
+def pixel(value: Any) -> float:
+    """A coordinate in an image, pixels; may lie outside the image, but not beyond reason.
+
+    Raises:
+        ValueError: Not a number, or more than a million pixels away.
+    """
+    result = number(value)
+    if abs(result) > MAX_PIXEL:
+        raise ValueError(f"is {result:g} pixels, which is beyond any image")
+    return result
+
+
+def whole(value: Any) -> int:
+    """A whole number, also when spelt ``7.0`` or ``"7"``.
+
+    Raises:
+        ValueError: Anything else.
+    """
+    result = number(value)
+    if result != int(result):
+        raise ValueError(f"is {result:g}, not a whole number")
+    return int(result)
+
+
+def numbers(value: Any, count: int) -> tuple[float, ...]:
+    """A list of ``count`` finite numbers.
+
+    Raises:
+        ValueError: Not a list, another length, or a member that is no number.
+    """
+    if not isinstance(value, (list, tuple)):
+        raise ValueError(f"is {_kind(value)}, not a list of {count} numbers")
+    if len(value) != count:
+        raise ValueError(f"has {len(value)} numbers, not {count}")
+    return tuple(number(item) for item in value)
+
+
+def mapping(value: Any) -> dict[str, Any]:
+    """A JSON object.
+
+    Raises:
+        ValueError: Anything else.
+    """
+    if not isinstance(value, dict):
+        raise ValueError(f"is {_kind(value)}, not an object")
+    return value
+
+
+def sequence(value: Any) -> list[Any]:
+    """A JSON list.
+
+    Raises:
+        ValueError: Anything else.
+    """
+    if not isinstance(value, (list, tuple)):
+        raise ValueError(f"is {_kind(value)}, not a list")
+    return list(value)
+
+
+def _kind(value: Any) -> str:
+    if value is None:
+        return "null"
+    names = {bool: "a truth value", str: "text", dict: "an object", list: "a list"}
+    return names.get(type(value), "a number")
+
+
+_SIDES = (("width", "height"), ("image_width", "image_height"), ("imageWidth", "imageHeight"))
+_PAIRS = ("image_size", "img_size", "resolution")
+
+
+def stated_size(value: Mapping[str, Any]) -> ImageSize | None:
+    """Width and height in pixels; None where the record states none that an image can have.
+
+    Example:
+        >>> stated_size({"image_size": [1280, 720]})
+        ImageSize(width=1280, height=720)
+    """
+    pairs = [[value.get(width), value.get(height)] for width, height in _SIDES]
+    for pair in (*pairs, *(value.get(name) for name in _PAIRS)):
+        try:
+            width, height = map(whole, numbers(pair, 2))
+        except ValueError:
+            continue
+        if min(width, height) >= 2 and max(width, height) <= MAX_SIDE:
+            return ImageSize(width, height)
+    return None
+
+
+_STEPS = 4
+
+
+def exact_inverse(guess: float, target: float, read: Callable[[float], float]) -> float:
+    """The number next to ``guess`` from which ``read`` makes exactly ``target``.
+
+    A reader that multiplies or subtracts rounds, and so does the writer's inverse; without this
+    a value would wander by a last digit with every export and import.
+
+    Args:
+        guess: The inverse but for rounding.
+        target: What must be read.
+        read: What the reader does with the number in the file.
+
+    Returns:
+        The guess where no neighbour is exact, which happens only to values that no file held.
+    """
+    below = above = guess
+    for _ in range(_STEPS):
+        if read(below) == target:
+            return below
+        if read(above) == target:
+            return above
+        below, above = math.nextafter(below, -math.inf), math.nextafter(above, math.inf)
+    return guess

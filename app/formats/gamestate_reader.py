@@ -1,0 +1,268 @@
+"""sn-gamestate: ``<sequence>/Labels-GameState.json``, each image a group of one view."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import PurePosixPath
+from typing import Any
+
+from app.errors import DatasetFormatError, UnsafePathError
+from app.formats import fields
+from app.formats.ball_names import is_ball
+from app.formats.file_tree import DEFAULT_LIMITS, FileTree, Limits, Root, files_inside
+from app.formats.gamestate import BALL, LABELS, METADATA, PITCH
+from app.formats.json_text import read_json
+from app.formats.record_ids import IdIndex
+from app.formats.report import Report
+from app.formats.safe_path import check_name
+from app.formats.sn_calibration_reader import lines_from_json
+from app.formats.soccernet_v3 import SPLITS
+from app.formats.trees import opened_tree
+from app.soccer.annotation import BallAnnotation, Extras, Lines
+from app.soccer.frames import MAX_SIDE, Box, ImageSize
+from app.soccer.group import Group, Station, View
+from app.soccer.media import Media
+
+_IDS = {1: "player", 2: "goalkeeper", 3: "referee", 4: BALL, 5: PITCH, 6: "camera"}
+_FOLDERS = ("img1/", "", "frames/")
+
+
+def read_gamestate(
+    root: Root,
+    report: Report,
+    *,
+    calibration: str = "given",
+    limits: Limits = DEFAULT_LIMITS,
+) -> Iterator[Group]:
+    """Every image of every sequence below ``root``, keyed ``<sequence>/<stem>``.
+
+    People go to ``Extras.boxes`` with their whole annotation; whatever else the file holds is
+    kept for the way back.
+    """
+    with opened_tree(root, report, limits) as tree:
+        if tree is None:
+            return
+        names = tree.names()
+        files = [name for name in names if PurePosixPath(name).name == LABELS]
+        if not files:
+            report.note(str(root), None, None, f"holds no {LABELS}")
+        seen: dict[tuple[str, str], str] = {}
+        stems: dict[str, set[str]] = {}
+        for name in files:
+            try:
+                sequence = _Sequence(tree, name, names, report, limits)
+                # A match whose groups are in several splits has a file in each.
+                place = (sequence.key, sequence.split)
+                if place in seen:
+                    problem = f"is a second {sequence.key}; {seen[place]} is used"
+                    raise DatasetFormatError(sequence.path, None, None, problem)
+            except DatasetFormatError as error:
+                report.skip(error)
+                continue
+            seen[place] = sequence.path
+            yield from sequence.groups(calibration, stems.setdefault(sequence.key, set()))
+
+
+@dataclass
+class _Image:
+    """An image and its annotations."""
+
+    record: dict[str, Any]
+    size: ImageSize
+    lines: Lines = field(default_factory=dict)
+    other_lines: tuple[Mapping[str, Any], ...] = ()
+    balls: list[BallAnnotation] = field(default_factory=list)
+    boxes: list[Mapping[str, Any]] = field(default_factory=list)
+    kept: dict[str, Any] = field(default_factory=dict)
+
+
+class _Sequence:
+    """One Labels-GameState.json on its way to groups."""
+
+    def __init__(self, tree: FileTree, name: str, names: list[str], report: Report, limits: Limits):
+        self.path, self._report, self._tree = tree.shown(name), report, tree
+        content = tree.read_bytes(name)
+        value = read_json(content, self.path, max_bytes=limits.file_bytes, report=report)
+        if not isinstance(value, dict):
+            raise DatasetFormatError(self.path, None, None, "is not an object")
+        self._value = value
+        self._folder = name[: -len(LABELS)]
+        self._inside = files_inside(names, self._folder)
+        self.key = self._key()
+        parts = PurePosixPath(name).parts
+        self.split = next((part for part in reversed(parts) if part in SPLITS), "")
+
+    def _key(self) -> str:
+        folders = PurePosixPath(self._folder).parts
+        info = self._value.get("info")
+        said = info.get("name") if isinstance(info, dict) else None
+        root = self._tree.path
+        name = folders[-1] if folders else said or (root.name if root.is_dir() else root.stem)
+        try:
+            return check_name(str(name)).replace("/", "_")
+        except UnsafePathError as error:
+            raise DatasetFormatError(self.path, None, "info.name", error.message) from error
+
+    def _list(self, name: str) -> list[Any]:
+        value = self._value.get(name)
+        if not isinstance(value, list):
+            self._report.note(self.path, None, name, "is missing or not a list")
+            return []
+        return value
+
+    def groups(self, calibration: str, stems: set[str]) -> Iterator[Group]:
+        """Image by image, in the file's order.
+
+        Args:
+            calibration: What counts for a view that has a camera and lines.
+            stems: Names that other files of this sequence have already; those of this one join.
+        """
+        images: list[_Image] = []
+        index: IdIndex[_Image] = IdIndex()
+        for identity, record, size in self._records(stems):
+            image = _Image(record, size)
+            if not index.add(identity, image):
+                problem = f"is {identity}, as that of another image is; no annotation joins it"
+                self._report.note(self.path, str(record["file_name"]), "image_id", problem)
+            images.append(image)
+        self._annotate(index)
+        common = {name: self._value[name] for name in ("info", "categories") if name in self._value}
+        for image in images:
+            record, size = image.record, image.size
+            key = str(record["file_name"])
+            kept = {"image": record, **image.kept, **common}
+            extras = Extras(tuple(image.boxes), image.other_lines, {METADATA: kept})
+            name = f"{self.key}/{PurePosixPath(key).stem}"
+            station = Station(name, size, lines=image.lines, calibration=calibration)
+            view = View(key, station, tuple(image.balls), self._media(key), extras=extras)
+            self._report.imported += 1
+            label = f"{self.key} · {PurePosixPath(key).stem}"
+            yield Group(name, (view,), match=self.key, split=self.split, label=label)
+
+    def _records(self, names: set[str]) -> Iterator[tuple[Any, dict[str, Any], ImageSize]]:
+        """Sound image records with their ids, each name once."""
+        for index, record in enumerate(self._list("images")):
+            self._report.read += 1
+            where = f"images[{index}]"
+            try:
+                image = fields.mapping(record)
+                key = image.get("file_name")
+                if not isinstance(key, str) or "/" in check_name(key):
+                    raise ValueError("has no file_name that is a file's name")
+                if "image_id" not in image and "id" not in image:
+                    raise ValueError("has no image_id")
+                if PurePosixPath(key).stem in names:
+                    raise ValueError(f"is a second {key}")
+                size = ImageSize(_side(image, "width"), _side(image, "height"))
+            except UnsafePathError as error:
+                self._report.note(self.path, where, "file_name", error.message)
+                continue
+            except ValueError as error:
+                self._report.note(self.path, where, None, str(error))
+                continue
+            names.add(PurePosixPath(key).stem)
+            yield image.get("image_id", image.get("id")), image, size
+
+    def _annotate(self, images: IdIndex[_Image]) -> None:
+        """Give each annotation to its image; one that joins none is named."""
+        categories = self._categories()
+        for index, item in enumerate(self._list("annotations")):
+            where = f"annotations[{index}]"
+            image = images.find(item.get("image_id")) if isinstance(item, dict) else None
+            if image is None:
+                self._report.note(self.path, where, "image_id", "names no image of the file")
+                continue
+            name = categories.find(item.get("category_id"))
+            if name is None:
+                shown = str(item.get("category_id"))[:40]
+                problem = f"is {shown}, which is no category; kept without its meaning"
+                self._report.note(self.path, where, "category_id", problem)
+            if name == PITCH:
+                self._add_lines(image, item, image.size, where)
+            elif name is not None and is_ball(name):
+                self._add_ball(image, item, where)
+            elif isinstance(item.get("bbox_image"), dict):
+                image.boxes.append(_box(item))
+            else:
+                image.kept.setdefault("others", []).append(item)
+
+    def _categories(self) -> IdIndex[str]:
+        """Name of each category by its id; the usual ones where a file does not list them."""
+        found: IdIndex[str] = IdIndex()
+        listed = self._value.get("categories")
+        for item in listed if isinstance(listed, list) else []:
+            if isinstance(item, dict) and isinstance(item.get("name"), str):
+                found.add(item.get("id"), item["name"].strip().lower())
+        for identity, name in _IDS.items():
+            found.add(identity, name)
+        return found
+
+    def _add_lines(self, image: _Image, item: dict[str, Any], size: ImageSize, where: str) -> None:
+        if "pitch" in image.kept:
+            self._report.note(self.path, where, None, "is a second pitch of its image; left out")
+            return
+        image.kept["pitch"] = {name: value for name, value in item.items() if name != "lines"}
+        try:
+            shown = f"{self.path}, {where}"
+            lines = item.get("lines") or {}
+            image.lines, image.other_lines = lines_from_json(lines, size, shown, self._report)
+        except DatasetFormatError as error:
+            self._report.note(self.path, where, "lines", error.problem)
+
+    def _add_ball(self, image: _Image, item: dict[str, Any], where: str) -> None:
+        try:
+            image.balls.append(_ball(item))
+        except ValueError as error:
+            self._report.note(self.path, where, "bbox_image", f"{error}; kept without geometry")
+            image.kept.setdefault("others", []).append(item)
+            return
+        rest = {name: value for name, value in item.items() if name != "bbox_image"}
+        image.kept.setdefault("balls", []).append(rest)
+
+    def _media(self, key: str) -> Media | None:
+        for folder in _FOLDERS:
+            if folder + key in self._inside:
+                name = self._folder + folder + key
+                return self._tree.media(name)
+        self._report.counts["views without frame"] += 1
+        return None
+
+
+def _side(image: Mapping[str, Any], name: str) -> int:
+    side = fields.whole(image.get(name))
+    if not 2 <= side <= MAX_SIDE:
+        raise ValueError(f"has a {name} of {side} pixels")
+    return side
+
+
+def _corner_box(item: Mapping[str, Any]) -> Box:
+    place = fields.mapping(item.get("bbox_image"))
+    missing = [name for name in ("x", "y", "w", "h") if name not in place]
+    if missing:
+        raise ValueError(f"has no {missing[0]}")
+    return Box(*(fields.pixel(place[name]) for name in ("x", "y", "w", "h")))
+
+
+def _ball(item: Mapping[str, Any]) -> BallAnnotation:
+    """A box without area is the ball's centre alone."""
+    box = _corner_box(item)
+    if box.width < 0 or box.height < 0:
+        raise ValueError("has a negative width or height")
+    if box.width == 0 or box.height == 0:
+        return BallAnnotation(point=box.center)
+    return BallAnnotation(box=box)
+
+
+def _box(item: Mapping[str, Any]) -> Mapping[str, Any]:
+    """A person in the shape that all datasets show, with the annotation as it was."""
+    attributes = item.get("attributes")
+    said = attributes if isinstance(attributes, dict) else {}
+    role = " ".join(str(said[name]) for name in ("role", "team") if said.get(name))
+    value: dict[str, Any] = {"class": role or None, "ID": said.get("jersey"), METADATA: dict(item)}
+    try:
+        box = _corner_box(item)
+    except ValueError:
+        return value
+    corners = {"x1": box.x, "y1": box.y, "x2": box.x + box.width, "y2": box.y + box.height}
+    return value | {"points": corners}

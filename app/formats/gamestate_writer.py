@@ -1,0 +1,368 @@
+"""sn-gamestate, written: one Labels-GameState.json a sequence, as it came or made anew."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import lru_cache
+from itertools import groupby
+from pathlib import Path, PurePosixPath
+from typing import Any
+
+import numpy as np
+
+from app.errors import InputError
+from app.finite import json_text
+from app.formats import fields
+from app.formats.camera_json import camera_to_json
+from app.formats.export_names import folded
+from app.formats.export_record import ExportRecord
+from app.formats.gamestate import (
+    BALL_ID,
+    CAMERA_ID,
+    IMAGES,
+    LABELS,
+    METADATA,
+    PITCH_ID,
+    file_name,
+    kept_of,
+    sequence_folder,
+)
+from app.formats.safe_path import resolve_inside
+from app.formats.sn_calibration_writer import lines_to_json
+from app.geometry.camera import Camera
+from app.soccer.annotation import CORNERS, BallAnnotation
+from app.soccer.group import Group, View
+from app.soccer.pitch import MARKINGS
+from app.soccer.policy import PAPER
+
+_ROLES = {
+    "player": 1,
+    "goalkeeper": 2,
+    "referee": 3,
+}
+_CATEGORIES: list[dict[str, Any]] = [
+    {"supercategory": "object", "id": 1, "name": "player"},
+    {"supercategory": "object", "id": 2, "name": "goalkeeper"},
+    {"supercategory": "object", "id": 3, "name": "referee"},
+    {"supercategory": "object", "id": 4, "name": "ball"},
+    {"supercategory": "pitch", "id": 5, "name": "pitch", "lines": list(MARKINGS)},
+    {"supercategory": "camera", "id": 6, "name": "camera"},
+    {"supercategory": "object", "id": 7, "name": "other"},
+]
+_OTHER = 7
+_BALL: dict[str, Any] = {
+    "track_id": None,
+    "supercategory": "object",
+    "category_id": BALL_ID,
+    "attributes": {"role": "ball", "jersey": None, "team": None},
+    "bbox_pitch": None,
+}
+_SPLIT_NUMBERS = {"train": 1, "valid": 2, "test": 3, "challenge": 4}
+_PITCH_BOX = tuple(
+    f"{axis}_bottom_{place}" for place in ("left", "middle", "right") for axis in "xy"
+)
+_PLACE_DIGITS = 9
+"""Decimals of a metre: of what is computed on the grass a nanometre is enough."""
+_FIRST_OF_OURS = 100_001
+"""Track in a sequence that brings tracks of its own."""
+
+
+@dataclass
+class _File:
+    """One Labels-GameState.json while it is made; each image, and the annotations of each, are JSON already."""
+
+    name: str
+    number: int
+    split: str
+    kept: Mapping[str, Any] = field(default_factory=dict)
+    images: list[str] = field(default_factory=list)
+    annotations: list[str] = field(default_factory=list)
+    tracks: dict[Hashable, int] = field(default_factory=dict)
+
+    def text(self) -> str:
+        info = _text(self.kept.get("info") or self._info())
+        categories = _text(self.kept.get("categories") or _CATEGORIES)
+        images, annotations = ",\n".join(self.images), ",\n".join(self.annotations)
+        return (
+            f'{{"info":{info},"images":[\n{images}\n],"annotations":[\n{annotations}\n],'
+            f'"categories":{categories}}}\n'
+        )
+
+    def _info(self) -> dict[str, Any]:
+        info = {"version": "1.3", "id": str(self.number), "name": self.name, "im_dir": IMAGES}
+        return {**info, "seq_length": len(self.images)}
+
+    def image_id(self) -> str:
+        """Id of the next image; no sequence of an export has the same."""
+        return f"{_SPLIT_NUMBERS.get(self.split, 9)}{self.number:03d}{len(self.images) + 1:06d}"
+
+    def track(self, who: Hashable) -> int:
+        """Number of a track, beyond those that a file may have brought."""
+        start = _FIRST_OF_OURS if self.kept else 1
+        return self.tracks.setdefault(who, start + len(self.tracks))
+
+
+def write_gamestate(root: Path, records: Iterable[ExportRecord]) -> dict[str, int]:
+    """Write ``<split>/<sequence>/Labels-GameState.json`` for the groups, sequence by sequence.
+
+    Images, people and whatever else came from such a file are written as they came. Of other
+    datasets each view becomes an image; roles and teams follow from SoccerNet's classes, places
+    on the pitch from its camera.
+
+    Args:
+        root: Existing folder.
+        records: Groups; one run of a match is in memory at a time.
+
+    Returns:
+        Counts: ``groups``, ``images``, ``annotated_balls``.
+
+    Raises:
+        InputError: Two matches would have one folder.
+        UnsafePathError: A key would leave ``root``.
+    """
+    counts = {"groups": 0, "images": 0, "annotated_balls": 0}
+    files, matches = dict[Path, _File](), dict[str, str]()
+    names: dict[tuple[str, str], str] = {}
+    for match, run in groupby(records, key=lambda record: record.group.match):
+        touched: dict[str, Path] = {}
+        for record in run:
+            counts["groups"] += 1
+            for view in record.group.views:
+                split = record.split(view)
+                if split not in touched:
+                    path = resolve_inside(root, f"{sequence_folder(match, split)}/{LABELS}")
+                    # Whatever its split, a sequence is known by the name of its folder.
+                    other = matches.setdefault(folded(path.parent.name), match)
+                    if other != match:
+                        raise InputError(f"the matches {other} and {match} would be one sequence")
+                    if path in files:
+                        _read_again(files[path], path)
+                    else:
+                        files[path] = _File(path.parent.name, len(files) + 1, split)
+                    touched[split] = path
+                _require_free(names, record, view)
+                _add(files[touched[split]], record, view, counts)
+        for path in sorted(touched.values()):
+            _write(files[path], path)
+    return counts
+
+
+def _require_free(names: dict[tuple[str, str], str], record: ExportRecord, view: View) -> None:
+    """Keep the name of an image; raises InputError where another one of its sequence has it."""
+    name = file_name(record.group, record.named(view))
+    whose = f"{record.group.key}, {view.key}"
+    first = names.setdefault((record.group.match, folded(PurePosixPath(name).stem)), whose)
+    if first != whose:
+        raise InputError(f"the images of two frames ({first} and {whose}) would be called {name}")
+
+
+def _write(file: _File, path: Path) -> None:
+    """Write a file, and forget what it holds until its match comes again."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(file.text(), encoding="utf-8")
+    file.images, file.annotations = [], []
+
+
+def _read_again(file: _File, path: Path) -> None:
+    earlier = json.loads(path.read_text(encoding="utf-8"))
+    file.images = [_text(item) for item in earlier["images"]]
+    file.annotations = [_text(item) for item in earlier["annotations"]]
+
+
+def _text(value: Any) -> str:
+    return json_text(value, compact=True)
+
+
+def _add(file: _File, record: ExportRecord, view: View, counts: dict[str, int]) -> None:
+    kept = kept_of(view)
+    file.kept = file.kept or kept
+    camera = record.camera(view)
+    people = _people(file, record.group, view, camera)
+    image = _image(file, record, view, camera, people)
+    file.images.append(_text(image))
+    identity = str(image.get("image_id", image.get("id")))
+    annotations = [*people, *_balls(file, record, view), *_rest(view, camera)]
+    if annotations:
+        found = [
+            {"id": f"{identity}{number:03d}", "image_id": identity, **annotation}
+            for number, annotation in enumerate(annotations, 1)
+        ]
+        file.annotations.append(_text(found).removeprefix("[").removesuffix("]"))
+    counts["images"] += 1
+    counts["annotated_balls"] += sum(ball.center is not None for ball in view.balls)
+
+
+def _image(
+    file: _File,
+    record: ExportRecord,
+    view: View,
+    camera: Camera | None,
+    people: list[dict[str, Any]],
+) -> dict[str, Any]:
+    kept, name = kept_of(view).get("image"), file_name(record.group, record.named(view))
+    if isinstance(kept, dict):
+        return kept | ({"file_name": name} if view.key in record.names else {})
+    return {
+        "is_labeled": True,
+        "image_id": file.image_id(),
+        "file_name": name,
+        "height": view.size.height,
+        "width": view.size.width,
+        # An evaluation asks for the place of everybody; somebody without one would end it.
+        "has_labeled_person": bool(people)
+        and (camera is None or all(person["bbox_pitch"] for person in people)),
+        "has_labeled_pitch": bool(view.station.lines),
+        "has_labeled_camera": _holds(camera),
+        "ignore_regions_y": [],
+        "ignore_regions_x": [],
+    }
+
+
+def _holds(camera: Camera | None) -> bool:
+    """Whether the format has a place for a camera: it is SoccerNet's, with no wide lens."""
+    return camera is not None and not camera.is_wide
+
+
+def _people(file: _File, group: Group, view: View, camera: Camera | None) -> list[dict[str, Any]]:
+    """The people of an image, as they came or made anew, each track once."""
+    seen: set[int] = set()
+    people: list[dict[str, Any]] = []
+    made: list[dict[str, Any]] = []
+    for index, box in enumerate(view.extras.boxes):
+        if isinstance(box.get(METADATA), dict):
+            people.append(dict(box[METADATA]))
+            continue
+        person = _person(box)
+        if person is None:
+            continue
+        track = file.track(_who(box, group, view, index))
+        if track in seen:
+            track = file.track((group.key, view.key, index))
+        seen.add(track)
+        person["track_id"] = track
+        people.append(person)
+        made.append(person)
+    standing = _on_pitch(camera, [person["bbox_image"] for person in made])
+    for person, place in zip(made, standing, strict=True):
+        person["bbox_pitch"] = place
+    return people
+
+
+def _who(box: Mapping[str, Any], group: Group, view: View, index: int) -> Hashable:
+    """Whose box it is: a shirt number is the same all match long, another tag in its group."""
+    # A class that is no text is kept as it came, like all that datasets bring.
+    name, tag = str(box.get("class")), box.get("ID")
+    if tag is None:
+        return (group.key, view.key, index)
+    text = str(tag)
+    return (name, text) if text.isdigit() else (name, text, group.key)
+
+
+def _on_pitch(
+    camera: Camera | None, boxes: Sequence[Mapping[str, float]]
+) -> list[dict[str, float] | None]:
+    """Where the lower edge of each box stands on the grass, metres; None without a place there."""
+    if camera is None or not boxes:
+        return [None] * len(boxes)
+    left, wide, low = np.array([(box["x"], box["w"], box["y"] + box["h"]) for box in boxes]).T
+    edges = np.column_stack([left, low, left + wide / 2, low, left + wide, low])
+    places = np.round(camera.on_ground(edges.reshape(-1, 2)).reshape(-1, 6), _PLACE_DIGITS)
+    stand = np.isfinite(places.sum(axis=1)).tolist()
+    return [
+        _pitch_box(place) if stands else None
+        for place, stands in zip(places.tolist(), stand, strict=True)
+    ]
+
+
+def _pitch_box(place: Sequence[float]) -> dict[str, float]:
+    """``bbox_pitch`` of x and y of the left, middle and right of a lower edge, pitch frame."""
+    return dict(zip(_PITCH_BOX, place, strict=True))
+
+
+def _balls(file: _File, record: ExportRecord, view: View) -> Iterator[dict[str, Any]]:
+    rest = kept_of(view).get("balls") or []
+    balls = [ball for ball in view.balls if ball.center is not None]
+    for index, ball in enumerate(balls):
+        kept = rest[index] if index < len(rest) else _new_ball(file, record, view, index)
+        yield {**_BALL, **kept, "bbox_image": _box_of(ball)}
+
+
+def _new_ball(file: _File, record: ExportRecord, view: View, index: int) -> dict[str, Any]:
+    return {"track_id": file.track(("ball", index)), "bbox_pitch": _below_ball(record, view)}
+
+
+def _below_ball(record: ExportRecord, view: View) -> dict[str, float] | None:
+    """The spot below the 3D ball, where that holds: the box of a ball in the air stands elsewhere."""
+    camera, point = record.camera(view), record.point
+    if camera is None or point is None or not record.has_ball_3d(view):
+        return None
+    # To the right in the image, along the grass.
+    x, y = camera.rotation[0, :2].tolist()
+    share = PAPER.ball_diameter_m / 2 / max(math.hypot(x, y), 1e-9)
+    (east, south, _), right, down = point, x * share, y * share
+    edge = (east - right, south - down, east, south, east + right, south + down)
+    return _pitch_box([round(value, _PLACE_DIGITS) for value in edge])
+
+
+def _rest(view: View, camera: Camera | None) -> Iterator[dict[str, Any]]:
+    """The lines, the camera, and what else there was."""
+    kept = kept_of(view)
+    if view.station.lines or view.extras.lines or "pitch" in kept:
+        lines = lines_to_json(view.station.lines, view.size, view.extras.lines)
+        head = {"supercategory": "pitch", "category_id": PITCH_ID}
+        # This format spells no name with a space at its end.
+        stripped = {name.strip(): points for name, points in lines.items()}
+        yield head | (kept.get("pitch") or {}) | {"lines": stripped}
+    if camera is not None and _holds(camera) and not kept:
+        head = {"supercategory": "camera", "category_id": CAMERA_ID}
+        measured = {"relative_mean_reproj": None, "accuracy@5": None}
+        yield {**head, "parameters": camera_to_json(camera), **measured}
+    yield from (dict(item) for item in kept.get("others") or [])
+
+
+def _box_of(ball: BallAnnotation) -> dict[str, float]:
+    assert ball.center is not None, "the caller leaves out what is out of view"
+    x, y = ball.center
+    box = ball.box
+    return _place(*((x, y, 0.0, 0.0) if box is None else (box.x, box.y, box.width, box.height)))
+
+
+def _place(x: float, y: float, width: float, height: float) -> dict[str, float]:
+    return {
+        "x": x,
+        "y": y,
+        "x_center": x + width / 2,
+        "y_center": y + height / 2,
+        "w": width,
+        "h": height,
+    }
+
+
+@lru_cache(maxsize=256)
+def _role_and_team(name: str) -> tuple[str, str | None]:
+    """What SoccerNet's class of a person says."""
+    words = name.lower().split()
+    role = next((role for role in _ROLES if role in words), "other")
+    return role, next((side for side in ("left", "right") if side in words), None)
+
+
+def _person(box: Mapping[str, Any]) -> dict[str, Any] | None:
+    """A person of SoccerNet-v3 (``Player team left``, ``Main referee``); None without corners."""
+    corners = box.get("points")
+    try:
+        x1, y1, x2, y2 = [fields.number(corners[name]) for name in CORNERS]  # type: ignore[index]
+    except (TypeError, KeyError, ValueError):
+        return None
+    role, team = _role_and_team(str(box.get("class") or ""))
+    number = str(box.get("ID"))
+    return {
+        "track_id": None,
+        "supercategory": "object",
+        "category_id": _ROLES.get(role, _OTHER),
+        "attributes": {"role": role, "jersey": number if number.isdigit() else None, "team": team},
+        "bbox_image": _place(min(x1, x2), min(y1, y2), abs(x2 - x1), abs(y2 - y1)),
+        "bbox_pitch": None,
+    }

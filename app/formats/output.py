@@ -1,0 +1,185 @@
+"""Output that appears whole or not at all: a folder, or a zip by its ending."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import tempfile
+import zipfile
+import zlib
+from collections.abc import Collection, Iterable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from app.durable import PARTIAL, sync
+from app.errors import InputError, StorageError
+from app.formats.manifest import MANIFEST, SOFTWARE
+from app.formats.view_files import GatheredFiles
+from app.progress import TellProgress, told
+
+MAX_MANIFEST = 1 << 30
+"""Bytes of a manifest that is read; that of a hundred thousand frames has a tenth of it."""
+LEVEL = 4
+"""Of compression: half of the usual one's time, and a tenth more bytes."""
+WHOLE = 32 << 20
+"""Bytes of a file that is read at once; a larger one passes through in pieces, compressed as usual."""
+_DATE = (1980, 1, 1, 0, 0, 0)
+"""Of every zip entry, so that the same content makes the same file."""
+
+
+@contextmanager
+def output_tree(
+    out: Path, beside: Path | None = None, progress: TellProgress | None = None
+) -> Iterator[Path]:
+    """A folder to write into, which becomes ``out`` when the block ends without an error.
+
+    The files are written beside it under a temporary name, synced and renamed. An error inside the
+    block leaves nothing behind and an earlier ``out`` as it was.
+
+    Args:
+        out: Folder, or file that ends in ``.zip``. An earlier export there is replaced.
+        beside: A path of the same folder, after which the temporary names are called; by default
+            ``out`` itself.
+        progress: Hears how many of its files are in a zip.
+
+    Raises:
+        InputError: Something else than an earlier export is there.
+        StorageError: The disk refuses.
+    """
+    out = Path.cwd() / out
+    _check_free(out)
+    try:
+        out.parent.mkdir(parents=True, exist_ok=True)
+        prefix = f".{(beside or out).name}."
+        staging = Path(tempfile.mkdtemp(prefix=prefix, suffix=PARTIAL, dir=out.parent))
+    except OSError as error:
+        raise StorageError(
+            f"the folder of {out.name} cannot be written ({error.strerror})"
+        ) from error
+    try:
+        yield staging
+        if out.suffix.lower() == ".zip":
+            _publish_zip(staging, out, prefix, progress)
+        else:
+            _publish_folder(staging, out)
+    except OSError as error:
+        raise StorageError(f"{out.name} cannot be written ({error.strerror or error})") from error
+    finally:
+        shutil.rmtree(staging, ignore_errors=True)
+
+
+def _check_free(out: Path) -> None:
+    if out.suffix.lower() == ".zip":
+        if out.is_dir():
+            raise InputError(f"{out} is a folder, not a zip file")
+        if os.path.lexists(out) and not _is_earlier_zip(out):
+            raise foreign(f"{out} is there already and is no earlier export")
+        return
+    if out.exists() and not out.is_dir():
+        raise InputError(f"{out} is a file; name a folder or a file that ends in .zip")
+    if out.is_dir() and any(out.iterdir()) and not _is_earlier_export(out):
+        raise foreign(f"{out} holds other files and is no earlier export")
+
+
+def foreign(sentence: str) -> InputError:
+    """The refusal of a place that holds something else."""
+    return InputError(sentence, hint="Name another place; an earlier export would be replaced.")
+
+
+def _is_earlier_export(out: Path) -> bool:
+    """Whether the folder holds what its manifest lists and nothing else."""
+    present = {path.relative_to(out).as_posix() for path in out.rglob("*") if not path.is_dir()}
+    try:
+        return present <= listed((out / MANIFEST).read_bytes())
+    except OSError:
+        return False
+
+
+def _is_earlier_zip(out: Path) -> bool:
+    """The same of a zip; a link is somebody's own."""
+    try:
+        with zipfile.ZipFile(out) as archive:
+            if archive.getinfo(MANIFEST).file_size > MAX_MANIFEST:
+                return False
+            ours = listed(archive.read(MANIFEST))
+            return not out.is_symlink() and set(archive.namelist()) <= ours
+    except (OSError, KeyError, ValueError, RuntimeError, zipfile.BadZipFile, zlib.error):
+        return False
+
+
+def listed(manifest: bytes) -> set[str]:
+    """The files that a manifest of ours lists; none where it is of somebody else."""
+    try:
+        value = json.loads(manifest)
+        if value["software"]["name"] != SOFTWARE:
+            return set()
+        return {MANIFEST, *(item["path"] for item in value["files"])}
+    except (ValueError, KeyError, TypeError, RecursionError):
+        return set()
+
+
+def _publish_zip(staging: Path, out: Path, prefix: str, progress: TellProgress | None) -> None:
+    handle, name = tempfile.mkstemp(prefix=prefix, suffix=PARTIAL, dir=out.parent)
+    partial = Path(name)
+    try:
+        with os.fdopen(handle, "wb") as file:
+            write_zip(staging, file, progress)
+            file.flush()
+            os.fsync(file.fileno())
+        partial.chmod(0o644)
+        partial.replace(out)
+    finally:
+        partial.unlink(missing_ok=True)
+    sync(out.parent)
+
+
+def write_zip(root: Path, file: object, progress: TellProgress | None = None) -> None:
+    """All files of an export below ``root`` into a zip: sorted names, dated 1980-01-01."""
+    files = GatheredFiles(root)
+    zip_files(told(files, len(files), progress, "Packing the files."), file)
+
+
+def zip_files(
+    files: Iterable[tuple[str, Path | bytes]], file: object, stored: Collection[str] = ()
+) -> None:
+    """Files into a zip, in their order, dated 1980-01-01.
+
+    Args:
+        files: Name and content of each.
+        file: Where the zip is written: a path, or a file that is open.
+        stored: Endings of names whose files are not compressed, such as ``.jpg``.
+    """
+    with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:  # type: ignore[call-overload]
+        for name, content in files:
+            entry = zipfile.ZipInfo(name, _DATE)
+            entry.external_attr = 0o644 << 16
+            entry.create_system = 3
+            packed = Path(name).suffix.lower() in stored
+            entry.compress_type = zipfile.ZIP_STORED if packed else zipfile.ZIP_DEFLATED
+            if isinstance(content, Path) and content.stat().st_size <= WHOLE:
+                content = content.read_bytes()
+            if isinstance(content, bytes):
+                archive.writestr(entry, content, compresslevel=LEVEL)
+                continue
+            # So that a file of more than 2 GB gets the sizes of ZIP64.
+            entry.file_size = content.stat().st_size
+            with content.open("rb") as source, archive.open(entry, "w") as target:
+                shutil.copyfileobj(source, target, 1024 * 1024)
+
+
+def _publish_folder(staging: Path, out: Path) -> None:
+    for folder, _, files in os.walk(staging, topdown=False):
+        for name in files:
+            sync(Path(folder) / name)
+        sync(Path(folder))
+    staging.chmod(0o755)
+    if not out.exists():
+        staging.rename(out)
+    else:
+        # A folder cannot be renamed onto one that holds files: the old one steps aside.
+        aside = staging.with_suffix(".replaced")
+        out.rename(aside)
+        staging.rename(out)
+        shutil.rmtree(aside, ignore_errors=True)
+    sync(out.parent)

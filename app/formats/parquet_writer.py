@@ -1,0 +1,324 @@
+"""Parquet: ``views.parquet``, one row a view, in row groups that are written as they fill."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from app.finite import finite
+from app.finite import json_text as finite_text
+from app.formats.camera_json import covariance_to_json
+from app.formats.export_record import ExportRecord, chosen_box, frame_name
+from app.formats.manifest import software_version
+from app.formats.parquet import pyarrow_modules
+from app.formats.view_state import view_to_json
+from app.geometry.camera import Camera
+from app.soccer.frames import Box
+from app.soccer.group import View
+from app.soccer.solution import Ball3D, BallFit, BestBall, Solution, ViewSolution
+
+TABLE = "views.parquet"
+ROWS = 1024
+"""Rows of a row group: a few megabytes in memory."""
+
+TEXT, NUMBER, WHOLE, FLAG, LIST = "string", "double", "int32", "bool", "list"
+
+
+@dataclass(frozen=True)
+class ViewRow:
+    """A view on its way out, and what its columns are made from."""
+
+    record: ExportRecord
+    view: View
+    position: int
+    boxes: str
+    everything: bool
+    provenance: Mapping[str, str | None]
+
+    @cached_property
+    def said(self) -> dict[str, Any]:
+        """Everything that was said of the view."""
+        return view_to_json(self.view)
+
+    @property
+    def solved(self) -> ViewSolution | None:
+        """What was computed for the view."""
+        return self.record.view_solution(self.view)
+
+    @property
+    def camera(self) -> Camera | None:
+        """The camera that counts."""
+        return self.record.camera(self.view)
+
+    @property
+    def fit(self) -> BallFit | None:
+        """The 3D ball in the view."""
+        return self.record.ball_fit(self.view, self.everything)
+
+
+Getter = Callable[[ViewRow], Any]
+
+
+def write_parquet(
+    root: Path,
+    records: Iterable[ExportRecord],
+    *,
+    everything: bool = False,
+    boxes: str = "optimized",
+    provenance: Mapping[str, str | None] | None = None,
+) -> dict[str, int]:
+    """Write ``views.parquet`` below an existing folder.
+
+    Args:
+        root: Existing folder.
+        records: Groups; one row group is in memory at a time.
+        everything: Whether views that failed a gate have ball values.
+        boxes: The box in ``box_x`` .. ``box_height``, one of ``BOX_KINDS``.
+        provenance: Values of the columns of ``PROVENANCE``.
+
+    Returns:
+        Counts: ``groups``, ``views``, ``boxes`` and ``balls`` (views in which the 3D ball holds).
+
+    Raises:
+        InputError: pyarrow is not installed.
+    """
+    pyarrow, parquet = pyarrow_modules()
+    counts = {"groups": 0, "views": 0, "boxes": 0, "balls": 0}
+    schema = pyarrow.schema([(name, _type(pyarrow, kind)) for name, kind, _ in COLUMNS])
+    waiting: list[dict[str, Any]] = []
+    with parquet.ParquetWriter(root / TABLE, schema, compression="zstd") as writer:
+        for record in records:
+            counts["groups"] += 1
+            for position, view in enumerate(record.group.views):
+                row = ViewRow(record, view, position, boxes, everything, provenance or {})
+                waiting.append(finite({name: get(row) for name, _, get in COLUMNS}))
+                counts["views"] += 1
+                counts["boxes"] += _chosen(row) is not None
+                counts["balls"] += record.has_ball_3d(view)
+            if len(waiting) >= ROWS:
+                writer.write_table(pyarrow.Table.from_pylist(waiting, schema))
+                waiting.clear()
+        writer.write_table(pyarrow.Table.from_pylist(waiting, schema))
+    return counts
+
+
+def _type(pyarrow: Any, kind: str) -> Any:
+    if kind == LIST:
+        return pyarrow.list_(pyarrow.float64())
+    return getattr(pyarrow, {"double": "float64", "bool": "bool_"}.get(kind, kind))()
+
+
+def json_text(value: Any) -> str | None:
+    """A value as JSON text; None stays None."""
+    return None if value is None else finite_text(value)
+
+
+def _camera(get: Callable[[Camera], Any]) -> Getter:
+    return lambda row: None if row.camera is None else get(row.camera)
+
+
+def _camera_covariance(row: ViewRow) -> list[float] | None:
+    known = row.record.covariance(row.view)
+    if row.camera is None or known is None:
+        return None
+    rows = covariance_to_json(known, row.camera, row.view.size)
+    return [number for each in rows for number in each]
+
+
+def _fit(name: str) -> Getter:
+    return lambda row: None if row.fit is None else getattr(row.fit, name)
+
+
+def _solved(get: Callable[[ViewSolution], Any]) -> Getter:
+    return lambda row: None if row.solved is None else get(row.solved)
+
+
+def _axis(number: int) -> Getter:
+    def get(row: ViewRow) -> float | None:
+        point = row.record.point
+        return None if point is None or row.fit is None else float(point[number])
+
+    return get
+
+
+def _ball(name: str) -> Getter:
+    def get(row: ViewRow) -> Any:
+        ball = row.record.solution.ball if row.record.solution else None
+        return None if ball is None or row.fit is None else getattr(ball, name)
+
+    return get
+
+
+def _of_ball(get: Callable[[Solution], Any]) -> Getter:
+    """Of the solution, in rows that have a 3D ball."""
+
+    def value(row: ViewRow) -> Any:
+        solution = row.record.solution
+        return None if solution is None or _ball("point")(row) is None else get(solution)
+
+    return value
+
+
+def _sigma(ball: Ball3D | BestBall | None) -> float | None:
+    return None if ball is None else ball.sigma_m
+
+
+def _p_value(solution: Solution) -> float | None:
+    return None if solution.chi_square is None else solution.chi_square.p_value
+
+
+def _box(which: Callable[[ViewRow], Box | None], name: str) -> Getter:
+    def get(row: ViewRow) -> float | None:
+        box = which(row)
+        return None if box is None else float(getattr(box, name))
+
+    return get
+
+
+def _annotated(row: ViewRow) -> Box | None:
+    return row.view.ball.box if row.view.ball else None
+
+
+def _chosen(row: ViewRow) -> Box | None:
+    return chosen_box(row.record, row.view, row.boxes) if row.view.ball else None
+
+
+def _center(axis: int) -> Getter:
+    def get(row: ViewRow) -> float | None:
+        center = row.view.ball.center if row.view.ball else None
+        return None if center is None else float(center[axis])
+
+    return get
+
+
+def _jac(index: int) -> Getter:
+    def get(row: ViewRow) -> float | None:
+        jac = row.solved.calibration.jac if row.solved else None
+        return None if jac is None else float(jac[index])
+
+    return get
+
+
+def _failing(row: ViewRow) -> str | None:
+    gate = row.record.solution.first_failing if row.record.solution else None
+    return None if gate is None else gate.name
+
+
+def _fits_pixels(row: ViewRow) -> Any:
+    point = row.fit.reprojected if row.fit else None
+    return None if point is None else [float(point.x), float(point.y)]
+
+
+def _said(name: str) -> Getter:
+    return lambda row: row.said[name]
+
+
+def _left_out(name: str) -> Getter:
+    return lambda row: None if row.view.left_out is None else getattr(row.view.left_out, name)
+
+
+def _said_json(name: str) -> Getter:
+    return lambda row: json_text(row.said[name])
+
+
+def _if_said(name: str) -> Getter:
+    return lambda row: json_text(row.said[name]) if name in row.said else None
+
+
+_SIDES = ("x", "y", "width", "height")
+PROVENANCE = ("dataset", "version", "policy", "policy_hash", "date")
+"""Columns that are the same in every row of an export."""
+
+COLUMNS: tuple[tuple[str, str, Getter], ...] = (
+    ("group", TEXT, lambda row: row.record.group.key),
+    ("view", TEXT, lambda row: row.view.key),
+    ("position", WHOLE, lambda row: row.position),
+    ("match", TEXT, lambda row: row.record.group.match),
+    ("split", TEXT, lambda row: row.record.split(row.view)),
+    ("group_split", TEXT, lambda row: row.record.group.split),
+    ("views", WHOLE, lambda row: len(row.record.group.views)),
+    ("label", TEXT, lambda row: row.record.group.label),
+    ("pitch_length", NUMBER, lambda row: float(row.record.group.pitch.length)),
+    ("pitch_width", NUMBER, lambda row: float(row.record.group.pitch.width)),
+    ("file_name", TEXT, lambda row: frame_name(row.record, row.view)),
+    ("frame_present", FLAG, lambda row: row.view.key in row.record.frames),
+    ("width", WHOLE, lambda row: row.view.size.width),
+    ("height", WHOLE, lambda row: row.view.size.height),
+    ("included", FLAG, _said("included")),
+    ("left_out_reason", TEXT, _left_out("reason")),
+    ("left_out_note", TEXT, _left_out("note")),
+    ("station", TEXT, _said("station")),
+    ("shared", FLAG, _said("shared")),
+    ("flipped", FLAG, _said("flipped")),
+    ("calibration", TEXT, _said("calibration")),
+    ("calibrated_by", TEXT, _solved(lambda solved: solved.calibration.source)),
+    ("pan_degrees", NUMBER, _camera(lambda camera: camera.pan_tilt_roll_degrees[0])),
+    ("tilt_degrees", NUMBER, _camera(lambda camera: camera.pan_tilt_roll_degrees[1])),
+    ("roll_degrees", NUMBER, _camera(lambda camera: camera.pan_tilt_roll_degrees[2])),
+    ("x_focal_length", NUMBER, _camera(lambda camera: float(camera.focal_length[0]))),
+    ("y_focal_length", NUMBER, _camera(lambda camera: float(camera.focal_length[1]))),
+    ("principal_point", LIST, _camera(lambda camera: [*map(float, camera.principal_point)])),
+    ("skew", NUMBER, _camera(lambda camera: float(camera.skew))),
+    ("position_meters", LIST, _camera(lambda camera: camera.position.tolist())),
+    ("rotation_matrix", LIST, _camera(lambda camera: camera.rotation.ravel().tolist())),
+    ("distortion", LIST, _camera(lambda camera: camera.distortion.tolist())),
+    ("lens", TEXT, _camera(lambda camera: camera.lens)),
+    ("camera_covariance", LIST, _camera_covariance),
+    ("jac_0.5", NUMBER, _jac(0)),
+    ("jac_1", NUMBER, _jac(1)),
+    ("jac_2", NUMBER, _jac(2)),
+    ("line_error_px", NUMBER, _solved(lambda solved: solved.calibration.error_px)),
+    ("agreement", NUMBER, _solved(lambda solved: solved.calibration.agreement)),
+    ("ball_x", NUMBER, _center(0)),
+    ("ball_y", NUMBER, _center(1)),
+    *((f"annotated_{side}", NUMBER, _box(_annotated, side)) for side in _SIDES),
+    *((f"box_{side}", NUMBER, _box(_chosen, side)) for side in _SIDES),
+    ("ball_3d_x", NUMBER, _axis(0)),
+    ("ball_3d_y", NUMBER, _axis(1)),
+    ("ball_3d_z", NUMBER, _axis(2)),
+    ("sigma_m", NUMBER, _ball("sigma_m")),
+    ("parallax_degrees", NUMBER, _ball("parallax_degrees")),
+    ("point", TEXT, _of_ball(lambda solution: solution.point)),
+    (
+        "mean_sigma_m",
+        NUMBER,
+        _of_ball(lambda solution: _sigma(solution.mean_ball or solution.ball)),
+    ),
+    ("best_sigma_m", NUMBER, _of_ball(lambda solution: _sigma(solution.best_ball))),
+    ("p_value", NUMBER, _of_ball(_p_value)),
+    ("covariance", LIST, lambda row: _listed(_ball("covariance")(row))),
+    ("reprojected", LIST, _fits_pixels),
+    ("error_px", NUMBER, _fit("error_px")),
+    ("error_percent", NUMBER, _fit("error_percent")),
+    ("optimized_diameter_px", NUMBER, _fit("optimized_diameter_px")),
+    ("optimized_error_m", NUMBER, _fit("optimized_error_m")),
+    ("size_ratio", NUMBER, _fit("size_ratio")),
+    ("depth_m", NUMBER, _fit("depth_m")),
+    ("in_valid_pair", FLAG, _solved(lambda solved: solved.included)),
+    ("view_failed", TEXT, _solved(lambda solved: solved.failed)),
+    ("group_failed", TEXT, _failing),
+    ("verdict", TEXT, lambda row: row.record.verdict),
+    ("reason", TEXT, lambda row: row.record.reason),
+    ("lines", TEXT, _said_json("lines")),
+    ("balls", TEXT, _said_json("balls")),
+    ("given", TEXT, _said_json("given")),
+    ("given_covariance", LIST, lambda row: row.said.get("given_covariance")),
+    ("picture", TEXT, _if_said("picture")),
+    ("proposed", TEXT, _if_said("proposed")),
+    ("extras", TEXT, lambda row: json_text(row.view.extras.values())),
+    *((name, TEXT, lambda row, name=name: row.provenance.get(name)) for name in PROVENANCE),
+    ("solver_version", TEXT, lambda row: _solver(row)),
+    ("software", TEXT, lambda row: software_version()),
+)
+"""Name, type and value of every column; docs/formats.md explains them."""
+
+
+def _listed(values: tuple[float, ...] | None) -> list[float] | None:
+    return None if values is None else [*map(float, values)]
+
+
+def _solver(row: ViewRow) -> str | None:
+    return row.record.solution.solver_version if row.record.solution else None

@@ -1,0 +1,328 @@
+"""sn-calibration, read: files of lines, and each image as a group of one view."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import PurePosixPath
+from typing import Any
+
+from app.errors import DatasetFormatError, UnknownMarkingError
+from app.formats import fields
+from app.formats.corner_origin import HALF
+from app.formats.file_tree import DEFAULT_LIMITS, FileTree, Limits, Root
+from app.formats.frame_names import IMAGE_SUFFIXES
+from app.formats.line_documents import LineDocument, read_line_documents
+from app.formats.match_info import METADATA, PLACE, match_of, place_of, read_match_info
+from app.formats.report import Report
+from app.formats.sn_calibration import LARGEST_UNIT, LineFile, split_and_size
+from app.formats.soccernet_v3 import SPLITS
+from app.formats.trees import opened_tree
+from app.plural import plural
+from app.soccer.annotation import Extras, Lines, make_lines
+from app.soccer.frames import ImagePoint, ImageSize
+from app.soccer.group import Group, Station, View
+from app.soccer.media import Media
+from app.soccer.pitch import WITHOUT_GEOMETRY, marking_like
+
+_OTHER_FILES = ("manifest.json", "findings.json", "calibrate.json", "leave_one_out.json")
+_OTHER_PREFIXES = ("camera_", "Labels-", "match_info")
+
+
+def read_line_files(
+    path: Root,
+    size: ImageSize,
+    report: Report,
+    limits: Limits = DEFAULT_LIMITS,
+    *,
+    by_folder: bool = False,
+) -> Iterator[LineFile]:
+    """The line files of a folder or zip (or one file), by name.
+
+    Coordinates are normalised by (width - 1, height - 1), or pixels when at least half of a file's
+    points lie beyond 2. Points outside the image are kept. Unknown markings and unreadable points
+    are reported; the rest of the file is kept. A file may hold the lines of many images
+    (``line_documents``).
+
+    Args:
+        path: Folder, zip or JSON file.
+        size: Size of the annotated images, pixels.
+        report: Takes what had to be left out.
+        limits: Caps on what is read.
+        by_folder: Whether a folder that is called as in our exports (``test-1280x720``), or a file
+            itself, says the size of its images; else all lines are in pixels of ``size``.
+    """
+    with opened_tree(path, report, limits) as tree:
+        if tree is None:
+            return
+        names = tree.names()
+        places = _places(read_match_info(tree, names, Report()))
+        sizes = _sizes(map(_whole, names), path.stem) if by_folder else {}
+        ours = Ours(places, sizes, own_sizes=by_folder)
+        yield from line_files_of(tree, names, size, report, ours)
+
+
+@dataclass(frozen=True)
+class Ours:
+    """What one of our own exports says of its files, each by its path without the ending."""
+
+    places: Mapping[str, str] = field(default_factory=dict)
+    """Where a frame would lie without the folders of the export."""
+    sizes: Mapping[str, ImageSize] = field(default_factory=dict)
+    own_sizes: bool = False
+    """Whether the size that a file says itself is that of its lines."""
+
+
+_NOTHING = Ours()
+
+
+def line_files_of(
+    tree: FileTree, names: Sequence[str], size: ImageSize, report: Report, ours: Ours = _NOTHING
+) -> Iterator[LineFile]:
+    """The line files among some files of a tree, with the images that lie beside them."""
+    beside = _images(names)
+    wholes = {name: _whole(name) for name in names if _is_line_file(name)}
+    places = {name: ours.places.get(whole, whole) for name, whole in wholes.items()}
+    # Names of an export are in no order of a match's frames.
+    ordered = sorted(places, key=places.__getitem__) if ours.places else list(places)
+    stems = Counter(PurePosixPath(place).name for place in places.values())
+    seen: set[str] = set()
+    for name in ordered:
+        whole, place = wholes[name], PurePosixPath(places[name])
+        key = place.name if stems[place.name] == 1 else str(place)
+        said = ours.sizes.get(whole)
+        for document in _documents(tree, name, report):
+            named, where = key, whole
+            if document.name is not None and document.name != place.name:
+                named, where = document.name, str(PurePosixPath(whole).parent / document.name)
+                if named in seen:
+                    named = f"{key}/{named}"
+            report.read += 1
+            if named in seen:
+                report.note(
+                    tree.shown(name), document.name, None, "is a second record of its image"
+                )
+                continue
+            seen.add(named)
+            drawn = document.size or said or size
+            stays = said is not None or (ours.own_sizes and document.size is not None)
+            made = drawn if stays else size
+            shown = tree.shown(name)
+            lines, others = lines_from_json(document.lines, made, shown, report, drawn)
+            media = _media(tree, beside.get(where))
+            report.imported += 1
+            yield LineFile(named, made, lines, others, media, where)
+
+
+def _whole(name: str) -> str:
+    return str(PurePosixPath(name).with_suffix(""))
+
+
+def _places(infos: Mapping[str, Mapping[str, Any]]) -> dict[str, str]:
+    return {whole: place for whole, info in infos.items() if (place := place_of(info))}
+
+
+def _sizes(places: Iterable[str], top: str = "") -> dict[str, ImageSize]:
+    said = {whole: split_and_size(PurePosixPath(whole).parent.name or top) for whole in places}
+    return {whole: found[1] for whole, found in said.items() if found}
+
+
+def _documents(tree: FileTree, name: str, report: Report) -> list[LineDocument]:
+    try:
+        return read_line_documents(tree.read_bytes(name), tree.shown(name), report)
+    except DatasetFormatError as error:
+        report.read += 1
+        report.skip(error)
+        return []
+
+
+def _is_line_file(name: str) -> bool:
+    last = PurePosixPath(name).name
+    if not last.lower().endswith(".json"):
+        return False
+    return last not in _OTHER_FILES and not last.startswith(_OTHER_PREFIXES)
+
+
+def _images(names: Iterable[str]) -> dict[str, str]:
+    places = (PurePosixPath(name) for name in names)
+    return {
+        str(place.with_suffix("")): str(place)
+        for place in places
+        if place.suffix.lower() in IMAGE_SUFFIXES
+    }
+
+
+def _media(tree: FileTree, image: str | None) -> Media | None:
+    return None if image is None else tree.media(image)
+
+
+def lines_from_json(
+    value: Any, size: ImageSize, path: str, report: Report, drawn: ImageSize | None = None
+) -> tuple[Lines, tuple[Mapping[str, Any], ...]]:
+    """Lines with geometry, and the others, of one image, in pixels.
+
+    Coordinates are pixels when at least half of all points lie beyond 2, so that no single point
+    decides (decision 0067); in a normalised file such points are left out and reported.
+
+    Args:
+        value: The parsed lines.
+        size: Of the image whose pixels are wanted.
+        path: File as the user knows it, for problems.
+        report: Takes what had to be left out.
+        drawn: Size of the image that pixels of the file are of; None: ``size``.
+
+    Raises:
+        DatasetFormatError: The file is no object at all.
+    """
+    if not isinstance(value, dict):
+        raise DatasetFormatError(path, None, None, "is not an object of lines")
+    known: dict[str, list[ImagePoint]] = {}
+    others = []
+    points = {name: _points(item, path, name, report) for name, item in value.items()}
+    every = [point for line in points.values() for _, point in line]
+    in_pixels = 2 * sum(map(_is_beyond, every)) >= max(len(every), 1)
+    for name, numbered in points.items():
+        line = [point for _, point in numbered]
+        if not in_pixels:
+            line = _near(numbered, path, name, report)
+        to_pixel = partial(_resized, drawn or size, size) if in_pixels else size.unit_to_pixel
+        pixels = [to_pixel(*point) for point in line]
+        marking = _marking(name, path, report)
+        if marking is None:
+            flat = [coordinate for point in pixels for coordinate in point]
+            others.append({"class": name, "points": flat})
+        elif pixels:
+            known.setdefault(marking, []).extend(pixels)
+    return make_lines(known), tuple(others)
+
+
+def _resized(drawn: ImageSize, size: ImageSize, x: float, y: float) -> ImagePoint:
+    """A pixel where its image has another size: images are resized about the first pixel's corner."""
+    if drawn == size:
+        return ImagePoint(x, y)
+    across, down = size.width / drawn.width, size.height / drawn.height
+    return ImagePoint((x + HALF) * across - HALF, (y + HALF) * down - HALF)
+
+
+_Numbered = list[tuple[int, tuple[float, float]]]
+"""Points of a line, each with its number in the file, from 1."""
+
+
+def _is_beyond(point: tuple[float, float]) -> bool:
+    return max(map(abs, point)) > LARGEST_UNIT
+
+
+def _near(line: _Numbered, path: str, name: str, report: Report) -> list[tuple[float, float]]:
+    """The points of a line of a normalised file that can be normalised; others are reported."""
+    far = [number for number, point in line if _is_beyond(point)]
+    if far:
+        x, y = next(point for _, point in line if _is_beyond(point))
+        problem = f"({x:g}, {y:g}) is far outside the image, and the file is normalised"
+        report.note(path, None, name, f"{problem}; {_left_out(far)}")
+    return [point for _, point in line if not _is_beyond(point)]
+
+
+def _left_out(numbers: Sequence[int]) -> str:
+    listed = ", ".join(map(str, numbers[:10])) + (", ..." if len(numbers) > 10 else "")
+    return f"points {listed} are left out" if len(numbers) > 1 else f"point {listed} is left out"
+
+
+def _points(value: Any, path: str, name: str, report: Report) -> _Numbered:
+    """The sound points of a line; they are in no order, so that one less says nothing false."""
+    points: _Numbered = []
+    bad: list[int] = []
+    first = ""
+    try:
+        listed = fields.sequence(value)
+    except ValueError as error:
+        report.note(path, None, name, f"{error}; the line is left out")
+        return []
+    for number, item in enumerate(listed, 1):
+        try:
+            points.append((number, _point(item)))
+        except ValueError as error:
+            bad.append(number)
+            first = first or str(error)
+    if bad:
+        report.note(path, None, name, f"{first}; {_left_out(bad)}")
+    return points
+
+
+def _point(item: Any) -> tuple[float, float]:
+    """A point as ``{"x", "y"}`` or ``[x, y]``."""
+    if isinstance(item, (list, tuple)):
+        x, y = fields.numbers(item, 2)
+    else:
+        point = fields.mapping(item)
+        if "x" not in point or "y" not in point:
+            raise ValueError("has a point without x or y")
+        x, y = point["x"], point["y"]
+    return fields.pixel(x), fields.pixel(y)
+
+
+def _marking(name: str, path: str, report: Report) -> str | None:
+    """The marking of that name; None (reported unless the format knows it) for any other."""
+    found = marking_like(name)
+    if found is None and name.replace("_", " ").strip() not in WITHOUT_GEOMETRY:
+        problem = UnknownMarkingError(name).message
+        report.note(path, None, name, f"{problem}; kept without geometry")
+    return found
+
+
+def read_sn_calibration(
+    path: Root,
+    size: ImageSize,
+    report: Report,
+    *,
+    calibration: str = "given",
+    limits: Limits = DEFAULT_LIMITS,
+) -> Iterator[Group]:
+    """Each frame as a group of one view, keyed by its stem.
+
+    Its match comes from match_info.json, its split from a folder ``train``, ``valid``, ``test``
+    or ``challenge``. A folder of our own exports says the size, too (``test-1280x720``). Cameras
+    are not read: import them as ``cameras``.
+
+    Args:
+        path: Folder, zip or JSON file.
+        size: Size of the annotated images where no folder says it, pixels.
+        report: Takes what had to be left out.
+        calibration: What counts for a view that has a camera and lines.
+        limits: Caps on what is read.
+    """
+    with opened_tree(path, report, limits) as tree:
+        if tree is None:
+            return
+        names = tree.names()
+        infos = read_match_info(tree, names, report)
+        places = _places(infos)
+        ours = Ours(places, _sizes(places), own_sizes=True)
+        unused = dict.fromkeys(infos)
+        for file in line_files_of(tree, names, size, report, ours):
+            unused.pop(file.place, None)
+            yield _group(file, infos.get(file.place, {}), calibration)
+        if unused:
+            count = plural(len(unused), "image")
+            shown = ", ".join(list(unused)[:5]) + (", ..." if len(unused) > 5 else "")
+            report.remark(f"{count} of match_info.json without a file of lines: {shown}")
+
+
+def _group(file: LineFile, record: Mapping[str, Any], calibration: str) -> Group:
+    info = {name: value for name, value in record.items() if name != PLACE}
+    station = Station(file.stem, file.size, lines=file.lines, calibration=calibration)
+    extras = Extras(lines=file.others, metadata={METADATA: info} if info else {})
+    view = View(file.stem, station, media=file.media, extras=extras)
+    match, folders = match_of(info), PurePosixPath(file.place).parts[:-1]
+    splits = (_split(folder) for folder in reversed(folders))
+    split = next((split for split in splits if split), "")
+    name = PurePosixPath(file.stem).name
+    label = f"{PurePosixPath(match).name} · frame {name}" if match else f"Frame {file.stem}"
+    return Group(file.stem, (view,), match=match, split=split, label=label)
+
+
+def _split(folder: str) -> str:
+    """The split that a folder says, or nothing."""
+    said = split_and_size(folder)
+    return said[0] if said else folder if folder in SPLITS else ""

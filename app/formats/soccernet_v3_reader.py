@@ -1,0 +1,246 @@
+"""SoccerNet-v3, read: ``<league>/<season>/<match>/{Labels-v3.json, Frames-v3.zip}``."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import PurePosixPath
+from typing import Any
+
+from app.errors import DatasetFormatError, UnsafePathError
+from app.formats.file_tree import DEFAULT_LIMITS, FileTree, Limits, Root, files_inside
+from app.formats.json_text import read_json
+from app.formats.match_frames import MatchFrames
+from app.formats.report import Report
+from app.formats.safe_path import check_name
+from app.formats.soccernet_record import GAME, IMAGE, REST, ImageRecord, record_from_json
+from app.formats.soccernet_v3 import (
+    IMAGE_LISTS,
+    IMAGE_NAME,
+    LABELS,
+    MATCH_DEPTH,
+    SPLITS,
+    group_label,
+)
+from app.formats.trees import opened_tree
+from app.plural import plural
+from app.soccer.group import Group, Station, View
+
+
+def read_soccernet_v3(
+    root: Root, report: Report, limits: Limits = DEFAULT_LIMITS
+) -> Iterator[Group]:
+    """The groups of every match below ``root``: each action with its linked replays.
+
+    A group's key is ``<league>/<season>/<match>/7.png``; its views are ``7.png`` (first) and its
+    replays. Frames are found in Frames-v3.zip or loose and read later where they are.
+
+    Args:
+        root: Dataset folder, or any folder in it down to one match; or a zip of such a tree.
+        report: Takes what had to be left out.
+        limits: Caps on what is read.
+    """
+    with opened_tree(root, report, limits) as tree:
+        if tree is None:
+            return
+        names = tree.names()
+        folders = [name[: -len(LABELS)] for name in names if PurePosixPath(name).name == LABELS]
+        if not folders:
+            report.note(str(root), None, None, f"holds no {LABELS}")
+        reader = MatchReader(tree, names, report, limits)
+        for folder in folders:
+            yield from reader.read_match(folder)
+
+
+class MatchReader:
+    """Reads match after match of one tree; ``file`` is the name of the labels in each."""
+
+    def __init__(
+        self,
+        tree: FileTree,
+        names: list[str],
+        report: Report,
+        limits: Limits,
+        file: str = LABELS,
+    ):
+        self.tree, self.names, self.report, self.limits = tree, names, report, limits
+        self.file = file
+        self.seen: dict[str, str] = {}
+
+    def read_match(self, folder: str) -> Iterator[Group]:
+        """The groups of the labels in one folder (``""``, or with a slash at its end)."""
+        path = self.tree.shown(folder + self.file)
+        try:
+            labels = self._labels(folder, path)
+            match = _match_key(self.tree.path, folder, labels.get(GAME))
+            if match in self.seen:
+                problem = f"is a second file of match {match}; {self.seen[match]} is used"
+                raise DatasetFormatError(path, None, None, problem)
+        except DatasetFormatError as error:
+            self.report.skip(error)
+            return
+        self.seen[match] = path
+        inside = files_inside(self.names, folder)
+        frames = MatchFrames(self.tree, folder, inside, self.report)
+        yield from _Match(match, labels, path, frames, self.report).groups()
+
+    def _labels(self, folder: str, path: str) -> dict[str, Any]:
+        content = self.tree.read_bytes(folder + self.file)
+        limit = self.limits.file_bytes
+        labels = read_json(content, path, double_encoded=True, max_bytes=limit, report=self.report)
+        if not isinstance(labels, dict):
+            raise DatasetFormatError(path, None, None, "is not an object")
+        return labels
+
+
+def _match_key(root: Root, folder: str, game: Any) -> str:
+    """``<league>/<season>/<match>`` from the folders, or as far as they go from the metadata."""
+    parts = PurePosixPath(folder).parts
+    if len(parts) >= MATCH_DEPTH:
+        return "/".join(parts[-MATCH_DEPTH:])
+    local = game.get("UrlLocal") if isinstance(game, dict) else None
+    if isinstance(local, str) and len(_parts(local)) == MATCH_DEPTH:
+        return "/".join(_parts(local))
+    whole = (*root.resolve().parts[1:], *parts) if root.is_dir() else parts
+    return "/".join(whole[-MATCH_DEPTH:]) or root.stem
+
+
+def _parts(local: str) -> tuple[str, ...]:
+    try:
+        return PurePosixPath(check_name(local.strip().strip("/"))).parts
+    except UnsafePathError:
+        return ()
+
+
+class _Match:
+    """One Labels-v3.json on its way to groups."""
+
+    def __init__(
+        self, key: str, labels: dict[str, Any], path: str, frames: MatchFrames, report: Report
+    ):
+        self.key, self.path, self.frames, self.report = key, path, frames, report
+        self.actions = self._images(labels, "actions")
+        self.replays = self._images(labels, "replays")
+        self.game = self._game(labels)
+        self.missing: list[str] = []
+
+    def _images(self, labels: dict[str, Any], name: str) -> dict[str, Any]:
+        """The records by image name; what is no such mapping is reported and empty."""
+        value = labels.get(name, {} if name == "replays" else None)
+        if not isinstance(value, dict):
+            self.note(None, name, "is missing or not an object")
+            return {}
+        sound = {}
+        for image, record in value.items():
+            if IMAGE_NAME.fullmatch(image):
+                sound[image] = record
+            else:
+                self.note(image[:80], None, "is not an image name such as 7.png or 7_1.png")
+        return sound
+
+    def _game(self, labels: dict[str, Any]) -> dict[str, Any]:
+        """What else the file says about the game; the lists are made anew when it is written."""
+        game = labels.get(GAME)
+        rest = {k: v for k, v in labels.items() if k not in (GAME, "actions", "replays")}
+        kept = (
+            {k: v for k, v in game.items() if k not in IMAGE_LISTS}
+            if isinstance(game, dict)
+            else {}
+        )
+        if game is not None and not isinstance(game, dict):
+            self.note(None, GAME, "is not an object")
+        return {GAME: kept} | ({REST: rest} if rest else {})
+
+    def note(self, record: str | None, where: str | None, problem: str) -> None:
+        self.report.note(self.path, record, where, problem)
+
+    def groups(self) -> Iterator[Group]:
+        links = self._links()
+        for action, record in self.actions.items():
+            self.report.read += 1
+            group = self._group(action, record, links[action])
+            if group is not None:
+                self.report.imported += 1
+                yield group
+        self._note_missing_frames()
+
+    def _links(self) -> dict[str, list[str]]:
+        """Replays of each action, in the file's order; each replay once."""
+        links: dict[str, list[str]] = {action: [] for action in self.actions}
+        owner: dict[str, str] = {}
+        for action, record in self.actions.items():
+            for replay in self._linked_replays(action, record):
+                if replay not in self.replays:
+                    self.note(action, "linked_replays", f"names {replay}, which is not there")
+                elif replay in owner:
+                    where = f"names {replay}, which already belongs to {owner[replay]}"
+                    self.note(action, "linked_replays", where)
+                else:
+                    owner[replay] = action
+                    links[action].append(replay)
+        for replay, record in self.replays.items():
+            if replay not in owner:
+                self._adopt(replay, record, links)
+        return links
+
+    def _linked_replays(self, action: str, record: Any) -> list[str]:
+        value = record.get("linked_replays") if isinstance(record, dict) else None
+        if value is None:
+            return []
+        names = [item for item in value if isinstance(item, str)] if isinstance(value, list) else []
+        if not isinstance(value, list) or len(names) < len(value):
+            self.note(action, "linked_replays", "is not a list of image names")
+        return [name[:80] for name in names]
+
+    def _adopt(self, replay: str, record: Any, links: dict[str, list[str]]) -> None:
+        """A replay that no action lists still says itself which action it shows."""
+        action = record.get("linked_action") if isinstance(record, dict) else None
+        if isinstance(action, str) and action in links:
+            links[action].append(replay)
+        elif isinstance(action, str):
+            self.note(replay, "linked_action", f"names {action[:80]}, which is not there")
+        else:
+            self.note(replay, "linked_action", "is missing, and no action links this replay")
+
+    def _group(self, action: str, value: Any, replays: list[str]) -> Group | None:
+        main = self._record(action, value)
+        if main is None:
+            return None
+        main.extras = replace(main.extras, metadata={**main.extras.metadata, **self.game})
+        others = [(replay, self._record(replay, self.replays[replay])) for replay in replays]
+        views = [self._view(action, main)]
+        views += [self._view(name, record) for name, record in others if record is not None]
+        metadata = main.extras.metadata[IMAGE]
+        return Group(
+            key=f"{self.key}/{action}",
+            views=tuple(views),
+            match=self.key,
+            split=_split(metadata.get("set")),
+            label=group_label(self.key, action, metadata),
+        )
+
+    def _record(self, image: str, value: Any) -> ImageRecord | None:
+        try:
+            return record_from_json(value, self.path, image, self.report)
+        except DatasetFormatError as error:
+            self.report.skip(error)
+            return None
+
+    def _view(self, image: str, record: ImageRecord) -> View:
+        station = Station(f"{self.key}/{image}", record.size, lines=record.lines)
+        media = self.frames.find(image)
+        if media is None:
+            self.report.counts["views without frame"] += 1
+            self.missing.append(image)
+        return View(image, station, record.balls, media, extras=record.extras)
+
+    def _note_missing_frames(self) -> None:
+        """One sentence a match; labels without any frames are a legitimate dataset."""
+        if self.missing and self.frames.some:
+            shown = ", ".join(self.missing[:5]) + (", ..." if len(self.missing) > 5 else "")
+            images = plural(len(self.missing), "image has", "images have")
+            self.note(None, None, f"{images} no frame: {shown}")
+
+
+def _split(value: Any) -> str:
+    return value if isinstance(value, str) and value in SPLITS else ""

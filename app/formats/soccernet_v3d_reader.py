@@ -1,0 +1,387 @@
+"""Reads SoccerNet-v3D: the table, and the labels that it points to."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import PurePosixPath
+from typing import Any
+
+from app.errors import DatasetFormatError, UnsafePathError
+from app.finite import quoted
+from app.formats import fields
+from app.formats.camera_json import camera_from_json
+from app.formats.csv_text import is_missing, numbers_in, read_rows
+from app.formats.file_tree import DEFAULT_LIMITS, FileTree, Limits, Root, files_inside
+from app.formats.json_text import parse_literal
+from app.formats.match_frames import MatchFrames
+from app.formats.report import Report
+from app.formats.safe_path import check_name
+from app.formats.soccernet_record import GAME, IMAGE
+from app.formats.soccernet_v3 import LABELS_3D as LABELS
+from app.formats.soccernet_v3 import SPLIT_FILES, TABLE, group_label
+from app.formats.soccernet_v3_reader import MatchReader
+from app.formats.trees import opened_tree
+from app.geometry.camera import Camera
+from app.plural import plural
+from app.soccer.annotation import BallAnnotation
+from app.soccer.frames import MAX_SIDE, Box, ImageSize
+from app.soccer.group import Group, Station, View
+
+REQUIRED = ("league", "season", "match", "main_action", "action", "replay", "img_w", "img_h")
+_TRUE, _FALSE = ("true", "1", "1.0"), ("false", "0", "0.0")
+_MAX_LINES = 1_000_000
+
+
+@dataclass(frozen=True)
+class TableRow:
+    """One view as the table has it.
+
+    Attributes:
+        match: ``<league>/<season>/<match>``.
+        action: Number of the action image.
+        replay: Number of the replay, or None for the action itself.
+        ball: The annotated box; None where the row has none.
+        camera: None where the row has none.
+        split: Empty where the row has none.
+    """
+
+    match: str
+    action: int
+    replay: int | None
+    size: ImageSize
+    ball: BallAnnotation | None
+    camera: Camera | None
+    split: str
+
+    @property
+    def image(self) -> str:
+        """Name of the view's image: ``7_1.png``."""
+        return f"{self.action}.png" if self.replay is None else f"{self.action}_{self.replay}.png"
+
+    @property
+    def main(self) -> str:
+        """Name of the action's image."""
+        return f"{self.action}.png"
+
+
+@dataclass(frozen=True)
+class SnTable:
+    """The rows of a table by match, action image and image; and the split lists.
+
+    ``folder`` is where the table lies in its tree, ``""`` or with a slash at its end.
+    """
+
+    folder: str
+    rows: Mapping[str, Mapping[str, Mapping[str, TableRow]]]
+    lists: Mapping[tuple[str, str], str]
+    asked: set[tuple[str, str]] = field(default_factory=set)
+    """Entries of the lists that some group has asked for."""
+
+    def split(self, match: str, main: str) -> str:
+        """Split of a group: as the lists have it, else as its rows do."""
+        folder, stem = PurePosixPath(match).name, PurePosixPath(main).stem
+        self.asked.add((folder, stem))
+        if (folder, stem) in self.lists:
+            return self.lists[folder, stem]
+        rows = self.rows.get(match, {}).get(main, {}).values()
+        return next((row.split for row in rows if row.split), "")
+
+    def unused(self) -> list[str]:
+        """Actions of the split lists that no group is; replays are listed with their action."""
+        known = {(match, stem.partition("_")[0]) for match, stem in self.asked}
+        entries = ((match, stem.partition("_")[0]) for match, stem in self.lists)
+        return [
+            f"{match}/{stem}"
+            for match, stem in dict.fromkeys(entries)
+            if (match, stem) not in known
+        ]
+
+
+def read_snv3d_table(tree: FileTree, names: list[str], report: Report, limits: Limits) -> SnTable:
+    """The table of a tree and its split lists; empty where there is none.
+
+    A row that is wrong is reported with its line and left out, an unreadable cell alone is.
+    """
+    tables = [name for name in names if PurePosixPath(name).name == TABLE]
+    if not tables:
+        return SnTable("", {}, {})
+    for name in tables[1:]:
+        report.note(tree.shown(name), None, None, f"is a second {TABLE}; {tables[0]} is used")
+    folder = tables[0][: -len(TABLE)]
+    rows: dict[str, dict[str, dict[str, TableRow]]] = {}
+    try:
+        _read_table(tree, tables[0], rows, report, limits)
+    except DatasetFormatError as error:
+        report.skip(error)
+    return SnTable(folder, rows, _read_lists(tree, names, folder, report))
+
+
+def _read_table(
+    tree: FileTree,
+    name: str,
+    rows: dict[str, dict[str, dict[str, TableRow]]],
+    report: Report,
+    limits: Limits,
+) -> None:
+    shown = tree.shown(name)
+    for line, cells in read_rows(tree.read_bytes(name), shown, REQUIRED, limits):
+        try:
+            row = _Cells(cells, shown, f"line {line}", report).row()
+        except DatasetFormatError as error:
+            report.skip(error)
+            continue
+        views = rows.setdefault(row.match, {}).setdefault(row.main, {})
+        if row.image in views:
+            report.note(shown, f"line {line}", None, f"is a second row of {row.image}")
+        views.setdefault(row.image, row)
+
+
+class _Cells:
+    """The cells of one row."""
+
+    def __init__(self, cells: Mapping[str, str], path: str, line: str, report: Report):
+        self._cells, self._path, self._line, self._report = cells, path, line, report
+
+    def row(self) -> TableRow:
+        """The row; raises DatasetFormatError where it does not say which image it is of."""
+        action, replay = self._whole("main_action"), None
+        if not self._flag("action"):
+            replay = self._whole("replay")
+        return TableRow(
+            match="/".join(map(self._folder, ("league", "season", "match"))),
+            action=action,
+            replay=replay,
+            size=ImageSize(self._side("img_w"), self._side("img_h")),
+            ball=self._ball(),
+            camera=self._camera(),
+            split=self._optional("set"),
+        )
+
+    def _optional(self, name: str) -> str:
+        text = self._cells.get(name)
+        return "" if text is None or is_missing(text) else text.strip()
+
+    def _error(self, name: str, problem: str) -> DatasetFormatError:
+        return DatasetFormatError(self._path, self._line, name, problem)
+
+    def _folder(self, name: str) -> str:
+        text = self._cells.get(name, "")
+        try:
+            if "/" in check_name(text) or text.strip() in ("", "."):
+                raise self._error(name, "is not the name of a folder")
+        except UnsafePathError as error:
+            raise self._error(name, error.message) from error
+        return text
+
+    def _whole(self, name: str) -> int:
+        try:
+            number = fields.whole(self._cells.get(name, ""))
+        except ValueError as error:
+            raise self._error(name, str(error)) from error
+        if number < 0:
+            raise self._error(name, "is negative")
+        return number
+
+    def _side(self, name: str) -> int:
+        side = self._whole(name)
+        if not 2 <= side <= MAX_SIDE:
+            raise self._error(name, f"is {side} pixels")
+        return side
+
+    def _flag(self, name: str) -> bool:
+        text = self._cells.get(name, "").strip().lower()
+        if text not in (*_TRUE, *_FALSE):
+            raise self._error(name, f"is {quoted(text, 20)}, neither True nor False")
+        return text in _TRUE
+
+    def _ball(self) -> BallAnnotation | None:
+        text = self._optional("ball_bbox")
+        if not text:
+            return None
+        try:
+            x, y, width, height = map(fields.pixel, numbers_in(text, 4))
+            if width <= 0 or height <= 0:
+                raise ValueError("is a box without area")
+        except ValueError as error:
+            self._report.skip(self._error("ball_bbox", f"{error}; left out"))
+            return None
+        return BallAnnotation(box=Box(x, y, width, height))
+
+    def _camera(self) -> Camera | None:
+        text = self._optional("calibration")
+        if not text:
+            return None
+        try:
+            value = parse_literal(text, self._path, self._line)
+            return camera_from_json(value, self._path, self._line)
+        except DatasetFormatError as error:
+            where = f"calibration, {error.field}" if error.field else "calibration"
+            self._report.skip(self._error(where, f"{error.problem}; left out"))
+            return None
+
+
+def _read_lists(
+    tree: FileTree, names: list[str], folder: str, report: Report
+) -> dict[tuple[str, str], str]:
+    """Split by (match folder, stem of the image)."""
+    found: dict[tuple[str, str], str] = {}
+    for split, name in SPLIT_FILES.items():
+        if folder + name in names:
+            try:
+                _read_list(tree, folder + name, split, found, report)
+            except DatasetFormatError as error:
+                report.skip(error)
+    return found
+
+
+def _read_list(
+    tree: FileTree,
+    name: str,
+    split: str,
+    found: dict[tuple[str, str], str],
+    report: Report,
+) -> None:
+    shown = tree.shown(name)
+    lines = tree.read_bytes(name).decode("utf-8-sig", "replace").splitlines()[:_MAX_LINES]
+    for number, line in enumerate(lines, 1):
+        match, slash, stem = line.strip().rpartition("/")
+        if not line.strip():
+            continue
+        if not slash:
+            report.note(shown, f"line {number}", None, "is not <match>/<action>[_<replay>]")
+        elif found.setdefault((PurePosixPath(match).name, stem), split) != split:
+            report.note(shown, f"line {number}", None, "is in another split already")
+
+
+COMPUTED = (
+    "calibration",
+    "JaC",
+    "calibrated_replays",
+    "ball_3D",
+    "rep_error",
+    "optimized_error",
+    "optimized_d",
+    "verdict",
+)
+"""What Labels-v3D.json adds to an image's metadata; it is computed and never goes stale here."""
+
+
+def read_soccernet_v3d(
+    root: Root,
+    report: Report,
+    *,
+    calibration: str = "given",
+    limits: Limits = DEFAULT_LIMITS,
+) -> Iterator[Group]:
+    """The groups of every match below ``root``, with the released cameras as given ones.
+
+    Args:
+        root: Dataset folder, or any folder in it down to one match; or a zip of such a tree.
+        report: Takes what had to be left out.
+        calibration: What counts for a view that has a camera and lines.
+        limits: Caps on what is read.
+    """
+    with opened_tree(root, report, limits) as tree:
+        if tree is None:
+            return
+        names = tree.names()
+        table = read_snv3d_table(tree, names, report, limits)
+        folders = [name[: -len(LABELS)] for name in names if PurePosixPath(name).name == LABELS]
+        if not folders and not table.rows:
+            report.note(str(root), None, None, f"holds neither {LABELS} nor {TABLE}")
+        reader = _Reader(table, calibration, report)
+        matches = MatchReader(tree, names, report, limits, LABELS)
+        for folder in folders:
+            for group in matches.read_match(folder):
+                yield reader.labelled(group, tree.shown(folder + LABELS))
+        yield from reader.tabled(tree, names, limits)
+        if unused := table.unused():
+            count = plural(len(unused), "action")
+            shown = ", ".join(unused[:5]) + (", ..." if len(unused) > 5 else "")
+            report.remark(f"{count} of the split lists did not come: {shown}")
+
+
+class _Reader:
+    """Brings labels and table together."""
+
+    def __init__(self, table: SnTable, calibration: str, report: Report):
+        self._table, self._calibration, self._report = table, calibration, report
+        self._seen: set[tuple[str, str]] = set()
+
+    def labelled(self, group: Group, path: str) -> Group:
+        """A group of Labels-v3D.json with its cameras, and what the table knows of it."""
+        main = group.views[0].key
+        self._seen.add((group.match, main))
+        rows = self._table.rows.get(group.match, {}).get(main, {})
+        for image in rows.keys() - {view.key for view in group.views}:
+            self._report.note(path, image, None, f"is in {TABLE} and not here")
+        views = tuple(self._view(view, rows.get(view.key), path) for view in group.views)
+        split = self._table.split(group.match, main) or group.split
+        return replace(group, views=views, split=split)
+
+    def _view(self, view: View, row: TableRow | None, path: str) -> View:
+        metadata = dict(view.extras.metadata)
+        image = metadata[IMAGE]
+        metadata[IMAGE] = {name: item for name, item in image.items() if name not in COMPUTED}
+        if GAME in metadata:
+            kept = {k: v for k, v in metadata[GAME].items() if k != "reconstructions"}
+            metadata[GAME] = kept
+        given = self._camera(image, view.key, path) or (row.camera if row else None)
+        station = replace(view.station, given=given, calibration=self._calibration)
+        balls = view.balls
+        # The labels may hold the optimised box; the table always has the annotated one.
+        if row is not None and row.ball is not None and len(balls) <= 1:
+            occluded = bool(balls) and balls[0].occluded
+            balls = (replace(row.ball, occluded=occluded),)
+        extras = replace(view.extras, metadata=metadata)
+        return replace(view, station=station, balls=balls, extras=extras)
+
+    def _camera(self, image: Mapping[str, Any], record: str, path: str) -> Any:
+        if image.get("calibration") is None:
+            return None
+        try:
+            return camera_from_json(image["calibration"], path, record)
+        except DatasetFormatError as error:
+            where = f"calibration, {error.field}" if error.field else "calibration"
+            self._report.note(path, record, where, f"{error.problem}; left out")
+            return None
+
+    def tabled(self, tree: FileTree, names: list[str], limits: Limits) -> Iterator[Group]:
+        """The groups that stand in the table alone: balls and cameras, no lines."""
+        for match, actions in self._table.rows.items():
+            new = [main for main in actions if (match, main) not in self._seen]
+            if not new:
+                continue
+            folder = f"{self._table.folder}{match}/"
+            inside = files_inside(names, folder)
+            frames = MatchFrames(tree, folder, inside, self._report)
+            for main in new:
+                self._report.read += 1
+                group = self._group(match, main, actions[main], frames)
+                if group is not None:
+                    self._report.imported += 1
+                    yield group
+
+    def _group(
+        self, match: str, main: str, rows: Mapping[str, TableRow], frames: MatchFrames
+    ) -> Group | None:
+        if main not in rows:
+            problem = "has replays and no row of its own"
+            self._report.note(f"{self._table.folder}{TABLE}", f"{match}/{main}", None, problem)
+            return None
+        ordered = sorted(rows.values(), key=lambda row: -1 if row.replay is None else row.replay)
+        views = []
+        for row in ordered:
+            station = Station(
+                f"{match}/{row.image}", row.size, given=row.camera, calibration=self._calibration
+            )
+            balls = (row.ball,) if row.ball else ()
+            views.append(View(row.image, station, balls, frames.find(row.image)))
+        return Group(
+            key=f"{match}/{main}",
+            views=tuple(views),
+            match=match,
+            split=self._table.split(match, main),
+            label=group_label(match, main, {}),
+        )

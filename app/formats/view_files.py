@@ -1,0 +1,125 @@
+"""View files: those of single views of an export, kept together on their way into a zip.
+
+To make a file, and to open it twice more for its checksum and for the zip, takes longer than all
+else that an export does for a view.
+"""
+
+from __future__ import annotations
+
+import sqlite3
+from collections.abc import Callable, Iterator
+from contextlib import closing
+from heapq import merge
+from pathlib import Path, PurePosixPath
+from typing import Any, TypeAlias
+
+from app.formats.safe_path import check_name, resolve_inside
+from app.formats.spill import disk_errors
+
+PutText = Callable[[str, str], None]
+"""Takes a relative path, and the text of the file there."""
+HELD = ".view-files"
+"""Where they wait, in the folder in which an export is gathered."""
+_BATCH = 1000
+Gathered: TypeAlias = tuple[str, Path | bytes]
+"""A file's relative path; where it lies, or its content."""
+
+
+def put_on_disk(root: Path) -> PutText:
+    """Writes each file at once below a folder.
+
+    Raises (the result):
+        UnsafePathError: A path would leave the folder.
+    """
+
+    def put(path: str, text: str) -> None:
+        write_below(root, path, text)
+
+    return put
+
+
+def write_below(root: Path, path: str, text: str) -> Path:
+    """Write a file below a folder, and the folders that it lies in; its path.
+
+    Raises:
+        UnsafePathError: The path would leave the folder.
+    """
+    target = resolve_inside(root, path)
+    target.parent.mkdir(parents=True, exist_ok=True)
+    target.write_text(text, encoding="utf-8")
+    return target
+
+
+class ViewFiles:
+    """Files of a zip, in a database beside its other files; use as a context.
+
+    A file that is put again is the newer one, as on a disk.
+    """
+
+    def __init__(self, root: Path):
+        self._waiting: list[tuple[str, bytes]] = []
+        with disk_errors():
+            self._connection = sqlite3.connect(root / HELD, isolation_level=None)
+            # Nothing in it outlives the export, so nothing needs to survive a power cut.
+            self._connection.execute("PRAGMA journal_mode = OFF")
+            self._connection.execute("PRAGMA synchronous = OFF")
+            self._connection.execute("CREATE TABLE file (path TEXT PRIMARY KEY, body BLOB)")
+            self._connection.execute("BEGIN")
+
+    def __enter__(self) -> ViewFiles:
+        return self
+
+    def __exit__(self, kind: object, *_: object) -> None:
+        with closing(self._connection):
+            if kind is None:
+                self._flush()
+                with disk_errors():
+                    self._connection.execute("COMMIT")
+
+    def put(self, path: str, text: str) -> None:
+        """Keep a file.
+
+        Raises:
+            OSError: The disk refuses, also where the context ends.
+            UnsafePathError: The path would leave a folder.
+        """
+        self._waiting.append((str(PurePosixPath(check_name(path))), text.encode()))
+        if len(self._waiting) >= _BATCH:
+            self._flush()
+
+    def _flush(self) -> None:
+        with disk_errors():
+            self._connection.executemany("INSERT OR REPLACE INTO file VALUES (?, ?)", self._waiting)
+        self._waiting.clear()
+
+
+class GatheredFiles:
+    """All files below a folder, those that wait among them, in the order of their paths.
+
+    Raises (each method):
+        OSError: The disk refuses.
+    """
+
+    def __init__(self, root: Path):
+        self._held = root / HELD
+        paths = (path for path in root.rglob("*") if path != self._held and path.is_file())
+        names: dict[str, Path | bytes] = {path.relative_to(root).as_posix(): path for path in paths}
+        self._on_disk = sorted(names.items(), key=_name)
+
+    def __len__(self) -> int:
+        waiting = self._ask("SELECT count(*) FROM file")
+        count: int = sum(number for (number,) in waiting)
+        return len(self._on_disk) + count
+
+    def __iter__(self) -> Iterator[Gathered]:
+        waiting = self._ask("SELECT path, body FROM file ORDER BY path")
+        return merge(self._on_disk, waiting, key=_name)
+
+    def _ask(self, question: str) -> Iterator[Any]:
+        if self._held.exists():
+            with disk_errors(), closing(sqlite3.connect(self._held)) as connection:
+                yield from connection.execute(question)
+
+
+def _name(item: Gathered) -> str:
+    return item[0]

@@ -1,0 +1,334 @@
+"""What was said of one view as plain JSON values, for formats that have room for all of it.
+
+COCO images carry it under ``touchline``, Parquet in columns: so an export can be read again and
+gives the same group.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from app.errors import DatasetFormatError, InputError, UnknownMarkingError, UnsafePathError
+from app.formats import fields
+from app.formats.camera_json import camera_from_json, camera_to_json
+from app.formats.safe_path import check_name
+from app.formats.soccernet_record import BALLS, GAME, IMAGE, RECORD, REST
+from app.geometry.camera import camera_covariance
+from app.soccer.annotation import BallAnnotation, Extras, Lines, make_lines
+from app.soccer.frames import MAX_SIDE, Box, ImagePoint, ImageSize
+from app.soccer.group import CALIBRATIONS, Group, Station, View
+from app.soccer.picture import PictureGeometry
+from app.soccer.pitch import Pitch, canonical_marking
+from app.soccer.reasons import LeftOut, left_out
+
+MAX_TEXT = 1000
+"""Longest key or label, characters."""
+_SHAPES: Mapping[str, type] = {IMAGE: dict, RECORD: dict, GAME: dict, REST: dict, BALLS: list}
+"""Of what ``Extras.metadata`` holds under names of ours."""
+
+
+@dataclass(frozen=True)
+class GroupHead:
+    """What a view says about its group; views of one key make one group."""
+
+    key: str
+    match: str
+    split: str
+    label: str
+    pitch: Pitch
+    views: int = 0
+    """How many views the group has; 0 where that is not known."""
+
+    def group(self, views: tuple[View, ...]) -> Group:
+        """The group of that head."""
+        return Group(self.key, views, self.match, self.pitch, self.split, self.label)
+
+
+def head_to_json(group: Group) -> dict[str, Any]:
+    """What a group is without its views."""
+    return {
+        "group": group.key,
+        "match": group.match,
+        "split": group.split,
+        "label": group.label,
+        "pitch": [float(group.pitch.length), float(group.pitch.width)],
+        "views": len(group.views),
+    }
+
+
+def view_to_json(view: View) -> dict[str, Any]:
+    """Everything that was said of a view but its size, its media and its extras."""
+    station, given, why = view.station, view.station.given, view.left_out
+    covariance = station.given_covariance
+    return {
+        "view": view.key,
+        "included": view.included,
+        **({} if why is None else {"left_out": {"reason": why.reason, "note": why.note}}),
+        "station": station.key,
+        "shared": station.shared,
+        "flipped": station.flipped,
+        "calibration": station.calibration,
+        "given": None if given is None else camera_to_json(given),
+        **({} if covariance is None else {"given_covariance": [*map(float, covariance)]}),
+        **({} if station.picture is None else {"picture": picture_to_json(station.picture)}),
+        "lines": lines_to_json(station.said_lines),
+        **({"proposed": [*station.proposed]} if station.proposed else {}),
+        "balls": [ball_to_json(ball) for ball in view.balls],
+    }
+
+
+def picture_to_json(picture: PictureGeometry) -> dict[str, Any]:
+    """``{"aspect": a, "shift": [right, down], "sigma": [aspect, right, down]}``."""
+    return {
+        "aspect": float(picture.aspect),
+        "shift": [*map(float, picture.shift)],
+        "sigma": [*map(float, picture.sigma)],
+    }
+
+
+def lines_to_json(lines: Lines) -> dict[str, Any]:
+    """``{marking: [[x, y], ...]}``, pixels; no points where it is said not to be visible."""
+    return {marking: [[float(x), float(y)] for x, y in points] for marking, points in lines.items()}
+
+
+def ball_to_json(ball: BallAnnotation) -> dict[str, Any]:
+    """``{"box": [x, y, w, h] | null, "point": [x, y] | null, ...}``, pixels."""
+    box = ball.box
+    return {
+        "box": None if box is None else [*map(float, (box.x, box.y, box.width, box.height))],
+        "point": None if ball.point is None else [*map(float, ball.point)],
+        "occluded": ball.occluded,
+        "out_of_view": ball.out_of_view,
+        **({"predicted_by": ball.predicted_by} if ball.predicted_by else {}),
+        **({"inferred": True} if ball.inferred else {}),
+    }
+
+
+class StateReader:
+    """Reads one record's values; whatever is wrong is an error with file, record and field."""
+
+    def __init__(self, value: Any, path: str, record: str):
+        self.path, self.record = path, record
+        self.value: Mapping[str, Any] = value if isinstance(value, dict) else {}
+        if not isinstance(value, dict):
+            raise self.error(None, "is not an object")
+
+    def error(self, field: str | None, problem: str) -> DatasetFormatError:
+        """What is wrong with a field."""
+        return DatasetFormatError(self.path, self.record, field, problem)
+
+    def text(self, name: str, default: str | None = None) -> str:
+        """A short text; ``default`` where there is none."""
+        found = self.value.get(name, default)
+        if found is None and default is not None:
+            return default
+        if not isinstance(found, str) or len(found) > MAX_TEXT:
+            raise self.error(
+                name, "is no text, or too long" if name in self.value else "is missing"
+            )
+        return found
+
+    def key(self, name: str) -> str:
+        """A text that may become part of a path."""
+        found = self.text(name)
+        try:
+            return check_name(found)
+        except UnsafePathError as error:
+            raise self.error(name, error.message) from error
+
+    def flag(self, name: str, default: bool) -> bool:
+        """True or false."""
+        found = self.value.get(name)
+        return found if isinstance(found, bool) else default
+
+    def size(self) -> ImageSize:
+        """``width`` and ``height``."""
+        sides = []
+        for name in ("width", "height"):
+            try:
+                side = fields.whole(self.value.get(name))
+            except ValueError as error:
+                raise self.error(name, str(error)) from error
+            if not 2 <= side <= MAX_SIDE:
+                raise self.error(name, f"is {side} pixels")
+            sides.append(side)
+        return ImageSize(*sides)
+
+    def head(self) -> GroupHead:
+        """Back from ``head_to_json``."""
+        try:
+            length, width = fields.numbers(self.value.get("pitch") or [105.0, 68.0], 2)
+            pitch = Pitch(length, width)
+        except (ValueError, InputError) as error:
+            raise self.error("pitch", str(error)) from error
+        match = self.text("match", "")
+        return GroupHead(
+            self.key("group"),
+            self.key("match") if match else "",
+            self.text("split", ""),
+            self.text("label", ""),
+            pitch,
+            self.count("views"),
+        )
+
+    def count(self, name: str) -> int:
+        """A whole number from 0; 0 where there is none."""
+        try:
+            return max(fields.whole(self.value.get(name) or 0), 0)
+        except ValueError as error:
+            raise self.error(name, str(error)) from error
+
+    def view(self, size: ImageSize, extras: Extras) -> View:
+        """Back from ``view_to_json``."""
+        key = self.key("view")
+        calibration = self.text("calibration", "given")
+        if calibration not in CALIBRATIONS:
+            raise self.error("calibration", f"is none of {' and '.join(CALIBRATIONS)}")
+        given, (lines, not_visible) = self.value.get("given"), self.lines()
+        station = Station(
+            key=self.key("station"),
+            size=size,
+            shared=self.flag("shared", False),
+            lines=lines,
+            calibration=calibration,
+            flipped=self.flag("flipped", False),
+            picture=self.picture(),
+            proposed=self.proposed(lines),
+            not_visible=not_visible,
+        )
+        camera = None if given is None else camera_from_json(given, self.path, self.record)
+        try:
+            station = station.with_given(camera, self.covariance())
+        except InputError as error:
+            raise self.error("given_covariance", error.message) from error
+        included = self.flag("included", True)
+        why = None if included else self.left_out()
+        return View(key, station, self.balls(), None, included, extras, why)
+
+    def covariance(self) -> tuple[float, ...] | None:
+        """What is known of the given camera, 64 numbers row by row; None where nothing is."""
+        found = self.value.get("given_covariance")
+        if found is None:
+            return None
+        try:
+            if self.value.get("given") is None:
+                raise ValueError("has no given camera")
+            return camera_covariance(fields.numbers(found, 64))
+        except ValueError as error:
+            raise self.error("given_covariance", str(error)) from error
+
+    def picture(self) -> PictureGeometry | None:
+        """What was done to the picture since it was taken; None where nothing was."""
+        found = self.value.get("picture")
+        if found is None:
+            return None
+        try:
+            value = fields.mapping(found)
+            aspect = fields.numbers([value.get("aspect")], 1)[0]
+            right, down = fields.numbers(value.get("shift"), 2)
+            sigma = fields.numbers(value.get("sigma"), 3)
+            return PictureGeometry(aspect, (right, down), (sigma[0], sigma[1], sigma[2]))
+        except (ValueError, InputError) as error:
+            raise self.error("picture", str(error)) from error
+
+    def left_out(self) -> LeftOut | None:
+        """Why a view was left out: ``{"reason": ..., "note": ...}``; None where nobody said."""
+        found = self.value.get("left_out")
+        if found is None:
+            return None
+        try:
+            value = fields.mapping(found)
+            reason, note = value.get("reason"), value.get("note")
+            if not isinstance(reason, str) or not isinstance(note, str | None):
+                raise ValueError("needs a reason, and a note that is a text or null")
+            return left_out(reason, note)
+        except (ValueError, InputError) as error:
+            raise self.error("left_out", str(error)) from error
+
+    def lines(self) -> tuple[Lines, tuple[str, ...]]:
+        """Back from ``lines_to_json``: the lines, and what is said not to be visible."""
+        lines = {}
+        try:
+            for name, points in fields.mapping(self.value.get("lines") or {}).items():
+                lines[canonical_marking(name)] = [self._point(p) for p in fields.sequence(points)]
+        except UnknownMarkingError as error:
+            raise self.error("lines", error.message) from error
+        except ValueError as error:
+            raise self.error("lines", str(error)) from error
+        return make_lines(lines), tuple(sorted(name for name in lines if not lines[name]))
+
+    def proposed(self, lines: Lines) -> tuple[str, ...]:
+        """Names of the lines that were accepted as they were proposed."""
+        try:
+            found = set(fields.sequence(self.value.get("proposed") or []))
+        except (TypeError, ValueError) as error:
+            raise self.error("proposed", "is no list of markings") from error
+        return tuple(name for name in lines if name in found)
+
+    def balls(self) -> tuple[BallAnnotation, ...]:
+        """Back from ``ball_to_json``."""
+        try:
+            values = fields.sequence(self.value.get("balls") or [])
+            return tuple(self._ball(fields.mapping(item)) for item in values)
+        except ValueError as error:
+            raise self.error("balls", str(error)) from error
+
+    def _ball(self, value: Mapping[str, Any]) -> BallAnnotation:
+        box, point = value.get("box"), value.get("point")
+        out_of_view = value.get("out_of_view") is True
+        if (box is None) == (point is None) and not out_of_view:
+            raise ValueError("has a ball with both a box and a point, or with neither")
+        return BallAnnotation(
+            box=None if box is None else self.box(box),
+            point=None if point is None else self._point(point),
+            occluded=value.get("occluded") is True,
+            out_of_view=out_of_view,
+            predicted_by=str(value.get("predicted_by") or ""),
+            inferred=value.get("inferred") is True,
+        )
+
+    @staticmethod
+    def box(value: Any) -> Box:
+        """``[x, y, w, h]``, pixels.
+
+        Raises:
+            ValueError: Anything else, or a box without area.
+        """
+        x, y, width, height = (fields.pixel(item) for item in fields.numbers(value, 4))
+        if width <= 0 or height <= 0:
+            raise ValueError("has a box without area")
+        return Box(x, y, width, height)
+
+    @staticmethod
+    def _point(value: Any) -> ImagePoint:
+        x, y = (fields.pixel(item) for item in fields.numbers(value, 2))
+        return ImagePoint(x, y)
+
+
+def extras_from_json(value: Any) -> Extras:
+    """Back from ``Extras.values``; what is none of it is left out."""
+    if not isinstance(value, dict):
+        return Extras()
+    boxes, lines = (
+        tuple(item for item in _listed(value.get(name)) if isinstance(item, dict))
+        for name in ("boxes", "lines")
+    )
+    return Extras(boxes, lines, _metadata(value.get("metadata")))
+
+
+def _metadata(value: Any) -> dict[str, Any]:
+    """What a source said of an image; what has a name of ours and another shape is left out."""
+    if not isinstance(value, dict):
+        return {}
+    fit: dict[str, Any] = {
+        name: item for name, item in value.items() if isinstance(item, _SHAPES.get(name, object))
+    }
+    if BALLS in fit:
+        fit[BALLS] = [item if isinstance(item, dict) else {} for item in fit[BALLS]]
+    return fit
+
+
+def _listed(value: Any) -> list[Any]:
+    return value if isinstance(value, list) else []

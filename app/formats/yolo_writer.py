@@ -1,0 +1,248 @@
+"""Writes YOLO: labels, lists of pictures, and the file that names them."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import ExitStack
+from pathlib import Path, PurePosixPath
+from typing import IO, Any
+
+from app.finite import json_text
+from app.formats.corner_origin import box_to_corner
+from app.formats.csv_text import CsvTable
+from app.formats.export_record import ExportRecord, chosen_box
+from app.formats.frame_names import flat_frame, likely_suffix, split_folder
+from app.formats.view_files import PutText, put_on_disk
+from app.plural import plural
+from app.soccer.frames import Box, ImageSize
+from app.soccer.group import View
+
+LISTS = ("train", "val", "test")
+HELD_OUT = 10
+"""Where no split validates, one in so many training images does."""
+ENOUGH_MATCHES = 5
+"""From so many on, whole matches are held out."""
+_PART = "train.part"
+
+
+class ImageLists:
+    """Writes the lists image by image.
+
+    The lists name images, wherever they lie: what is held out stays in ``images/train``.
+
+    Attributes:
+        used: Lists that have an image, once all is written.
+        sentence: What validates, in words, once all is written.
+    """
+
+    def __init__(self, root: Path):
+        self.used: set[str] = set()
+        self.sentence = ""
+        self._root = root
+        self._matches: Counter[str] = Counter()
+        self._groups = 0
+        self._newest: tuple[str, str] | None = None
+
+    def __enter__(self) -> ImageLists:
+        with ExitStack() as stack:
+            self._others = {
+                name: stack.enter_context(_create(self._root / f"{name}.txt")) for name in LISTS[1:]
+            }
+            self._waiting = stack.enter_context(_create(self._root / _PART))
+            self._stack = stack.pop_all()
+        return self
+
+    def __exit__(self, kind: object, *_: object) -> None:
+        self._stack.close()
+        if kind is None:
+            self._finish()
+
+    def add(self, split: str, match: str, group: str, image: str) -> None:
+        """One image of one of ``LISTS``."""
+        self.used.add(split)
+        if split != "train":
+            self._others[split].write(f"./{image}\n")
+            return
+        if (match, group) != self._newest:
+            self._newest, self._groups = (match, group), self._groups + 1
+        self._matches[match] += 1
+        # Which of them train is known once all have been seen.
+        self._waiting.write(json_text([match, self._groups, image]) + "\n")
+
+    def _finish(self) -> None:
+        held_out = self._held_out()
+        part = self._root / _PART
+        with (
+            part.open(encoding="utf-8") as waiting,
+            _create(self._root / "train.txt") as train,
+            (self._root / "val.txt").open("a", encoding="utf-8", newline="\n") as val,
+        ):
+            for match, group, image in _rows(waiting):
+                (val if held_out(match, group) else train).write(f"./{image}\n")
+        part.unlink()
+        for name in set(LISTS) - self.used - {"train"}:
+            (self._root / f"{name}.txt").unlink()
+
+    def _held_out(self) -> Callable[[str, int], bool]:
+        """Which training images validate, by their match and the number of their group."""
+        if "val" in self.used:
+            self.sentence = "val.txt holds the validation split."
+            return lambda match, group: False
+        if self._groups < 2:
+            self.sentence = "Too few groups train to hold any out: they validate themselves."
+            return lambda match, group: False
+        self.used.add("val")
+        if len(self._matches) >= ENOUGH_MATCHES:
+            self.sentence = (
+                "No split validates: val.txt holds whole matches that were meant for training."
+            )
+            chosen = _some_matches(self._matches)
+            return lambda match, group: match in chosen
+        # Neighbours in time look alike: one piece at the end is better than every tenth group.
+        last = self._groups - max(round(self._groups / HELD_OUT), 1)
+        self.sentence = (
+            "No split validates: val.txt holds the last groups that were meant for training, "
+            "of matches that train, too."
+        )
+        return lambda match, group: group > last
+
+
+def _some_matches(images: Counter[str]) -> set[str]:
+    """About one in ``HELD_OUT`` images by whole matches: the same ones for the same matches."""
+    chosen: set[str] = set()
+    count = 0
+    for match in sorted(images, key=lambda name: hashlib.sha256(name.encode()).digest()):
+        chosen.add(match)
+        count += images[match]
+        if count * HELD_OUT >= images.total():
+            break
+    return chosen
+
+
+def _create(path: Path) -> IO[str]:
+    return path.open("w", encoding="utf-8", newline="\n")
+
+
+def _rows(file: IO[str]) -> Iterator[tuple[str, int, str]]:
+    for line in file:
+        match, group, image = json.loads(line)
+        yield match, group, image
+
+
+TABLE = "frames.csv"
+_COLUMNS = ("image", "present", "group", "view", "split", "width", "height", "verdict")
+# Without a path the lists lie beside this file, wherever that is.
+_DATA = """# Ball boxes, one class. {missing}
+# {validation}
+train: train.txt
+val: {val}
+{test}nc: 1
+names:
+  0: ball
+"""
+
+
+def write_yolo(
+    root: Path,
+    records: Iterable[ExportRecord],
+    put: PutText | None = None,
+    *,
+    boxes: str = "optimized",
+) -> dict[str, int]:
+    """Write labels, lists and ``data.yaml`` below an existing folder.
+
+    Every view has a label file; one without a ball box is empty, which says "no ball here".
+    Boxes are clipped at the image border. Where no split validates, some of what trains is held
+    out; what tests never validates. ``frames.csv`` says which image is which view, and
+    whether it is there: a frame that was not copied must be put under its name before training.
+
+    Args:
+        root: Existing folder.
+        records: Groups; one is in memory at a time.
+        put: Takes the label files; below ``root`` by default.
+        boxes: One of ``BOX_KINDS``.
+
+    Returns:
+        Counts: ``groups``, ``labels`` (files), ``boxes`` (files with one), ``balls`` (views in
+        which the 3D ball holds), ``images``, ``images_missing``.
+    """
+    names = ("groups", "labels", "boxes", "balls", "images", "images_missing")
+    counts = dict.fromkeys(names, 0)
+    put = put or put_on_disk(root)
+    with ExitStack() as stack:
+        lists = stack.enter_context(ImageLists(root))
+        file = stack.enter_context((root / TABLE).open("w", encoding="utf-8", newline=""))
+        table = CsvTable(file, _COLUMNS)
+        for record in records:
+            counts["groups"] += 1
+            for view in record.group.views:
+                image = _add(put, record, view, table, boxes, counts)
+                split, group = split_folder(record.split(view)), record.group
+                lists.add(split, group.match, group.key, image)
+    _write_data(root, lists, counts)
+    return counts
+
+
+def _add(
+    put: PutText,
+    record: ExportRecord,
+    view: View,
+    table: CsvTable,
+    boxes: str,
+    counts: dict[str, int],
+) -> str:
+    """Write the label file of a view; returns the name of its image."""
+    group, present, split = record.group, view.key in record.frames, record.split(view)
+    image = record.frames.get(view.key) or flat_frame(group, view, split, likely_suffix(view))
+    label = PurePosixPath("labels", *PurePosixPath(image).parts[1:]).with_suffix(".txt")
+    box = chosen_box(record, view, boxes) if view.ball else None
+    line = None if box is None else label_line(box_to_corner(box), view.size)
+    put(str(label), "" if line is None else f"{line}\n")
+    cells: tuple[Any, ...] = (image, present, group.key, view.key, split)
+    table.add((*cells, view.size.width, view.size.height, record.verdict_text))
+    counts["labels"] += 1
+    counts["boxes"] += line is not None
+    counts["balls"] += record.has_ball_3d(view)
+    counts["images" if present else "images_missing"] += 1
+    return image
+
+
+def label_line(box: Box, size: ImageSize) -> str | None:
+    """``0 cx cy w h`` in parts of the image; None where the box lies outside.
+
+    Args:
+        box: Measured from the corner of the first pixel, as this format does.
+        size: Of the image.
+
+    Example:
+        >>> label_line(Box(192.0, 54.0, 96.0, 54.0), ImageSize(960, 540))
+        '0 0.25 0.15 0.1 0.1'
+    """
+    left, right = max(box.x, 0.0), min(box.x + box.width, float(size.width))
+    top, bottom = max(box.y, 0.0), min(box.y + box.height, float(size.height))
+    if not all(map(math.isfinite, (left, right, top, bottom))) or right <= left or bottom <= top:
+        return None
+    numbers = (
+        (left + right) / 2 / size.width,
+        (top + bottom) / 2 / size.height,
+        (right - left) / size.width,
+        (bottom - top) / size.height,
+    )
+    return "0 " + " ".join(f"{number:.9g}" for number in numbers)
+
+
+def _write_data(root: Path, lists: ImageLists, counts: dict[str, int]) -> None:
+    missing = counts["images_missing"]
+    sentence = (
+        f"{plural(missing, 'image is', 'images are')} not in this export: put each where {TABLE} names it."
+        if missing
+        else "All images are in this export."
+    )
+    val = "val.txt" if "val" in lists.used else "train.txt"
+    test = "test: test.txt\n" if "test" in lists.used else ""
+    text = _DATA.format(missing=sentence, validation=lists.sentence, val=val, test=test)
+    (root / "data.yaml").write_text(text, encoding="utf-8")

@@ -1,0 +1,247 @@
+"""Request bodies: JSON alone, capped while they arrive, and plain enough for every reader."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections import Counter
+from collections.abc import Iterable
+from typing import Any, NoReturn
+
+import numpy as np
+from starlette.datastructures import Headers
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from app.finite import quoted
+from app.http.origin import SAFE_METHODS
+from app.http.problem import make_problem, problem_response
+
+MAX_JSON_BYTES = 512 * 1024
+"""A group with every line of six views is below 50 kB; what is longer is refused before it is read."""
+BYTES = "application/octet-stream"
+"""What upload routes take, and nothing else does."""
+MAX_DEPTH = 16
+MAX_CONTAINERS = 5_000
+"""Lists and objects of one body: a request may bring 2,000 points, and each is an object. Ten times as
+many were read for a second, in which nobody else was answered."""
+MAX_VALUES = 10_000
+"""Values of one body, by its commas: 2,000 points are 4,000. Each one that is wrong costs as much as ten
+that are right, and whoever asks for that is answered before anybody is known by name."""
+MAX_NAMES = 200
+"""Names of one object: the 26 markings, or 64 views, and room for what comes."""
+MAX_NAME = 1_000
+"""Characters of a name; that of a view is a file's."""
+MAX_STRANGERS_BYTES = 64 * 1024
+"""Of what is asked before anybody is known: a passkey's answer has three texts of 16 kB at most."""
+VALUE = "touchline.json"
+"""Where a request's scope says what its JSON body is."""
+_STRANGERS = re.compile(r"/api/v\d+/(?:session|links)(?:/|$)")
+# Possessive, and the closing quote may be missing: linear on whatever comes.
+_STRINGS = re.compile(rb'"(?:[^"\\]|\\.)*+"?', re.DOTALL)
+_NO_BRACKETS = bytes(sorted(set(range(256)) - set(b"[]{}")))
+_STEPS = np.zeros(256, np.int32)
+_STEPS[list(b"[{")], _STEPS[list(b"]}")] = 1, -1
+_DOUBTFUL = re.compile(rb"\\u[dD][89abAB]|\d[eE]\+?\d|\d{300}")
+"""What may be half of a surrogate pair, or a number that is too large."""
+
+
+class BodyError(Exception):
+    """A body that is refused, and the status that says so."""
+
+    def __init__(self, status: int, detail: str, hint: str | None = None):
+        super().__init__(detail)
+        self.status, self.detail, self.hint = status, detail, hint
+
+
+def read_json(body: bytes) -> Any:
+    """The value of a body; raises ``BodyError`` unless the bytes are JSON as RFC 8259 has it, finite and flat enough.
+
+    Python's reader also takes NaN, Infinity, 1e999, other encodings and lone surrogates; none of
+    these survives a way through a database or another program.
+    """
+    try:
+        text = body.decode("utf-8")
+    except UnicodeDecodeError:
+        raise BodyError(400, "the body is not UTF-8 text") from None
+    _require_flat(body)
+    try:
+        value = json.loads(
+            text, parse_constant=_refuse_constant, object_pairs_hook=_without_repetition
+        )
+    except ValueError as error:
+        place = f" at character {error.pos}" if isinstance(error, json.JSONDecodeError) else ""
+        raise BodyError(400, f"the body is not JSON{place}") from None
+    if _DOUBTFUL.search(body):
+        _refuse_what_cannot_be_written(value)
+    if rb"\u0000" in body and (where := _null_character(value)) is not None:
+        raise BodyError(
+            400,
+            f"the text at {quoted(where, 80)} in the body holds U+0000, which is not stored",
+            hint="Leave it out.",
+        )
+    return value
+
+
+def _null_character(value: object, place: str = "") -> str | None:
+    """JSON pointer to a text, or to a name, that holds U+0000; None where there is none."""
+    parts: Iterable[tuple[object, object]] = ()
+    if isinstance(value, str):
+        return place or "/" if "\0" in value else None
+    if isinstance(value, dict):
+        if any("\0" in name for name in value):
+            return place or "/"
+        parts = value.items()
+    elif isinstance(value, list):
+        parts = enumerate(value)
+    found = (_null_character(part, f"{place}/{name}") for name, part in parts)
+    return next((one for one in found if one is not None), None)
+
+
+def _require_flat(body: bytes) -> None:
+    """Count brackets and commas before anything is made of them, on text that may not be JSON."""
+    outside = _without_strings(body)
+    if outside.count(b",") > MAX_VALUES:
+        raise BodyError(400, f"the body holds more than {MAX_VALUES} values")
+    brackets = outside.translate(None, _NO_BRACKETS)
+    steps = _STEPS[np.frombuffer(brackets, np.uint8)]
+    if np.cumsum(steps).max(initial=0) > MAX_DEPTH:
+        raise BodyError(400, f"the body is nested more than {MAX_DEPTH} levels deep")
+    if np.count_nonzero(steps > 0) > MAX_CONTAINERS:
+        raise BodyError(400, f"the body holds more than {MAX_CONTAINERS} lists and objects")
+
+
+def _without_strings(body: bytes) -> bytes:
+    """What stands outside of quotes."""
+    if b"\\" in body:
+        return _STRINGS.sub(b"", body)
+    # Every other part lies between quotes: five times as quick, and while it lasts nobody is answered.
+    return b"".join(body.split(b'"')[::2])
+
+
+def _refuse_constant(name: str) -> NoReturn:
+    raise BodyError(400, f"{name} is not a number in JSON")
+
+
+def _without_repetition(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """An object whose names differ: of two equal ones, readers disagree which counts."""
+    if len(pairs) > MAX_NAMES:
+        raise BodyError(400, f"an object of the body has more than {MAX_NAMES} names")
+    if any(len(name) > MAX_NAME for name, _ in pairs):
+        raise BodyError(400, f"a name in the body has more than {MAX_NAME} characters")
+    found = dict(pairs)
+    if len(found) < len(pairs):
+        names = Counter(name for name, _ in pairs)
+        raise BodyError(
+            400, f"the body names {quoted(names.most_common(1)[0][0], 80)} more than once"
+        )
+    return found
+
+
+def _refuse_what_cannot_be_written(value: object) -> None:
+    try:
+        json.dumps(value, ensure_ascii=False, allow_nan=False).encode("utf-8")
+    except UnicodeEncodeError:
+        raise BodyError(400, "a text in the body is not valid Unicode") from None
+    except ValueError:
+        raise BodyError(400, "a number in the body is too large") from None
+
+
+class JsonBodies:
+    """Reads the body of a request that changes something, up to a cap, and checks it.
+
+    An honest Content-Length is refused before a byte is read; a dishonest or chunked one is cut
+    off as soon as the cap is passed. Paths in ``streamed`` take bytes instead, which pass
+    through unread.
+    """
+
+    def __init__(
+        self,
+        app: ASGIApp,
+        max_bytes: int = MAX_JSON_BYTES,
+        streamed: frozenset[str] = frozenset(),
+    ):
+        self.app = app
+        self.max_bytes = max_bytes
+        self.streamed = streamed
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        if scope["type"] != "http" or scope["method"] in SAFE_METHODS:
+            await self.app(scope, receive, send)
+            return
+        if scope["method"] == "POST" and scope["path"] in self.streamed:
+            await self._pass_on(scope, receive, send)
+            return
+        try:
+            strangers = _STRANGERS.match(scope["path"])
+            most = min(self.max_bytes, MAX_STRANGERS_BYTES) if strangers else self.max_bytes
+            body = await _read(Headers(scope=scope), receive, most)
+            if body is None:
+                return
+            if body:
+                require_json_type(Headers(scope=scope).getlist("content-type"))
+                scope[VALUE] = read_json(body)
+        except BodyError as error:
+            problem = make_problem(error.status, error.detail, hint=error.hint)
+            # The rest of the body is unread: the connection cannot carry another request.
+            headers = {"Connection": "close"} if error.status == 413 else None
+            await problem_response(problem, headers)(scope, receive, send)
+            return
+        await self.app(scope, _replay(body, receive), send)
+
+    async def _pass_on(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Let a body of bytes through as it comes; its route counts it."""
+        kinds = Headers(scope=scope).getlist("content-type")
+        if [kind.strip().lower() for kind in kinds] == [BYTES]:
+            await self.app(scope, receive, send)
+            return
+        problem = make_problem(
+            415, "an upload must be plain bytes", hint=f"Send Content-Type: {BYTES}."
+        )
+        await problem_response(problem)(scope, receive, send)
+
+
+async def _read(headers: Headers, receive: Receive, most: int) -> bytes | None:
+    """The body, of so many bytes at most; None where whoever sent it has left."""
+    declared = headers.get("content-length", "0")
+    if not declared.isascii() or not declared.isdigit():
+        raise BodyError(400, "Content-Length is not a number")
+    if len(declared) > 18 or int(declared) > most:
+        raise _too_large(most)
+    body = bytearray()
+    more = True
+    while more:
+        message = await receive()
+        if message["type"] == "http.disconnect":
+            return None
+        body += message.get("body", b"")
+        more = message.get("more_body", False)
+        if len(body) > most:
+            raise _too_large(most)
+    return bytes(body)
+
+
+def _too_large(most: int) -> BodyError:
+    return BodyError(413, f"a request body may have at most {most} bytes")
+
+
+def require_json_type(types: list[str]) -> None:
+    """Raise ``BodyError`` (415) unless the Content-Type is JSON in UTF-8."""
+    kind, *parameters = [part.strip().lower() for part in "".join(types).split(";")]
+    charsets = [item.partition("=")[2].strip('"') for item in parameters if "charset" in item]
+    if len(types) != 1 or kind != "application/json" or any(c != "utf-8" for c in charsets):
+        raise BodyError(
+            415, "a request body must be JSON", hint="Send Content-Type: application/json."
+        )
+
+
+def _replay(body: bytes, receive: Receive) -> Receive:
+    sent = False
+
+    async def replay() -> Message:
+        nonlocal sent
+        if sent:
+            return await receive()
+        sent = True
+        return {"type": "http.request", "body": body, "more_body": False}
+
+    return replay

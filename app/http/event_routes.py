@@ -1,0 +1,148 @@
+"""Events: a stream of what changes, for every window that is open."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import AsyncIterator
+from typing import Annotated
+
+from fastapi import APIRouter, Depends, Header, Query, Request, Response
+from fastapi.responses import StreamingResponse
+
+from app.features.datasets.service import dataset_id
+from app.features.people.visibility_queries import reads_blind
+from app.http.deps import AppServices, SeesWhole
+from app.http.event_schemas import EVENTS
+from app.http.events import Feed, hello
+from app.http.problem import Responses, responses
+from app.http.requests import is_head
+from app.http.services import Services
+
+_UNBUFFERED = {"Cache-Control": "no-cache", "X-Accel-Buffering": "no"}
+"""What a proxy between asks for, which would hold events back otherwise."""
+_MOMENT = re.compile(r"(\d{1,18})-(\d{1,18})", re.ASCII)
+
+router = APIRouter(prefix="/events", tags=["events"])
+
+STREAM: Responses = {
+    200: {
+        "description": "Server-sent events without end; `x-events` says what the data of each is.",
+        "content": {
+            "text/event-stream": {
+                "schema": {"type": "string"},
+                "x-events": {
+                    kind: {"$ref": f"#/components/schemas/{model.__name__}"}
+                    for kind, model in EVENTS.items()
+                },
+            }
+        },
+    }
+}
+
+
+async def where_room_is(services: AppServices) -> Services:
+    """The services, unless as many listen as may: who is turned away costs the database nothing."""
+    services.events.require_room()
+    return services
+
+
+class Start:
+    """Where a listener begins: all that asks the database, done off the event loop."""
+
+    def __init__(
+        self,
+        services: Annotated[Services, Depends(where_room_is)],
+        dataset: Annotated[
+            str | None, Query(max_length=200, description="Name or id; default: all datasets.")
+        ] = None,
+        last_event_id: Annotated[
+            str | None,
+            Header(
+                alias="Last-Event-ID",
+                description="`id` of the last event that was seen: what came after it is told "
+                "first. Anything that is no such id counts as none.",
+            ),
+        ] = None,
+        since: Annotated[
+            str | None,
+            Query(
+                max_length=40,
+                description="`moment` of the session, or of the page: what came after it is told "
+                "first, where no `Last-Event-ID` says more. Anything else counts as none.",
+            ),
+        ] = None,
+    ):
+        self.dataset_id = None if dataset is None else dataset_id(services.store, dataset)
+        newest = self.newest = services.events.position()
+        seen = last_event_id or ""
+        self.resumed = seen.isascii() and seen.isdigit() and len(seen) < 19 and int(seen) <= newest
+        moment = None if self.resumed else _MOMENT.fullmatch(since or "")
+        known = moment is not None and int(moment[1]) <= newest
+        self.position = (
+            int(seen) if self.resumed else int(moment[1]) if moment and known else newest
+        )
+        self.solution = int(moment[2]) if moment and known else None
+        self.numbered = not reads_blind()
+        if not self.numbered:
+            # Whoever is told no id of the log is told all of it that they see.
+            self.position, self.solution, self.resumed = 0, 0, False
+
+
+async def begin(
+    services: AppServices, sight: SeesWhole, start: Annotated[Start, Depends()]
+) -> AsyncIterator[Feed]:
+    """A feed for as long as the request lasts."""
+    feed = services.events.subscribe(
+        start.dataset_id,
+        start.position,
+        resumed=start.resumed,
+        sight=sight,
+        began=start.newest,
+        numbered=start.numbered,
+    )
+    try:
+        yield feed
+    finally:
+        services.events.unsubscribe(feed)
+
+
+def under_way(
+    services: AppServices,
+    sight: SeesWhole,
+    start: Annotated[Start, Depends()],
+    feed: Annotated[Feed, Depends(begin)],
+) -> list[bytes]:
+    """Jobs that are under way and solutions that arrived, read once the feed hears of later ones."""
+    jobs = services.events.open_jobs(start.dataset_id, sight)
+    if start.solution is None:
+        return jobs
+    return [*services.events.solved_since(start.solution, feed), *jobs]
+
+
+@router.get(
+    "",
+    operation_id="listenToEvents",
+    response_class=Response,
+    responses={**responses(404), **STREAM},
+)
+async def listen(
+    request: Request,
+    start: Annotated[Start, Depends()],
+    feed: Annotated[Feed, Depends(begin)],
+    first: Annotated[list[bytes], Depends(under_way)],
+) -> StreamingResponse:
+    """What changes, as it changes: by anybody, in a browser or on the command line.
+
+    `group`: a group has another ETag. `dataset`: a dataset changed as a whole. `job`: a job began,
+    went on or ended. `work`: who has a group of a batch open. `maintenance`: another
+    notice is shown to everybody. The stream begins with the jobs that are under way.
+    """
+
+    async def told() -> AsyncIterator[bytes]:
+        yield b"".join([hello(start.position), *first])
+        if is_head(request.scope):
+            return
+        async for events in feed.read():
+            yield events
+
+    return StreamingResponse(told(), headers=_UNBUFFERED, media_type="text/event-stream")

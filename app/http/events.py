@@ -1,0 +1,346 @@
+"""Events: what changed, told to every browser that listens.
+
+A thread of its own looks at the log while somebody listens, so that no request waits for it: when
+this process has committed, and from time to time for what others have. Each listener has a bounded
+queue: one that does not keep up is let go, comes back with the last id that it saw, and misses
+nothing.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import functools
+import re
+import threading
+from collections.abc import AsyncIterator, Mapping
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from time import monotonic
+
+import structlog
+from fastapi.sse import KEEPALIVE_COMMENT, format_sse_event
+from pydantic import BaseModel
+
+from app.db.store import Store
+from app.errors import OverloadedError, StorageError
+from app.features.batches.leases import Lease
+from app.features.jobs.queries import Job
+from app.features.jobs.schemas import JobDocument
+from app.features.jobs.service import Jobs
+from app.features.maintenance.schemas import BannerDocument
+from app.features.maintenance.service import Banner, read_banner
+from app.features.people.visibility_queries import EVERYTHING, Sight
+from app.features.queue.changes import (
+    Change,
+    read_moment,
+    read_news,
+    read_position,
+    read_solved_since,
+)
+from app.http.event_schemas import (
+    DatasetEvent,
+    GroupEvent,
+    MaintenanceEvent,
+    PresenceDocument,
+    WorkEvent,
+)
+
+log = structlog.get_logger("touchline.events")
+
+PAUSE = 0.05
+"""Seconds between two looks at the log while commits follow each other."""
+POLL = 2.0
+"""Seconds until the log is looked at for what other processes have committed and not told."""
+MAX_FEEDS = 100
+"""Listeners at a time; a browser has one a window."""
+MAX_WAITING = 1000
+"""Events that a listener may be behind."""
+_WORK = "work"
+"""How what processes tell each other of a lease begins."""
+RETRY_MS = 1000
+"""How long a browser waits before it comes back."""
+PING_SECONDS = 15.0
+"""Between two words to a listener whom there is nothing to tell, lest a proxy thinks it gone."""
+
+
+_ID = re.compile(rb"^id: \d+$", re.MULTILINE)
+"""How an event says its id."""
+
+
+@dataclass
+class Counts:
+    """Listeners since the server started; ``resumed`` ones came back with the last id they saw."""
+
+    open: int = 0
+    opened: int = 0
+    resumed: int = 0
+    lost: int = 0
+
+
+class Feed:
+    """One listener: what it has not been told yet.
+
+    Args:
+        dataset_id: Tell of this dataset alone; None: of all.
+        position: Id of the log entry up to which it knows everything.
+        sight: What its reader sees.
+        began: Id of the newest log entry when it began to listen.
+        numbered: Its events have the ids of their log entries; else they all have 0.
+
+    Attributes:
+        lost: It did not keep up and was let go.
+        told: When it was told something last, by the monotonic clock.
+        loop: The event loop on which it is read.
+    """
+
+    def __init__(
+        self, dataset_id: int | None, position: int, sight: Sight, began: int, numbered: bool = True
+    ):
+        self.dataset_id, self.position, self._numbered = dataset_id, position, numbered
+        self._sight, self._began = sight, began
+        self.lost, self.told = False, monotonic()
+        self._events: list[bytes] = []
+        self.loop = asyncio.get_running_loop()
+        self._ready, self._ended = asyncio.Event(), False
+
+    def wants(self, dataset_id: int | None, actor: str | None = None) -> bool:
+        """Whether what happens in a dataset (None: in none, by somebody) is told here."""
+        meant = self.dataset_id is None or dataset_id in (None, self.dataset_id)
+        return meant and self._sight.sees(dataset_id, actor)
+
+    def is_told(self, change: Change) -> bool:
+        """Whether a change is told here.
+
+        Who saw a dataset that was gone before this one listened, nobody knows any more.
+        """
+        gone = change.dataset is None and (change.id or 0) <= self._began
+        return self.wants(change.dataset_id) and (not gone or self._sight == EVERYTHING)
+
+    def take(self, events: list[bytes], *, ended: bool = False) -> None:
+        """Have something to tell, and nothing more where it has ended; on the event loop."""
+        self.lost = self.lost or len(self._events) + len(events) > MAX_WAITING
+        self._ended = self._ended or ended or self.lost
+        if not self._ended:
+            plain = events if self._numbered else [_ID.sub(b"id: 0", event) for event in events]
+            self._events.extend(plain)
+        self.told = monotonic()
+        self._ready.set()
+
+    async def read(self) -> AsyncIterator[bytes]:
+        """Events as they come, those that came together at once, until the feed ends."""
+        while not self._ended or self._events:
+            await self._ready.wait()
+            self._ready.clear()
+            told, self._events = self._events, []
+            if told:
+                yield b"".join(told)
+
+
+class Events:
+    """All listeners of one server, and the thread that looks at the log for them."""
+
+    def __init__(self, store: Store, jobs: Jobs):
+        self._store, self._jobs = store, jobs
+        self._feeds: set[Feed] = set()
+        self._lock = threading.Lock()
+        self._wake, self._closing = threading.Event(), threading.Event()
+        self._thread: threading.Thread | None = None
+        self._solutions = 0
+        self._banner: Banner | None = None
+        self._counts = Counts()
+        jobs.listen(self._tell_job)
+        store.listen(self._wake.set)
+        store.sharing.hear(self._hear_lease)
+
+    def position(self) -> int:
+        """Id of the newest entry of the log."""
+        return read_position(self._store)
+
+    def moment(self) -> str:
+        """How things stand, as a page that begins to read them tells the stream later on."""
+        return "-".join(map(str, read_moment(self._store)))
+
+    def banner(self) -> str:
+        """The notice of maintenance as JSON; empty: there is none."""
+        banner = read_banner(self._store)
+        return "" if banner is None else BannerDocument.model_validate(banner).model_dump_json()
+
+    def solved_since(self, solution: int, feed: Feed) -> list[bytes]:
+        """Solutions that arrived after one, for a listener that has read what was there then."""
+        found = read_solved_since(self._store, solution)
+        return [_change_event(item) for item in found if feed.is_told(item)]
+
+    @property
+    def counts(self) -> Counts:
+        """Listeners since the start."""
+        with self._lock:
+            return replace(self._counts, open=len(self._feeds))
+
+    def require_room(self) -> None:
+        """Raise OverloadedError where as many listen as may, or the server stops; waits for nothing."""
+        if len(self._feeds) >= MAX_FEEDS or self._closing.is_set():
+            raise OverloadedError("too many windows listen for events")
+
+    def subscribe(
+        self,
+        dataset_id: int | None,
+        position: int,
+        *,
+        resumed: bool = False,
+        sight: Sight = EVERYTHING,
+        began: int | None = None,
+        numbered: bool = True,
+    ) -> Feed:
+        """Begin to listen, or go on where an earlier stream ended; on the event loop.
+
+        ``began`` is the newest entry of the log by now, where that is not the position; ``numbered``
+        as ``Feed`` has it.
+
+        Raises:
+            OverloadedError: Too many listen, or the server stops.
+        """
+        feed = Feed(dataset_id, position, sight, position if began is None else began, numbered)
+        with self._lock:
+            self.require_room()
+            self._feeds.add(feed)
+            self._counts.opened += 1
+            self._counts.resumed += resumed
+            if self._thread is None:
+                self._thread = threading.Thread(target=self._tail, name="events", daemon=True)
+                self._thread.start()
+        self._wake.set()
+        return feed
+
+    def unsubscribe(self, feed: Feed) -> None:
+        """Stop listening."""
+        with self._lock:
+            self._feeds.discard(feed)
+            self._counts.lost += feed.lost
+
+    def open_jobs(self, dataset_id: int | None, sight: Sight) -> list[bytes]:
+        """Jobs that are under way, for whoever begins to listen."""
+        return [_job_event(job) for job in self._jobs.under_way(dataset_id, sight)]
+
+    def close(self) -> None:
+        """End every feed, so that the server can stop; may be called twice."""
+        self._closing.set()
+        self._wake.set()
+        _tell({feed: [] for feed in self._listening()}, ended=True)
+        thread = self._thread
+        if thread is not None and thread is not threading.current_thread():
+            thread.join(5)
+
+    def _listening(self) -> list[Feed]:
+        with self._lock:
+            return list(self._feeds)
+
+    def _tail(self) -> None:
+        awake = False
+        while not self._closing.is_set():
+            if feeds := self._listening():
+                try:
+                    self._look(feeds, first=not awake)
+                    awake = True
+                except StorageError as error:
+                    log.warning("the log could not be read", error=str(error))
+                except Exception:
+                    log.exception("events could not be told")
+                idle = monotonic() - PING_SECONDS
+                _tell({feed: [KEEPALIVE_COMMENT] for feed in feeds if feed.told < idle})
+                self._closing.wait(PAUSE)
+            else:
+                awake = False
+            self._wake.wait(POLL if feeds else None)
+            self._wake.clear()
+
+    def _look(self, feeds: list[Feed], *, first: bool) -> None:
+        """Tell each listener what has happened since it was told last."""
+        places = {feed.position for feed in feeds}
+        self._look_for_banner(feeds, first=first)
+        news = read_news(self._store, places, None if first else self._solutions)
+        self._solutions = news.solution
+        written = functools.cache(_change_event)
+        told: dict[Feed, list[bytes]] = {}
+        for feed in feeds:
+            wanted = [*news.changes.get(feed.position, []), *news.solved]
+            feed.position = max(feed.position, news.entry)
+            if events := [written(item) for item in wanted if feed.is_told(item)]:
+                told[feed] = events
+        _tell(told)
+
+    def _look_for_banner(self, feeds: list[Feed], *, first: bool) -> None:
+        """Tell each listener of another notice of maintenance, whichever process has set it."""
+        before, self._banner = self._banner, read_banner(self._store)
+        if first or self._banner == before:
+            return
+        banner = self._banner and BannerDocument.model_validate(self._banner)
+        event = _event("maintenance", MaintenanceEvent(banner=banner))
+        _tell({feed: [event] for feed in feeds})
+
+    def tell_lease(self, lease: Lease) -> None:
+        """Tell who has a group of a batch open."""
+        if lease.group is None:
+            return
+        here = [PresenceDocument.model_validate(one) for one in lease.here]
+        told = WorkEvent(
+            batch=lease.batch.id, group=lease.group, dataset=lease.batch.dataset, here=here
+        )
+        self._tell_work(lease.batch.dataset_id, told)
+        self._store.say(f"{_WORK} {lease.batch.dataset_id} {told.model_dump_json()}")
+
+    def _hear_lease(self, word: str) -> None:
+        """Tell of a lease that another process has given."""
+        kind, _, rest = word.partition(" ")
+        if kind == _WORK:
+            dataset_id, _, told = rest.partition(" ")
+            self._tell_work(int(dataset_id), WorkEvent.model_validate_json(told))
+
+    def _tell_work(self, dataset_id: int, told: WorkEvent) -> None:
+        event = _event("work", told)
+        _tell({feed: [event] for feed in self._listening() if feed.wants(dataset_id)})
+
+    def _tell_job(self, job: Job) -> None:
+        event, feeds = _job_event(job), self._listening()
+        _tell({feed: [event] for feed in feeds if feed.wants(job.dataset_id, job.actor)})
+
+
+def _tell(told: Mapping[Feed, list[bytes]], *, ended: bool = False) -> None:
+    """Tell listeners of something, each loop by one call; from any thread."""
+
+    def take(loop: asyncio.AbstractEventLoop) -> None:
+        for feed, events in told.items():
+            if feed.loop is loop:
+                feed.take(events, ended=ended)
+
+    for loop in {feed.loop for feed in told}:
+        # One of a server that has stopped calls nothing any more.
+        with suppress(RuntimeError):
+            loop.call_soon_threadsafe(take, loop)
+
+
+def hello(position: int) -> bytes:
+    """What a listener gets first: where it stands, should it have to come back."""
+    return format_sse_event(comment="listening", id=str(position), retry=RETRY_MS)
+
+
+def _change_event(change: Change) -> bytes:
+    identity = None if change.id is None else str(change.id)
+    if change.group_id is None:
+        told = DatasetEvent(dataset=change.dataset, kind=change.kind, actor=change.actor)
+        return _event("dataset", told, identity)
+    group = GroupEvent(
+        group=change.group_id,
+        dataset=change.dataset,
+        etag=change.etag,
+        kind=change.kind,
+        actor=change.actor,
+    )
+    return _event("group", group, identity)
+
+
+def _job_event(job: Job) -> bytes:
+    return _event("job", JobDocument.model_validate(job))
+
+
+def _event(kind: str, told: BaseModel, identity: str | None = None) -> bytes:
+    return format_sse_event(data_str=told.model_dump_json(), event=kind, id=identity)

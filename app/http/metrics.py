@@ -1,0 +1,260 @@
+"""Metrics: what Prometheus reads of one server, besides the durations of its requests."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import re
+from collections.abc import Iterator
+from contextlib import suppress
+from threading import Lock
+from typing import Any
+
+from fastapi import FastAPI, Request
+from prometheus_client import CollectorRegistry, Counter, Gauge
+from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metric
+from prometheus_client.multiprocess import MultiProcessCollector
+from prometheus_client.registry import Collector
+from prometheus_client.samples import Sample
+from prometheus_fastapi_instrumentator.middleware import PrometheusInstrumentatorMiddleware
+
+from app.db.store import Store
+from app.errors import StorageError
+from app.features.upkeep.service import Home, read_home
+from app.http.events import Counts
+from app.http.pages import ELSEWHERE
+from app.http.request_limits import Doors
+from app.http.services import Services
+from app.worker_process import COUNTS
+
+MAX_ADDRESSES = 2000
+"""Whose routes are remembered: addresses hold names of datasets, too."""
+MAX_LETTERS = 200
+"""Of a path that is remembered; a person's are shorter."""
+MULTIPROCESS = "PROMETHEUS_MULTIPROC_DIR"
+"""Where web processes count together; unset where there is one."""
+REFRESH_SECONDS = 1.0
+"""Between two looks at the numbers that another process may be asked for."""
+_NUMBER = re.compile(r"/[0-9]+(?=/|$)")
+
+
+def install_metrics(app: FastAPI, doors: Doors) -> None:
+    """Count requests by route, each application for itself, and watch its services.
+
+    Of several web processes each counts in a file that all of them read, and whichever answers adds
+    them up (``web_processes``): a number never depends on who was asked.
+    """
+    registry = app.state.metrics = CollectorRegistry()
+    own = ProcessCollector(app, doors)
+    if MULTIPROCESS in os.environ:
+        app.state.shared_metrics = SharedNumbers(own)
+        answered = CollectorRegistry()
+        MultiProcessCollector(answered)  # type: ignore[no-untyped-call]
+    else:
+        registry.register(own)
+        answered = registry
+    answered.register(DatabaseCollector(app))
+    app.state.answered_metrics = answered
+    excluded = [re.compile(path) for path in ("/metrics", "/healthz", "/readyz")]
+    app.add_middleware(RequestMetrics, registry=registry, excluded_handlers=excluded)
+
+
+class RequestMetrics(PrometheusInstrumentatorMiddleware):
+    """Counts requests and their durations by route, and finds the route of an address once.
+
+    The library tries all routes for every request, after FastAPI has done so: a tenth of what it
+    costs to answer with a group.
+    """
+
+    def __init__(self, *arguments: Any, **options: Any):
+        super().__init__(*arguments, **options)
+        self._routes: dict[tuple[str, str], str] = {}
+
+    def _get_handler(self, request: Request) -> tuple[str, bool]:
+        """The route of a request, or its path where it has none; and whether it has one."""
+        # No route asks more of a number than that it is one.
+        path = request.url.path
+        if len(path) > MAX_LETTERS:
+            return super()._get_handler(request)
+        address = request.method, _NUMBER.sub("/0", path)
+        known = self._routes.get(address)
+        if known is not None:
+            return known, True
+        route, found = super()._get_handler(request)
+        # Whatever is nowhere else has one route, and no end of addresses.
+        if found and route != ELSEWHERE:
+            if len(self._routes) >= MAX_ADDRESSES:
+                self._routes.clear()
+            self._routes[address] = route
+        return route, found
+
+
+class DatabaseCollector(Collector):
+    """Reads what the database says while it is asked: the same whichever process answers."""
+
+    def __init__(self, app: FastAPI):
+        self._app = app
+
+    def describe(self) -> Iterator[Metric]:
+        """Nothing beforehand: what there is is read when it is asked for."""
+        return iter(())
+
+    def collect(self) -> Iterator[Metric]:
+        """Every number of this moment."""
+        services: Services = self._app.state.services
+        yield from _database(services.store)
+
+
+class ProcessCollector(Collector):
+    """Reads the numbers of this process: its requests at work, its event streams, its worker processes."""
+
+    def __init__(self, app: FastAPI, doors: Doors):
+        self._app, self._doors = app, doors
+
+    def describe(self) -> Iterator[Metric]:
+        """Nothing beforehand: what there is is read when it is asked for."""
+        return iter(())
+
+    def collect(self) -> Iterator[Metric]:
+        """Every number of this moment."""
+        services: Services = self._app.state.services
+        yield from self._lanes()
+        yield from _streams(services.events.counts)
+        yield from _workers()
+
+    def _lanes(self) -> Iterator[Metric]:
+        doors = self._doors.all
+        busy = {door.lane.name: door.busy for door in doors}
+        yield _gauges("lane_busy", "Requests at work, by kind.", "lane", busy)
+        waiting = {door.lane.name: door.waiting for door in doors}
+        yield _gauges("lane_waiting", "Requests that wait for their turn.", "lane", waiting)
+        refused = {door.lane.name: door.refused for door in doors}
+        yield _counter("lane_refused", "Requests that were told to come back.", "lane", refused)
+
+
+class SharedNumbers:
+    """Keeps the numbers of this process where the other web processes read them.
+
+    Numbers of this moment are added up over the processes that live; what is counted also over those
+    that have died.
+    """
+
+    def __init__(self, own: ProcessCollector):
+        self._own = own
+        self._gauges: dict[str, Gauge] = {}
+        self._counters: dict[str, Counter] = {}
+        self._counted: dict[tuple[str, tuple[str, ...]], float] = {}
+        self._lock = Lock()
+
+    def refresh(self) -> None:
+        """Write down every number of this moment; any thread may ask, and each counts once."""
+        with self._lock:
+            for family in self._own.collect():
+                for sample in family.samples:
+                    if family.type == "gauge":
+                        self._gauge(family, sample)
+                    else:
+                        self._count(family, sample)
+
+    async def keep_fresh(self) -> None:
+        """Refresh every second, without an end."""
+        while True:
+            self.refresh()
+            await asyncio.sleep(REFRESH_SECONDS)
+
+    def _gauge(self, family: Metric, sample: Sample) -> None:
+        names = tuple(sample.labels)
+        if family.name not in self._gauges:
+            self._gauges[family.name] = Gauge(
+                family.name,
+                family.documentation,
+                names,
+                registry=None,
+                multiprocess_mode="livesum",
+            )
+        gauge = self._gauges[family.name]
+        (gauge.labels(**sample.labels) if names else gauge).set(sample.value)
+
+    def _count(self, family: Metric, sample: Sample) -> None:
+        names = tuple(sample.labels)
+        if family.name not in self._counters:
+            self._counters[family.name] = Counter(
+                family.name, family.documentation, names, registry=None
+            )
+        key = family.name, tuple(sample.labels.values())
+        counter = self._counters[family.name]
+        more = sample.value - self._counted.get(key, 0)
+        (counter.labels(**sample.labels) if names else counter).inc(more)
+        self._counted[key] = sample.value
+
+
+def _streams(counts: Counts) -> Iterator[Metric]:
+    yield _gauge("event_streams", "Windows that listen for events.", counts.open)
+    ended = {"opened": counts.opened, "resumed": counts.resumed, "lost": counts.lost}
+    text = "Event streams that were opened, came back, or were let go for being too slow."
+    yield _counter("event_stream", text, "what", ended)
+
+
+def _workers() -> Iterator[Metric]:
+    busy = {kind: counts.busy for kind, counts in COUNTS.items()}
+    yield _gauges("worker_busy", "Tasks at work in worker processes.", "kind", busy)
+    waiting = {kind: counts.waiting for kind, counts in COUNTS.items()}
+    yield _gauges("worker_waiting", "Tasks that wait for a worker process.", "kind", waiting)
+    ended = CounterMetricFamily(
+        "touchline_worker_ended",
+        "Worker processes that ended in the midst of a task.",
+        labels=["kind", "reason"],
+    )
+    for kind, counts in COUNTS.items():
+        for reason, number in counts.ended.items():
+            ended.add_metric([kind, reason], number)
+    yield ended
+
+
+def _database(store: Store) -> Iterator[Metric]:
+    home = None
+    with suppress(StorageError):
+        home = read_home(store)
+    yield _gauge("database_up", "1 while the database answers.", int(home is not None))
+    # After it was read, which may have shown damage.
+    text = "1 from the first sign on that the database is damaged."
+    yield _gauge("database_damaged", text, int(store.is_damaged))
+    if home is not None:
+        yield from _home(home)
+
+
+def _home(home: Home) -> Iterator[Metric]:
+    yield _gauge("groups", "Groups of all datasets.", home.groups)
+    yield _gauge("unsolved_groups", "Groups that wait to be solved.", home.unsolved)
+    yield _gauge(
+        "oldest_unsolved_seconds",
+        "How long the oldest group waits to be solved.",
+        home.oldest_unsolved_seconds,
+    )
+    yield _gauge("log_entries", "Entries of the log of changes.", home.entries)
+    yield _gauges("file_bytes", "Size of the database's files.", "file", home.file_bytes)
+    yield _gauge("disk_free_bytes", "Room on the disk of the home.", home.free_bytes)
+    jobs = GaugeMetricFamily(
+        "touchline_jobs", "Jobs on record, by kind and state.", labels=["kind", "state"]
+    )
+    for (kind, state), number in sorted(home.jobs.items()):
+        jobs.add_metric([kind, state], number)
+    yield jobs
+
+
+def _gauge(name: str, text: str, value: float) -> Metric:
+    return GaugeMetricFamily(f"touchline_{name}", text, value=value)
+
+
+def _gauges(name: str, text: str, label: str, values: dict[str, int]) -> Metric:
+    family = GaugeMetricFamily(f"touchline_{name}", text, labels=[label])
+    for key, value in values.items():
+        family.add_metric([key], value)
+    return family
+
+
+def _counter(name: str, text: str, label: str, values: dict[str, int]) -> Metric:
+    family = CounterMetricFamily(f"touchline_{name}", text, labels=[label])
+    for key, value in values.items():
+        family.add_metric([key], value)
+    return family

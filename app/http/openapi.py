@@ -1,0 +1,309 @@
+"""The OpenAPI document: what FastAPI does not say by itself, and its examples."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from typing import Any
+
+from fastapi import FastAPI
+from fastapi.openapi.utils import get_openapi
+from pydantic import BaseModel
+
+from app.features.people.roles import Action
+from app.http.event_schemas import EVENTS
+from app.http.idempotency import UNKEPT
+from app.http.problem import Problem
+from app.http.property_descriptions import PARAMETERS, PROPERTIES
+from app.http.rules import OPEN, RULES
+from app.http.team import NAME
+
+Schema = Mapping[str, Any]
+_DEEP = 12
+"""No answer holds answers in one another more often."""
+_FORMATS: Mapping[str, Any] = {
+    "date-time": "2026-03-14T15:09:26Z",
+    "date": "2026-03-14",
+    "uri": "http://127.0.0.1:8000/",
+}
+NAMES: Mapping[str, Any] = {
+    "actor": "anna",
+    "dataset": "league",
+    "etag": '"12-5f8a"',
+    "hash": "6f1ed002ab5595859014ebf0951522d9",
+    "key": "epl/2015-2016/match/7.png",
+    "label": "Alder Town 3 - 1 Birch Rovers",
+    "marking": "Middle line",
+    "match": "epl/2015-2016/match",
+    "name": "v1",
+    "next": "200",
+    "q": "status:unreviewed",
+    "sentence": "The camera of view B is uncertain.",
+    "split": "train",
+    "view": "7_1.png",
+}
+"""Of texts that stand in many answers."""
+NUMBERS: Mapping[str, float] = {
+    "ball_diameter_m": 0.22,
+    "height": 720,
+    "length": 105,
+    "outside_pitch_m": 5,
+    "pan_degrees": 12.3,
+    "pitch_length_m": 105,
+    "pitch_width_m": 68,
+    "tilt_degrees": 78.9,
+    "width": 1280,
+    "x_focal_length": 2100,
+    "y_focal_length": 2100,
+}
+"""Of numbers that are none of the usual ones."""
+
+
+def example_of(schema: Schema, schemas: Mapping[str, Schema], name: str = "", deep: int = 0) -> Any:
+    """A value that fits a schema.
+
+    Args:
+        schema: Of the value.
+        schemas: Those that it may refer to, by name.
+        name: Of the property that it is the value of.
+        deep: In how many others it lies.
+    """
+    if "$ref" in schema:
+        found = schemas[schema["$ref"].rpartition("/")[2]]
+        return example_of({**found, **_given(schema)}, schemas, name, deep + 1)
+    for word in ("examples", "enum"):
+        if schema.get(word):
+            return schema[word][0]
+    for word in ("const", "default"):
+        if schema.get(word) is not None:
+            return schema[word]
+    for word in ("anyOf", "oneOf", "allOf"):
+        if schema.get(word):
+            choices = [one for one in schema[word] if one.get("type") != "null"]
+            # What may be null is null where answers would hold themselves without an end.
+            if len(choices) < len(schema[word]) and deep > _DEEP:
+                return None
+            return example_of(choices[0], schemas, name, deep)
+    kind = schema.get("type")
+    if kind == "object":
+        return _object(schema, schemas, deep)
+    if kind == "array":
+        return _array(schema, schemas, name, deep)
+    if kind in ("integer", "number"):
+        return _number(schema, kind, name)
+    return {"boolean": True, "null": None}.get(str(kind), _text(schema, name))
+
+
+def _given(schema: Schema) -> dict[str, Any]:
+    return {word: schema[word] for word in ("examples", "default") if word in schema}
+
+
+def _object(schema: Schema, schemas: Mapping[str, Schema], deep: int) -> dict[str, Any]:
+    found = {
+        key: example_of(one, schemas, key, deep + 1)
+        for key, one in schema.get("properties", {}).items()
+    }
+    more = schema.get("additionalProperties")
+    if not found and isinstance(more, dict):
+        return {"accepted": example_of(more, schemas, "", deep + 1)}
+    return found
+
+
+def _array(schema: Schema, schemas: Mapping[str, Schema], name: str, deep: int) -> list[Any]:
+    if "prefixItems" in schema:
+        return [example_of(one, schemas, name, deep + 1) for one in schema["prefixItems"]]
+    count = schema.get("minItems", 1 if deep <= _DEEP else 0)
+    return [example_of(schema.get("items", {}), schemas, name, deep + 1)] * count
+
+
+def _number(schema: Schema, kind: str, name: str) -> int | float:
+    usual = NUMBERS.get(name, 12 if kind == "integer" else 0.5)
+    value = min(usual, schema.get("maximum", usual))
+    if value <= schema.get("exclusiveMinimum", value - 1):
+        value = schema["exclusiveMinimum"] + 1
+    value = max(value, schema.get("minimum", value))
+    return int(value) if kind == "integer" else float(value)
+
+
+def _text(schema: Schema, name: str) -> str:
+    text = str(_FORMATS.get(str(schema.get("format")), NAMES.get(name, name or "text")))
+    return text.ljust(schema.get("minLength", 0), "x")[: schema.get("maxLength", len(text) + 99)]
+
+
+DESCRIPTION = """
+Everything that the browser does goes through these addresses.
+
+* **State and ETag.** `PATCH`, `PUT`, undo and redo need `If-Match` with the ETag of the state that
+  they build on: 428 without it, 412 (with the present document as `current`) when somebody else
+  was faster.
+* **Names.** A script says its name in `X-Actor` and is remembered as `script:NAME`; nobody checks it.
+* **Who asks.** A server that one person runs alone asks nobody. On a server of a team everything but
+  `/healthz`, `/readyz` and logging in needs a session: `POST /api/v1/session` sets its cookie, and a
+  change must carry an `Origin` of this server. Scripts send a token of `POST /api/v1/tokens` as
+  `Authorization: Bearer tl_...`, and neither cookie nor `Origin`. 401: there is none that is valid;
+  403: the role does not suffice, or the token lacks a scope.
+* **Problems.** Every answer that is not a success is `application/problem+json` (RFC 9457).
+* **Pages.** Every list takes `limit` and `cursor` and answers `items` and `next`: the cursor of the
+  next page, null on the last one. Some answer `total`, too: how many there are.
+* **Units.** Pixels of the annotated image size, (0, 0) the centre of the first pixel; metres in
+  the pitch frame, z down; degrees.
+""".strip()
+TAGS = {
+    "datasets": "What there is, how far it is, how its numbers are spread, what judges it.",
+    "groups": "The views of one instant: the unit of review.",
+    "views": "One image of an instant: its lines, its ball, its frame.",
+    "stations": "Static cameras, whose lines many views share.",
+    "findings": "What a person should look at.",
+    "insight": "What would mend a group, and which points move its ball most.",
+    "verdicts": "Many groups judged at once.",
+    "queue": "Saved queries, and who has reviewed how much.",
+    "work": "Batches of groups that leads give out, and who has which group open.",
+    "takes": "Own annotations that nobody else sees, groups whose truth is known, guidelines.",
+    "yield": "What a policy lets through, and what another one would.",
+    "agreement": "How far people agree who annotated the same frames.",
+    "comments": "What people say to each other about groups, and what they are told.",
+    "webhooks": "Addresses that are told what happens in a dataset, each message signed.",
+    "imports": "Files and folders that become datasets.",
+    "predictions": "What detectors say, beside what people said.",
+    "evaluations": "Detectors measured on what was accepted.",
+    "versions": "Datasets as they were frozen.",
+    "exports": "Datasets as files.",
+    "policies": "The thresholds that judge a dataset.",
+    "practice": "Eight groups with known answers, to learn on.",
+    "jobs": "Work that outlasts a request: how far it is and what came of it.",
+    "events": "What changes, as it changes.",
+    "pitch": "Names and shapes of the 26 markings.",
+    "sessions": "On a server of a team: who is logged in, and where.",
+    "tokens": "On a server of a team: with what scripts ask, in the name of a person.",
+    "users": "On a server of a team: who has an account, and which role.",
+    "health": "For whoever runs the service.",
+}
+
+
+REFERENCE = "#/components/schemas/{model}"
+
+
+def describe(app: FastAPI) -> None:
+    """Replace the framework's own description of errors by ours."""
+
+    def openapi() -> dict[str, Any]:
+        if app.openapi_schema is None:
+            app.openapi_schema = _document(app)
+        return app.openapi_schema
+
+    app.openapi = openapi  # type: ignore[method-assign]
+
+
+def _document(app: FastAPI) -> dict[str, Any]:
+    document = get_openapi(
+        title=app.title,
+        version=app.version,
+        summary=app.summary,
+        description=DESCRIPTION,
+        routes=app.routes,
+        tags=[{"name": name, "description": text} for name, text in TAGS.items()],
+    )
+    _mend_operations(document)
+    schemas = document["components"]["schemas"]
+    for name in ("HTTPValidationError", "ValidationError"):
+        schemas.pop(name, None)
+    models: tuple[type[BaseModel], ...] = (Problem, *EVENTS.values())
+    for model in models:
+        described = model.model_json_schema(ref_template=REFERENCE)
+        schemas.update(described.pop("$defs", {}))
+        schemas[model.__name__] = described
+    _describe_schemas(schemas)
+    _secure(document)
+    _give_examples(document)
+    return document
+
+
+def _describe_schemas(schemas: dict[str, Any]) -> None:
+    """Say what each property means, and that lists always have ``next``."""
+    for name, schema in schemas.items():
+        properties = schema.get("properties", {})
+        for key, one in properties.items():
+            if "description" not in one:
+                words = PROPERTIES.get(f"{name}.{key}", PROPERTIES.get(key))
+                one |= {} if words is None else {"description": words}
+        if {"items", "next"} <= set(properties):
+            schema["required"] = sorted(
+                {*schema.get("required", ()), "next"}, key=[*properties].index
+            )
+
+
+def _secure(document: dict[str, Any]) -> None:
+    """Say with what one may ask: on a server that one person runs alone, with nothing."""
+    document["components"]["securitySchemes"] = SCHEMES
+    document["security"] = [*({name: []} for name in SCHEMES), {}]
+    for path, operations in document["paths"].items():
+        for method, operation in operations.items():
+            if RULES.get(f"{method.upper()} {path}", Action.READ) is OPEN:
+                operation["security"] = []
+
+
+def _give_examples(document: dict[str, Any]) -> None:
+    """Give every answer in JSON an example."""
+    schemas = document["components"]["schemas"]
+    for operations in document["paths"].values():
+        for operation in operations.values():
+            for status, answer in operation["responses"].items():
+                for kind, content in answer.get("content", {}).items():
+                    is_given = {"example", "examples"} & set(content)
+                    if status.startswith("2") and kind == "application/json" and not is_given:
+                        content["example"] = example_of(content.get("schema", {}), schemas)
+
+
+def _mend_operations(document: dict[str, Any]) -> None:
+    """Say what the framework cannot know, and not what belongs to a newer OpenAPI."""
+    for path, operations in document["paths"].items():
+        for method, operation in operations.items():
+            # What the framework makes of a function's name may be that of another one, too.
+            operation["summary"] = _words(operation["operationId"])
+            parameters = operation.setdefault("parameters", [])
+            for parameter in parameters:
+                if not parameter.get("description"):
+                    words = PARAMETERS.get(parameter["name"])
+                    parameter |= {} if words is None else {"description": words}
+                # Asked for by our own code, which answers 428 where it is missing.
+                if parameter["name"] == "If-Match":
+                    parameter |= {"required": True, "schema": {"type": "string"}}
+            named = {parameter["name"] for parameter in parameters}
+            kept = method != "get" and not UNKEPT.match(path)
+            if kept and KEY_PARAMETER["name"] not in named:
+                parameters.append(KEY_PARAMETER)
+            for answer in operation["responses"].values():
+                answer.get("content", {}).get("text/event-stream", {}).pop("itemSchema", None)
+
+
+def _words(name: str) -> str:
+    """``listSavedViews`` as a person writes it: *List saved views*."""
+    words = re.sub("([A-Z])", lambda found: f" {found[1].lower()}", name)
+    return words[:1].upper() + words[1:]
+
+
+SCHEMES: dict[str, Any] = {
+    "session": {
+        "type": "apiKey",
+        "in": "cookie",
+        "name": NAME,
+        "description": "The session of a person who has logged in on a server of a team, set by"
+        " `POST /api/v1/session`; `__Host-` stands before its name where people come by TLS. A"
+        " change carries an `Origin` of the server, too.",
+    },
+    "token": {
+        "type": "http",
+        "scheme": "bearer",
+        "bearerFormat": "tl_...",
+        "description": "A token of `POST /api/v1/tokens`, with which scripts ask in the name of a"
+        " person, within its scopes.",
+    },
+}
+KEY_PARAMETER: dict[str, Any] = {
+    "name": "Idempotency-Key",
+    "in": "header",
+    "required": False,
+    "schema": {"type": "string", "pattern": "^[!-~]{1,200}$"},
+    "description": "Any text of up to 200 visible characters. The same key with the same request "
+    "gives the first answer again, for a day; with another request, 422.",
+}

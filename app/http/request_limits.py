@@ -1,0 +1,311 @@
+"""Lanes: how many requests of a kind are at work at a time, and how many may wait.
+
+Threads are few. A request waits for its turn on the event loop, where waiting costs next to
+nothing, so that changes behind a held write lock never take the threads that reads need. People have
+their turns one after the other, however many requests each of them sends.
+
+Lanes of what is computed are narrow: threads that compute take turns within one process, and each
+more makes all of them slower, with the event loop (decision 0049).
+"""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import re
+from contextlib import suppress
+from dataclasses import dataclass
+
+import anyio
+from starlette.datastructures import Headers
+from starlette.responses import HTMLResponse, Response
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from app.admission import hold_admission
+from app.http.access import login_of
+from app.http.fair_turns import Turns
+from app.http.origin import SAFE_METHODS
+from app.http.problem import make_problem, problem_response
+
+PATIENCE = 10.0
+"""Seconds that a request waits for its turn."""
+RETRY_SECONDS = "2"
+BUSY_PAGE = f"""<!doctype html>
+<html lang="en">
+<meta charset="utf-8">
+<meta http-equiv="refresh" content="{RETRY_SECONDS}">
+<title>Busy · Touchline</title>
+<p>The server is busy with other pages. This one tries again by itself; nothing is lost.</p>
+</html>
+"""
+
+
+@dataclass(frozen=True)
+class Lane:
+    """Requests of one kind.
+
+    Args:
+        name: What they are called in the metrics.
+        width: How many are at work at a time, each in a thread of its own.
+        queue: How many more may wait for their turn.
+        served: How many are at work where a server of databases is waited for at each statement; None:
+            as many as elsewhere.
+        apart: How many are at work where each has a process that does it; None: as many as elsewhere.
+        each: How many of them one person of a team may have at work; None: all.
+        pause: Seconds until who cannot even wait is told so. A refusal costs the event loop about as
+            much as any answer, and who has hundreds of them at once asks again at once.
+    """
+
+    name: str
+    width: int
+    queue: int
+    served: int | None = None
+    apart: int | None = None
+    each: int | None = None
+    pause: float = 0.0
+
+
+LOOKS = Lane("looks", 2, 200)
+"""What one group, view or camera is, and what a window asks again and again."""
+PAGES = Lane("pages", 2, 200)
+"""The page of the browser application, whichever address it is asked for under."""
+READS = Lane("reads", min(4, max(2, os.cpu_count() or 2)), 200, each=1)
+"""All other reading: lists and counts of many groups, which the database takes a processor for. What one
+person of a team asks is read one after the other: two long lists at once take the server from all others."""
+EDITS = Lane("edits", 1, 100, served=3)
+"""What people do to one group, view or lease all day: read, solved and encoded one after the other. Who
+waits for the disk or a picture has left already (``app.admission``)."""
+CHANGES = Lane("changes", 3, 100)
+"""All others; they may take their time."""
+PREVIEWS = Lane("previews", 1, 100, apart=2, each=1)
+"""What a drag asks: some milliseconds of solving, dozens where lines are dragged. A person drags one thing at
+a time."""
+LARGE = Lane("large", 1, 50)
+"""Edits and previews of hundreds of points, each of which is solved for as long as dozens of others, and
+edits of many views at once."""
+QUESTIONS = Lane("questions", 2, 100)
+"""What is answered by solving many times, or many groups; it takes up to seconds."""
+STREAMS = Lane("streams", 1, 200)
+"""Those that begin: who listens takes nobody's place. All windows of a team come back at the same
+moment when a server starts again, and what each asks first would keep readers waiting."""
+IMAGES = Lane("images", 6, 200)
+UPLOADS = Lane("uploads", 8, 8, each=4, pause=4.0)
+ZIPS = Lane("zips", 16, 100)
+"""Those of exports, which a request may find still being written."""
+LOGINS = Lane("logins", 4, 50)
+"""Passwords, whose hashes take some tenths of a second of a processor."""
+SIGN_ONS = Lane("sign-ons", 4, 50)
+"""Single sign-on, whose provider may take its time, or never answer."""
+LANES = (
+    LOOKS,
+    PAGES,
+    READS,
+    EDITS,
+    CHANGES,
+    PREVIEWS,
+    LARGE,
+    QUESTIONS,
+    STREAMS,
+    IMAGES,
+    UPLOADS,
+    ZIPS,
+    LOGINS,
+    SIGN_ONS,
+)
+LARGE_BYTES = 8 * 1024
+"""A body beyond these draws hundreds of points."""
+AWAY = 8
+"""So many of a lane may have left it before they were done."""
+THREADS = sum(max(lane.width, lane.served or 0, lane.apart or 0) for lane in LANES) + 2 * AWAY + 6
+"""A thread for each request at work, for as many edits and changes as may have left, and some for files
+of the browser application."""
+
+_API = re.compile(r"/api/v\d+/")
+_NO_PAGE = re.compile(r"/(?:healthz|readyz|metrics)$|/(?:assets|static)/")
+_STREAM = re.compile(r"/events$")
+_IMAGE = re.compile(r"/(?:image|figures/[^/]+|views/[^/]+/(?:neighbours|paint|propose))$")
+_ZIP = re.compile(r"/exports/[^/]+/content$")
+_PREVIEW = re.compile(r"/preview$")
+_EDIT = re.compile(
+    r"/(?:views/[^/]+(?:/ball|/lines)?|groups/[^/]+/(?:verdict|undo|redo)"
+    r"|batches/[^/]+/(?:next|groups/[^/]+/lease))$"
+)
+_BULK_EDIT = re.compile(r"/datasets/[^/]+/edits$")
+_QUESTION = re.compile(r"/(?:comparison|influence|remedies|yield|noise)$")
+_LOOK = re.compile(r"/(?:groups/(?!ids$)|views/|stations/|session$|bell$|work$)")
+_LOGIN = re.compile(r"/(?:session|session/password|links/use)$")
+_SIGN_ON = re.compile(r"/session/(?:sign-on|sign-on/begin|identity/begin)$")
+_UPLOAD = re.compile(r"/uploads$")
+
+
+def lane_of(method: str, path: str) -> Lane | None:
+    """The lane of a request; None where it needs no thread for long."""
+    if not _API.match(path):
+        return None if _NO_PAGE.match(path) else PAGES
+    if _STREAM.search(path):
+        return STREAMS
+    if _PREVIEW.search(path):
+        return PREVIEWS
+    if _QUESTION.search(path):
+        return QUESTIONS
+    if _IMAGE.search(path):
+        return IMAGES
+    if method in SAFE_METHODS:
+        return ZIPS if _ZIP.search(path) else LOOKS if _LOOK.search(path) else READS
+    if _LOGIN.search(path):
+        return LOGINS
+    if _SIGN_ON.search(path):
+        return SIGN_ONS
+    if method == "POST" and _UPLOAD.search(path):
+        return UPLOADS
+    if _BULK_EDIT.search(path):
+        return LARGE
+    return EDITS if _EDIT.search(path) else CHANGES
+
+
+def is_large(scope: Scope) -> bool:
+    """Whether a request brings far more than a person draws; one that does not say how much may."""
+    headers = Headers(scope=scope)
+    size = headers.get("content-length", "")
+    return int(size) > LARGE_BYTES if size.isdecimal() else "transfer-encoding" in headers
+
+
+class Door:
+    """The door of one lane: who is at work, who waits, and how many were turned away.
+
+    Args:
+        lane: The lane.
+        served: Whether a server of databases answers.
+        apart: Whether there are processes for what takes long.
+    """
+
+    def __init__(self, lane: Lane, served: bool = False, apart: bool = False):
+        self.lane = lane
+        self.refused = self.away = 0
+        width = (served and lane.served) or (apart and lane.apart) or lane.width
+        self._turns = Turns(width, lane.queue, lane.each)
+
+    @property
+    def busy(self) -> int:
+        """How many are at work."""
+        return self._turns.width - self._turns.free
+
+    @property
+    def waiting(self) -> int:
+        """How many wait for their turn."""
+        return self._turns.waiting
+
+    async def enter(self, who: str = "") -> bool:
+        """Wait for a turn; False where too many wait, or it took too long.
+
+        Args:
+            who: The person whose request it is; those of nobody wait together.
+        """
+        if self._turns.take(who):
+            return True
+        if not self._turns.has_room(who):
+            self.refused += 1
+            await anyio.sleep(self.lane.pause)
+            return False
+        if await self._turns.wait(who, PATIENCE):
+            return True
+        self.refused += 1
+        return False
+
+    def leave(self, who: str = "") -> None:
+        """Let the next one in; ``who``: as on entering."""
+        self._turns.give(who)
+
+
+class Doors:
+    """The doors of all lanes of one server; ``served``, ``apart``: see ``Door``."""
+
+    def __init__(self, served: bool = False, apart: bool = False) -> None:
+        self.all = tuple(Door(lane, served, apart) for lane in LANES)
+        self._of = {door.lane: door for door in self.all}
+
+    def of(self, scope: Scope) -> Door | None:
+        """The door that a request goes through, if any."""
+        if scope["type"] != "http":
+            return None
+        lane = lane_of(scope["method"], scope["path"])
+        if lane in (EDITS, PREVIEWS) and is_large(scope):
+            lane = LARGE
+        return None if lane is None else self._of[lane]
+
+
+class Lanes:
+    """Lets each request wait for its turn; 503 where too many of its kind wait already.
+
+    The turn ends when the answer begins, for sending it to a slow client takes nobody's place; and
+    before, where the work says that it waits for something else (``release_admission``).
+    """
+
+    def __init__(self, app: ASGIApp, doors: Doors):
+        self.app, self._doors = app, doors
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        door = self._doors.of(scope)
+        if door is None:
+            await self.app(scope, receive, send)
+            return
+        login = login_of(scope)
+        who = "" if login is None else login.name
+        if not await door.enter(who):
+            await _refusal(scope, door.lane)(scope, receive, send)
+            return
+        place = _Place(door, who)
+        hold_admission(place.leave_from_anywhere)
+
+        async def watch(message: Message) -> None:
+            place.end()
+            await send(message)
+
+        try:
+            await self.app(scope, receive, watch)
+        finally:
+            place.end()
+
+
+def _refusal(scope: Scope, lane: Lane) -> Response:
+    """What who had no turn is told: a page for people who asked for one, else a problem."""
+    later = {"Retry-After": RETRY_SECONDS}
+    if lane is PAGES and "text/html" in Headers(scope=scope).get("accept", ""):
+        return HTMLResponse(BUSY_PAGE, 503, {**later, "Cache-Control": "no-store"})
+    problem = make_problem(
+        503,
+        f"the server is busy with other {lane.name}",
+        hint="Nothing was done. Send it again in a moment.",
+    )
+    return problem_response(problem, later)
+
+
+class _Place:
+    """One request's place in its lane; it is given back once."""
+
+    def __init__(self, door: Door, who: str):
+        self._door, self._who, self._has, self._is_over = door, who, True, False
+        self._loop = asyncio.get_running_loop()
+
+    def leave_from_anywhere(self) -> None:
+        """Give the place back before the work is done, from another thread; only so many may do so."""
+        # A loop that has stopped lets nobody in any more.
+        with suppress(RuntimeError):
+            self._loop.call_soon_threadsafe(self._leave)
+
+    def _leave(self) -> None:
+        if self._has and self._door.away < AWAY:
+            self._door.away += 1
+            self._has = False
+            self._door.leave(self._who)
+
+    def end(self) -> None:
+        """The work is done."""
+        if self._is_over:
+            return
+        self._is_over = True
+        if self._has:
+            self._has = False
+            self._door.leave(self._who)
+        else:
+            self._door.away -= 1

@@ -1,0 +1,186 @@
+"""Services: what lives as long as a server, opened over one home, started, and told to stop."""
+
+from __future__ import annotations
+
+from contextlib import nullcontext
+from dataclasses import dataclass, field
+from math import inf
+from threading import Event, Thread
+from time import monotonic
+
+import structlog
+
+from app.config import Settings
+from app.db.store import Store
+from app.errors import BusyError
+from app.features.agreement.service import weigh_left
+from app.features.exports.folder import ExportFolder
+from app.features.exports.jobs import resume_exports
+from app.features.groups.large_edit_routes import LargeEdits
+from app.features.groups.preview_routes import Previews
+from app.features.groups.view_paint import PaintFollower
+from app.features.imports.jobs import resume_imports
+from app.features.jobs.service import Jobs, Pool
+from app.features.jobs.shared import SharedJobs
+from app.features.match_estimates.jobs import PICTURES, POSITIONS, make_rigs
+from app.features.match_estimates.noise import NoiseStore
+from app.features.paint.jobs import PAINT, PROPOSALS
+from app.features.practice.service import resume_practice
+from app.features.predictions.jobs import resume_evaluations
+from app.features.predictions.reader import PredictionReader
+from app.features.solve.jobs import resume_solving, solve_leftovers
+from app.features.upkeep.service import Upkeep
+from app.features.versions.jobs import resume_versions
+from app.features.webhooks.sender import WebhookSender
+from app.features.what_if.service import YieldStore
+from app.features.what_if.statistics import StatisticsStore
+from app.http.events import Events
+from app.media.frames import Frames
+from app.soccer.actors import LOCAL_USER
+from app.solving.warm import warm_up
+
+log = structlog.get_logger("touchline.api")
+
+LEFTOVERS_AGAIN_S = 2.0
+STOP_SECONDS = 10.0
+"""A server that is told to stop has ended after so long."""
+
+
+class Stopping(Event):
+    """Set when the server is told to stop; from then on its time is counted."""
+
+    _until = inf
+
+    def set(self) -> None:
+        """Begin to stop."""
+        self._until = min(self._until, monotonic() + STOP_SECONDS)
+        super().set()
+
+    def seconds_left(self) -> float:
+        """Until the server shall have ended."""
+        return max(self._until - monotonic(), 0.0)
+
+
+@dataclass(frozen=True)
+class Services:
+    """What lives as long as the application.
+
+    Attributes:
+        stopping: Set when the server is told to stop, before it waits for open requests.
+    """
+
+    settings: Settings
+    store: Store
+    frames: Frames
+    large: LargeEdits
+    previews: Previews
+    predictions: PredictionReader
+    exports: ExportFolder
+    jobs: Jobs
+    events: Events
+    yields: YieldStore
+    statistics: StatisticsStore
+    noises: NoiseStore
+    upkeep: Upkeep
+    webhooks: WebhookSender
+    stopping: Stopping = field(default_factory=Stopping)
+
+    @property
+    def paint(self) -> PaintFollower:
+        """Reads the paint of edited lines again."""
+        return PaintFollower(self.frames)
+
+    @staticmethod
+    def open(settings: Settings, pool: Pool = nullcontext) -> Services:
+        """Open everything over one home; ``pool`` is for jobs that are worth processes."""
+        store = Store.open(settings)
+        jobs = SharedJobs(store, pool=pool) if store.sharing.is_shared else Jobs(store, pool=pool)
+        exports, frames = ExportFolder(settings.exports), Frames(settings)
+        large = LargeEdits(settings)
+        return Services(
+            settings,
+            store,
+            frames,
+            large,
+            Previews(settings, store, PaintFollower(frames), large),
+            PredictionReader(settings),
+            exports,
+            jobs,
+            Events(store, jobs),
+            YieldStore(store),
+            StatisticsStore(store),
+            NoiseStore(store),
+            Upkeep(store, jobs),
+            WebhookSender(store, leads=jobs.leads),
+        )
+
+    def start(self) -> None:
+        """Load the solver's kernels, and take up the work that an earlier run left undone."""
+        Thread(target=warm_up, daemon=True).start()
+        Thread(target=self._keep_large_up, name="yield", daemon=True).start()
+        self.frames.warm()
+        resume_solving(self.jobs, self.store)
+        for kind in (PAINT, PROPOSALS, PICTURES):
+            kind.resume(self.jobs, self.store)
+        # Begun again, a share would be one more to take back.
+        POSITIONS.make(self.jobs, self.store)
+        resume_exports(self.jobs, self.store, self.exports, self.frames)
+        resume_versions(self.jobs, self.store)
+        resume_imports(self.jobs, self.store, self.settings)
+        resume_evaluations(self.jobs, self.store)
+        resume_practice(self.jobs, self.store)
+        make_rigs(self.jobs, self.store)
+        self.jobs.on_lead(self._lead)
+        self.jobs.start()
+        self.store.follow()
+        self.upkeep.start()
+        self.webhooks.start()
+
+    def _lead(self) -> None:
+        """Begin what one process does for all."""
+        if not self._solved_leftovers():
+            Thread(target=self._solve_leftovers_later, daemon=True).start()
+        Thread(target=self._weigh_left, name="agreement", daemon=True).start()
+        self.webhooks.wake()
+
+    def _weigh_left(self) -> None:
+        """Compare annotations that an earlier run was stopped before."""
+        try:
+            weigh_left(self.store, self.paint)
+        except Exception:
+            log.exception("annotations could not be compared")
+
+    def _keep_large_up(self) -> None:
+        self.statistics.keep_large_up()
+        self.yields.keep_large_up()
+
+    def _solved_leftovers(self) -> bool:
+        """Whether what an earlier run left is taken up; not while another process keeps writing."""
+        try:
+            solve_leftovers(self.jobs, self.store, actor=LOCAL_USER)
+        except BusyError:
+            return False
+        return True
+
+    def _solve_leftovers_later(self) -> None:
+        while not self.stopping.wait(LEFTOVERS_AGAIN_S) and not self._solved_leftovers():
+            pass
+
+    def stop(self) -> None:
+        """Tell all work to end after its next step; requests that are open go on."""
+        self.stopping.set()
+        self.events.close()
+        self.webhooks.stop()
+        self.upkeep.stop()
+        self.jobs.stop()
+
+    def close(self) -> None:
+        """Let the running work end, and close processes and database."""
+        self.stop()
+        for work in (self.webhooks, self.jobs, self.upkeep):
+            work.close(self.stopping.seconds_left())
+        self.previews.close()
+        self.large.close()
+        self.frames.close()
+        self.predictions.close()
+        self.store.close()

@@ -1,0 +1,250 @@
+"""Team: what a server has that many people log in to, and one that somebody runs alone has not."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from ipaddress import ip_address
+from typing import Annotated, Any
+from urllib.parse import urlsplit
+
+from fastapi import Depends, Request
+
+from app.config import Settings
+from app.db.store import Store
+from app.errors import ConflictError, NotLoggedInError
+from app.features.people.access_tokens import AccessTokens
+from app.features.people.devices import CHALLENGE_LASTS, Devices
+from app.features.people.devices import LASTS as DEVICE_LASTS
+from app.features.people.logins import LASTS, Login, Logins, Way
+from app.features.people.passkeys import Passkeys, PasskeySite
+from app.features.people.second_factor import SecondFactors
+from app.features.people.sign_on import LASTS as BEGUN_LASTS
+from app.features.people.sign_on import SignOn
+from app.features.people.sign_on_rules import read_rules
+from app.http.headers import cookie_of
+from app.http.tries import Tries
+from app.mail import MailServer, read_mail_server
+
+NAME = "touchline_session"
+ASKER = "touchline_passkey"
+"""The cookie that says which browser was asked to sign with a passkey."""
+BEGUN = "touchline_sign_on"
+"""The cookie that says which browser was sent to the provider of single sign-on."""
+DEVICE = "touchline_device"
+"""The cookie by which a browser is known in which somebody has logged in before."""
+LANDING = "/login"
+"""The page to which the provider sends people back."""
+
+
+@dataclass(frozen=True)
+class Team:
+    """The way in.
+
+    Attributes:
+        logins: Sessions of people in browsers.
+        tokens: Tokens of their scripts.
+        factors: Their second factors.
+        passkeys: With which they need no password.
+        sign_on: The provider by which they come in; None: there is none.
+        url: The address that people open; None: the one that they came by.
+        proxies: Who is believed whom they forward.
+        tries: Counts who tries too often.
+        devices: Browsers in which people have logged in before.
+        mail: Sends invitations; None: links are shown.
+    """
+
+    logins: Logins
+    tokens: AccessTokens
+    factors: SecondFactors
+    passkeys: Passkeys
+    sign_on: SignOn | None
+    url: str | None
+    proxies: frozenset[str]
+    tries: Tries
+    devices: Devices
+    mail: MailServer | None
+
+    @staticmethod
+    def of(settings: Settings, store: Store) -> Team | None:
+        """Of a server of a team; None for one that somebody runs alone.
+
+        Raises:
+            InputError: The settings of single sign-on, or of mail, are there by half.
+        """
+        rules = read_rules(settings)
+        if not settings.team:
+            return None
+        logins = Logins(store, only=Way.SIGN_ON if rules and rules.only else None)
+        return Team(
+            logins,
+            AccessTokens(store),
+            SecondFactors(store),
+            Passkeys(store, logins),
+            SignOn(store, logins, rules) if rules else None,
+            settings.url,
+            frozenset(settings.proxies),
+            Tries(store),
+            Devices(store),
+            read_mail_server(settings),
+        )
+
+    @property
+    def secure(self) -> bool:
+        """Whether people come by TLS."""
+        return (self.url or "").startswith("https://")
+
+    @property
+    def cookie(self) -> str:
+        """Name of the cookie. With the prefix browsers refuse one that was set by another name, or
+        without TLS."""
+        return self._cookie_name(NAME)
+
+    def cookie_values(self, token: str | None) -> dict[str, Any]:
+        """How the cookie of a token is set; None: how it is taken back."""
+        return self._values(NAME, token or "", int(LASTS.total_seconds()) if token else 0)
+
+    def asker(self, request: Request) -> str:
+        """What a browser alone knows that was asked to sign with a passkey; empty: it was not."""
+        return cookie_of(request.scope, self._cookie_name(ASKER)) or ""
+
+    def asker_values(self, asker: str) -> dict[str, Any]:
+        """How it is told that."""
+        return self._values(ASKER, asker, int(CHALLENGE_LASTS.total_seconds()))
+
+    def count_try(self, request: Request, name: str | None = None) -> None:
+        """Count that somebody asks whether a password is right.
+
+        Raises:
+            TooManyTriesError: There were too many.
+        """
+        device = None
+        if name is not None and (token := cookie_of(request.scope, self._device_cookie(name))):
+            device = self.devices.recognise(name, token)
+        self.tries.count(self.address(request), name, device)
+
+    def device_values(self, name: str) -> dict[str, Any]:
+        """How a browser is told that it is a known one of a person, who has just logged in there."""
+        values = self._values(DEVICE, self.devices.make(name), int(DEVICE_LASTS.total_seconds()))
+        return {**values, "key": self._device_cookie(name)}
+
+    def _device_cookie(self, name: str) -> str:
+        return f"{self._cookie_name(DEVICE)}_{self.devices.cookie_of(name)}"
+
+    def begun(self, request: Request) -> str:
+        """What a browser alone knows that was sent to the provider; empty: it was not."""
+        return cookie_of(request.scope, self._cookie_name(BEGUN)) or ""
+
+    def begun_values(self, asker: str | None) -> dict[str, Any]:
+        """How it is told that; None: how it is taken back."""
+        return self._values(BEGUN, asker or "", int(BEGUN_LASTS.total_seconds()) if asker else 0)
+
+    def landing(self, request: Request) -> str:
+        """The address to which the provider sends people back."""
+        return self.base(request) + LANDING
+
+    def require_sign_on(self) -> SignOn:
+        """The provider by which people come in; raises ConflictError where there is none."""
+        if self.sign_on is None:
+            raise ConflictError(
+                "there is no single sign-on here", hint="The operator sets it up: docs/teams.md."
+            )
+        return self.sign_on
+
+    def require_passwords(self) -> None:
+        """Raise ConflictError where people come by single sign-on alone."""
+        if self.sign_on is not None and self.sign_on.rules.only:
+            label = self.sign_on.rules.label
+            raise ConflictError(
+                f"people log in by {label} alone here", hint=f"Log in with {label}."
+            )
+
+    def site(self, request: Request) -> PasskeySite:
+        """For whom passkeys are: the address that people open, as the operator said, or this machine.
+
+        Raises:
+            ConflictError: Browsers make no passkeys for it.
+        """
+        said = urlsplit(self.base(request))
+        name = said.hostname or ""
+        if name == "localhost" or (said.scheme == "https" and not _is_number(name)):
+            port = f":{said.port}" if said.port not in (None, 80, 443) else ""
+            return PasskeySite(name, f"{said.scheme}://{name}{port}")
+        raise ConflictError(
+            "browsers make no passkeys for this address",
+            hint="They need https and a name (touchline serve --team --url), or localhost.",
+        )
+
+    def _cookie_name(self, name: str) -> str:
+        return f"__Host-{name}" if self.secure else name
+
+    def _values(self, name: str, value: str, age: int) -> dict[str, Any]:
+        values = {"key": self._cookie_name(name), "value": value, "path": "/", "httponly": True}
+        return {**values, "samesite": "strict", "secure": self.secure, "max_age": age}
+
+    def token(self, request: Request) -> str | None:
+        """The token that a browser sent."""
+        return cookie_of(request.scope, self.cookie)
+
+    def login(self, request: Request) -> Login | None:
+        """Who that is, on a route that anybody may ask."""
+        token = self.token(request)
+        return self.logins.find(token) if token else None
+
+    def login_with(self, token: str, request: Request) -> Login:
+        """Who asks with a token.
+
+        Raises:
+            NotLoggedInError: It is not valid.
+            TooManyTriesError: Nor were too many before, from the same address.
+        """
+        try:
+            return self.tokens.find(token)
+        except NotLoggedInError:
+            self.tries.count_token(self.address(request))
+            raise
+
+    def base(self, request: Request) -> str:
+        """The beginning of addresses that are shown to people."""
+        return self.url or f"{request.url.scheme}://{request.headers['host']}"
+
+    def address(self, request: Request) -> str:
+        """Where a request comes from: the last address that a proxy of ours has seen."""
+        peer = request.client.host if request.client else ""
+        forwarded = request.headers.getlist("x-forwarded-for")
+        if self.url is None or peer not in self.proxies or not forwarded:
+            return peer
+        return forwarded[-1].rpartition(",")[2].strip()[:60] or peer
+
+
+def _is_number(name: str) -> bool:
+    """Whether that is an address of numbers, which no passkey is for."""
+    try:
+        ip_address(name)
+    except ValueError:
+        return False
+    return True
+
+
+def allowed_hosts(settings: Settings) -> list[str]:
+    """Names that the server answers to."""
+    own = urlsplit(settings.url).hostname if settings.url else None
+    name = f"[{own}]" if own and ":" in own else own
+    return [*settings.allowed_hosts, *([name] if name else [])]
+
+
+async def get_team(request: Request) -> Team:
+    """The way in.
+
+    Raises:
+        ConflictError: Somebody runs this server alone.
+    """
+    team: Team | None = request.app.state.team
+    if team is None:
+        raise ConflictError(
+            "this server is run by one person alone: it has no accounts",
+            hint="touchline serve --team asks everybody who they are.",
+        )
+    return team
+
+
+AppTeam = Annotated[Team, Depends(get_team)]

@@ -1,0 +1,202 @@
+"""The application: settings in, an ASGI application out."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager, nullcontext
+from pathlib import Path
+
+from anyio.to_thread import current_default_thread_limiter
+from fastapi import Depends, FastAPI
+
+from app.config import Settings
+from app.features.agreement import routes as agreement
+from app.features.audit import routes as audit
+from app.features.batches import routes as batches
+from app.features.comments import routes as comments
+from app.features.datasets import routes as datasets
+from app.features.exports import routes as exports
+from app.features.findings import routes as findings
+from app.features.groups import bulk_routes as groups_bulk
+from app.features.groups import routes as groups
+from app.features.groups import view_routes as groups_view
+from app.features.guidelines import routes as guidelines
+from app.features.imports import routes as imports
+from app.features.independent_annotations import routes as independent_annotations
+from app.features.jobs import routes as jobs
+from app.features.jobs.service import Pool
+from app.features.maintenance import routes as maintenance
+from app.features.match_estimates import routes as match_estimates
+from app.features.notifications import routes as notifications
+from app.features.paint import routes as paint
+from app.features.people import login_routes as people_login
+from app.features.people import routes as people
+from app.features.people import session_routes as people_session
+from app.features.people import sign_on_routes as people_sign_on
+from app.features.pitches import routes as pitches
+from app.features.policies import routes as policies
+from app.features.practice import routes as practice
+from app.features.predictions import evaluation_routes as predictions_evaluation
+from app.features.predictions import routes as predictions
+from app.features.queue import routes as queue
+from app.features.saved_views import routes as saved_views
+from app.features.stations import routes as stations
+from app.features.verdicts import routes as verdicts
+from app.features.versions import routes as versions
+from app.features.webhooks import routes as webhooks
+from app.features.what_if import routes as what_if
+from app.formats.manifest import software_version
+from app.http import event_routes as http_event
+from app.http.access import Access, require_decided
+from app.http.bodies import MAX_JSON_BYTES, JsonBodies
+from app.http.errors import install_handlers
+from app.http.headers import SecurityHeaders
+from app.http.idempotency import Idempotency
+from app.http.metrics import SharedNumbers, install_metrics
+from app.http.openapi import describe
+from app.http.origin import KnownHosts, SameOrigin
+from app.http.pages import install_pages
+from app.http.request_limits import THREADS, Doors, Lanes
+from app.http.request_log import RequestLog
+from app.http.requests import HeadAsGet, OneLength, OneRange
+from app.http.services import Services
+from app.http.site import STATIC, Site
+from app.http.strict_parameters import refuse_unknown_parameters
+from app.http.team import Team, allowed_hosts
+from app.soccer.actors import LOCAL_USER
+
+PREFIX = "/api/v1"
+ROUTERS = (
+    # A request is compared with every route before its own, twice: what people ask all the time is first.
+    groups.router,
+    groups_view.router,
+    verdicts.router,
+    groups_bulk.router,
+    batches.router,
+    http_event.router,
+    people_session.router,
+    notifications.router,
+    datasets.router,
+    independent_annotations.gold_router,
+    guidelines.router,
+    comments.router,
+    paint.view_paint_router,
+    stations.router,
+    match_estimates.rig_router,
+    queue.timeline_router,
+    findings.router,
+    queue.insight_router,
+    exports.router,
+    pitches.pitch_router,
+    pitches.pitches_router,
+    match_estimates.pictures_router,
+    paint.paint_router,
+    paint.proposals_router,
+    match_estimates.positions_router,
+    jobs.router,
+    match_estimates.noise_router,
+    policies.router,
+    what_if.router,
+    versions.router,
+    predictions.router,
+    predictions_evaluation.router,
+    imports.uploads_router,
+    imports.imports_router,
+    saved_views.router,
+    queue.query_fields_router,
+    queue.statistics_router,
+    independent_annotations.takes_router,
+    practice.router,
+    people_sign_on.router,
+    people_login.passkeys_router,
+    people_login.second_factors_router,
+    maintenance.maintenance_router,
+    people_login.tokens_router,
+    people.users_router,
+    people.members_router,
+    audit.router,
+    webhooks.router,
+    agreement.router,
+)
+
+
+def create_app(settings: Settings, *, static: Path = STATIC, pool: Pool = nullcontext) -> FastAPI:
+    """The whole service over one home.
+
+    The database must exist in the present schema (``touchline migrate``); it is opened here, so
+    that a fault shows at start and not at the first request.
+
+    Args:
+        settings: Where things live and how much is allowed.
+        static: Folder of the browser application.
+        pool: Makes the processes that large jobs solve in; without any they share this one.
+
+    Raises:
+        StorageError: The database cannot be used.
+    """
+    services = Services.open(settings, pool)
+    site = Site(static, team=settings.team)
+    app = FastAPI(
+        title="Touchline",
+        version=software_version(),
+        summary="Multi-view soccer frames into a trusted 3D ball dataset.",
+        openapi_url=f"{PREFIX}/openapi.json",
+        # Both pages load scripts from elsewhere, which the content policy refuses.
+        docs_url=None,
+        redoc_url=None,
+        redirect_slashes=False,
+        lifespan=_lifespan,
+    )
+    app.state.services = services
+    team = app.state.team = Team.of(settings, services.store)
+    install_handlers(app)
+    app.include_router(maintenance.health_router, dependencies=[Depends(require_decided)])
+    # Before the API: nobody asks for as much at once as somebody who opens the first page.
+    events = services.events
+    install_pages(app, site, None if settings.team else events.moment, events.banner)
+    for router in ROUTERS:
+        app.include_router(
+            router,
+            prefix=PREFIX,
+            dependencies=[Depends(require_decided), Depends(refuse_unknown_parameters)],
+        )
+    describe(app)
+    _add_middleware(app, settings, site, team)
+    return app
+
+
+def _add_middleware(app: FastAPI, settings: Settings, site: Site, team: Team | None) -> None:
+    """The first one added is the innermost."""
+    doors = Doors(app.state.services.store.sharing.is_shared, settings.solves_apart)
+    app.add_middleware(Lanes, doors=doors)
+    # Outside of the lanes: a repetition that waits for the first response takes nobody's place.
+    app.add_middleware(Idempotency, actor=LOCAL_USER)
+    if team is not None:
+        # Inside of what makes HEAD a GET, outside of whatever could answer.
+        app.add_middleware(Access, team=team, store=app.state.services.store)
+    app.add_middleware(OneRange)
+    app.add_middleware(HeadAsGet)
+    app.add_middleware(
+        JsonBodies,
+        max_bytes=min(MAX_JSON_BYTES, settings.max_upload_bytes),
+        streamed=frozenset({f"{PREFIX}/uploads"}),
+    )
+    app.add_middleware(OneLength)
+    app.add_middleware(SameOrigin, url=settings.url, required=team is not None)
+    app.add_middleware(KnownHosts, allowed=allowed_hosts(settings))
+    install_metrics(app, doors)
+    app.add_middleware(RequestLog)
+    app.add_middleware(SecurityHeaders, policy=site.policy)
+
+
+@asynccontextmanager
+async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
+    current_default_thread_limiter().total_tokens = THREADS
+    app.state.services.start()
+    shared: SharedNumbers | None = getattr(app.state, "shared_metrics", None)
+    keeping = None if shared is None else asyncio.create_task(shared.keep_fresh())
+    yield
+    if keeping is not None:
+        keeping.cancel()
+    app.state.services.close()

@@ -1,0 +1,182 @@
+"""Videos: opened as files of known containers.
+
+An index of when each frame is shown, by which it is found again exactly.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections import OrderedDict
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from app.config import Settings
+from app.durable import replace_file
+from app.errors import ImageError, TooLargeError
+
+_CONTAINERS = "mov,mp4,m4a,3gp,3g2,mj2,matroska,webm,avi,mpegts,mpeg,asf,flv,ogg"
+"""By FFmpeg's names. Those that are left out include playlists (concat, hls): their files could
+be anywhere."""
+_OPTIONS = f"format_whitelist;{_CONTAINERS}|protocol_whitelist;file"
+
+
+@contextmanager
+def open_video(path: Path) -> Iterator[cv2.VideoCapture]:
+    """A video, opened or not (``isOpened``), and closed again."""
+    # Read by OpenCV at each opening. No other backend: one of them takes "%d" in a name for a
+    # row of files.
+    os.environ["OPENCV_FFMPEG_CAPTURE_OPTIONS"] = _OPTIONS
+    video = cv2.VideoCapture(str(path), cv2.CAP_FFMPEG)
+    try:
+        yield video
+    finally:
+        video.release()
+
+
+MAX_FRAMES = 2_000_000
+"""Frames of one video; eleven hours at 50 a second."""
+_A_WORD = 250
+"""Frames between two words of how far the decoding is: about a second of 1080p."""
+_VERSION = 1
+_MARGINS = (32, 256)
+"""Frames before the one that is sought from which decoding starts: behind a jump some decoders return
+frames whose references they have not seen."""
+
+Times = npt.NDArray[np.float64]
+"""Presentation time of each frame as the decoder returns them, milliseconds, shape (N,)."""
+_MOST_REMEMBERED = 8
+"""Videos; each takes 16 MiB at most."""
+_REMEMBERED: OrderedDict[str, Times] = OrderedDict()
+"""Indices that the disk refused, by the stamps of their videos."""
+
+
+def make_index(
+    path: Path, stamp: str, settings: Settings, tell: Callable[[int], None] | None = None
+) -> Times:
+    """When each frame of a video is shown: decodes it all, and keeps the index in the cache.
+
+    Where the disk refuses it, it is remembered by this process.
+
+    Args:
+        path: The video.
+        stamp: Name of its content: another video under the same path has another one.
+        settings: The folder of the cache.
+        tell: Called every now and then with how many frames are decoded; what it raises ends it.
+
+    Raises:
+        ImageError: It is no video that can be read.
+        TooLargeError: It has more frames than ``MAX_FRAMES``.
+    """
+    times = _decode_times(path, tell)
+    content = BytesIO()
+    np.save(content, times, allow_pickle=False)
+    place = _place(stamp, settings)
+    # A full disk costs the cache and no frame.
+    try:
+        place.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+        replace_file(place, content.getvalue())
+    except OSError:
+        remember_index(stamp, times)
+    return times
+
+
+def remember_index(stamp: str, times: Times) -> None:
+    """Keep an index in this process, which the disk refuses."""
+    _REMEMBERED[stamp] = times
+    while len(_REMEMBERED) > _MOST_REMEMBERED:
+        _REMEMBERED.popitem(last=False)
+
+
+def remembered_index(stamp: str) -> Times | None:
+    """The index of a video that this process remembers."""
+    return _REMEMBERED.get(stamp)
+
+
+def kept_index(stamp: str, settings: Settings) -> Times | None:
+    """The index of a video that was decoded before; None where there is none."""
+    if (remembered := remembered_index(stamp)) is not None:
+        return remembered
+    with suppress(OSError, ValueError, EOFError):
+        times: Times = np.load(_place(stamp, settings), allow_pickle=False)
+        if times.dtype == np.float64 and times.ndim == 1:
+            return times
+    return None
+
+
+def frame_at(path: Path, number: int, times: Times) -> Any:
+    """The frame of that number, or None where it cannot be decoded.
+
+    Args:
+        path: The video.
+        number: From 0, below ``len(times)``.
+        times: Index of the video.
+
+    Raises:
+        ImageError: It is no video that can be read.
+    """
+    if number > _MARGINS[0]:
+        with _opened(path) as video:
+            for margin in _MARGINS:
+                if number > margin and _jump(video, number - margin, number, times):
+                    return _retrieved(video)
+    # Opened anew: sent back to its start, a decoder may land behind the first frame.
+    with _opened(path) as video:
+        for _ in range(number + 1):
+            if not video.grab():
+                return None
+        return _retrieved(video)
+
+
+@contextmanager
+def _opened(path: Path) -> Iterator[cv2.VideoCapture]:
+    with open_video(path) as video:
+        if not video.isOpened():
+            raise ImageError(f"{path.name} is no video that can be read")
+        yield video
+
+
+def _jump(video: cv2.VideoCapture, start: int, number: int, times: Times) -> bool:
+    """Go to a frame from about another one; whether every frame on the way came when it should."""
+    video.set(cv2.CAP_PROP_POS_MSEC, times[start])
+    if not video.grab():
+        return False
+    places = np.flatnonzero(times == video.get(cv2.CAP_PROP_POS_MSEC))
+    # Where the jump led too far, or two frames have one time, nothing says which one this is.
+    if len(places) != 1 or places[0] > number - _MARGINS[0] // 2:
+        return False
+    for expected in times[places[0] + 1 : number + 1]:
+        if not video.grab() or video.get(cv2.CAP_PROP_POS_MSEC) != expected:
+            return False
+    return True
+
+
+def _retrieved(video: cv2.VideoCapture) -> Any:
+    done, picture = video.retrieve()
+    return picture if done else None
+
+
+def _decode_times(path: Path, tell: Callable[[int], None] | None) -> Times:
+    times: list[float] = []
+    with _opened(path) as video:
+        while video.grab():
+            times.append(video.get(cv2.CAP_PROP_POS_MSEC))
+            if len(times) > MAX_FRAMES:
+                raise TooLargeError(f"{path.name} has more than {MAX_FRAMES:,} frames")
+            if tell is not None and len(times) % _A_WORD == 0:
+                tell(len(times))
+    return np.array(times)
+
+
+def _place(stamp: str, settings: Settings) -> Path:
+    """Where the index of a video is kept."""
+    # Another decoder may return other frames.
+    key = repr((stamp, _VERSION, cv2.__version__))
+    return settings.cache / "videos" / f"{hashlib.sha256(key.encode()).hexdigest()[:32]}.npy"

@@ -1,0 +1,173 @@
+"""Commands that run the service: serve it, and bring its database up to date."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from app.terminal.opened import opened_store
+from app.terminal.options import Cluster, acting, read_settings
+from app.terminal.terminal import say, show_progress
+
+if TYPE_CHECKING:
+    from socket import socket
+
+    from app.config import Settings
+    from app.db.store import Store
+
+commands = typer.Typer()
+
+QUICK_BYTES = 256 * 2**20
+"""A database up to this size is looked through before it is served (about a second), a larger one
+while it is."""
+
+
+@commands.command()
+def serve(
+    host: Annotated[str | None, typer.Option(help="Address to listen on.")] = None,
+    port: Annotated[int | None, typer.Option(min=0, max=65535, help="0: any free one.")] = None,
+    team: Annotated[
+        bool | None,
+        typer.Option(
+            "--team/--alone",
+            help="Ask everybody who they are, or nobody. Default: alone, unless TOUCHLINE_TEAM is set.",
+        ),
+    ] = None,
+    url: Annotated[
+        str | None,
+        typer.Option(help="The address that people open, where a proxy stands in front."),
+    ] = None,
+    cluster: Cluster = None,
+    workers: Annotated[
+        int | None,
+        typer.Option(
+            min=1,
+            max=64,
+            help="Processes that answer requests, on PostgreSQL. Default: one.",
+        ),
+    ] = None,
+    with_sample: Annotated[
+        bool, typer.Option("--sample", help="Make the dataset sample first, where it is missing.")
+    ] = False,
+) -> None:
+    """Serve the browser application and the REST interface."""
+    settings = read_settings(
+        host=host, port=port, team=team, url=url, cluster=cluster, web_workers=workers
+    )
+    _require_safe(settings)
+    from app.db.dialects.dialect import dialect_of, require_processes
+    from app.db.locks import server_lock
+    from app.features.people.service import require_no_people
+    from app.features.upkeep.service import file_sizes
+    from app.http.server import listen, run
+    from app.http.web_processes import serve_with
+    from app.log import log_to_stderr
+    from app.main import create_app
+    from app.workers.executors import server_pool
+
+    require_processes(settings, settings.web_workers)
+    log_to_stderr(settings.log_format)
+    with server_lock(settings, shared=not dialect_of(settings).is_file):
+        _prepare(settings)
+        if not settings.team and team is None:
+            with opened_store(settings) as store:
+                require_no_people(store)
+        if with_sample:
+            _make_sample(settings)
+        with listen(settings.host, settings.port) as (socket, address):
+            if settings.web_workers > 1:
+                _say_address(settings, address)
+                serve_with(settings.web_workers, _serve_part, settings, socket)
+                return
+            application = create_app(settings, pool=server_pool(settings))
+            if file_sizes(settings).get("database", 0) <= QUICK_BYTES:
+                application.state.services.store.require_whole()
+            say(f"Touchline is at {address}")
+            if settings.team:
+                _say_first_link(application.state.services.store, settings.url or address)
+            run(application, socket)
+
+
+def _require_safe(settings: Settings) -> None:
+    """Refuse to serve where strangers could come in, or passwords would be read on their way."""
+    from app.features.maintenance.service import exposure_of
+    from app.features.people.sign_on_rules import read_rules
+    from app.mail import read_mail_server
+
+    read_rules(settings)
+    read_mail_server(settings)
+    problem = exposure_of(settings)
+    if problem is not None:
+        raise typer.BadParameter(problem)
+
+
+def _make_sample(settings: Settings) -> None:
+    """The dataset ``sample``, where it is missing or not complete."""
+    from app.features.practice.service import SAMPLE, make_sample_dataset
+    from app.sample.order import SampleOrder
+    from app.workers.executors import executor_of
+
+    folder, pool = settings.home / SAMPLE, partial(executor_of, settings)
+    with opened_store(settings) as store, show_progress("Making the sample") as progress:
+        make_sample_dataset(store, SAMPLE, folder, SampleOrder(), pool, progress, actor=acting())
+
+
+def _serve_part(settings: Settings, socket: socket) -> None:
+    """Serve in one process of several."""
+    from app.http.server import run
+    from app.log import log_to_stderr
+    from app.main import create_app
+    from app.workers.executors import server_pool
+
+    log_to_stderr(settings.log_format)
+    run(create_app(settings, pool=server_pool(settings)), socket)
+
+
+def _say_address(settings: Settings, address: str) -> None:
+    say(f"Touchline is at {address}")
+    if settings.team:
+        with opened_store(settings) as store:
+            _say_first_link(store, settings.url or address)
+
+
+def _say_first_link(store: Store, base: str) -> None:
+    """Show whoever starts a server without an admin how to become one."""
+    from app.features.people.links import FIRST_LASTS, make_first_link
+
+    link = make_first_link(store, actor=acting())
+    if link is not None:
+        hours = int(FIRST_LASTS.total_seconds() // 3600)
+        say(f"No admin can log in yet. Become one here (good once, for {hours} hours):")
+        say(link.address(base))
+
+
+@commands.command()
+def migrate() -> None:
+    """Bring the database to this version's schema, after a backup; no server may run."""
+    from app.db.locks import server_lock
+    from app.db.migrate import migrate as run_migrations
+
+    settings = read_settings()
+    with server_lock(settings):
+        migrated = run_migrations(settings)
+    if migrated.copy is not None:
+        say(f"backup {migrated.copy}")
+    say(f"schema {migrated.revision}")
+
+
+def _prepare(settings: Settings) -> None:
+    """Make the home private and its database the present one; the log says what was changed."""
+    import structlog
+
+    from app.db.home import make_private
+    from app.db.migrate import migrate as run_migrations
+
+    log = structlog.get_logger("touchline")
+    mended = make_private(settings)
+    if mended:
+        log.warning("others could read the home; now its owner alone can", files=mended)
+    migrated = run_migrations(settings)
+    if migrated.copy is not None:
+        log.info("schema migrated", schema=migrated.revision, backup=str(migrated.copy))

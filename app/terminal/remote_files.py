@@ -1,0 +1,185 @@
+"""What commands send to a server as files, or fetch from it: imports, exports and evaluations."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from app.errors import InputError, NotFoundError
+from app.object_store.address import is_address
+from app.progress import TellProgress
+from app.terminal.remote import IMPORT, follow, part, some, time_text
+
+if TYPE_CHECKING:
+    from app.features.predictions.sources import PredictionSource, SourcesRequest
+    from touchline.client import Client
+
+
+def import_values(
+    client: Client,
+    dataset: str,
+    format_: str,
+    path: Path | str,
+    options: Mapping[str, Any],
+    *,
+    lines: Path | None,
+    frames: str | None,
+    policy: str | None,
+    dry_run: bool,
+    progress: TellProgress,
+) -> tuple[dict[str, Any], tuple[str, str | None] | None]:
+    """Send files, and let the server read them; a text is an address in a store of the server.
+
+    Returns:
+        The report, and why nothing was read, where nothing was.
+
+    Raises:
+        InputError: The policy is a file, which this cannot send.
+        JobError: It failed otherwise.
+    """
+    from app.soccer.policy import POLICIES
+    from touchline.errors import JobError
+
+    if policy is not None and policy not in POLICIES:
+        raise InputError(
+            "a policy in a file cannot be sent with an import",
+            hint=f"Name one of {', '.join(POLICIES)}, and change its thresholds in the browser.",
+        )
+    more: dict[str, Any] = {} if lines is None else {"lines": {"upload": _send(client, lines)}}
+    if frames is not None:
+        stored = is_address(frames)
+        more["frames"] = {"folder": frames} if stored else {"upload": _send(client, Path(frames))}
+    body = {
+        "dataset": dataset,
+        "format": format_,
+        "source": {"folder": path} if isinstance(path, str) else {"upload": _send(client, path)},
+        "options": {**options, **more},
+        "policy": policy,
+        "dry_run": dry_run,
+    }
+    try:
+        report = follow(client, client.post("imports", body), progress)["result"]
+    except JobError as error:
+        report, problem = error.job["result"], error.job["problem"]
+        if not report or not problem:
+            raise
+        return _report(report), (problem["detail"], problem["hint"])
+    return _report(report), None
+
+
+def _report(result: Mapping[str, Any]) -> dict[str, Any]:
+    """As ``import`` has it; the server keeps names in their alphabetical order."""
+    skipped = [some(item, "file", "record", "field", "problem") for item in result["skipped"]]
+    return {**some(result, *IMPORT), "skipped": skipped}
+
+
+def export_values(
+    client: Client, out: Path | str, request: Mapping[str, Any], progress: TellProgress
+) -> dict[str, Any]:
+    """Let the server write an export, and fetch it to ``out``: a folder, or a zip by its ending.
+
+    A text is an address in a store of the server, which writes it there.
+    """
+    if isinstance(out, str):
+        job = follow(client, client.post("exports", {**request, "to": out}), progress)
+        report = _export_report(client.get(f"exports/{job['id']}"))
+        return {"out": out, "format": request["format"], **report}
+    from app.formats.output import output_tree
+    from app.formats.packing import unpack
+
+    with output_tree(out) as folder, tempfile.TemporaryDirectory() as held:
+        job = client.post("exports", request)
+        follow(client, job, progress)
+        found = client.get(f"exports/{job['id']}")
+        content = client.download(f"exports/{job['id']}/content", Path(held) / "export.zip")
+        unpack(content, folder)
+    return {"out": str(out), "format": request["format"], **_export_report(found)}
+
+
+def _export_report(found: Mapping[str, Any]) -> dict[str, Any]:
+    return some(found, "counts", "left_out", "missing_images")
+
+
+def evaluate(
+    client: Client,
+    dataset: str,
+    asked: SourcesRequest,
+    progress: TellProgress,
+) -> tuple[dict[str, Any], list[dict[str, Any]]]:
+    """Send predictions, and let the server measure them.
+
+    Returns:
+        The evaluation, and the sets that were made or found for it.
+    """
+    named = {"predictions": asked.predictions, "careful": asked.careful}
+    sets = {
+        name: _set(client, dataset, source) for name, source in named.items() if not source.is_empty
+    }
+    found_sets = {name: found["id"] for name, found in sets.items()}
+    body = {**vars(asked.request), **found_sets, "version": asked.version}
+    place = f"datasets/{part(dataset)}/evaluations"
+    job = follow(client, client.post(place, body), progress)
+    found = client.get(f"evaluations/{job['result']['evaluation']}")
+    dataset_id = client.get(f"datasets/{part(dataset)}")["id"]
+    names = {
+        "predictions": "prediction_set_id",
+        "careful": "careful_set_id",
+        "version": "version_id",
+    }
+    values = {names.get(name, name): found[name] for name in found if name != "headline"}
+    created = time_text(found["created"])
+    return {**values, "dataset_id": dataset_id, "created": created}, list(sets.values())
+
+
+def write_evaluation(client: Client, values: Mapping[str, Any], out: Path) -> None:
+    """Fetch everything of an evaluation into a folder.
+
+    Raises:
+        InputError: The folder cannot be written.
+        UnsafePathError: The server names what would lie outside of it.
+    """
+    from app.features.predictions.folder import write_parts
+
+    place = f"evaluations/{values['id']}"
+
+    def fetch(kind: str, name: str, file: Path) -> None:
+        client.download(f"{place}/{kind}/{part(name)}", file)
+
+    write_parts(out, values, client.pages(f"{place}/frames"), fetch)
+
+
+def _set(client: Client, dataset: str, source: PredictionSource) -> dict[str, Any]:
+    """The set of a source: of its files, which are read once, or of its name."""
+    place = f"datasets/{part(dataset)}/predictions"
+    path = None if source.boxes is None else Path(source.boxes)
+    if path is not None and not path.exists():
+        known = {item["name"]: item for item in client.get(place)["items"]}
+        if source.cameras is not None or str(path) not in known:
+            raise NotFoundError(
+                f"there is no file {path} here, and no set of predictions of that name on the server"
+            )
+        return dict(known[str(path)])
+    files = {"upload": path, "images_upload": source.images, "cameras_upload": source.cameras}
+    sizes = {"size": source.size, "cameras_size": source.cameras_size}
+    body: dict[str, Any] = {
+        **{field: _send(client, file) for field, file in files.items() if file is not None},
+        **{name: [size.width, size.height] for name, size in sizes.items() if size is not None},
+        "format": source.format,
+        "category": source.category,
+    }
+    return dict(client.post(place, body))
+
+
+def _send(client: Client, path: Path) -> str:
+    """Id of an upload of a file, or of a folder as a zip; what is there already is not sent again."""
+    from app.features.imports.upload_queries import upload_id
+    from app.formats.packing import as_one_file
+    from touchline.errors import NotFoundError as NotThere
+
+    with as_one_file(path) as file:
+        try:
+            return str(client.get(f"uploads/{upload_id(file)}")["id"])
+        except NotThere:
+            return client.upload(file)

@@ -1,0 +1,186 @@
+"""The server that a command works against, instead of a home on this machine.
+
+The command line is then a user of the public interface, and uses the library for scripts
+(``touchline.client``) like any other script; no other module of the server does.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from contextvars import ContextVar
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+from urllib.parse import urlsplit
+
+from app.errors import InputError, ReviewError
+from app.formats.plain_file import open_plain
+from app.private_file import is_open_to_others
+
+if TYPE_CHECKING:
+    from touchline.client import Client
+
+ABLE = (
+    "datasets",
+    "findings",
+    "import",
+    "solve",
+    "policy",
+    "verdict",
+    "export",
+    "freeze",
+    "versions",
+    "evaluate",
+    "batch",
+)
+"""Commands that work against a server; of ``datasets`` its ``list``."""
+MAX_TOKEN = 1000
+"""Bytes of a file that is read for a token."""
+
+
+@dataclass(frozen=True)
+class ServerPlace:
+    """Where it is, and the file that holds a token for it; None: it asks nobody."""
+
+    url: str
+    token_file: Path | None
+
+
+_SERVER: ContextVar[ServerPlace | None] = ContextVar("server", default=None)
+
+
+def work_at(url: str | None, token_file: Path | None, command: str | None) -> None:
+    """Let this command work against a server; None: in a home on this machine.
+
+    Raises:
+        InputError: The command cannot, or the address would show the token to others.
+    """
+    _SERVER.set(None)
+    if url is None:
+        return
+    if command not in ABLE:
+        raise InputError(
+            f"touchline {command} works in a home on this machine, not against a server",
+            hint=f"Leave out --server (TOUCHLINE_SERVER). Those that can: {', '.join(ABLE)}.",
+        )
+    from app.hosts import is_local
+
+    parts = urlsplit(url)
+    if parts.scheme not in ("http", "https") or not parts.hostname or parts.username:
+        raise InputError(f"{url} is no address of a server", hint="Write https://NAME.")
+    if parts.scheme == "http" and not is_local(parts.hostname):
+        raise InputError(
+            f"{url} is not encrypted: a token must not travel in the clear",
+            hint="Write https://; http:// is for this machine alone.",
+        )
+    _SERVER.set(ServerPlace(url.rstrip("/"), token_file))
+
+
+def given_server() -> ServerPlace | None:
+    """The server that this command works against; None: it works in a home."""
+    return _SERVER.get()
+
+
+def require_home() -> None:
+    """Raise InputError in what cannot be asked of the server that was named."""
+    if given_server() is not None:
+        raise InputError(
+            "this works in a home on this machine, not against a server",
+            hint="Leave out --server (TOUCHLINE_SERVER).",
+        )
+
+
+def read_token(path: Path) -> str:
+    """The token in a file that its owner alone can read.
+
+    Raises:
+        InputError: It is no plain file, others can read it, or it holds none.
+    """
+    from app.features.people.access_tokens import is_whole
+
+    try:
+        with open_plain(path) as file:
+            found = os.fstat(file.fileno())
+            text = file.read(MAX_TOKEN).decode("ascii", "replace").strip()
+    except OSError as error:
+        raise InputError(f"{path} cannot be read ({error.strerror})") from error
+    if is_open_to_others(found):
+        raise InputError(f"other users can read {path}", hint=f"chmod 600 {path}")
+    if not is_whole(text):
+        raise InputError(
+            f"{path} holds no whole token",
+            hint="Copy it again, all of it: tl_ and 54 letters and digits.",
+        )
+    return text
+
+
+@contextmanager
+def connected(server: ServerPlace) -> Iterator[Client]:
+    """A connection to a server that was looked at: it is there, of this version, and knows us.
+
+    Raises:
+        ReviewError: It is not; or, inside the block, it refuses something.
+    """
+    from touchline.client import Client
+    from touchline.errors import TouchlineError
+
+    headers = {}
+    if server.token_file is not None:
+        headers["Authorization"] = f"Bearer {read_token(server.token_file)}"
+    try:
+        with Client(server.url, patience=0, timeout=20) as first:
+            _require_version(server, first)
+        with Client(server.url, headers=headers) as client:
+            _require_team(server, client)
+            yield client
+    except TouchlineError as error:
+        raise _explained(server, error) from error
+
+
+def _require_version(server: ServerPlace, client: Client) -> None:
+    from app.formats.manifest import software_version
+
+    mine, found = software_version(), None
+    # What is no JSON at all.
+    with suppress(ValueError):
+        found = client.get("/healthz")
+    theirs = found.get("version") if isinstance(found, dict) else None
+    if not isinstance(theirs, str):
+        raise InputError(
+            f"what answers at {server.url} is not Touchline", hint="Is the address right?"
+        )
+    if theirs.split(".")[:2] != mine.split(".")[:2]:
+        raise InputError(
+            f"{server.url} runs Touchline {theirs}, and this is {mine}",
+            hint=f"Install the wheel of Touchline {theirs} here, or name another server.",
+        )
+
+
+def _require_team(server: ServerPlace, client: Client) -> None:
+    session = client.get("session")
+    if session["team"] and session["name"] is None:
+        raise InputError(
+            f"{server.url} asks who you are",
+            hint="Name a file with a token: --token-file (TOUCHLINE_TOKEN_FILE).",
+        )
+    if not session["team"] and server.token_file is not None:
+        raise InputError(
+            "this server is run by one person alone: it has no tokens",
+            hint="Leave out --token-file (TOUCHLINE_TOKEN_FILE).",
+        )
+
+
+def _explained(server: ServerPlace, error: Exception) -> ReviewError:
+    """The same as an error of a command: what the server said, or why it said nothing."""
+    message, hint = getattr(error, "message", str(error)), getattr(error, "hint", None)
+    said_nothing = getattr(error, "status", None) == 0
+    if said_nothing and ("certificate" in message.lower() or "ssl" in message.lower()):
+        return InputError(
+            f"{server.url} cannot prove who it is: {message}",
+            hint="Is the address right? A certificate of your own goes into SSL_CERT_FILE.",
+        )
+    if said_nothing:
+        hint = "Is it running, and the address right?"
+    return ReviewError(message, hint=hint)

@@ -1,0 +1,120 @@
+"""The scheduler and the workers of a cluster, as programs of their own."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import signal
+from collections.abc import Callable, Coroutine
+from contextlib import suppress
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from app.errors import ClusterError
+from app.workers.cluster import SchedulerPlace, hush
+
+AGAIN_S = 2.0
+"""Seconds until a worker whose scheduler has gone looks for it again."""
+_NO_PAGES: dict[str, Any] = {
+    "distributed.scheduler.http.routes": [],
+    "distributed.worker.http.routes": [],
+    # A worker that is killed is no fault of what it did; a task over which ten ended is.
+    "distributed.scheduler.allowed-failures": 10,
+    "distributed.comm.timeouts.connect": "10s",
+    "distributed.worker.daemon": True,
+}
+"""Neither a dashboard nor any other page: what Dask's show is for nobody but the operator."""
+_NOWHERE = "127.0.0.1:0"
+
+Say = Callable[[str], None]
+
+
+def run_scheduler(place: SchedulerPlace, say: Say) -> None:
+    """Carry tasks between servers and workers until the process is told to end.
+
+    Raises:
+        ClusterError: It cannot listen there.
+    """
+    _run(_schedule(place, say))
+
+
+def run_workers(place: SchedulerPlace, count: int, memory: int | None, say: Say) -> None:
+    """Solve for a scheduler until the process is told to end; one that ends is started again.
+
+    Args:
+        place: Where the scheduler is; it may come later, and go and come back.
+        count: Processes.
+        memory: Bytes that each may use before it is started anew; None: its share of the machine.
+        say: Told when they begin.
+    """
+    with TemporaryDirectory(prefix="touchline-worker-") as folder:
+        _run(_work(place, count, memory, folder, say))
+
+
+def _run(program: Coroutine[Any, Any, None]) -> None:
+    import dask
+    import distributed.scheduler  # noqa: F401  # so that its log is known
+
+    hush()
+    with dask.config.set(_NO_PAGES):
+        asyncio.run(program)
+
+
+async def _schedule(place: SchedulerPlace, say: Say) -> None:
+    from distributed import Scheduler
+
+    end = _told_to_end()
+    try:
+        scheduler = await Scheduler(
+            host=place.host,
+            port=place.port,
+            protocol="tcp" if place.keys is None else "tls",
+            security=place.security(),
+            dashboard=False,
+            dashboard_address=_NOWHERE,
+        )
+    except OSError as error:
+        raise ClusterError(f"{place.address} cannot be listened on ({error})") from error
+    async with scheduler:
+        say(f"The scheduler is at {scheduler.address}")
+        await end.wait()
+
+
+async def _work(
+    place: SchedulerPlace, count: int, memory: int | None, folder: str, say: Say
+) -> None:
+    end = _told_to_end()
+    say(f"{count} workers look for the scheduler at {place.address}")
+    limit = 0.9 / count if memory is None else memory
+    keepers = [asyncio.ensure_future(_keep(place, limit, folder)) for _ in range(count)]
+    await end.wait()
+    for keeper in keepers:
+        keeper.cancel()
+    await asyncio.gather(*keepers, return_exceptions=True)
+
+
+async def _keep(place: SchedulerPlace, limit: float, folder: str) -> None:
+    """A worker, and another one whenever it has ended."""
+    from distributed import Nanny
+
+    while True:
+        with suppress(OSError, TimeoutError, RuntimeError):
+            async with Nanny(
+                place.address,
+                nthreads=1,
+                memory_limit=limit,
+                local_directory=folder,
+                silence_logs=logging.ERROR,
+                security=place.security(),
+                dashboard=False,
+                dashboard_address=_NOWHERE,
+            ) as nanny:
+                await nanny.finished()
+        await asyncio.sleep(AGAIN_S)
+
+
+def _told_to_end() -> asyncio.Event:
+    end, loop = asyncio.Event(), asyncio.get_running_loop()
+    for number in (signal.SIGTERM, signal.SIGINT):
+        loop.add_signal_handler(number, end.set)
+    return end

@@ -1,0 +1,65 @@
+"""Where batches are solved, as the settings say: here, in processes, or on a cluster."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator
+from concurrent.futures import Executor
+from contextlib import AbstractContextManager, contextmanager
+
+from app.config import Settings
+from app.errors import InputError
+from app.worker_process import spawned_pool
+from app.workers.cluster import Cluster, read_place
+
+
+@contextmanager
+def executor_of(settings: Settings, workers: int | None = None) -> Iterator[Executor | None]:
+    """Where a command solves: on a cluster where one is named; None: in its own process.
+
+    Args:
+        settings: Name the cluster, and how many processes there are.
+        workers: As many processes instead.
+
+    Raises:
+        InputError: The cluster's address cannot be one, or processes cannot enter the folder.
+        ClusterError: Nobody is there, or somebody of another version.
+    """
+    count = workers or settings.workers
+    if settings.cluster is not None:
+        with _cluster_of(settings) as cluster:
+            yield cluster
+    elif count == 1:
+        yield None
+    else:
+        with process_pool(count) as pool:
+            yield pool
+
+
+def server_pool(settings: Settings) -> Callable[[], AbstractContextManager[Executor]]:
+    """Where large jobs of a server are solved, opened when there is one; raises as ``executor_of``."""
+    if settings.cluster is not None:
+        return lambda: _cluster_of(settings)
+    # One processor is left for the requests.
+    return lambda: process_pool(max(1, settings.workers - 1))
+
+
+@contextmanager
+def process_pool(workers: int) -> Iterator[Executor]:
+    """Processes that solve; what is not done when the work fails is found again by the next run.
+
+    Raises:
+        InputError: They could not even enter the present folder.
+    """
+    if not os.access(".", os.X_OK):
+        raise InputError(
+            "this user may not enter the folder in which the command was given, and processes"
+            " that solve begin there",
+            hint="Change to another folder first (cd /), or solve with --workers 1.",
+        )
+    with spawned_pool(workers) as pool:
+        yield pool
+
+
+def _cluster_of(settings: Settings) -> Cluster:
+    return Cluster(read_place(settings.cluster or "", settings.cluster_keys))

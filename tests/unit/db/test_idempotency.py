@@ -1,0 +1,226 @@
+from __future__ import annotations
+
+import threading
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+import pytest
+
+from app.db.idempotency import (
+    KeyedRequest,
+    PendingResponse,
+    find_stored,
+    has_key,
+    read_progress,
+    save_progress,
+    store_sent,
+    without_response,
+)
+from app.db.log import Entry, append
+from app.db.store import Store
+from app.db.stored_responses import IdempotencyKey, StoredResponse
+from app.errors import ConflictError
+from tests.unit.features.pending import keyed_request
+
+RESPONSE = StoredResponse("digest", 201, {"etag": '"a"'}, b"{}")
+
+
+def work(store: Store, outcome: object) -> object:
+    """What a service does: it writes, and answers the request as the last of its transaction."""
+    with store.write() as session:
+        append(session, [Entry("deed", "ann", "2026-01-01T00:00:00Z", {"did": str(outcome)})])
+        session.respond(outcome)
+    return outcome
+
+
+def entries(store: Store) -> int:
+    with store.read() as session:
+        count: int = session.exec_driver_sql("SELECT count(*) FROM log").scalar_one()
+        return count
+
+
+class TestStoreSent:
+    def test_the_first_one_stays(self, store: Store) -> None:
+        assert find_stored(store, "key", "ann") is None
+        store_sent(store, "key", "ann", RESPONSE)
+        store_sent(store, "key", "ann", StoredResponse("other", 200, {}, b""))
+        assert find_stored(store, "key", "ann") == RESPONSE
+        assert find_stored(store, "key", "ben") is None
+
+
+class TestPendingResponse:
+    @staticmethod
+    def pending(request: KeyedRequest | None, made: list[object]) -> PendingResponse[str]:
+        def make(outcome: object) -> str:
+            made.append(outcome)
+            return f"response to {outcome}"
+
+        return PendingResponse(
+            request, make, lambda text, digest: StoredResponse(digest, 200, {}, text.encode())
+        )
+
+    def test_is_stored_with_its_work_and_sent_as_it_is_stored(self, store: Store) -> None:
+        request, made = KeyedRequest(IdempotencyKey("key", "ann", "digest")), list[object]()
+        pending = self.pending(request, made)
+        with pending.open():
+            outcome = work(store, "outcome")
+        assert request.stored
+        assert pending.response_to(outcome) == "response to outcome"
+        assert made == ["outcome"]
+        stored = find_stored(store, "key", "ann")
+        assert stored == StoredResponse("digest", 200, {}, b"response to outcome")
+
+    def test_is_stored_as_the_last_statement_of_the_transaction(
+        self, store: Store, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        statements: list[str] = []
+        with keyed_request().open(), store.write() as session:
+            session.respond("outcome")
+            run = session.execute
+
+            def execute(statement: Any, *values: Any, **options: Any) -> Any:
+                statements.append(str(statement).split()[0])
+                return run(statement, *values, **options)
+
+            monkeypatch.setattr(session, "execute", execute)
+            append(session, [Entry("deed", "ann", "2026-01-01T00:00:00Z", {"did": "it"})])
+            before = len(statements)
+        assert before > 0
+        assert statements[before:] == ["INSERT"]
+
+    def test_of_a_request_without_a_key_nothing_is_stored_and_the_response_is_made_afterwards(
+        self, store: Store
+    ) -> None:
+        made = list[object]()
+        pending = self.pending(None, made)
+        with pending.open():
+            outcome = work(store, "outcome")
+            assert made == []
+        assert pending.response_to(outcome) == "response to outcome"
+        assert find_stored(store, "key", "ann") is None
+
+    def test_is_not_stored_where_the_work_is_rolled_back(self, store: Store) -> None:
+        request = KeyedRequest(IdempotencyKey("key", "ann", "digest"))
+        pending = self.pending(request, [])
+        with pending.open():
+            with pytest.raises(KeyError), store.write() as session:
+                session.respond("first")
+                raise KeyError
+            assert find_stored(store, "key", "ann") is None
+            assert not request.stored
+            # As where a service tries again what somebody else has changed meanwhile.
+            outcome = work(store, "second")
+        assert pending.response_to(outcome) == "response to second"
+
+    def test_is_not_stored_where_the_commit_fails(
+        self, store: Store, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        request, before = KeyedRequest(IdempotencyKey("key", "ann", "digest")), entries(store)
+        with self.pending(request, []).open():
+            with pytest.raises(OSError, match="full"), store.write() as session:
+                session.respond("outcome")
+                monkeypatch.setattr(
+                    session, "commit", lambda: (_ for _ in ()).throw(OSError("full"))
+                )
+            assert (request.stored, entries(store)) == (False, before)
+            assert find_stored(store, "key", "ann") is None
+
+    def test_of_two_that_do_the_same_work_the_second_does_nothing(self, store: Store) -> None:
+        with keyed_request().open():
+            work(store, "outcome")
+        done = entries(store)
+        with (
+            pytest.raises(ConflictError, match="answered in the meantime"),
+            keyed_request().open(),
+        ):
+            work(store, "outcome")
+        assert entries(store) == done
+
+    def test_the_last_outcome_of_a_transaction_counts(self, store: Store) -> None:
+        pending = self.pending(KeyedRequest(IdempotencyKey("key", "ann", "digest")), [])
+        with pending.open(), store.write() as session:
+            session.respond("inner")
+            session.respond("outer")
+        assert pending.response_to("outer") == "response to outer"
+
+    @pytest.mark.parametrize("has_a_key", [True, False])
+    def test_a_request_is_answered_in_one_transaction_alone(
+        self, store: Store, has_a_key: bool
+    ) -> None:
+        request = KeyedRequest(IdempotencyKey("key", "ann", "digest")) if has_a_key else None
+        with self.pending(request, []).open():
+            work(store, "first")
+            with pytest.raises(RuntimeError, match="answered once"):
+                work(store, "second")
+
+    @pytest.mark.parametrize("has_a_key", [True, False])
+    def test_what_is_sent_is_the_outcome_that_the_work_answered_with(
+        self, store: Store, has_a_key: bool
+    ) -> None:
+        request = KeyedRequest(IdempotencyKey("key", "ann", "digest")) if has_a_key else None
+        pending = self.pending(request, [])
+        with pending.open():
+            work(store, ["answered"])
+        with pytest.raises(RuntimeError, match="must return the outcome"):
+            pending.response_to(["answered"])
+
+    def test_other_threads_and_what_comes_after_have_no_request(self, store: Store) -> None:
+        looked = threading.Event()
+
+        def look() -> bool:
+            looked.set()
+            return has_key()
+
+        with keyed_request().open(), ThreadPoolExecutor(1) as pool:
+            assert has_key()
+            assert pool.submit(look).result() is False
+            assert looked.is_set()
+        assert not has_key()
+
+
+class TestWithoutResponse:
+    def test_inner_work_leaves_the_response_to_the_outer_one(self, store: Store) -> None:
+        pending = keyed_request()
+        with pending.open():
+            with without_response():
+                work(store, "inner")
+            assert find_stored(store, "key", "ann") is None
+            assert work(store, "outer") == "outer"
+        assert pending.response_to("outer") == "outer"
+
+
+class TestProgress:
+    @staticmethod
+    def save(store: Store, value: object) -> None:
+        with store.write() as session:
+            save_progress(session, value)
+
+    @staticmethod
+    def read(store: Store) -> object:
+        with store.read() as session:
+            return read_progress(session)
+
+    def test_what_was_saved_last_is_read(self, store: Store) -> None:
+        with keyed_request().open():
+            assert self.read(store) is None
+            self.save(store, {"next": 7})
+            self.save(store, {"next": 9})
+            assert self.read(store) == {"next": 9}
+        with keyed_request(actor="ben").open():
+            assert self.read(store) is None
+
+    def test_the_response_takes_its_place(self, store: Store) -> None:
+        with keyed_request().open():
+            self.save(store, {"next": 7})
+            found = find_stored(store, "key", "ann")
+            assert found is not None
+            assert found.under_way
+            work(store, "outcome")
+            assert self.read(store) is None
+        found = find_stored(store, "key", "ann")
+        assert found is not None
+        assert not found.under_way
+
+    def test_a_request_without_a_key_saves_none(self, store: Store) -> None:
+        self.save(store, {"next": 7})
+        assert self.read(store) is None

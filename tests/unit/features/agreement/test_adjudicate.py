@@ -1,0 +1,249 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from app.db.store import Store
+from app.errors import ConflictError, ForbiddenError, NotFoundError
+from app.evaluation.agreement_limits import AgreementLimits
+from app.features.agreement import service as weigh
+from app.features.agreement.adjudicate import decide, get_case, hand_back, list_waiting, take_over
+from app.features.agreement.compare import read_limits, set_limits
+from app.features.agreement.service import BY_ITSELF, after_hand_in
+from app.features.groups.edit import SetBall
+from app.features.groups.history import history
+from app.features.groups.state import GroupState
+from app.features.groups.submit import load, submit
+from app.features.imports.ingest import ingest
+from app.features.independent_annotations.return_work import hand_back_take
+from app.features.independent_annotations.service import Take, get_take, list_takes
+from app.features.integrity.database import examine
+from app.features.people.roles import Role
+from app.features.people.service import invite
+from app.features.queue.service import list_groups
+from app.features.verdicts.service import set_verdict
+from tests.unit.features.independent_annotations.begun import begin_take
+
+
+def judged(store: Store, group_id: int, person: str, moved: float = 0.0) -> Take:
+    """The take of a person who moves the ball of the first view and accepts."""
+    take = begin_take(store, group_id, person=person)
+    state = load(store, take.copy_id)
+    view = next(view for view in state.group.views if view.ball is not None)
+    assert view.ball is not None and view.ball.box is not None
+    if moved:
+        ball = replace(view.ball, box=replace(view.ball.box, x=view.ball.box.x + moved))
+        state = submit(
+            store, take.copy_id, SetBall(view.key, ball), if_match=state.etag, actor=person
+        )
+    set_verdict(store, take.copy_id, "accepted", None, "seen", if_match=state.etag, actor=person)
+    return get_take(store, take.id)
+
+
+def ball_x(state: GroupState) -> float:
+    view = next(view for view in state.group.views if view.ball is not None)
+    assert view.ball is not None and view.ball.box is not None
+    return view.ball.box.x
+
+
+def kinds(store: Store, group_id: int) -> list[tuple[str, str]]:
+    return [(entry.kind, entry.actor) for entry in history(store, group_id)]
+
+
+class TestAfterHandIn:
+    def test_two_who_agree_settle_the_group_by_themselves(self, store, state) -> None:
+        first = judged(store, state.id, "ann", 1.0)
+        assert after_hand_in(store, first.copy_id) is None
+        second = judged(store, state.id, "ben", 2.0)
+        assert after_hand_in(store, second.copy_id) == "agreed"
+        after = load(store, state.id)
+        assert ball_x(after) == ball_x(state) + 1
+        assert (after.verdict.state, after.verdict.actor) == ("accepted", "ann")
+        assert ("agreement", BY_ITSELF) in kinds(store, state.id)
+        assert all(get_take(store, one.id).settled for one in (first, second))
+        assert list_waiting(store, state.dataset) == []
+        assert [str(check) for check in examine(store) if not check.ok] == []
+
+    @pytest.mark.parametrize(("moved", "comes_to"), [(2.0, "agreed"), (40.0, "open")])
+    def test_what_a_stopped_server_left_is_compared_by_the_next_one(
+        self, store, state, monkeypatch, moved, comes_to
+    ) -> None:
+        judged(store, state.id, "ann", 1.0)
+        second = judged(store, state.id, "ben", moved)
+        assert get_take(store, second.id).handed_in is not None
+
+        def fail(*_: object) -> None:
+            raise OSError("the power went")
+
+        with monkeypatch.context() as broken:
+            broken.setattr(weigh, "settle_rest" if comes_to == "agreed" else "_announce", fail)
+            with pytest.raises(OSError, match="power"):
+                after_hand_in(store, second.copy_id)
+        assert load(store, state.id).etag == state.etag
+        assert list_waiting(store, state.dataset) == []
+        assert (weigh.weigh_left(store), weigh.weigh_left(store)) == (1, 0)
+        assert [one.group for one in list_waiting(store, state.dataset)] == (
+            [state.id] if comes_to == "open" else []
+        )
+        moved_by = ball_x(load(store, state.id)) - ball_x(state)
+        assert moved_by == (1.0 if comes_to == "agreed" else 0.0)
+
+    def test_what_cannot_be_taken_over_waits_for_a_decision(
+        self, store, state, monkeypatch
+    ) -> None:
+        judged(store, state.id, "ann", 1.0)
+        second = judged(store, state.id, "ben", 2.0)
+
+        def faster(*_: object, **__: object) -> None:
+            raise ConflictError("somebody was faster")
+
+        with monkeypatch.context() as broken:
+            broken.setattr(weigh, "adopt_take", faster)
+            assert after_hand_in(store, second.copy_id) == "open"
+        assert [one.group for one in list_waiting(store, state.dataset)] == [state.id]
+
+    def test_two_who_do_not_wait_for_a_decision(self, store, state) -> None:
+        judged(store, state.id, "ann")
+        second = judged(store, state.id, "ben", 40.0)
+        assert after_hand_in(store, second.copy_id) == "open"
+        assert load(store, state.id).etag == state.etag
+        (waiting,) = list_waiting(store, state.dataset)
+        assert (waiting.group, waiting.people) == (state.id, ("ann", "ben"))
+        assert waiting.worst > 10
+
+    def test_wider_limits_let_them_agree(self, store, state) -> None:
+        wide = AgreementLimits(ball_px=100, ball_m=100)
+        set_limits(store, state.dataset, wide, actor="lea")
+        with store.read() as session:
+            assert read_limits(session, state.dataset_id) == wide
+        judged(store, state.id, "ann")
+        second = judged(store, state.id, "ben", 40.0)
+        assert after_hand_in(store, second.copy_id) == "agreed"
+
+    def test_handing_in_the_copy_of_an_ordinary_group_compares_nothing(self, store, state) -> None:
+        assert after_hand_in(store, state.id) is None
+
+
+class TestDecide:
+    @pytest.fixture
+    def takes(self, store, state) -> tuple[Take, Take]:
+        found = judged(store, state.id, "ann"), judged(store, state.id, "ben", 40.0)
+        assert after_hand_in(store, found[1].copy_id) == "open"
+        return found
+
+    def test_takes_one_with_the_verdict_of_who_decided(self, store, state, takes) -> None:
+        case = get_case(store, state.id, actor="lea")
+        assert [take.person for take in case.takes] == ["ann", "ben"]
+        assert not case.own and case.refused is None
+        after = decide(store, state.id, takes[1].id, actor="lea")
+        assert ball_x(after) == ball_x(state) + 40
+        assert (after.verdict.state, after.verdict.actor) == ("accepted", "lea")
+        said = kinds(store, state.id)
+        assert ("edit", "ben") in said and ("agreement", "lea") in said
+        with pytest.raises(NotFoundError, match="waits for a decision"):
+            decide(store, state.id, takes[0].id, actor="lea")
+        assert [str(check) for check in examine(store) if not check.ok] == []
+
+    def test_is_done_whole_or_not_at_all(self, store, state, takes, monkeypatch) -> None:
+        before = kinds(store, state.id)
+
+        def fail(*_: object, **__: object) -> None:
+            raise OSError("the power went")
+
+        with monkeypatch.context() as broken:
+            broken.setattr(weigh, "give_verdict_of", fail)
+            with pytest.raises(OSError, match="power"):
+                decide(store, state.id, takes[1].id, actor="lea")
+        assert load(store, state.id).etag == state.etag
+        assert kinds(store, state.id) == before
+        assert not any(get_take(store, one.id).settled for one in takes)
+        assert [one.group for one in list_waiting(store, state.dataset)] == [state.id]
+        after = decide(store, state.id, takes[1].id, actor="lea")
+        assert (ball_x(after), after.verdict.actor) == (ball_x(state) + 40, "lea")
+
+    def test_begins_a_third_one_without_a_verdict_of_who_decided(self, store, state, takes) -> None:
+        after = decide(store, state.id, takes[1].id, as_start=True, actor="lea")
+        assert ball_x(after) == ball_x(state) + 40
+        assert after.verdict.actor == "ben"
+        assert list_waiting(store, state.dataset) == []
+
+    def test_nobody_decides_about_their_own_while_somebody_else_is_there(
+        self, store, state, takes
+    ) -> None:
+        # Where nobody else is there they may, and it is said.
+        case = get_case(store, state.id, actor="ann")
+        assert case.own and case.refused is None
+        invite(store, "rob", Role.REVIEWER, actor="lea")
+        assert "rob can decide" in (get_case(store, state.id, actor="ann (token x)").refused or "")
+        with pytest.raises(ForbiddenError, match="rob can decide"):
+            decide(store, state.id, takes[0].id, actor="ann")
+
+    def test_takes_nothing_that_does_not_wait_here(self, store, state, takes) -> None:
+        with pytest.raises(NotFoundError, match="annotation 99"):
+            decide(store, state.id, 99, actor="lea")
+
+
+class TestHandBack:
+    @pytest.fixture
+    def takes(self, store, state) -> tuple[Take, Take]:
+        found = judged(store, state.id, "ann"), judged(store, state.id, "ben", 40.0)
+        assert after_hand_in(store, found[1].copy_id) == "open"
+        return found
+
+    def test_tells_its_person_why_and_the_group_waits_for_them_alone(
+        self, store, state, takes
+    ) -> None:
+        assert hand_back(store, state.id, takes[1].id, " the  spot ", actor="lea").handed_in is None
+        assert list_waiting(store, state.dataset) == []
+        shown = list_takes(store, state.dataset, lambda _: True, person="lea")
+        assert [one.handed_back and one.handed_back.reason for one in shown] == [None, "the spot"]
+        again = load(store, takes[1].copy_id)
+        set_verdict(
+            store, takes[1].copy_id, "deferred", None, "x", if_match=again.etag, actor="ben"
+        )
+        assert after_hand_in(store, takes[1].copy_id) == "open"
+        (waiting,) = list_waiting(store, state.dataset)
+        assert waiting.people == ("ann", "ben")
+        shown = list_takes(store, state.dataset, lambda _: True, person="lea")
+        assert [one.handed_back for one in shown] == [None, None]
+
+    def test_the_queue_finds_it_and_says_what_it_came_to(
+        self, store, state, takes, make_group
+    ) -> None:
+        ingest(store, "demo", [make_group(8)], source="test", actor="ann")
+
+        def found(query: str) -> int:
+            return list_groups(store, state.dataset_id, query).total
+
+        every = found("")
+        assert every == 2
+        (row,) = list_groups(store, state.dataset_id, "annotations:waiting").items
+        assert (row.id, row.takes, row.came_to) == (state.id, 2, "open")
+        asked = {
+            "annotations:any": 1, "annotations:none": every - 1, "annotations:agreed": 0,
+            "-annotations:waiting": every - 1, "takes:2": 1, "takes>2": 0, "takes<2": every - 1,
+            "takes:none": every - 1, "takes>=0": every,
+        }  # fmt: skip
+        assert {query: found(query) for query in asked} == asked
+        decide(store, state.id, takes[1].id, actor="lea")
+        assert [found(f"annotations:{one}") for one in ("waiting", "decided")] == [0, 1]
+        assert list_groups(store, state.dataset_id, "takes:2").items[0].came_to == "decided"
+
+    def test_what_a_lead_returned_leaves_nothing_that_waits(self, store, state, takes) -> None:
+        hand_back_take(store, takes[0].id, "the ball", actor="lea")
+        assert list_waiting(store, state.dataset) == []
+
+    def test_nobody_hands_back_where_others_have_to_decide(self, store, state, takes) -> None:
+        invite(store, "rob", Role.REVIEWER, actor="lea")
+        with pytest.raises(ForbiddenError, match="rob can decide"):
+            hand_back(store, state.id, takes[1].id, actor="ann")
+        with pytest.raises(NotFoundError, match="annotation 99"):
+            hand_back(store, state.id, 99, actor="rob")
+
+    def test_a_lead_who_takes_one_over_has_decided(self, store, state, takes) -> None:
+        after = take_over(store, takes[1], actor="lea")
+        assert ball_x(after) == ball_x(state) + 40
+        assert list_waiting(store, state.dataset) == []
+        assert ("agreement", "lea") in kinds(store, state.id)
+        assert get_take(store, takes[0].id).settled

@@ -1,0 +1,88 @@
+"""A batch that asks two people for an annotation of each group, from giving out to the decision."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from app.db.store import Store
+from app.features.agreement.adjudicate import decide, get_case, list_waiting
+from app.features.agreement.service import after_hand_in
+from app.features.batches.leases import Leases, Worker
+from app.features.batches.progress import my_work
+from app.features.batches.service import Batch, NewBatch, change_batch, get_batch, make_batch
+from app.features.groups.edit import SetBall
+from app.features.groups.submit import load, submit
+from app.features.notifications.queries import read_rings
+from app.features.people.queries import person_by_name
+from app.features.people.roles import Role
+from app.features.people.service import invite
+from app.features.people.visibility_queries import EVERYTHING
+from app.features.verdicts.service import set_verdict
+
+PEOPLE = ("ada", "bo")
+
+
+@pytest.fixture
+def batch(store, fill, make_group) -> Batch:
+    ids = fill(make_group(1), make_group(2))
+    for name in (*PEOPLE, "cy"):
+        invite(store, name, Role.REVIEWER, actor="local")
+    new = NewBatch("twice", annotators=PEOPLE, reviewers=("cy",), verdicts=2)
+    return make_batch(store, load(store, ids[0]).dataset_id, new, actor="lead")
+
+
+def annotate(store: Store, leases: Leases, batch: Batch, person: str, moved: float) -> int:
+    """The copy that somebody gets next, its ball moved and the group accepted."""
+    copy = leases.next(batch.id, Worker(person)).group
+    assert copy is not None
+    state = load(store, copy)
+    view = next(view for view in state.group.views if view.ball is not None)
+    assert view.ball is not None and view.ball.box is not None
+    ball = replace(view.ball, box=replace(view.ball.box, x=view.ball.box.x + moved))
+    state = submit(store, copy, SetBall(view.key, ball), if_match=state.etag, actor=person)
+    set_verdict(store, copy, "accepted", None, "seen", if_match=state.etag, actor=person)
+    return copy
+
+
+def left(store: Store, person: str) -> int:
+    """How many groups somebody is told that they may still get."""
+    (mine,) = my_work(store, lambda _dataset: Worker(person))
+    return mine.left
+
+
+def test_what_agrees_is_over_and_the_rest_waits_for_the_third(store, batch) -> None:
+    leases = Leases(store)
+    assert left(store, "ada") == 2
+    for moved in (1.0, 1.0):
+        copy = annotate(store, leases, batch, "ada", moved)
+        assert after_hand_in(store, copy) is None
+    assert leases.next(batch.id, Worker("ada")).group is None
+    assert (left(store, "ada"), left(store, "bo")) == (0, 2)
+    assert get_batch(store, batch.id).settled == 0
+
+    assert after_hand_in(store, annotate(store, leases, batch, "bo", 2.0)) == "agreed"
+    assert get_batch(store, batch.id).settled == 1
+    assert after_hand_in(store, annotate(store, leases, batch, "bo", 30.0)) == "open"
+    assert leases.next(batch.id, Worker("bo")).group is None
+    assert leases.next(batch.id, Worker("cy")).group is None
+
+    waiting = list_waiting(store, batch.dataset_id)
+    assert len(waiting) == 1
+    group = waiting[0].group
+    assert load(store, group).verdict.state == "unreviewed"
+    case = get_case(store, group, actor="cy")
+    after = decide(store, group, case.takes[1].id, actor="cy")
+    assert (after.verdict.state, after.verdict.actor) == ("accepted", "cy")
+    assert get_batch(store, batch.id).settled == 2
+    assert list_waiting(store, batch.dataset_id) == []
+
+
+def test_the_people_of_a_batch_are_told_of_it_once(store, batch) -> None:
+    change_batch(store, batch.id, actor="lead", annotators=("ada", "bo", "cy"))
+    for name in ("ada", "bo", "cy"):
+        with store.read() as session:
+            person = person_by_name(session, name)
+            rings = read_rings(session, person.id, EVERYTHING, "", 10, None)
+        assert [ring.kind for ring in rings] == ["assigned"], name

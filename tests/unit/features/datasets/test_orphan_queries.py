@@ -1,0 +1,49 @@
+from __future__ import annotations
+
+import pytest
+from sqlalchemy import insert, text
+
+from app.db.store import Store
+from app.features.datasets.orphan_queries import delete_calibrations, spare_calibrations
+from app.features.datasets.queries import delete_solutions, solutions_of
+from app.features.solutions.queries import known_calibrations
+from app.features.solutions.tables import CalibrationModel, SolutionModel
+
+KEYS = ("a", "b", "c")
+
+
+@pytest.fixture
+def solved(filled: Store) -> Store:
+    """The group 1 with two solutions that share the calibration "b"."""
+    with filled.write() as session:
+        session.execute(insert(CalibrationModel), [{"key": key, "body": b""} for key in KEYS])
+        for place, names in enumerate(('["a", "b"]', '["b", "c"]'), 1):
+            values = {"id": place, "group_id": 1, "inputs_hash": str(place), "policy_hash": "p"}
+            values |= {"solver_version": "s", "calibrations": names, "summary": "{}", "body": b""}
+            session.execute(insert(SolutionModel), [values])
+        session.execute(text("UPDATE queue SET solved = true"))
+    return filled
+
+
+class TestSpareCalibrations:
+    def test_a_calibration_stays_while_a_solution_names_it(self, solved: Store) -> None:
+        with solved.write() as session:
+            assert spare_calibrations(session) == []
+            found = [sorted(solutions_of(session, group)) for group in (1, 2)]
+            assert found == [[1, 2], []]
+            delete_solutions(session, [1])
+            assert spare_calibrations(session) == ["a"]
+            assert delete_calibrations(session, KEYS[:2]) == 1
+            assert known_calibrations(session, KEYS) == {"b", "c"}
+
+    def test_only_those_that_were_found_go(self, solved: Store) -> None:
+        with solved.write() as session:
+            delete_solutions(session, [1, 2])
+            assert delete_calibrations(session, KEYS[:2]) == 2
+            assert known_calibrations(session, KEYS) == {"c"}
+
+    def test_they_stay_while_a_group_waits_to_be_solved(self, solved: Store) -> None:
+        with solved.write() as session:
+            delete_solutions(session, [1, 2])
+            session.execute(text("UPDATE queue SET solved = false"))
+            assert (spare_calibrations(session), delete_calibrations(session, KEYS)) == ([], 0)

@@ -1,0 +1,129 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+from sqlalchemy import text
+
+from app.db.store import Store
+from app.errors import StorageError
+from app.features.groups.ball_noise import give_factors
+from app.features.groups.edit import IncludeView, SetBall, SetLines, SetStationLines
+from app.features.groups.replay import rebuild, replay
+from app.features.groups.state_snapshot import read_ledger
+from app.features.groups.submit import load, submit
+from app.features.groups.undo import redo, undo
+from app.features.imports.cameras import ingest_cameras
+from app.features.imports.ingest import ingest
+from app.features.imports.spare import SpareFrame, ingest_spare
+from app.features.match_estimates.noise_queries import Factor
+from app.features.policies.service import change_policy
+from app.features.stations.service import load_station, submit_station, undo_station
+from app.features.verdicts.service import set_verdict
+from app.geometry.camera import Camera
+from app.soccer.annotation import BallAnnotation, Extras, make_lines
+from app.soccer.frames import Box, ImagePoint
+from app.soccer.policy import STRICT
+from tests.databases import said_for_sqlite
+
+
+@pytest.fixture
+def busy(store: Store, fill, make_group, make_static, opposite: Camera) -> Store:
+    """A dataset to which everything has been done that can be done."""
+    ids = fill(make_group(7), make_group(8), make_static(10), make_static(11))
+    state = load(store, ids[0])
+    ball = BallAnnotation(box=Box(500.0, 300.0, 14.0, 14.0))
+    for edit in (
+        SetBall("7.png", ball),
+        SetLines("7_1.png", {"Middle line": None}),
+        IncludeView("7_1.png", False),
+    ):
+        state = submit(store, ids[0], edit, if_match=state.etag, actor="ann")
+    for step in (undo, undo, redo):
+        state = step(store, ids[0], if_match=state.etag, actor="ben")
+    state = set_verdict(store, ids[0], "rejected", "other", "odd", if_match=state.etag, actor="ben")
+    station = load_station(store, load(store, ids[2]).station_ids["cam2"])
+    lines = {"Side line left": (ImagePoint(1.0, 2.0), ImagePoint(30.0, 40.0))}
+    for _ in range(2):
+        station = submit_station(
+            store, station.id, SetStationLines(lines), if_match=station.etag, actor="ann"
+        )
+        lines = {"Middle line": None}
+    undo_station(store, station.id, if_match=station.etag, actor="ann")
+    with store.write() as session:
+        give_factors(session, 1, (Factor("cam2", None, 2.0), Factor("cam2", "ann", 3.0)), "ann")
+    state = load(store, ids[2])
+    submit(
+        store, ids[2], SetBall(state.group.views[-1].key, ball), if_match=state.etag, actor="ann"
+    )
+    _import_changed(store, make_group, make_static)
+    ingest_cameras(
+        store, "demo", {"8_1": opposite, "cam2": opposite}, source="cameras", actor="ann"
+    )
+    spare = [SpareFrame("cam1", "99", Extras(boxes=({"class": "Person"},)))]
+    ingest_spare(store, "demo", spare, source="spare", actor="ann")
+    change_policy(store, "demo", STRICT, if_match=None, actor="ann")
+    return store
+
+
+def _import_changed(store: Store, make_group, make_static) -> None:
+    """The dataset again: another ball, a view less, another camera."""
+    seven, eight, static = make_group(7), make_group(8), make_static(10)
+    first = seven.views[0]
+    other = BallAnnotation(box=Box(1.0, 2.0, 10.0, 10.0))
+    camera = static.views[1]
+    lines = make_lines({"Middle line": [(1, 2), (3, 4)]})
+    groups = [
+        seven.with_view(replace(first, balls=(other,))),
+        replace(eight, views=eight.views[:1]),
+        static.with_view(replace(camera, station=replace(camera.station, lines=lines))),
+    ]
+    ingest(store, "demo", groups, source="second", actor="ann")
+    ingest(store, "demo", [eight], source="third", actor="ann")
+
+
+class TestReplay:
+    def test_the_log_alone_gives_the_state_of_the_tables(self, busy: Store) -> None:
+        with busy.read() as session:
+            replayed, present = replay(session), read_ledger(session)
+        assert replayed.groups == present.groups
+        assert replayed.stations == present.stations
+        assert replayed.verdicts == present.verdicts
+        assert replayed.noticed == present.noticed
+        assert replayed == present
+        assert len(present.noticed) == 2
+
+    def test_the_inputs_hashes_of_the_tables_follow_from_it(self, busy: Store) -> None:
+        with busy.read() as session:
+            replayed = replay(session)
+            stored = dict(session.execute(text("SELECT id, inputs_hash FROM groups")).all())
+        assert {key: replayed.inputs_hash(key) for key in replayed.groups} == stored
+
+    def test_a_table_that_was_changed_behind_the_log_is_seen(self, busy: Store) -> None:
+        with busy.write() as session:
+            session.execute(text("UPDATE view SET included = NOT included WHERE key = '8.png'"))
+        with busy.read() as session:
+            assert replay(session) != read_ledger(session)
+
+    def test_a_log_that_was_tampered_with_is_refused(self, busy: Store) -> None:
+        with busy.write() as session, said_for_sqlite(session):
+            session.execute(text("DROP TRIGGER log_refuses_update"))
+            session.execute(text("UPDATE log SET actor = 'eve' WHERE id = 3"))
+        with busy.read() as session, pytest.raises(StorageError, match="row 3 of the log"):
+            replay(session)
+
+
+class TestRebuild:
+    def test_lost_tables_come_back(self, busy: Store) -> None:
+        with busy.read() as session:
+            before = read_ledger(session)
+            queue = session.execute(text("SELECT * FROM queue ORDER BY group_id")).all()
+        with busy.write() as session:
+            session.execute(text("DELETE FROM queue"))
+            session.execute(text("DELETE FROM view WHERE key = '7.png'"))
+            session.execute(text("UPDATE station SET lines = '{}'"))
+        assert rebuild(busy) == 4
+        with busy.read() as session:
+            assert read_ledger(session) == before
+            again = session.execute(text("SELECT * FROM queue ORDER BY group_id")).all()
+        assert again == queue

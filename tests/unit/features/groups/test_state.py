@@ -1,0 +1,92 @@
+"""ETags worked out from rows are those of the whole states."""
+
+from __future__ import annotations
+
+from app.db.store import Store
+from app.features.groups.edit import IncludeView, SetStationLines
+from app.features.groups.state import GroupState, Head, group_etag, read_etags, read_head, said_of
+from app.features.groups.submit import load, submit
+from app.features.groups.undo import undo
+from app.features.imports.ingest import ingest
+from app.features.stations.service import load_station, submit_station, undo_station
+from app.features.verdicts.service import set_verdict
+from app.soccer.frames import ImagePoint
+
+
+def etags_of(store: Store, *ids: int) -> dict[int, str]:
+    with store.read() as session:
+        return read_etags(session, ids)
+
+
+class TestReadEtags:
+    def test_follows_edits_and_verdicts(self, store: Store, state: GroupState) -> None:
+        seen = [state.etag]
+        edited = submit(store, state.id, IncludeView("7.png", False), if_match=seen[0], actor="ann")
+        seen.append(edited.etag)
+        assert etags_of(store, state.id) == {state.id: edited.etag}
+        judged = set_verdict(store, state.id, "deferred", if_match=edited.etag, actor="ann")
+        seen.append(judged.etag)
+        assert etags_of(store, state.id) == {state.id: judged.etag}
+        assert len(set(seen)) == 3
+
+    def test_what_is_undone_is_not_what_it_was(self, store: Store, state: GroupState) -> None:
+        edit = IncludeView("7.png", False)
+        edited = submit(store, state.id, edit, if_match=state.etag, actor="ann")
+        undone = undo(store, state.id, if_match=edited.etag, actor="ann")
+        assert undone.stored.inputs_hash == state.stored.inputs_hash
+        assert etags_of(store, state.id) == {state.id: undone.etag} != {state.id: state.etag}
+
+    def test_a_static_camera_that_was_changed_and_changed_back_makes_a_cached_document_old(
+        self, store: Store, fill, make_static
+    ) -> None:
+        """Its own ETag is another, and whoever went on from the old one would be refused."""
+        (one, other) = fill(make_static(10), make_static(11))
+        before = load(store, one)
+        station = load_station(store, before.station_ids["cam1"])
+        edit = SetStationLines({"Middle line": (ImagePoint(1.5, 2.5), ImagePoint(3.0, 4.0))})
+        edited = submit_station(store, station.id, edit, if_match=station.etag, actor="ann")
+        undone = undo_station(store, station.id, if_match=edited.etag, actor="ann")
+        for number in (one, other):
+            assert load(store, number).station_etags["cam1"] == undone.etag != station.etag
+        after = load(store, one)
+        assert etags_of(store, one) == {one: after.etag} != {one: before.etag}
+        # What was said is the same: an edit of another view still goes through.
+        assert said_of(after.etag) == said_of(before.etag)
+
+    def test_other_thresholds_under_the_same_name_are_another(self) -> None:
+        etags = {group_etag("said", policy, "custom", (), 0) for policy in ("one", "two")}
+        assert len(etags) == 2
+
+    def test_without_a_solution_is_another(self, store: Store, fill, make_group) -> None:
+        (one,) = fill(make_group(), solved=False)
+        before = load(store, one).etag
+        assert etags_of(store, one) == {one: before}
+        fill()
+        assert etags_of(store, one) == {one: load(store, one).etag} != {one: before}
+
+    def test_counts_the_findings_of_the_solution_and_of_imports(
+        self, store: Store, fill, make_group
+    ) -> None:
+        ids = fill(make_group(7, shift=300.0), make_group(8))
+        edit = IncludeView("8.png", False)
+        etag = load(store, ids[1]).etag
+        submit(store, ids[1], edit, if_match=etag, actor="ann")
+        # The same group comes with another ball: what a person edited stays, with a finding.
+        ingest(store, "demo", [make_group(8, ball=(6.0, 2.0, -0.5))], source="b", actor="ann")
+        fill()
+        states = {number: load(store, number) for number in ids}
+        assert all(state.solution.findings for state in states.values())
+        assert etags_of(store, *ids) == {number: item.etag for number, item in states.items()}
+
+    def test_leaves_out_groups_that_do_not_exist(self, store: Store, state: GroupState) -> None:
+        assert list(etags_of(store, state.id, 99)) == [state.id]
+
+
+class TestReadHead:
+    def test_is_the_first_part_of_the_etag_and_the_policy(
+        self, store: Store, state: GroupState
+    ) -> None:
+        with store.read() as session:
+            said = state.etag.strip('"').partition("-")[0]
+            assert read_head(session, state.id) == Head(said, state.policy.hash)
+            assert read_head(session, 99) is None

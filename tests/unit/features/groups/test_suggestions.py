@@ -1,0 +1,194 @@
+from dataclasses import replace
+
+import numpy as np
+
+from app.features.groups import suggestions as remedies
+from app.features.groups.suggested_edits import edit_of_fix, influences
+from app.features.groups.suggestions import find_remedies
+from app.soccer.annotation import BallAnnotation, make_lines
+from app.soccer.finding import Finding, Fix
+from app.soccer.frames import ImagePoint
+from app.soccer.pitch import Pitch
+from app.soccer.policy import PAPER
+from app.soccer.solution import Suspect
+from app.solving.solve import solve
+from tests.cameras import SIZE
+from tests.unit.solving.conftest import BEHIND_GOAL, MAIN, group, view
+
+BALL = (36.0, 3.0, -0.5)
+
+
+def spoilt(of, markings=4, pixels=40.0):
+    """A view in which one point of each of some markings was put somewhere else."""
+    lines = {name: list(points) for name, points in of.station.lines.items()}
+    for name in sorted(lines)[:markings]:
+        x, y = lines[name][1]
+        lines[name][1] = ImagePoint(x + pixels, y + pixels)
+    return replace(of, station=replace(of.station, lines=make_lines(lines)))
+
+
+class TestFindRemedies:
+    def test_a_group_that_passes_needs_none(self):
+        good = group(view("a", MAIN, BALL), view("b", BEHIND_GOAL, BALL))
+        solution = solve(good, PAPER)
+        assert solution.passes
+        assert find_remedies(good, PAPER, solution) == []
+
+    def bad_point(self):
+        """A group that one bad point keeps from passing, and the policy that asks for more."""
+        good = group(view("a", MAIN, BALL), view("b", BEHIND_GOAL, BALL))
+        clean = min(found.calibration.jac[0] for found in solve(good, PAPER).views)
+        bad = good.with_view(spoilt(good.views[1], markings=1))
+        return bad, replace(PAPER, min_jac=clean - 0.01)
+
+    def test_what_would_make_it_pass_does_so_when_it_is_done(self):
+        bad, policy = self.bad_point()
+        solution = solve(bad, policy)
+        assert solution.first_failing.name == "jac"
+        remedies = find_remedies(bad, policy, solution)
+        assert remedies[0].passes
+        assert remedies[0].fix.action == "move_point"
+        for remedy in remedies:
+            if remedy.fix.action == "draw_marking":
+                continue
+            edited = edit_of_fix(bad, remedy.fix, remedy.point).apply(bad)
+            assert solve(edited, policy).passes == remedy.passes
+
+    def test_the_sentence_names_the_point_and_how_far_it_moves(self):
+        bad, policy = self.bad_point()
+        best = find_remedies(bad, policy, solve(bad, policy))[0]
+        marking = sorted(bad.views[1].station.lines)[0]
+        assert best.sentence.startswith(f"point 2 of {marking} in B moved ")
+
+    def with_ball_off(self, pixels):
+        off = view("b", BEHIND_GOAL, BALL)
+        box = off.balls[0].box
+        off = replace(off, balls=(BallAnnotation(box=replace(box, y=box.y + pixels)),))
+        return group(view("a", MAIN, BALL), off)
+
+    def test_a_ball_beside_the_other_views_ray_is_looked_for_on_it(self):
+        bad = self.with_ball_off(38.0)
+        solution = solve(bad, PAPER)
+        assert solution.first_failing.name == "reprojection"
+        remedies = find_remedies(bad, PAPER, solution)
+        assert remedies
+        assert {remedy.fix.action for remedy in remedies} == {"look_ball"}
+        assert all(remedy.passes for remedy in remedies)
+
+    def test_no_remedy_puts_a_ball_onto_the_ray_that_would_then_confirm_it(self):
+        bad = self.with_ball_off(40.0)
+        (remedy,) = find_remedies(bad, PAPER, solve(bad, PAPER))
+        assert (remedy.fix.action, remedy.passes) == ("look_ball", True)
+        assert edit_of_fix(bad, remedy.fix, remedy.point) is None
+
+    def test_no_ball_is_looked_for_farther_off_than_a_hand_slips(self):
+        bad = self.with_ball_off(440.0)
+        solution = solve(bad, PAPER)
+        assert solution.first_failing.name == "reprojection"
+        assert find_remedies(bad, PAPER, solution) == []
+
+    def test_no_ball_is_looked_for_where_a_better_cause_is_known(self):
+        bad = self.with_ball_off(40.0)
+        solution = solve(bad, PAPER)
+        swapped = Finding("sides_swapped", "Left is right.", "b", fix=Fix("swap_sides", "b"))
+        known = replace(solution, findings=(swapped,))
+        actions = {remedy.fix.action for remedy in find_remedies(bad, PAPER, known)}
+        assert "look_ball" not in actions
+
+    def undrawn(self):
+        """A group whose second view lacks drawn lines, and a policy that asks for them."""
+        good = group(view("a", MAIN, BALL), view("b", BEHIND_GOAL, BALL))
+        clean = min(found.calibration.jac[0] for found in solve(good, PAPER).views)
+        lines = dict(good.views[1].station.lines)
+        missing = sorted(lines)[:2]
+        for marking in missing:
+            del lines[marking]
+        station = replace(good.views[1].station, lines=make_lines(lines))
+        bad = good.with_view(replace(good.views[1], station=station))
+        return bad, replace(PAPER, min_jac=clean - 0.01), missing
+
+    def test_lines_that_nobody_drew_are_named_as_what_keeps_a_view_from_passing(self):
+        bad, policy, missing = self.undrawn()
+        solution = solve(bad, policy)
+        assert solution.first_failing.name == "jac"
+        best = find_remedies(bad, policy, solution)[0]
+        assert (best.fix.action, best.fix.view, best.passes) == ("draw_marking", "b", True)
+        assert all(marking in best.sentence for marking in missing)
+        assert "visible over" in best.sentence
+        assert edit_of_fix(bad, best.fix) is None
+
+    def lengths(self, bad, policy):
+        """Of the markings of the second view that nobody drew, pixels at 960 x 540."""
+        unit = SIZE.diagonal / np.hypot(960, 540)
+        fits = solve(bad, policy).view("b").calibration.markings
+        return {fit.marking: fit.length_px / unit for fit in fits if not fit.distances_px}
+
+    def test_where_all_are_stubs_they_are_marked_as_not_visible_and_not_drawn(self, monkeypatch):
+        """Two clicks anywhere on a stub of a pixel would pass as well."""
+        bad, policy, missing = self.undrawn()
+        monkeypatch.setattr(remedies, "STUB_PX", 2000.0)
+        found = find_remedies(bad, policy, solve(bad, policy))
+        hides = [remedy for remedy in found if remedy.fix.action == "hide_marking"]
+        hidden = sorted(remedy.fix.marking for remedy in hides)
+        assert hidden == sorted(self.lengths(bad, policy)) and {*missing} <= {*hidden}
+        assert "draw_marking" not in {remedy.fix.action for remedy in found}
+        assert "was marked as not visible" in hides[0].sentence
+        marked = bad
+        for remedy in hides:
+            (offer,) = remedy.offers
+            marked = offer.edit.apply(marked)
+        assert list(marked.views[1].station.not_visible) == hidden
+        assert solve(marked, policy).passes
+
+    def test_stubs_are_those_of_less_than_five_pixels(self):
+        bad, policy, _ = self.undrawn()
+        found = find_remedies(bad, policy, solve(bad, policy))
+        hidden = {one.fix.marking for one in found if one.fix.action == "hide_marking"}
+        short = {name for name, length in self.lengths(bad, policy).items() if length < 5.0}
+        assert hidden == short != set()
+        assert "draw_marking" in {one.fix.action for one in found}
+
+    def test_a_line_that_is_there_under_a_wrong_name_is_not_to_be_drawn_again(self):
+        bad, policy, missing = self.undrawn()
+        solution = solve(bad, policy)
+        seen = solution.view("b")
+        suspects = tuple(Suspect("Middle line", name, 0.9, 50.0) for name in missing)
+        doubted = replace(seen, calibration=replace(seen.calibration, suspects=suspects))
+        views = tuple(doubted if one is seen else one for one in solution.views)
+        remedies = find_remedies(bad, policy, replace(solution, views=views))
+        sentences = " ".join(remedy.sentence for remedy in remedies)
+        assert not any(f"{marking} (visible" in sentences for marking in missing)
+
+    def test_a_view_that_was_left_out_can_be_used_again(self):
+        good = group(view("a", MAIN, BALL), view("b", BEHIND_GOAL, BALL))
+        bad = good.with_view(replace(good.views[1], included=False))
+        solution = solve(bad, PAPER)
+        assert solution.first_failing.name == "two_views"
+        (remedy,) = find_remedies(bad, PAPER, solution)
+        assert (remedy.fix, remedy.passes) == (Fix("include_view", "b"), True)
+        assert "B left out by a person" in solution.first_failing.sentence
+
+
+class TestInfluences:
+    def test_each_marking_is_predicted_by_the_others(self):
+        station = view("a", MAIN, BALL, noise_px=0.5).station
+        found = influences(station, Pitch(), PAPER.calibration)
+        assert [item.marking for item in found] == list(station.lines)
+        predicted = [item.largest_px_without for item in found]
+        assert np.median(predicted) < 4.0
+        assert all(item.jac is not None and item.jac[0] > 0.9 for item in found)
+
+    def test_a_bad_marking_is_the_one_without_which_the_view_fits(self):
+        station = spoilt(view("a", MAIN, BALL), markings=1, pixels=60.0).station
+        found = influences(station, Pitch(), replace(PAPER.calibration, check_labels=False))
+        marking = sorted(station.lines)[0]
+        by_name = {item.marking: item for item in found}
+        best = max(found, key=lambda item: item.jac_without[2])
+        assert by_name[marking].largest_px_without > 40
+        assert best.jac_without[2] >= by_name[marking].jac[2]
+
+    def test_without_enough_left_there_is_no_camera(self):
+        station = view("a", MAIN, BALL).station
+        lines = {name: points[:2] for name, points in list(station.lines.items())[:4]}
+        few = replace(station, lines=make_lines(lines))
+        assert all(item.jac_without is None for item in influences(few, Pitch(), PAPER.calibration))

@@ -1,0 +1,195 @@
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from app.errors import NotFoundError
+from app.features.datasets.service import get_dataset
+from app.features.exports.service import export
+from app.features.groups.edit import SetLines, SetStationCamera
+from app.features.groups.replay import replay
+from app.features.groups.state_snapshot import read_ledger
+from app.features.groups.submit import load, submit
+from app.features.imports.cameras import ingest_cameras
+from app.features.imports.ingest import ingest
+from app.features.imports.sources import Source, import_source
+from app.features.solutions.service import solve_dataset, stale_groups
+from app.features.stations.service import load_station, submit_station
+from app.formats.camera_json import covariance_to_json
+from app.formats.cameras_writer import camera_text
+from app.geometry.arrays import row_by_row
+from app.soccer.frames import ImageSize
+from tests.cameras import FULL_HD
+
+
+def attach(store, cameras):
+    return ingest_cameras(store, "demo", cameras, source="cameras.zip", actor="ann")
+
+
+class TestIngestCameras:
+    @pytest.mark.parametrize("name", ["7_1", "{match}/7_1"])
+    def test_a_camera_is_matched_to_a_view_by_the_stem_of_its_name(
+        self, store, state, opposite, name
+    ) -> None:
+        report = attach(store, {name.format(match=state.group.match): opposite})
+        after = load(store, state.id)
+        assert (report.changed, report.problems) == (1, [])
+        assert after.group.view("7_1.png").station.given == opposite
+        assert (after.revision, after.solution) == (2, None)
+
+    def test_attaching_the_same_cameras_again_changes_nothing(self, store, state, opposite) -> None:
+        attach(store, {"7": opposite})
+        before = load(store, state.id)
+        report = attach(store, {"7": opposite})
+        assert (report.changed, report.unchanged) == (0, 1)
+        assert load(store, state.id) == before
+
+    def test_a_static_camera_changes_for_all_its_groups(
+        self, store, fill, make_static, opposite
+    ) -> None:
+        ids = fill(make_static(10), make_static(11))
+        assert attach(store, {"cam1": opposite}).changed == 1
+        assert load(store, ids[1]).group.view("cam1").station.given == opposite
+        assert stale_groups(store, "demo") == ids
+
+    def test_what_was_known_of_the_camera_before_is_not_known_of_the_new_one(
+        self, store, fill, make_static, opposite
+    ) -> None:
+        (group_id,) = fill(make_static(10))
+        station = load_station(store, load(store, group_id).station_ids["cam1"])
+        known = SetStationCamera(station.station.given, (0.5,) * 64)
+        submit_station(store, station.id, known, if_match=station.etag, actor="ann")
+        assert load_station(store, station.id).station.given_covariance == (0.5,) * 64
+        attach(store, {"cam1": opposite})
+        after = load_station(store, station.id).station
+        assert (after.given, after.given_covariance) == (opposite, None)
+        with store.read() as session:
+            assert replay(session).stations[station.id].station == after
+
+    def test_how_well_it_is_known_comes_along_and_counts_for_the_ball(
+        self, store, state, tmp_path
+    ) -> None:
+        view, sigmas = state.group.view("7_1.png"), []
+        camera = state.solution.view("7_1.png").calibration.camera
+        for sigma in (1e-3, 1.0):
+            known = row_by_row(np.diag([1e-6] * 3 + [sigma**2] * 3 + [1e-6] * 2))
+            (tmp_path / "camera_7_1.json").write_text(camera_text(camera, known, view.size))
+            source = Source("cameras", tmp_path)
+            assert import_source(store, "demo", source, store.settings).result.changed == 1
+            again = import_source(store, "demo", source, store.settings).result
+            assert (again.changed, again.unchanged) == (0, 1)
+            solve_dataset(store, "demo")
+            after = load(store, state.id)
+            station = after.group.view("7_1.png").station
+            assert station.given_covariance == pytest.approx(known, rel=1e-9)
+            with store.read() as session:
+                assert replay(session) == read_ledger(session)
+            sigmas.append(after.solution.ball.sigma_m)
+        assert sigmas[1] > 2 * sigmas[0]
+        export(store, "demo", "cameras", tmp_path / "out", everything=True)
+        (file,) = (tmp_path / "out").rglob("camera_7_1.json")
+        told = json.loads(file.read_text())["covariance"]
+        assert np.diag(told)[:3] == pytest.approx([1.0] * 3)
+
+    def test_a_file_that_says_nothing_takes_nothing_of_what_is_known(
+        self, store, state, opposite
+    ) -> None:
+        known = {"7": covariance_to_json(row_by_row(np.eye(8) * 1e-4), opposite, FULL_HD)}
+        options = {"source": "x", "actor": "ann"}
+        ingest_cameras(store, "demo", {"7": opposite}, covariances=known, **options)
+        assert attach(store, {"7": opposite}).unchanged == 1
+        station = load(store, state.id).group.views[0].station
+        assert station.given_covariance is not None
+
+    def test_names_that_match_no_view_or_several_are_reported(
+        self, store, fill, make_group, opposite
+    ) -> None:
+        other = replace(make_group(7), key="other/7.png", match="other")
+        fill(make_group(7), other, solved=False)
+        report = attach(store, {"7": opposite, "99": opposite})
+        assert report.changed == 0
+        assert report.problems == [
+            'camera "7": views of 2 matches have this name; call it '
+            f'"{make_group(7).match}/7", or like the other match',
+            'camera "99": no view has this name; views are called "7", "7_1"',
+        ]
+
+    def test_views_of_one_match_that_are_called_alike_have_one_camera(
+        self, store, fill, make_group, opposite
+    ) -> None:
+        first = make_group(7)
+        second = replace(make_group(8), key="8", match=first.match)
+        views = [
+            replace(view, key=old.key) for view, old in zip(second.views, first.views, strict=True)
+        ]
+        ids = fill(first, replace(second, views=tuple(views)), solved=False)
+        report = attach(store, {"7": opposite})
+        assert report.changed == 2
+        assert report.problems == ['camera "7" is that of 2 views of this name']
+        assert all(load(store, each).group.view("7.png").station.given == opposite for each in ids)
+
+    def test_cameras_of_another_size_are_scaled_to_their_views(
+        self, store, state, opposite
+    ) -> None:
+        size = state.group.view("7.png").size
+        half = opposite.scaled(0.5, 0.5)
+        halved = ImageSize(size.width // 2, size.height // 2)
+        report = ingest_cameras(store, "demo", {"7": half}, source="x", actor="ann", size=halved)
+        given = load(store, state.id).group.view("7.png").station.given
+        assert report.problems == []
+        assert given.focal_length == opposite.focal_length
+        assert given.principal_point == opposite.principal_point
+
+    def test_a_size_that_the_file_states_counts_before_the_option(
+        self, store, state, opposite
+    ) -> None:
+        size = state.group.view("7.png").size
+        halved = ImageSize(size.width // 2, size.height // 2)
+        half, sizes = opposite.scaled(0.5, 0.5), {"7": halved}
+        for said, told in ((None, 0), (halved, 0), (ImageSize(640, 480), 1)):
+            report = ingest_cameras(
+                store, "demo", {"7": half}, source="x", actor="ann", size=said, sizes=sizes
+            )
+            assert len(report.problems) == told
+            given = load(store, state.id).group.view("7.png").station.given
+            assert given.focal_length == opposite.focal_length
+
+    def test_a_camera_of_another_size_than_was_said_is_told(self, store, state, opposite) -> None:
+        size = state.group.view("7.png").size
+        half = replace(
+            opposite, principal_point=((size.width / 2 - 1) / 2, (size.height / 2 - 1) / 2)
+        )
+        (problem,) = attach(store, {"7": half}).problems
+        assert f"--size {size.width // 2}x{size.height // 2}" in problem
+
+    def test_the_camera_stays_when_the_labels_are_imported_again(
+        self, store, fill, make_group, opposite
+    ) -> None:
+        bare = make_group()
+        for view in bare.views:
+            bare = bare.with_view(replace(view, station=replace(view.station, given=None)))
+        (group_id,) = fill(bare, solved=False)
+        attach(store, {"7": opposite})
+        ingest(store, "demo", [replace(bare, label="new")], source="x", actor="ann")
+        after = load(store, group_id)
+        assert after.group.label == "new"
+        assert after.group.view("7.png").station.given == opposite
+        assert not after.stored.edited
+
+    def test_attaching_cameras_is_no_edit_of_a_person(self, store, state, opposite) -> None:
+        attach(store, {"7": opposite})
+        assert not load(store, state.id).stored.edited
+        now = load(store, state.id)
+        edit = SetLines("7.png", {"Middle line": None})
+        submit(store, state.id, edit, if_match=now.etag, actor="ann")
+        attach(store, {"7": replace(opposite, skew=0.5)})
+        assert load(store, state.id).stored.edited
+
+    def test_needs_a_dataset(self, store, opposite) -> None:
+        with pytest.raises(NotFoundError):
+            ingest_cameras(store, "nothing", {"7": opposite}, source="x", actor="ann")
+        with pytest.raises(NotFoundError):
+            get_dataset(store, "nothing")

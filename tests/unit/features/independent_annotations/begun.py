@@ -1,0 +1,23 @@
+"""A take as a batch begins it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from app.db.store import Store
+from app.features.groups.submit import solved
+from app.features.independent_annotations import service as take
+from app.features.independent_annotations.service import Take, begin, get_take
+
+
+def begin_for_batch(store: Store, group_id: int, person: str, **terms: Any) -> Take:
+    """Let a person begin a group on a batch's terms, and solve their copy."""
+    with store.write() as session:
+        begun = begin(session, group_id, person=person, **terms)
+    solved(store, begun.copy_id)
+    return begun
+
+
+def begin_take(store: Store, group_id: int, *, person: str) -> Take:
+    """The take that a person begins of a group."""
+    return get_take(store, take.begin_take(store, group_id, person=person).id)

@@ -1,0 +1,201 @@
+from __future__ import annotations
+
+from dataclasses import replace
+from random import Random
+
+import numpy as np
+import pytest
+
+from app.errors import ConflictError, InputError, NotFoundError
+from app.features.groups.edit import SetBall, SetLines
+from app.features.groups.history import history
+from app.features.groups.submit import load, submit
+from app.features.independent_annotations.errors import polyline_distance
+from app.features.independent_annotations.gold import (
+    mark,
+    middle_of,
+    read_report,
+    start_with,
+    unmark,
+    wilson,
+)
+from app.features.independent_annotations.gold_queries import gold_truth
+from app.features.independent_annotations.known_truth import Terms, begin_next
+from app.features.independent_annotations.return_work import hand_back_take
+from app.features.independent_annotations.service import hand_in
+from app.features.verdicts.service import set_verdict
+from app.soccer.annotation import BallAnnotation
+from app.soccer.frames import Box, ImagePoint
+
+
+def judge(store, group_id, state="accepted", actor="lea", reason=None):
+    etag = load(store, group_id).etag
+    return set_verdict(store, group_id, state, reason, "seen", if_match=etag, actor=actor)
+
+
+def change(store, group_id, edit, actor):
+    return submit(store, group_id, edit, if_match=load(store, group_id).etag, actor=actor)
+
+
+@pytest.fixture
+def terms(store, fill, make_group) -> Terms:
+    """A batch of two groups of three; the third one is gold."""
+    groups = fill(*(make_group(number) for number in (1, 2, 3)))
+    judge(store, groups[2])
+    mark(store, groups[2], "imported", actor="lea")
+    dataset_id = load(store, groups[0]).dataset_id
+    return Terms(4, dataset_id, groups[:2], 2, True, "2000", gold_every=2)
+
+
+class TestMark:
+    def test_only_a_group_with_a_verdict_is_made_gold(self, store, state) -> None:
+        with pytest.raises(ConflictError):
+            mark(store, state.id, "bare", actor="lea")
+        with pytest.raises(InputError):
+            mark(store, state.id, "half", actor="lea")
+        judge(store, state.id)
+        assert mark(store, state.id, "bare", actor="lea").start == "bare"
+        assert unmark(store, state.id, actor="lea").group == state.id
+        with pytest.raises(NotFoundError):
+            unmark(store, state.id, actor="lea")
+
+    def test_the_history_of_a_group_does_not_tell_that_it_is_gold(self, store, state) -> None:
+        judge(store, state.id)
+        before = [entry.kind for entry in history(store, state.id)]
+        etag = load(store, state.id).etag
+        mark(store, state.id, "bare", actor="lea")
+        assert [entry.kind for entry in history(store, state.id)] == before
+        assert load(store, state.id).etag == etag
+
+
+class TestStartWith:
+    def test_what_is_true_stays_although_the_group_is_another_by_now(self, store, state) -> None:
+        judge(store, state.id)
+        marked = mark(store, state.id, "bare", actor="lea")
+        with store.read() as session:
+            truth = gold_truth(session, state.id)
+        view = state.group.views[0]
+        change(store, state.id, SetBall(view.key, BallAnnotation(box=Box(1, 1, 9, 9))), "ann")
+        changed = start_with(store, state.id, "without_balls", actor="max")
+        assert changed == replace(marked, start="without_balls")
+        assert read_report(store, state.dataset_id).groups == (changed,)
+        with store.read() as session:
+            assert gold_truth(session, state.id) == truth
+
+    def test_of_an_ordinary_group_there_is_nothing_to_begin_with(self, store, state) -> None:
+        with pytest.raises(NotFoundError, match="no gold group"):
+            start_with(store, state.id, "bare", actor="lea")
+        with pytest.raises(NotFoundError, match="there is no group 99"):
+            start_with(store, 99, "bare", actor="lea")
+        judge(store, state.id)
+        mark(store, state.id, "bare", actor="lea")
+        with pytest.raises(InputError) as refused:
+            start_with(store, state.id, "half", actor="lea")
+        assert refused.value.pointer == "/start"
+
+
+class TestMixing:
+    def test_each_gold_group_once_and_it_looks_like_the_others(self, store, terms) -> None:
+        copies, kinds = [], []
+        while (take := begin_next(store, terms, person="ann", chance=Random(1))) is not None:
+            copies.append(load(store, take.copy_id))
+            kinds.append(take.kind)
+            judge(store, take.copy_id, actor="ann")
+        assert sorted(kinds) == ["gold", "independent", "independent"]
+        shapes = {
+            (copy.group.match, copy.group.split, tuple(copy.view_ids), copy.can_undo)
+            for copy in copies
+        }
+        assert len(shapes) == 1
+        assert [copy.group.label for copy in copies] == ["Group 1", "Group 2", "Group 3"]
+        kinds_of = {tuple(e.kind for e in history(store, copy.id)) for copy in copies}
+        assert kinds_of == {("import", "verdict", "take")}
+
+    @pytest.mark.parametrize(
+        ("start", "balls", "lines"), [("without_balls", 0, True), ("bare", 0, False)]
+    )
+    def test_it_is_stripped_of_what_is_measured(self, store, terms, start, balls, lines) -> None:
+        gold = read_report(store, terms.dataset_id).groups[0]
+        mark(store, gold.group, start, actor="lea")
+        chance = Random(1)
+        takes = []
+        while (take := begin_next(store, terms, person="ann", chance=chance)) is not None:
+            takes.append(take)
+            judge(store, take.copy_id, actor="ann")
+        (found,) = [take for take in takes if take.kind == "gold"]
+        for view in load(store, found.copy_id).group.views:
+            assert len(view.balls) == balls and bool(view.station.lines) == lines
+
+
+class TestReadReport:
+    def test_it_says_how_far_somebody_is_from_the_truth(self, store, terms) -> None:
+        while (take := begin_next(store, terms, person="ann")) is not None:
+            if take.kind == "gold":
+                group = load(store, take.copy_id).group
+                view = group.views[0]
+                box = view.balls[0].box
+                moved = BallAnnotation(box=Box(box.x + 3.0, box.y + 4.0, box.width, box.height))
+                change(store, take.copy_id, SetBall(view.key, moved), "ann")
+                name = next(iter(view.station.lines))
+                gone = SetLines(view.key, {name: None})
+                change(store, take.copy_id, gone, "ann")
+            reject = ("rejected", "ann", "bad_field_lines")
+            state, actor, reason = reject if take.kind == "gold" else ("accepted", "ann", None)
+            judge(store, take.copy_id, state, actor, reason)
+        (person,) = read_report(store, terms.dataset_id).people
+        (result,) = person.results
+        assert (result.verdict, result.true_verdict, result.right) == (
+            "rejected",
+            "accepted",
+            False,
+        )
+        assert result.error.ball_px == pytest.approx(5.0)
+        assert (result.error.line_px, result.error.lines_missing) == (0.0, 1)
+        assert result.error.ball_m is not None and result.error.ball_m > 0.0
+        assert (person.line_px.count, person.line_px.low) == (1, None)
+
+    def test_what_was_submitted_first_is_measured_whatever_a_lead_returned_since(
+        self, store, terms
+    ) -> None:
+        take = next(
+            one
+            for one in iter(lambda: begin_next(store, terms, person="ann", chance=Random(1)), None)
+            if one.kind == "gold" or not hand_in(store, one.id, actor="ann")
+        )
+        view = load(store, take.copy_id).group.views[0]
+        box = view.balls[0].box
+        wrong = BallAnnotation(box=Box(box.x + 30.0, box.y, box.width, box.height))
+        change(store, take.copy_id, SetBall(view.key, wrong), "ann")
+        hand_in(store, take.id, actor="ann")
+        (first,) = read_report(store, terms.dataset_id).people[0].results
+        assert (first.error.ball_px, first.submissions) == (pytest.approx(30.0), 1)
+        hand_back_take(store, take.id, "look again", actor="lea")
+        assert read_report(store, terms.dataset_id).people[0].results == (first,)
+        change(store, take.copy_id, SetBall(view.key, view.balls[0]), "ann")
+        judge(store, take.copy_id, actor="ann")
+        (second,) = read_report(store, terms.dataset_id).people[0].results
+        assert second == replace(first, submissions=2)
+
+
+class TestNumbers:
+    def test_distances_go_both_ways(self) -> None:
+        long = (ImagePoint(0.0, 0.0), ImagePoint(10.0, 0.0))
+        short = (ImagePoint(0.0, 2.0), ImagePoint(5.0, 2.0))
+        both = [2.0, 2.0, 2.0, float(np.hypot(5.0, 2.0))]
+        assert polyline_distance(long, short) == pytest.approx(np.mean(both))
+        assert polyline_distance(short, long) == polyline_distance(long, short)
+        assert polyline_distance(long[:1], short[:1]) == 2.0
+
+    def test_an_interval_holds_the_median_as_often_as_it_says(self) -> None:
+        chance = np.random.default_rng(5)
+        held = 0
+        for _ in range(400):
+            found = middle_of([float(x) for x in chance.exponential(1.0, 9)])
+            held += found.low <= np.log(2.0) <= found.high
+        assert held >= 0.95 * 400
+        assert middle_of([1.0] * 5).low is None
+
+    def test_of_nothing_there_is_no_share(self) -> None:
+        assert wilson(0, 0) == (None, None)
+        low, high = wilson(10, 10)
+        assert low == pytest.approx(0.722, abs=1e-3) and high == pytest.approx(1.0)

@@ -1,0 +1,465 @@
+from __future__ import annotations
+
+from dataclasses import replace
+from random import Random
+
+import pytest
+
+from app.db.log import newest_entry, verify_chain
+from app.errors import ConflictError, ForbiddenError, InputError, NotFoundError
+from app.features.batches.own import own_left
+from app.features.batches.service import NewBatch, make_batch
+from app.features.datasets.service import delete_dataset, insert_dataset, list_datasets
+from app.features.groups.edit import IncludeView, SetBall, SetLines, SetStationLines
+from app.features.groups.history import history
+from app.features.groups.replay import rebuild
+from app.features.groups.state import GroupState
+from app.features.groups.submit import load, solved, submit
+from app.features.groups.undo import undo
+from app.features.independent_annotations.adopt import adopt_take
+from app.features.independent_annotations.gold import mark
+from app.features.independent_annotations.known_truth import (
+    Terms,
+    begin_next,
+    count_gold_left,
+    is_gold_turn,
+)
+from app.features.independent_annotations.queries import GOLD, INDEPENDENT
+from app.features.independent_annotations.return_work import hand_back_take
+from app.features.independent_annotations.service import get_take, get_take_of, hand_in, list_takes
+from app.features.integrity.database import examine
+from app.features.people.logins import read_roles
+from app.features.people.members import give_role
+from app.features.people.roles import Role
+from app.features.people.service import invite
+from app.features.people.visibility_queries import COPIES, READER, Reader, Sight
+from app.features.policies.service import change_policy
+from app.features.queue.changes import read_news
+from app.features.stations.service import load_station, submit_station
+from app.features.verdicts.bulk import give_verdicts, list_batches, plan_verdicts
+from app.features.verdicts.bulk_undo import undo_batch
+from app.features.verdicts.service import set_verdict
+from app.soccer.annotation import BallAnnotation
+from app.soccer.frames import Box, ImagePoint
+from app.soccer.policy import STRICT
+from tests.unit.features.independent_annotations.begun import begin_for_batch, begin_take
+
+BALL = BallAnnotation(box=Box(500.0, 300.0, 14.0, 14.0))
+HERE = (ImagePoint(1.5, 2.5), ImagePoint(3.0, 4.0))
+
+
+def change(store, group_id, edit, actor="ann") -> GroupState:
+    return submit(store, group_id, edit, if_match=load(store, group_id).etag, actor=actor)
+
+
+def judge(store, group_id, state="accepted", actor="ann", reason=None, note="as it is"):
+    etag = load(store, group_id).etag
+    return set_verdict(store, group_id, state, reason, note, if_match=etag, actor=actor)
+
+
+def faults(store) -> list[str]:
+    return [str(check) for check in examine(store) if not check.ok]
+
+
+class TestBeginTake:
+    def test_a_copy_is_exact(self, store, state) -> None:
+        take = begin_take(store, state.id, person="ann")
+        copy = load(store, take.copy_id)
+        assert copy.group == state.group
+        assert copy.stored.inputs_hash == state.stored.inputs_hash
+        assert (
+            copy.solution is not None
+            and copy.solution.ball == solved(store, state.id).solution.ball
+        )
+        assert copy.dataset_id > COPIES and copy.policy == state.policy
+        assert copy.verdicts == [] and not copy.can_undo
+
+    def test_it_is_judged_by_the_policy_of_the_moment(self, store, fill, make_group) -> None:
+        first, second = fill(make_group(1), make_group(2))
+        one = begin_take(store, first, person="ann")
+        assert load(store, one.copy_id).policy == load(store, first).policy
+        change_policy(store, load(store, first).dataset, STRICT, if_match=None, actor="lea")
+        two = begin_take(store, second, person="ann")
+        assert load(store, two.copy_id).dataset_id == load(store, one.copy_id).dataset_id
+        assert load(store, two.copy_id).policy == STRICT
+
+    def test_a_copy_has_static_cameras_of_its_own_until_it_is_adopted(
+        self, store, fill, make_static
+    ) -> None:
+        first, second = fill(make_static(10), make_static(11))
+        one = begin_take(store, first, person="ann")
+        camera = load(store, one.copy_id).station_ids["cam1"]
+        line = next(iter(load_station(store, camera).station.lines))
+        etag = load_station(store, camera).etag
+        submit_station(store, camera, SetStationLines({line: HERE}), if_match=etag, actor="ann")
+        two = begin_take(store, second, person="ann")
+        assert load(store, two.copy_id).group.views[0].station.lines[line] == HERE
+        assert faults(store) == []
+        assert load(store, second).group.views[0].station.lines[line] != HERE
+        assert load(store, first).group.views[0].station.lines[line] != HERE
+        hand_in(store, one.id, actor="ann")
+        adopt_take(store, one.id, actor="lea")
+        assert load(store, second).group.views[0].station.lines[line] == HERE
+        assert faults(store) == []
+
+    def test_the_log_has_it_and_makes_it_again(self, store, state) -> None:
+        take = begin_take(store, state.id, person="ann")
+        change(store, take.copy_id, SetBall(state.group.views[0].key, BALL))
+        before = load(store, take.copy_id)
+        assert faults(store) == []
+        rebuild(store)
+        assert load(store, take.copy_id).etag == before.etag
+        with store.read() as session:
+            verify_chain(session)
+
+    def test_it_begins_once_a_person(self, store, state) -> None:
+        take = begin_take(store, state.id, person="ann (token deploy)")
+        assert begin_take(store, state.id, person="ann") == take
+        assert begin_take(store, state.id, person="ben").copy_id != take.copy_id
+        with pytest.raises(ConflictError):
+            begin_take(store, take.copy_id, person="ann")
+        with pytest.raises(NotFoundError):
+            begin_take(store, 999, person="ann")
+
+    def test_scripts_have_their_own_too(self, store, state) -> None:
+        names = ("script:nightly import", "script:a@b+c", "script:a+b@c")
+        takes = [begin_take(store, state.id, person=name) for name in names]
+        assert [take.person for take in takes] == list(names)
+        assert len({load(store, take.copy_id).dataset for take in takes}) == 3
+        assert faults(store) == []
+
+    def test_a_blind_copy_begins_with_the_group_as_it_was_when_the_batch_began(
+        self, store, state
+    ) -> None:
+        since = "2999-01-01"
+        view = state.group.views[0].key
+        change(store, state.id, SetBall(view, None), actor="eve")
+        late = begin_for_batch(store, state.id, "ann", batch_id=1, since=since)
+        assert load(store, late.copy_id).group.view(view).balls == ()
+        early = begin_for_batch(store, state.id, "ann", batch_id=2, since="2000-01-01")
+        assert load(store, early.copy_id).group == state.group
+
+    def test_a_copy_that_is_not_blind_begins_with_what_the_person_before_left(
+        self, store, state
+    ) -> None:
+        view = state.group.views[0].key
+        first = begin_for_batch(store, state.id, "ann", batch_id=1)
+        change(store, first.copy_id, SetBall(view, BALL))
+        hand_in(store, first.id, actor="ann")
+        blind = begin_for_batch(store, state.id, "ben", batch_id=1)
+        assert load(store, blind.copy_id).group == state.group
+        seeing = begin_for_batch(store, state.id, "cleo", batch_id=1, blind=False)
+        assert load(store, seeing.copy_id).group.view(view).balls == (BALL,)
+
+    def test_a_nameless_copy_says_nowhere_which_group_it_is_of(self, store, state) -> None:
+        take = begin_for_batch(store, state.id, "ann", batch_id=3, nameless=True)
+        copy = load(store, take.copy_id)
+        said = repr(replace(copy.group, views=())) + repr(copy.view_ids) + repr(copy.station_ids)
+        assert copy.group.label == "Group 1" and copy.group.match == ""
+        for word in ("north", "Alder", ".png"):
+            assert word not in said
+        change(store, take.copy_id, SetBall("view 1", BALL))
+        hand_in(store, take.id, actor="ann")
+        adopted = adopt_take(store, take.id, actor="lea")
+        assert adopted.group.views[0].balls == (BALL,)
+
+    @pytest.mark.parametrize("kind", [INDEPENDENT, GOLD])
+    def test_its_person_is_told_nothing_of_what_became_of_a_nameless_copy_also_later(
+        self, store, state, kind
+    ) -> None:
+        take = begin_for_batch(store, state.id, "ann", batch_id=3, nameless=True, kind=kind)
+        hand_in(store, take.id, actor="ann")
+        if kind == INDEPENDENT:
+            adopt_take(store, take.id, actor="lea")
+        own, leads = (told_to(store, state, take, name) for name in ("ann", "lea"))
+        # The batch is closed: nothing is hidden blind any more.
+        assert (own.of, own.number, own.title, own.settled) == (None, None, "Group 1", None)
+        assert (leads.of, leads.number, leads.title) == (state.id, 1, state.group.label)
+        assert (leads.settled is None) == (kind == GOLD)
+
+
+def told_to(store, state, take, name):
+    """A take as somebody sees it who works in no open batch."""
+    token = READER.set(Reader(name, {}, lambda _dataset: True))
+    try:
+        (view,) = list_takes(store, state.dataset_id, lambda _dataset: True, person=name)
+    finally:
+        READER.reset(token)
+    assert view.id == take.id
+    return view
+
+
+class TestStart:
+    @pytest.mark.parametrize(
+        ("starts", "balls", "lines"),
+        [
+            (("imported", "imported"), True, True),
+            (("imported", "without_balls"), False, True),
+            (("bare", "imported"), False, False),
+        ],
+    )
+    def test_every_copy_of_a_batch_with_gold_groups_begins_alike(
+        self, store, fill, make_group, starts, balls, lines
+    ) -> None:
+        groups = fill(*(make_group(number) for number in range(1, 6)))
+        for group, start in zip(groups[3:], starts, strict=True):
+            judge(store, group, actor="lea")
+            mark(store, group, start, actor="lea")
+        terms = Terms(7, load(store, groups[0]).dataset_id, groups[:3], 1, True, "2000", 2)
+        kinds = []
+        while (take := begin_next(store, terms, person="ann", chance=Random(3))) is not None:
+            kinds.append(take.kind)
+            copy = load(store, take.copy_id).group
+            assert [bool(view.balls) for view in copy.views] == [balls] * len(copy.views)
+            assert [bool(view.station.lines) for view in copy.views] == [lines] * len(copy.views)
+            hand_in(store, take.id, actor="ann")
+        assert sorted(kinds) == ["gold", "gold", "independent", "independent", "independent"]
+
+
+class TestHandIn:
+    def test_it_changes_no_more(self, store, state) -> None:
+        take = begin_take(store, state.id, person="ann")
+        assert hand_in(store, take.id, actor="ann").handed_in is not None
+        with pytest.raises(ConflictError):
+            change(store, take.copy_id, SetBall(state.group.views[0].key, BALL))
+        hand_back_take(store, take.id, "the ball", actor="lea")
+        change(store, take.copy_id, SetBall(state.group.views[0].key, BALL))
+
+    def test_nobody_hands_in_the_copy_of_somebody_else(self, store, state) -> None:
+        take = begin_take(store, state.id, person="ann")
+        with pytest.raises(ForbiddenError):
+            hand_in(store, take.id, actor="ben")
+
+    def test_a_verdict_does_it_and_is_not_taken_back(self, store, state) -> None:
+        take = begin_take(store, state.id, person="ann")
+        judge(store, take.copy_id, "rejected", reason="other")
+        found = get_take_of(store, take.copy_id)
+        assert (found.verdict, found.handed_in is not None) == ("rejected", True)
+        for verdict in ("unreviewed", "accepted", "deferred"):
+            with pytest.raises(ConflictError, match="submitted"):
+                judge(store, take.copy_id, verdict)
+        assert get_take(store, take.id) == found
+
+    def test_only_its_person_judges_it(self, store, state) -> None:
+        take = begin_take(store, state.id, person="ann")
+        with pytest.raises(ForbiddenError, match="only ann"):
+            judge(store, take.copy_id, actor="ben")
+        dataset = load(store, take.copy_id).dataset_id
+        with pytest.raises(ForbiddenError, match="only ann"):
+            give_verdicts(store, dataset, "", "deferred", actor="ben")
+        give_verdicts(store, dataset, "", "deferred", actor="ann")
+        (batch,) = list_batches(store, dataset)
+        with pytest.raises(ConflictError, match="submitted"):
+            undo_batch(store, batch.id, actor="ann")
+        assert get_take(store, take.id).verdict == "deferred"
+
+    def test_nobody_else_takes_back_the_verdict_of_a_copy_that_was_returned(
+        self, store, state
+    ) -> None:
+        take = begin_take(store, state.id, person="ann")
+        judge(store, take.copy_id, "rejected", reason="other")
+        hand_back_take(store, take.id, "the ball", actor="lea")
+        with pytest.raises(ForbiddenError, match="only ann"):
+            judge(store, take.copy_id, "unreviewed", actor="lea")
+        assert get_take(store, take.id).verdict == "rejected"
+        judge(store, take.copy_id, "unreviewed")
+        assert get_take(store, take.id).verdict is None
+
+    def test_a_submitted_one_among_many_is_counted_and_the_others_are_judged(
+        self, store, fill, make_group
+    ) -> None:
+        takes = [
+            begin_take(store, number, person="ann")
+            for number in fill(make_group(7), make_group(8), make_group(9))
+        ]
+        hand_in(store, takes[1].id, actor="ann")
+        dataset = load(store, takes[0].copy_id).dataset_id
+        refused = [("submitted", 1)]
+        for verdict in ("deferred", "accepted"):
+            plan = plan_verdicts(store, dataset, "", verdict, note="seen")
+            assert [(item.reason, item.groups) for item in plan.refused] == refused
+            assert plan.would_change == 2
+        report = give_verdicts(store, dataset, "", "deferred", actor="ann", expected=2)
+        assert report.changed == 2
+        assert [(item.reason, item.groups) for item in report.refused] == refused
+        said = [get_take(store, take.id).verdict for take in takes]
+        assert said == ["deferred", None, "deferred"]
+
+    def test_a_lead_returns_it_with_a_reason_and_each_step_is_in_the_log(
+        self, store, state
+    ) -> None:
+        take = begin_take(store, state.id, person="ann")
+        hand_in(store, take.id, actor="ann")
+        with pytest.raises(ConflictError, match="submitted"):
+            hand_in(store, take.id, actor="ann")
+        with pytest.raises(InputError) as refused:
+            hand_back_take(store, take.id, "  ", actor="lea")
+        assert refused.value.pointer == "/reason"
+        hand_back_take(store, take.id, "the ball", actor="lea")
+        hand_in(store, take.id, actor="ann")
+        said = [(one.actor, one.body["did"]) for one in history(store, take.copy_id)[1:]]
+        assert said == [("ann", "handed in"), ("lea", "handed back"), ("ann", "handed in")]
+        assert faults(store) == []
+
+
+class TestAdoptTake:
+    def test_it_is_one_edit_of_its_person_and_undo_takes_it_back(self, store, state) -> None:
+        take = begin_take(store, state.id, person="ann")
+        views = [view.key for view in state.group.views]
+        line = next(iter(state.group.views[1].station.lines))
+        change(store, take.copy_id, SetBall(views[0], BALL))
+        change(store, take.copy_id, SetLines(views[1], {line: HERE}))
+        judge(store, take.copy_id)
+        after = adopt_take(store, take.id, actor="lea")
+        copy = load(store, take.copy_id)
+        assert after.group == copy.group
+        assert (after.verdict.state, after.verdict.actor) == ("accepted", "ann")
+        said = [(entry.kind, entry.actor) for entry in history(store, state.id)][1:]
+        assert said == [("edit", "ann"), ("verdict", "ann"), ("take", "lea")]
+        assert get_take(store, take.id).settled is not None
+        with pytest.raises(ConflictError):
+            adopt_take(store, take.id, actor="lea")
+        with pytest.raises(ConflictError):
+            judge(store, take.copy_id, "deferred")
+        assert faults(store) == []
+        back = undo(store, state.id, if_match=after.etag, actor="lea")
+        assert back.group == state.group
+
+    def test_a_view_that_was_left_out_is_left_out_then(self, store, state) -> None:
+        take = begin_take(store, state.id, person="ann")
+        view = state.group.views[0].key
+        change(store, take.copy_id, IncludeView(view, False))
+        hand_in(store, take.id, actor="ann")
+        after = adopt_take(store, take.id, actor="lea")
+        assert [one.key for one in after.group.views if not one.included] == [view]
+
+    def test_a_gold_group_whose_truth_is_known_adopts_no_gold_copy(self, store, state) -> None:
+        take = begin_take(store, state.id, person="ann")
+        gold = begin_for_batch(store, state.id, "ben", kind=GOLD)
+        for one in (take, gold):
+            hand_in(store, one.id, actor=one.person)
+        with pytest.raises(ConflictError, match="gold"):
+            adopt_take(store, gold.id, actor="lea")
+        assert adopt_take(store, take.id, actor="lea").id == state.id
+
+    def test_only_a_copy_that_was_handed_in_is_adopted(self, store, state) -> None:
+        take = begin_take(store, state.id, person="ann")
+        with pytest.raises(ConflictError):
+            adopt_take(store, take.id, actor="lea")
+        hand_in(store, take.id, actor="ann")
+        after = adopt_take(store, take.id, actor="lea")
+        assert after.group == state.group and after.verdict.state == "unreviewed"
+
+
+class TestCopies:
+    def test_the_list_of_datasets_has_no_copies(self, store, state) -> None:
+        begin_take(store, state.id, person="ann")
+        assert [one.name for one in list_datasets(store)] == [state.dataset]
+
+    def test_they_go_with_what_they_are_of(self, store, state) -> None:
+        take = begin_take(store, state.id, person="ann")
+        delete_dataset(store, state.dataset, confirm=state.dataset, actor="lea")
+        with pytest.raises(NotFoundError):
+            load(store, take.copy_id)
+        assert faults(store) == []
+        with store.write() as session:
+            assert insert_dataset(session, "next", state.policy, "ann") < COPIES
+
+    def test_their_person_and_the_leads_of_what_they_are_of_see_them_alone(
+        self, store, state
+    ) -> None:
+        people = {
+            name: (invite(store, name, role, actor="local")[0].id, role)
+            for name, role in (
+                ("ann", Role.ANNOTATOR),
+                ("ben", Role.REVIEWER),
+                ("lea", Role.LEAD),
+                ("here", Role.VIEWER),
+                ("elsewhere", Role.LEAD),
+            )
+        }
+        give_role(store, state.dataset, people["here"][0], Role.LEAD, actor="local")
+        give_role(store, state.dataset, people["elsewhere"][0], Role.VIEWER, actor="local")
+        copies = load(store, begin_take(store, state.id, person="ann").copy_id).dataset_id
+        with store.read() as session:
+            roles = {name: read_roles(session, *who) for name, who in people.items()}
+        assert {name: str(one.role_in(copies)) for name, one in roles.items()} == {
+            "ann": "annotator",
+            "ben": "none",
+            "lea": "lead",
+            "here": "lead",
+            "elsewhere": "none",
+        }
+
+    def test_one_that_is_made_later_is_hidden_from_the_first_entry_on(self, store, state) -> None:
+        reader = Sight(True, frozenset(), "ben", frozenset())
+        with store.read() as session:
+            last = newest_entry(session)
+        begin_take(store, state.id, person="ann")
+        changes = read_news(store, {last}, None).changes[last]
+        assert changes and not [one for one in changes if reader.sees(one.dataset_id)]
+
+
+class TestBeginNext:
+    def test_what_is_left_is_what_will_come(self, store, fill, make_group) -> None:
+        groups = fill(make_group(1), make_group(2), make_group(3))
+        dataset = load(store, groups[0]).dataset_id
+        batch = make_batch(store, dataset, NewBatch("a", verdicts=2), actor="lea")
+        terms = Terms(batch.id, dataset, groups, 2, True, batch.created)
+
+        def left(person: str) -> int:
+            with store.read() as session:
+                return own_left(session, batch, person)
+
+        for person, comes in (("ann", 3), ("ben", 3), ("cleo", 0)):
+            assert left(person) == comes
+            for rest in range(comes, 0, -1):
+                take = begin_next(store, terms, person=person)
+                assert left(person) == rest
+                hand_in(store, take.id, actor=person)
+            assert left(person) == 0
+
+    def test_each_group_as_often_as_the_batch_asks(self, store, fill, make_group) -> None:
+        groups = fill(make_group(1), make_group(2))
+        terms = Terms(5, load(store, groups[0]).dataset_id, groups, 2, True, "2000")
+        had = []
+        for person in ("ann", "ben", "cleo"):
+            while (take := begin_next(store, terms, person=person)) is not None:
+                had.append((person, take.group_id))
+                assert begin_next(store, terms, person=person) == take
+                hand_in(store, take.id, actor=person)
+        assert had == [(name, group) for name in ("ann", "ben") for group in groups]
+        assert len(list_takes(store, terms.dataset_id, lambda _: False, person="ann")) == 2
+        assert len(list_takes(store, terms.dataset_id, lambda _: True, person="ann")) == 4
+
+    def test_one_of_each_block_is_gold_and_nobody_knows_which(self) -> None:
+        every, chance, kinds = 5, Random(4), list[str]()
+        for _ in range(every * 100):
+            kinds.append("gold" if is_gold_turn(kinds, every, 1000, chance) else "independent")
+        blocks = [kinds[at : at + every] for at in range(0, len(kinds), every)]
+        assert all(block.count("gold") == 1 for block in blocks)
+        assert len({block.index("gold") for block in blocks}) == every
+
+    @pytest.mark.parametrize(
+        ("every", "groups", "fresh", "runs_out"),
+        [(4, 10, 99, False), (2, 7, 3, True), (1, 3, 5, True), (5, 2, 1, False)],
+    )
+    def test_the_last_one_is_gold_as_often_and_what_is_left_falls_by_one(
+        self, every: int, groups: int, fresh: int, runs_out: bool
+    ) -> None:
+        chance, last = Random(8), set()
+        for _ in range(60):
+            kinds, free, gold = list[str](), groups, fresh
+            while True:
+                left = free + count_gold_left(kinds, every, free, gold)
+                if gold and is_gold_turn(kinds, every, free, chance):
+                    kinds, gold = [*kinds, "gold"], gold - 1
+                elif free:
+                    kinds, free = [*kinds, "independent"], free - 1
+                else:
+                    break
+                assert free + count_gold_left(kinds, every, free, gold) == left - 1
+            assert left == 0
+            last.add(kinds[-1])
+        # Where gold groups run out, ordinary ones are left.
+        assert last == ({"independent"} if runs_out else {"independent", "gold"})

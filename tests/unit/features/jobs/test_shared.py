@@ -1,0 +1,216 @@
+"""Jobs of several processes: what a row says counts, whoever wrote it, and a claim that is lost ends them."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Iterator
+
+import pytest
+
+from app.db.store import Store
+from app.errors import ConflictError, JobCancelled
+from app.features.jobs.queries import Job, update_job
+from app.features.jobs.run import JobProgress
+from app.features.jobs.shared import SharedJobs
+from tests.waiting import SECONDS
+
+
+class Claims:
+    """Claims as several processes have them; here a test says who has which."""
+
+    is_shared = True
+
+    def __init__(self) -> None:
+        self.free = True
+        self.words: list[str] = []
+
+    def take(self, name: str) -> bool:
+        return self.free
+
+    def holds(self, name: str) -> bool:
+        return self.free
+
+    def give_back(self, name: str) -> None:
+        """It is free."""
+
+    def tell(self, session: object, word: str) -> None:
+        self.words.append(word)
+
+    def hear(self, hearer: Callable[[str], None]) -> None:
+        """Nobody says anything: what a row says must be enough."""
+
+    def listen(self) -> None:
+        """See ``hear``."""
+
+    def close(self) -> None:
+        """Nothing is open."""
+
+
+class Work:
+    """Work that waits in its step until it is let go, and counts how often it was begun."""
+
+    def __init__(self, *, looks: bool = True) -> None:
+        self._looks = looks
+        self.begun, self.go_on = threading.Semaphore(0), threading.Semaphore(0)
+        self.times = 0
+
+    def __call__(self, progress: JobProgress) -> str:
+        self.times += 1
+        self.begun.release()
+        assert self.go_on.acquire(timeout=SECONDS)
+        if self._looks:
+            progress.require_wanted()
+            progress(1, 1)
+        return "done"
+
+
+@pytest.fixture
+def claims(store: Store, monkeypatch: pytest.MonkeyPatch) -> Claims:
+    claims = Claims()
+    monkeypatch.setattr(store, "sharing", claims)
+    monkeypatch.setattr("app.features.jobs.shared.LOOK_SECONDS", 0.05)
+    return claims
+
+
+@pytest.fixture
+def work() -> Work:
+    return Work()
+
+
+Open = Callable[..., SharedJobs]
+
+
+@pytest.fixture
+def opened(store: Store, claims: Claims, work: Work) -> Iterator[Open]:
+    """The jobs of another process each time."""
+    opened: list[SharedJobs] = []
+
+    def make(own: Work = work) -> SharedJobs:
+        jobs = SharedJobs(store)
+        # As if it had been started when another one led.
+        jobs._alone = False
+        jobs.resumes("solve", lambda _job: own)
+        opened.append(jobs)
+        return jobs
+
+    yield make
+    for _ in range(10):
+        work.go_on.release()
+    for jobs in opened:
+        jobs.close()
+
+
+def ask(jobs: SharedJobs) -> Job:
+    return jobs.submit("solve", "Solve", lambda _progress: "never called", actor="ann")
+
+
+class TestSharedJobs:
+    def test_work_is_made_from_the_row_by_who_leads(self, opened: Open, work: Work) -> None:
+        asked, leads = opened(), opened()
+        job = ask(asked)
+        leads.start()
+        work.go_on.release()
+        assert (asked.wait(job.id, SECONDS).result, asked.leads()) == ("done", False)
+        # Whoever has read it when it waited may not begin it again.
+        leads._join(job)
+        work.go_on.release()
+        work.go_on.release()
+        assert leads.wait(ask(asked).id, SECONDS).state == "done"
+        assert work.times == 2
+
+    def test_what_waits_ends_at_once_whoever_was_asked(self, opened: Open, work: Work) -> None:
+        asked, leads = opened(), opened()
+        job = asked.cancel(ask(asked).id)
+        assert job.state == "cancelled"
+        leads.start()
+        second = ask(asked)
+        work.go_on.release()
+        assert leads.wait(second.id, SECONDS).state == "done"
+        assert work.times == 1
+
+    def test_what_runs_writes_nothing_after_it_was_told_to_end_elsewhere(
+        self, store: Store, opened: Open, work: Work
+    ) -> None:
+        asked, leads = opened(), opened()
+        leads.start()
+        job = ask(asked)
+        assert work.begun.acquire(timeout=SECONDS)
+        with store.write() as session:
+            asked.end_with(session, [job.id])
+        # The row alone says so: no look has passed, and no word was heard.
+        work.go_on.release()
+        assert asked.wait(job.id, SECONDS).state == "cancelled"
+        with pytest.raises(ConflictError):
+            update_and_cancel(store, asked, job.id)
+
+    def test_who_lost_the_claim_ends_and_the_next_one_begins_it_again(
+        self, claims: Claims, opened: Open, work: Work
+    ) -> None:
+        unaware = Work(looks=False)
+        first, second = opened(unaware), opened()
+        first.start()
+        job = ask(first)
+        assert unaware.begun.acquire(timeout=SECONDS)
+        claims.free = False
+        first._attempt()
+        assert not first.leads()
+        first._ended.set()
+        claims.free = True
+        second.start()
+        assert work.begun.acquire(timeout=SECONDS)
+        # Both are at it; what the first comes to is not kept.
+        (run,) = first._queue.runs
+        unaware.go_on.release()
+        assert run.over.wait(SECONDS)
+        assert second.get(job.id).state == "running"
+        work.go_on.release()
+        assert second.wait(job.id, SECONDS).state == "done"
+
+    def test_who_lost_the_claim_ends_at_its_next_step_and_counts_for_no_death(
+        self, claims: Claims, opened: Open, work: Work
+    ) -> None:
+        jobs = opened()
+        jobs.start()
+        job = ask(jobs)
+        assert work.begun.acquire(timeout=SECONDS)
+        (run,) = jobs._queue.runs
+        claims.free = False
+        jobs._attempt()
+        work.go_on.release()
+        assert run.over.wait(SECONDS)
+        assert (jobs.get(job.id).state, jobs.get(job.id).tries) == ("running", 0)
+
+    def test_one_that_waits_is_answered_again_by_any_process(self, opened: Open) -> None:
+        one, other = opened(), opened()
+        first = one.submit("solve", "Solve", lambda _: None, actor="ann", once=True)
+        again = other.submit("solve", "Solve", lambda _: None, actor="ann", once=True)
+        elses = other.submit("solve", "Solve", lambda _: None, actor="ben", once=True)
+        assert (again.id, elses.id == first.id) == (first.id, False)
+
+    def test_a_row_that_no_work_can_be_made_of_holds_up_nothing(
+        self, opened: Open, work: Work
+    ) -> None:
+        jobs = opened()
+        jobs.makes("bulk", lambda job: job.request["nothing of the kind"])
+        spoiled = jobs.submit("bulk", "Accept", lambda _: None, actor="ann")
+        jobs.start()
+        work.go_on.release()
+        assert jobs.wait(ask(jobs).id, SECONDS).state == "done"
+        assert jobs.get(spoiled.id).state == "failed"
+
+
+def update_and_cancel(store: Store, jobs: SharedJobs, number: int) -> None:
+    with store.write() as session:
+        update_job(session, number, state="done")
+    jobs.cancel(number)
+
+
+def test_a_progress_whose_claim_is_lost_wants_nothing(store: Store, opened: Open) -> None:
+    from app.features.jobs.shared import SharedProgress
+
+    lost = threading.Event()
+    progress = SharedProgress(ask(opened()).id, lost, store)
+    progress.require_wanted()
+    lost.set()
+    with pytest.raises(JobCancelled):
+        progress.require_wanted()

@@ -1,0 +1,246 @@
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from app.errors import ConflictError, InputError, StaleRevisionError
+from app.features.groups.edit import SetStationCalibration, SetStationCamera
+from app.features.groups.replay import replay
+from app.features.groups.submit import load
+from app.features.imports.ingest import ingest
+from app.features.match_estimates import rig
+from app.features.match_estimates.rig import (
+    CAMERAS,
+    SIGMA,
+    ProposedRig,
+    accept,
+    anchor_sentence,
+    proposal_values,
+    propose,
+    take_back,
+    time_sentence,
+)
+from app.features.pitches.service import change_pitches, read_pitches
+from app.features.solutions.service import stale_groups
+from app.features.stations.service import load_station, submit_station
+from app.features.versions.frozen_queries import freeze_said, thaw_group
+from app.soccer.annotation import BallAnnotation
+from app.soccer.frames import ImagePoint
+from app.soccer.group import Group, Station, View
+from app.soccer.pitch import Pitch
+from tests.cameras import SIZE
+from tests.rigs import GIVEN, cameras, frames
+
+
+def groups() -> list[Group]:
+    stations = {
+        item.key: Station(item.key, SIZE, shared=True, lines=item.lines, given=item.camera)
+        for item in cameras()
+    }
+    return [
+        Group(
+            str(frame.time),
+            tuple(
+                View(key, stations[key], (BallAnnotation(point=center),))
+                for key, center in frame.balls.items()
+            ),
+            match="rig",
+        )
+        for frame in frames(60)
+        if frame.balls
+    ]
+
+
+@pytest.fixture
+def ids(fill) -> list[int]:
+    return fill(*groups(), solved=False)
+
+
+@pytest.fixture(scope="module")
+def known() -> dict[str, ProposedRig]:
+    """What was proposed once holds for every copy of the same database."""
+    return {}
+
+
+@pytest.fixture
+def proposed(store, ids, known) -> ProposedRig:
+    """Something for every camera."""
+    if not known:
+        known["demo"] = propose(store, "demo")
+    found = known["demo"]
+    keys = [change.key for change in found.proposal.cameras]
+    assert keys == sorted(found.stations) == sorted(GIVEN) != []
+    return found
+
+
+def stations(store, proposed) -> dict[str, Station]:
+    return {key: load_station(store, state.id).station for key, state in proposed.stations.items()}
+
+
+class TestPropose:
+    def test_saves_nothing(self, store, ids, proposed) -> None:
+        assert all(item.given == GIVEN[key] for key, item in stations(store, proposed).items())
+        assert all(load_station(store, s.id).revision == 1 for s in proposed.stations.values())
+
+    def test_says_what_holds_the_rig_and_that_no_camera_is_ahead(self, proposed) -> None:
+        assert "points of field lines" in anchor_sentence(proposed.proposal)
+        assert time_sentence(proposed.proposal).startswith("no camera is ahead")
+        values = proposal_values(proposed)
+        assert json.loads(json.dumps(values)) == values
+
+    def test_tells_the_largest_difference_in_time_that_is_one(self, proposed) -> None:
+        def said(*offsets: tuple[float, float]) -> str:
+            pairs = tuple(
+                replace(pair, offset_frames=offset, offset_sigma_frames=sigma)
+                for pair, (offset, sigma) in zip(proposed.proposal.pairs, offsets, strict=False)
+            )
+            return time_sentence(replace(proposed.proposal, pairs=pairs))
+
+        first, second = proposed.proposal.pairs[:2]
+        # Small and sure, large and sure enough, larger and unsure.
+        found = said((0.05, 0.001), (0.40, 0.08), (0.9, 0.5))
+        assert found.startswith(f"{second.b} is 0.40 +- 0.08 frames ahead of {second.a}")
+        assert f"what {second.a} shows at t + 0.40" in found
+        found = said((-0.40, 0.08))
+        assert found.startswith(f"{first.a} is 0.40 +- 0.08 frames ahead of {first.b}")
+        # Not the mean: which of two comes first says nothing.
+        none = said((0.05, 0.01), (-0.05, 0.02))
+        assert none.startswith("no camera is ahead")
+        assert f"{first.b} of {first.a} by +0.050 +- 0.010 frames" in none
+        assert said() == "too few moving balls to see whether a camera is ahead of another"
+
+    def test_a_ball_that_was_put_where_others_see_it_says_nothing(self, store, fill) -> None:
+        inferred = BallAnnotation(point=ImagePoint(10, 10), inferred=True)
+        fill(
+            *(
+                Group(g.key, tuple(View(v.key, v.station, (inferred,)) for v in g.views), "rig")
+                for g in groups()
+            ),
+            solved=False,
+        )
+        with pytest.raises(InputError, match="show the ball together"):
+            propose(store, "demo")
+
+    def test_line_files_count_instead_of_the_lines_of_the_dataset(
+        self, store, ids, proposed, tmp_path
+    ) -> None:
+        lines = {"Middle line": [{"x": 640.0, "y": y} for y in (100.0, 300.0, 500.0)]}
+        (tmp_path / "cam1.json").write_text(json.dumps(lines))
+        assert propose(store, "demo", tmp_path).proposal.line_points == 3
+        (tmp_path / "cam1.json").rename(tmp_path / "left.json")
+        with pytest.raises(InputError, match="no line file"):
+            propose(store, "demo", tmp_path)
+
+
+class TestAccept:
+    def test_gives_every_camera_its_place_and_its_covariance(self, store, ids, proposed) -> None:
+        accept(store, proposed, CAMERAS, actor="ann")
+        for change in proposed.proposal.cameras:
+            station = stations(store, proposed)[change.key]
+            assert (station.given, station.given_covariance) == (change.after, change.covariance)
+        assert set(stale_groups(store, "demo")) == set(ids)
+
+    def test_accepting_sigma_keeps_the_cameras_and_says_how_far_they_may_be_off(
+        self, store, proposed
+    ) -> None:
+        accept(store, proposed, SIGMA, actor="ann")
+        for change in proposed.proposal.cameras:
+            station = stations(store, proposed)[change.key]
+            assert station.given == GIVEN[change.key]
+            assert station.given_covariance == change.covariance_before
+
+    def test_importing_the_dataset_again_changes_nothing_of_it(self, store, proposed) -> None:
+        accept(store, proposed, CAMERAS, actor="ann")
+        before = stations(store, proposed)
+        report = ingest(store, "demo", groups(), source="test", actor="ann")
+        assert (report.changed, report.findings) == (0, 0)
+        assert stations(store, proposed) == before
+
+    def test_a_frozen_group_has_the_covariance_of_its_cameras(self, store, ids, proposed) -> None:
+        accept(store, proposed, SIGMA, actor="ann")
+        group = load(store, ids[0]).group
+        said = freeze_said(group)
+        texts = {key: json.loads(text) for key, text in said.texts.items()}
+        assert group.views[0].station.given_covariance is not None
+        assert thaw_group(texts[said.key], texts) == group
+
+    def test_the_log_alone_leads_to_the_same_cameras(self, store, proposed) -> None:
+        accept(store, proposed, CAMERAS, actor="ann")
+        with store.read() as session:
+            ledger = replay(session)
+        for key, state in proposed.stations.items():
+            assert ledger.stations[state.id].station == stations(store, proposed)[key]
+
+    def test_a_camera_that_has_changed_since_is_not_overwritten(self, store, proposed) -> None:
+        state = proposed.stations["cam3"]
+        other = SetStationCalibration("lines")
+        submit_station(store, state.id, other, if_match=state.etag, actor="bob")
+        with pytest.raises(StaleRevisionError):
+            accept(store, proposed, CAMERAS, actor="ann")
+        # All of them or none.
+        assert stations(store, proposed)["cam1"].given_covariance is None
+
+    def test_balls_do_not_count_twice(self, store, proposed) -> None:
+        accept(store, proposed, SIGMA, actor="ann")
+        with pytest.raises(ConflictError, match="adjusted already"):
+            propose(store, "demo")
+
+    def test_what_can_be_accepted_is_the_cameras_or_sigma_and_nothing_else(
+        self, store, proposed
+    ) -> None:
+        with pytest.raises(InputError, match='"sigma"'):
+            accept(store, proposed, "all", actor="ann")
+
+    def test_a_pitch_that_has_changed_since_makes_another_proposal(self, store, proposed) -> None:
+        etag = read_pitches(store, "demo").etag
+        change_pitches(store, "demo", {"rig": Pitch(104.0, 67.0)}, if_match=etag, actor="ann")
+        with pytest.raises(ConflictError, match="size of the pitch has changed"):
+            accept(store, proposed, CAMERAS, actor="ann")
+        assert stations(store, proposed)["cam1"].given_covariance is None
+        assert propose(store, "demo").inputs != proposed.inputs
+
+    def test_a_solver_that_has_changed_since_makes_another_proposal(
+        self, store, ids, proposed, monkeypatch
+    ) -> None:
+        monkeypatch.setattr(rig, "propose_rig", lambda *asked: proposed.proposal)
+        assert propose(store, "demo").inputs == proposed.inputs
+        monkeypatch.setattr(rig, "SOLVER_VERSION", "another")
+        assert propose(store, "demo").inputs != proposed.inputs
+
+    def test_importing_again_does_not_take_an_accepted_camera_for_the_datasets(
+        self, store, fill
+    ) -> None:
+        bare = [
+            Group(
+                g.key,
+                tuple(View(v.key, replace(v.station, given=None), v.balls) for v in g.views),
+                "rig",
+            )
+            for g in groups()[:2]
+        ]
+        fill(*bare, solved=False)
+        view = load(store, 1).group.views[0]
+        before = load_station(store, load(store, 1).station_ids[view.key])
+        assert before.station.given is None
+        covariance = tuple((np.eye(8) / 7).ravel().tolist())
+        edit = SetStationCamera(GIVEN[view.key], covariance)
+        submit_station(store, before.id, edit, if_match=before.etag, actor="ann")
+        edited = load_station(store, before.id)
+        report = ingest(store, "demo", bare, source="test", actor="ann")
+        assert (report.changed, report.findings) == (0, 0)
+        assert load_station(store, before.id) == edited
+
+
+class TestTakeBack:
+    def test_every_camera_is_what_it_was(self, store, proposed) -> None:
+        accept(store, proposed, CAMERAS, actor="ann")
+        assert take_back(store, "demo", actor="ann") == len(GIVEN)
+        for key, state in proposed.stations.items():
+            assert stations(store, proposed)[key] == state.station
+
+    def test_there_must_be_something_to_take_back(self, store, ids) -> None:
+        with pytest.raises(ConflictError, match="nothing to take back"):
+            take_back(store, "demo", actor="ann")

@@ -1,0 +1,60 @@
+"""The sample as a dataset: made once, completed where it is not complete."""
+
+from __future__ import annotations
+
+from contextlib import nullcontext
+
+import pytest
+
+from app.db.log import read_log
+from app.db.store import Store
+from app.errors import JobCancelled
+from app.features.datasets.service import get_dataset, list_datasets
+from app.features.practice.service import SampleDataset, make_sample_dataset
+from app.sample.order import SampleOrder
+from app.sample.truth import read_truth
+from app.sample.write import SampleReport
+
+ORDER = SampleOrder(groups=2, seed=3, labels_only=True)
+
+
+def make(store: Store, progress=lambda *_: None) -> SampleDataset:
+    folder = store.settings.home / "sample"
+    return make_sample_dataset(
+        store, "drawn", folder, ORDER, nullcontext, progress, workers=1, actor="ann"
+    )
+
+
+def test_it_is_drawn_imported_and_solved(store: Store) -> None:
+    made = make(store)
+    assert (made.dataset, made.groups, made.solved, made.is_complete) == ("drawn", 2, 2, True)
+    assert isinstance(made.written, SampleReport)
+    assert len(read_truth(store.settings.home / "sample")) == 2
+    assert get_dataset(store, "drawn").solved == 2
+
+
+def test_a_complete_one_is_left_alone(store: Store) -> None:
+    make(store)
+    truth = store.settings.home / "sample" / "truth.json"
+    truth.unlink()
+    again = make(store)
+    assert (again.written, again.groups, again.solved) == (None, 2, 2)
+    assert not truth.exists()
+
+
+def test_one_that_was_stopped_before_it_was_solved_is_completed(store: Store) -> None:
+    def stop(_done: int, _total: int | None = None, _sentence: str = "", /) -> None:
+        if any(item.groups for item in list_datasets(store)):
+            raise JobCancelled
+
+    with pytest.raises(JobCancelled):
+        make(store, stop)
+    left = get_dataset(store, "drawn")
+    assert left.solved < left.groups
+    assert make(store).is_complete
+
+
+def test_the_log_says_who_made_it(store: Store) -> None:
+    make(store)
+    with store.read() as session:
+        assert {entry.actor for entry in read_log(session)} == {"ann"}

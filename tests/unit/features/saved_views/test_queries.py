@@ -1,0 +1,22 @@
+from __future__ import annotations
+
+from app.features.saved_views.queries import (
+    dataset_saved_views,
+    delete_saved_view,
+    find_saved_view,
+    insert_saved_view,
+)
+
+
+class TestSavedViews:
+    def test_come_by_name_until_they_are_deleted(self, filled) -> None:
+        with filled.write() as session:
+            late = insert_saved_view(session, 1, "late", "sort:newest", actor="ann")
+            early = insert_saved_view(session, 1, "early", "views:2", actor="bob")
+            assert [row.id for row in dataset_saved_views(session, 1)] == [early, late]
+            assert dataset_saved_views(session, 2) == []
+            found = find_saved_view(session, late)
+            assert (found.dataset_id, found.name, found.query) == (1, "late", "sort:newest")
+            delete_saved_view(session, late)
+            assert find_saved_view(session, late) is None
+            assert [row.name for row in dataset_saved_views(session, 1)] == ["early"]

@@ -1,0 +1,379 @@
+"""Sending: signed, once, again where nobody answered, and nowhere else."""
+
+from __future__ import annotations
+
+import ssl
+import threading
+from datetime import UTC, datetime, timedelta
+
+import pytest
+from sqlalchemy import text
+
+from app.db.home import WEBHOOKS
+from app.db.store import Store
+from app.errors import ConflictError, InputError, NotFoundError
+from app.features.datasets.service import delete_dataset
+from app.features.groups.edit import SetBall
+from app.features.groups.submit import submit
+from app.features.groups.undo import undo
+from app.features.jobs.queries import NewJob, insert_job, update_job
+from app.features.upkeep.service import forget_old_deliveries
+from app.features.verdicts.service import set_verdict
+from app.features.webhooks import sender as module
+from app.features.webhooks.messages import CHOSEN, Kind, sign
+from app.features.webhooks.sender import AGAIN, WebhookSender
+from app.features.webhooks.service import (
+    change_webhook,
+    list_deliveries,
+    list_webhooks,
+    make_webhook,
+    remove_webhook,
+    renew_secret,
+    send_again,
+    send_ping,
+)
+from app.soccer.annotation import BallAnnotation
+from app.soccer.frames import Box
+from tests.unit.features.webhooks.conftest import Receiver
+from tests.waiting import SECONDS
+
+BALL = BallAnnotation(box=Box(500.0, 300.0, 14.0, 14.0))
+
+
+class Clock:
+    """A time that tests set."""
+
+    def __init__(self) -> None:
+        self.now = datetime.now(UTC) + timedelta(minutes=1)
+
+    def __call__(self) -> datetime:
+        return self.now
+
+
+@pytest.fixture
+def clock() -> Clock:
+    return Clock()
+
+
+@pytest.fixture
+def sender(allowed: Store, clock: Clock) -> WebhookSender:
+    return WebhookSender(allowed, clock)
+
+
+@pytest.fixture
+def hook(allowed: Store, receiver: Receiver, state) -> int:
+    """A webhook that wants everything, of a receiver that verifies it."""
+    webhook, receiver.secret = make_webhook(allowed, "demo", receiver.url, CHOSEN, actor="ann")
+    return webhook.id
+
+
+def judge(store, state, verdict="accepted"):
+    return set_verdict(store, state.id, verdict, None, None, if_match=state.etag, actor="ann")
+
+
+def end_job(store: Store, state: str) -> None:
+    with store.write() as session:
+        number = session.execute(text("SELECT id FROM dataset")).scalar_one()
+        job = insert_job(session, NewJob("export", "COCO", "ann", number))
+        at = datetime.now(UTC).isoformat(timespec="microseconds")
+        update_job(session, job, state=state, ended=at)
+
+
+class TestTelling:
+    def test_what_happens_is_told_signed_and_once(
+        self, allowed, sender, receiver, hook, state
+    ) -> None:
+        after = submit(
+            allowed,
+            state.id,
+            SetBall(state.group.views[0].key, BALL),
+            if_match=state.etag,
+            actor="ann",
+        )
+        after = undo(allowed, state.id, if_match=after.etag, actor="ann")
+        after = judge(allowed, after)
+        end_job(allowed, "failed")
+        assert sender.look() == 3
+        assert sender.send() == 3
+        assert sorted(receiver.kinds) == [
+            Kind.CHANGED,
+            Kind.JUDGED,
+            Kind.JOB_FAILED,
+        ]
+        by_kind = {body["type"]: body["data"] for _, body in receiver.got}
+        changed = by_kind[Kind.CHANGED]
+        assert [entry["kind"] for entry in changed["entries"]] == ["edit", "undo"]
+        assert {entry["group"] for entry in changed["entries"]} == {state.id}
+        assert (changed["dataset"], changed["actor"]) == ("demo", "ann")
+        assert by_kind[Kind.JOB_FAILED]["job"]["kind"] == "export"
+        assert (sender.look(), sender.send()) == (0, 0)
+        (webhook,) = list_webhooks(allowed, "demo")
+        assert (webhook.waiting, webhook.delivered, webhook.failed) == (0, 3, 0)
+        judge(allowed, after, "deferred")
+        assert (sender.look(), sender.send()) == (1, 1)
+        assert len(receiver.got[-1][1]["data"]["entries"]) == 1
+
+    def test_certificates_are_read_once(
+        self, allowed, sender, receiver, hook, state, monkeypatch
+    ) -> None:
+        found, read = [], ssl.create_default_context
+        monkeypatch.setattr(
+            ssl, "create_default_context", lambda **asked: found.append(asked) or read(**asked)
+        )
+        module._trusted.cache_clear()
+        for verdict in ("accepted", "deferred"):
+            state = judge(allowed, state, verdict)
+            assert (sender.look(), sender.send()) == (1, 1)
+        assert len(found) == 1
+
+    def test_what_was_before_and_kinds_that_nobody_wants_are_not_told(
+        self, allowed, sender, receiver, state
+    ) -> None:
+        state = judge(allowed, state)
+        make_webhook(allowed, "demo", receiver.url, [Kind.JOB_DONE], actor="ann")
+        state = judge(allowed, state, "deferred")
+        end_job(allowed, "done")
+        end_job(allowed, "cancelled")
+        sender.look()
+        sender.send()
+        assert receiver.kinds == [Kind.JOB_DONE]
+
+    def test_a_sender_that_died_before_it_sent_is_followed_by_one_that_does(
+        self, allowed, sender, receiver, hook, state, clock
+    ) -> None:
+        judge(allowed, state)
+        sender.look()
+        later = WebhookSender(allowed, clock)
+        assert (later.look(), later.send()) == (0, 1)
+        assert receiver.kinds == [Kind.JUDGED]
+
+    def test_a_server_sends_by_itself(self, allowed, receiver, hook, state) -> None:
+        running = WebhookSender(allowed)
+        running.start()
+        judge(allowed, state)
+        deadline = datetime.now(UTC) + timedelta(seconds=SECONDS)
+        while not receiver.got and datetime.now(UTC) < deadline:
+            running._closing.wait(0.02)
+        running.close()
+        assert receiver.kinds == [Kind.JUDGED]
+
+
+class TestTryingAgain:
+    def test_one_that_fails_is_tried_again_later_under_the_same_id(
+        self, allowed, sender, receiver, hook, clock
+    ) -> None:
+        # The library takes no message of another hour; here it is the sender's clock that runs.
+        receiver.answers, receiver.secret = [500, 302], None
+        send_ping(allowed, "demo", hook, actor="ann")
+        assert sender.send() == 1
+        assert sender.send() == 0
+        clock.now += AGAIN[0]
+        assert sender.send() == 1
+        (delivery,) = list_deliveries(allowed, "demo", hook)
+        assert delivery.problem == "it answered 302 (redirects are not followed)"
+        clock.now += AGAIN[1]
+        assert sender.send() == 1
+        (delivery,) = list_deliveries(allowed, "demo", hook)
+        assert (delivery.state, delivery.attempts, delivery.status) == ("delivered", 3, 204)
+        assert delivery.problem is None
+        assert {headers["webhook-id"] for headers, _ in receiver.got} == {delivery.message}
+        assert receiver.kinds == [Kind.PING] * 3
+
+    def test_who_takes_nothing_for_days_is_told_no_more(
+        self, allowed, sender, receiver, hook, clock, state
+    ) -> None:
+        receiver.answers, receiver.secret = [500] * 20, None
+        send_ping(allowed, "demo", hook, actor="ann")
+        for pause in (*AGAIN, timedelta()):
+            assert sender.send() == 1
+            clock.now += pause
+        assert sender.send() == 0
+        (webhook,) = list_webhooks(allowed, "demo")
+        assert webhook.failed == 1
+        assert "nothing arrived since" in (webhook.off or "")
+        judge(allowed, state)
+        assert sender.look() == 0
+        with pytest.raises(ConflictError, match="nothing arrived since"):
+            send_ping(allowed, "demo", hook, actor="ann")
+
+    def test_turned_on_again_it_is_told_what_happens_from_then_on(
+        self, allowed, sender, receiver, hook, state
+    ) -> None:
+        change_webhook(allowed, "demo", hook, on=False, actor="local")
+        state = judge(allowed, state)
+        change_webhook(allowed, "demo", hook, on=True, actor="local")
+        assert sender.look() == 0
+        judge(allowed, state, "deferred")
+        assert (sender.look(), sender.send()) == (1, 1)
+
+    def test_who_answers_410_wants_nothing_more(self, allowed, sender, receiver, hook) -> None:
+        receiver.answers = [410]
+        send_ping(allowed, "demo", hook, actor="ann")
+        sender.send()
+        (webhook,) = list_webhooks(allowed, "demo")
+        assert "410" in (webhook.off or "")
+
+    def test_a_message_is_sent_again_when_somebody_asks(
+        self, allowed, sender, receiver, hook
+    ) -> None:
+        send_ping(allowed, "demo", hook, actor="ann")
+        sender.send()
+        (delivery,) = list_deliveries(allowed, "demo", hook)
+        send_again(allowed, "demo", hook, delivery.id)
+        assert sender.send() == 1
+        assert receiver.kinds == [Kind.PING, Kind.PING]
+        with pytest.raises(NotFoundError):
+            send_again(allowed, "demo", hook, delivery.id + 1)
+
+    def test_one_that_nobody_listens_to_says_so(
+        self, allowed, sender, hook, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        url = "http://127.0.0.1:9/hook"
+        settings = allowed.settings.model_copy(update={"webhooks": [url]})
+        monkeypatch.setattr(allowed, "settings", settings)
+        change_webhook(allowed, "demo", hook, url=url, actor="local")
+        send_ping(allowed, "demo", hook, actor="ann")
+        sender.send()
+        (delivery,) = list_deliveries(allowed, "demo", hook)
+        assert (delivery.state, delivery.status) == ("waiting", None)
+        assert "could not be reached" in (delivery.problem or "")
+
+
+class TestTogether:
+    @pytest.fixture
+    def slow(self, allowed, hook, receiver) -> int:
+        """A webhook whose receiver takes what is sent and says nothing; a message waits for it."""
+        made, _ = make_webhook(allowed, "demo", f"{receiver.url}/slow", CHOSEN, actor="ann")
+        send_ping(allowed, "demo", made.id, actor="ann")
+        return made.id
+
+    def test_a_receiver_that_says_nothing_holds_up_nobody_else(
+        self, allowed, sender, receiver, hook, slow, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(module, "SECONDS", 0.5)
+        send_ping(allowed, "demo", hook, actor="ann")
+        assert sender.send() == 2
+        assert receiver.kinds == [Kind.PING]
+        (delivery,) = list_deliveries(allowed, "demo", slow)
+        assert "no answer" in (delivery.problem or "")
+
+    def test_one_of_many_messages_to_it_is_no_reason_to_let_others_wait(
+        self, allowed, sender, receiver, hook, slow, state, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(module, "SECONDS", 0.5)
+        monkeypatch.setattr(module, "TOGETHER", 2)
+        for verdict in ("accepted", "deferred", "accepted"):
+            state = judge(allowed, state, verdict)
+            sender.look()
+        assert sender.send() == 2
+        assert receiver.kinds == [Kind.JUDGED]
+
+    def test_a_server_that_stops_does_not_wait_for_it(
+        self, allowed, sender, receiver, slow
+    ) -> None:
+        sending = threading.Thread(target=sender.send)
+        sending.start()
+        sender.close()
+        sending.join(SECONDS)
+        assert not sending.is_alive()
+        (delivery,) = list_deliveries(allowed, "demo", slow)
+        assert (delivery.state, delivery.attempts) == ("waiting", 0)
+
+    def test_whatever_goes_wrong_with_one_message_the_others_arrive(
+        self, allowed, sender, receiver, hook, state, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        def spoilt(secret: str, message: str, *rest: object) -> dict[str, str]:
+            if "ping" in message:
+                raise UnicodeError("label empty or too long")
+            return sign(secret, message, *rest)  # type: ignore[arg-type]
+
+        monkeypatch.setattr(module, "sign", spoilt)
+        send_ping(allowed, "demo", hook, actor="ann")
+        judge(allowed, state)
+        sender.look()
+        assert (sender.send(), sender.send()) == (2, 0)
+        assert receiver.kinds == [Kind.JUDGED]
+        (_, pinged) = list_deliveries(allowed, "demo", hook)
+        assert (pinged.attempts, pinged.problem) == (
+            1,
+            "it could not be sent: label empty or too long",
+        )
+
+    def test_a_ping_that_waits_is_not_doubled(self, allowed, hook) -> None:
+        first = send_ping(allowed, "demo", hook, actor="ann")
+        assert send_ping(allowed, "demo", hook, actor="ann").id == first.id
+
+
+class TestWhere:
+    def test_an_address_that_is_allowed_no_more_gets_nothing(
+        self, allowed, sender, receiver, hook, monkeypatch
+    ) -> None:
+        send_ping(allowed, "demo", hook, actor="ann")
+        elsewhere = allowed.settings.model_copy(update={"webhooks": ["https://other.test/"]})
+        monkeypatch.setattr(allowed, "settings", elsewhere)
+        sender.send()
+        assert receiver.got == []
+        (delivery,) = list_deliveries(allowed, "demo", hook)
+        assert "does not allow" in (delivery.problem or "")
+
+    def test_no_other_address_can_be_given(self, allowed, hook) -> None:
+        with pytest.raises(InputError, match="does not allow"):
+            make_webhook(allowed, "demo", "http://127.0.0.1:1/", CHOSEN, actor="ann")
+        with pytest.raises(InputError, match="does not allow"):
+            change_webhook(allowed, "demo", hook, url="http://169.254.169.254/", actor="local")
+
+    def test_who_is_deleted_or_whose_dataset_is_hears_nothing_more(
+        self, allowed, sender, receiver, hook
+    ) -> None:
+        other, _ = make_webhook(allowed, "demo", receiver.url, CHOSEN, actor="ann")
+        for number in (hook, other.id):
+            send_ping(allowed, "demo", number, actor="ann")
+        remove_webhook(allowed, "demo", hook, actor="local")
+        delete_dataset(allowed, "demo", confirm="demo", actor="ann")
+        assert (sender.look(), sender.send()) == (0, 0)
+        with allowed.read() as session:
+            assert session.execute(text("SELECT count(*) FROM webhook_delivery")).scalar_one() == 0
+
+
+class TestSecrets:
+    def test_the_database_alone_signs_nothing(self, allowed, receiver, hook) -> None:
+        with allowed.read() as session:
+            rows = session.execute(text("SELECT * FROM webhook")).all()
+        assert receiver.secret is not None
+        assert receiver.secret.removeprefix("whsec_") not in str(rows)
+        key = allowed.settings.home / WEBHOOKS
+        assert key.stat().st_mode & 0o777 == 0o600
+
+    def test_a_new_secret_takes_the_place_of_the_old(self, allowed, sender, receiver, hook) -> None:
+        _, renewed = renew_secret(allowed, "demo", hook, actor="local")
+        assert renewed != receiver.secret
+        receiver.secret = renewed
+        send_ping(allowed, "demo", hook, actor="ann")
+        sender.send()
+        assert receiver.kinds == [Kind.PING]
+
+
+class TestForgetting:
+    def test_what_was_sent_long_ago_is_forgotten_and_what_waits_is_not(
+        self, allowed, sender, hook, clock, monkeypatch
+    ) -> None:
+        send_ping(allowed, "demo", hook, actor="ann")
+        sender.send()
+        send_ping(allowed, "demo", hook, actor="ann")
+        clock.now += timedelta(days=31)
+        assert forget_old_deliveries(allowed, clock.now) == 1
+        monkeypatch.setattr(allowed, "write", None)
+        assert forget_old_deliveries(allowed, clock.now) == 0, "and nothing is written"
+        (left,) = list_deliveries(allowed, "demo", hook)
+        assert left.state == "waiting"
+
+    def test_a_job_that_was_told_is_not_told_again_once_that_is_forgotten(
+        self, allowed, sender, receiver, hook, clock
+    ) -> None:
+        end_job(allowed, "done")
+        end_job(allowed, "done")
+        assert (sender.look(), sender.send()) == (2, 2)
+        clock.now += timedelta(days=31)
+        assert forget_old_deliveries(allowed, clock.now) == 2
+        assert sender.look() == 0
+        assert receiver.kinds == [Kind.JOB_DONE] * 2

@@ -1,0 +1,82 @@
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from app.formats.looks_like import HEAD_BYTES, looks_like
+from tests.unit.formats.foreign_coco import coco, write
+
+VOC = "<annotation><filename>a.jpg</filename><object><name>ball</name></object></annotation>"
+CVAT = "<?xml version='1.0'?><annotations><version>1.1</version><meta/></annotations>"
+CASES: list[tuple[dict[str, Any], str]] = [
+    ({"x.json": coco()}, "coco"),
+    ({"l/Labels-v3.json": {"actions": {"7.png": {"imageMetadata": {}}}}}, "soccernet-v3"),
+    ({"labels.json": {"actions": {"7.png": {"imageMetadata": {}}}}}, "soccernet-v3"),
+    ({"x.json": {"annotations": [{"bbox_image": {}}], "images": []}}, "gamestate"),
+    ({"x.json": {"Side line left": [{"x": 0.1, "y": 0.2}]}}, "sn-calibration"),
+    ({"x.json": {"pan_degrees": 1.0}}, "cameras"),
+    ({"x.xml": "<?xml version='1.0'?><viper xmlns='x'></viper>"}, "issia"),
+    ({"x.parquet": "PAR1"}, "parquet"),
+    ({"x.csv": ",frame,x_cam1,y_cam1\n"}, "issia-3d"),
+    ({"labels/a.txt": "0 0.5 0.5 0.1 0.1\n", "data.yaml": "names: [ball]"}, "YOLO labels"),
+    ({"labels/a.txt": "3 0.51 0.52 0.11 0.1 0.93\n"}, "YOLO labels"),
+    ({"gt/gt.txt": "1,1,10,20,30,40,1,-1,-1\n"}, "MOT"),
+    ({"a.json": {"shapes": [], "imagePath": "a.jpg"}, "a.jpg": "x"}, "LabelMe"),
+    ({"via.json": {"a.jpg1": {"regions": [], "file_attributes": {}}}}, "VIA"),
+    ({"p.json": [{"data": {}, "annotations": [{"from_name": "a", "to_name": "b"}]}]},
+     "Label Studio"),
+    ({"a.xml": VOC}, "Pascal VOC"),
+    ({"annotations.xml": CVAT}, "CVAT"),
+    ({"r.json": [{"image_id": 1, "category_id": 1, "bbox": [1, 2, 3, 4], "score": 0.5}]},
+     "COCO results of a detector"),
+    ({"x.csv": "filename,xmin,ymin,xmax,ymax,class\n"}, "a table of boxes"),
+    ({"a.mp4": "x"}, "a video"),
+    ({"a.jpg": "x"}, "pictures alone"),
+]  # fmt: skip
+
+
+class TestLooksLike:
+    @pytest.mark.parametrize(("files", "name"), CASES)
+    def test_it_says_what_the_files_are(
+        self, tmp_path: Path, files: dict[str, Any], name: str
+    ) -> None:
+        look = looks_like(write(tmp_path, files), "none of them")
+        assert look is not None
+        assert look.sentence.startswith("It looks like ")
+        assert name in look.sentence
+        formats = {"coco", "gamestate", "issia", "issia-3d", "cameras", "parquet"}
+        if name in formats | {"sn-calibration", "soccernet-v3"}:
+            assert (look.format, "choose that format" in look.sentence) == (name, True)
+        else:
+            assert look.format is None
+
+    def test_what_it_was_given_for_is_no_news(self, tmp_path: Path) -> None:
+        assert looks_like(write(tmp_path, {"x.json": coco()}), "coco") is None
+        assert looks_like(write(tmp_path / "y", {"notes.md": "x"}), "coco") is None
+        assert looks_like(tmp_path / "none", "coco") is None
+
+    @pytest.mark.parametrize("name", ["camera_1.json", "0001.json", "Labels-v3.json"])
+    def test_what_a_file_holds_counts_before_its_name(self, tmp_path: Path, name: str) -> None:
+        assert looks_like(write(tmp_path, {name: coco()}), "coco") is None
+        look = looks_like(tmp_path, "issia")
+        assert look is not None
+        assert look.format == "coco"
+
+    def test_one_file_and_a_large_one_are_told_alike(self, tmp_path: Path) -> None:
+        value = coco()
+        value["annotations"] *= HEAD_BYTES // 10
+        write(tmp_path, {"x.json": {"info": {}, **value}})
+        look = looks_like(tmp_path / "x.json", "gamestate")
+        assert look is not None
+        assert look.format == "coco"
+
+    @pytest.mark.parametrize("suffix", ["json", "xml", "txt", "csv"])
+    @pytest.mark.parametrize("unit", ['"images"', "0 0.5 ", "<annotation", "1,1,1", "a", "Goal "])
+    def test_hostile_text_takes_no_time(self, tmp_path: Path, suffix: str, unit: str) -> None:
+        write(tmp_path, {f"x.{suffix}": unit * (HEAD_BYTES // len(unit))})
+        start = time.process_time()
+        looks_like(tmp_path, "coco")
+        assert time.process_time() - start < 2

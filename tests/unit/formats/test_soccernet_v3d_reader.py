@@ -1,0 +1,143 @@
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from app.formats.report import Report
+from app.formats.soccernet_v3d_reader import read_soccernet_v3d
+from app.soccer.frames import Box
+from app.soccer.group import Group
+
+Value = dict[str, Any]
+
+
+@pytest.fixture
+def solved_labels(labels: Value, camera_json: Value) -> Value:
+    """Labels-v3D.json as released: cameras and JaC beside the metadata, empty reconstructions."""
+    labels["GameMetadata"]["reconstructions"] = [{}, {}]
+    for image in labels["actions"].values():
+        image["imageMetadata"] |= {
+            "calibration": camera_json,
+            "JaC": {"JaC@0.005": 0.9},
+            "calibrated_replays": ["7_1.png"],
+        }
+    labels["replays"]["7_0.png"]["imageMetadata"]["calibration"] = None
+    return labels
+
+
+@pytest.fixture
+def read(tmp_path: Path, match: str, report: Report) -> Callable[..., list[Group]]:
+    def run(text: str | None, table: str | None = None, **options: Any) -> list[Group]:
+        folder = tmp_path / match
+        folder.mkdir(parents=True, exist_ok=True)
+        if text is not None:
+            (folder / "Labels-v3D.json").write_text(text)
+        if table is not None:
+            (tmp_path / "SNv3D.csv").write_text(table)
+        return list(read_soccernet_v3d(tmp_path, report, **options))
+
+    return run
+
+
+def table(match: str, *rows: str) -> str:
+    league, season, folder = match.split("/")
+    head = "league,season,match,main_action,action,replay,img_w,img_h,ball_bbox,set"
+    return "\n".join([head, *(f"{league},{season},{folder},{row}" for row in rows), ""])
+
+
+class TestReadSoccernetV3d:
+    @pytest.mark.parametrize("spell", [json.dumps, lambda value: json.dumps(repr(value))])
+    def test_plain_json_and_a_json_string_with_a_python_dict_in_it(
+        self, read: Callable[..., list[Group]], solved_labels: Value, report: Report, spell: Any
+    ) -> None:
+        first, second = read(spell(solved_labels))
+        assert [view.key for view in first.views] == ["7.png", "7_1.png", "7_0.png"]
+        assert [view.station.given is not None for view in first.views] == [True, False, False]
+        assert second.key.endswith("8.png")
+        assert report.problems == []
+
+    def test_what_was_computed_is_not_kept_as_said(
+        self, read: Callable[..., list[Group]], solved_labels: Value
+    ) -> None:
+        views = [view for group in read(json.dumps(solved_labels)) for view in group.views]
+        assert len(views) >= 4
+        for view in views:
+            text = json.dumps(view.extras.metadata)
+            assert "JaC" not in text and "reconstructions" not in text
+            assert "pan_degrees" not in text and "calibrated_replays" not in text
+
+    def test_code_in_the_string_is_not_run(
+        self, read: Callable[..., list[Group]], report: Report, tmp_path: Path
+    ) -> None:
+        mark = tmp_path / "mark"
+        assert read(json.dumps(f"open({str(mark)!r}, 'w').close()")) == []
+        assert not mark.exists()
+        assert "neither JSON nor a Python literal" in report.problems[0].problem
+
+    def test_a_camera_that_is_wrong_is_left_out_and_named(
+        self, read: Callable[..., list[Group]], solved_labels: Value, report: Report
+    ) -> None:
+        del solved_labels["actions"]["7.png"]["imageMetadata"]["calibration"]["x_focal_length"]
+        first, _ = read(json.dumps(solved_labels))
+        assert first.views[0].station.given is None
+        places = {(item.record, item.field) for item in report.problems}
+        assert ("7.png", "calibration, x_focal_length") in places
+
+    def test_the_table_has_the_annotated_box_and_the_split(
+        self, read: Callable[..., list[Group]], solved_labels: Value, match: str
+    ) -> None:
+        rows = table(match, '7,True,,1280,720,"[600, 300, 14, 13]",test')
+        first, _ = read(json.dumps(solved_labels), rows)
+        assert first.views[0].balls[0].box == Box(600.0, 300.0, 14.0, 13.0)
+        assert first.views[1].balls[0].box == Box(610.0, 300.0, 12.0, 11.0)
+        assert first.split == "test"
+
+    def test_the_table_alone_makes_groups_without_lines(
+        self, read: Callable[..., list[Group]], match: str, report: Report, tmp_path: Path
+    ) -> None:
+        (tmp_path / match).mkdir(parents=True)
+        (tmp_path / match / "7_2.png").write_bytes(b"x")
+        rows = table(
+            match,
+            "7,0.0,2.0,1280,720,,train",
+            '7,1.0,nan,1280,720,"[1, 2, 3, 4]",train',
+            "9,0,1,1280,720,,train",
+        )
+        (group,) = read(None, rows)
+        assert [view.key for view in group.views] == ["7.png", "7_2.png"]
+        assert group.views[1].media is not None
+        assert all(view.station.lines == {} for view in group.views)
+        assert [item.record for item in report.problems] == [f"{match}/9.png"]
+
+    def test_lines_can_count_instead_of_the_cameras(
+        self, read: Callable[..., list[Group]], solved_labels: Value
+    ) -> None:
+        first, _ = read(json.dumps(solved_labels), calibration="lines")
+        assert {view.station.calibration for view in first.views} == {"lines"}
+
+    def test_a_view_of_the_table_that_the_labels_do_not_have_is_reported(
+        self, read: Callable[..., list[Group]], solved_labels: Value, match: str, report: Report
+    ) -> None:
+        rows = table(match, "7,0,5,1280,720,,train")
+        read(json.dumps(solved_labels), rows)
+        assert [item.record for item in report.problems] == ["7_5.png"]
+
+    def test_actions_of_the_split_lists_that_did_not_come_are_said(
+        self,
+        read: Callable[..., list[Group]],
+        solved_labels: Value,
+        match: str,
+        tmp_path: Path,
+        report: Report,
+    ) -> None:
+        folder = match.rpartition("/")[2]
+        lines = [f"{folder}/7", f"{folder}/7_1", f"{folder}/99", f"{folder}/99_1", "Other/1"]
+        (tmp_path / "SNv3D-train.txt").write_text("\n".join(lines))
+        read(json.dumps(solved_labels), table(match, "7,1,,1280,720,,test"))
+        assert report.remarks == [
+            f"2 actions of the split lists did not come: {folder}/99, Other/1"
+        ]

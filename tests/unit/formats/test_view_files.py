@@ -1,0 +1,63 @@
+from __future__ import annotations
+
+import io
+import zipfile
+
+import pytest
+
+from app.errors import UnsafePathError
+from app.formats.output import write_zip
+from app.formats.view_files import HELD, GatheredFiles, ViewFiles, put_on_disk
+
+
+class TestViewFiles:
+    def test_come_back_among_the_files_of_the_disk_in_the_order_of_their_paths(self, tmp_path):
+        (tmp_path / "b").mkdir()
+        (tmp_path / "b" / "2.csv").write_text("on disk")
+        with ViewFiles(tmp_path) as files:
+            files.put("b/3.json", "ü")
+            files.put("b/1.json", "{}")
+            files.put("a.json", "")
+        assert list(GatheredFiles(tmp_path)) == [
+            ("a.json", b""),
+            ("b/1.json", b"{}"),
+            ("b/2.csv", tmp_path / "b" / "2.csv"),
+            ("b/3.json", "ü".encode()),
+        ]
+
+    def test_what_is_put_again_is_the_newer_file(self, tmp_path):
+        with ViewFiles(tmp_path) as files:
+            files.put("a", "first")
+            files.put("./a", "then")
+        assert list(GatheredFiles(tmp_path)) == [("a", b"then")]
+
+    def test_a_zip_of_them_is_that_of_files_on_the_disk_to_the_byte(self, tmp_path):
+        texts = {f"{match}/camera_{view}.json": f"{match} {view}" * view for match in "ba" for view in range(40)}  # fmt: skip
+        (tmp_path / "disk").mkdir()
+        (tmp_path / "held").mkdir()
+        with ViewFiles(tmp_path / "held") as files:
+            for put in (put_on_disk(tmp_path / "disk"), files.put):
+                for path, text in texts.items():
+                    put(path, text)
+        made = []
+        for folder in ("disk", "held"):
+            (tmp_path / folder / "manifest.json").write_text("{}")
+            made.append(io.BytesIO())
+            write_zip(tmp_path / folder, made[-1])
+        assert made[0].getvalue() == made[1].getvalue()
+        assert HELD not in zipfile.ZipFile(made[1]).namelist()
+
+    def test_a_disk_that_is_full_is_told_as_it_is_of_a_file(self, tmp_path):
+        files = ViewFiles(tmp_path)
+        # What SQLite is told of a disk without room.
+        files._connection.execute("PRAGMA max_page_count = 3")
+        with pytest.raises(OSError, match="full"), files:
+            for number in range(5000):
+                files.put(f"{number}.json", "x" * 100)
+
+    @pytest.mark.parametrize("path", ["../out", "/etc/passwd", "a/../../b", ""])
+    def test_no_path_leaves_the_folder(self, tmp_path, path):
+        with ViewFiles(tmp_path) as files:
+            for put in (files.put, put_on_disk(tmp_path)):
+                with pytest.raises(UnsafePathError):
+                    put(path, "x")

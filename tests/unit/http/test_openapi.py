@@ -1,0 +1,114 @@
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+from jsonschema import Draft202012Validator
+from openapi_spec_validator import validate
+
+from app.http.property_descriptions import PARAMETERS, PROPERTIES
+from app.http.rules import OPEN, RULES
+
+Document = dict[str, Any]
+
+
+@pytest.fixture
+def document(app) -> Document:
+    return app.openapi()
+
+
+def operations(document: Document) -> Iterator[tuple[str, Document]]:
+    for path, methods in document["paths"].items():
+        for method, operation in methods.items():
+            yield f"{method.upper()} {path}", operation
+
+
+class TestDocument:
+    def test_is_valid_openapi_for_readers_that_are_not_ours(self, document) -> None:
+        validate(document)
+
+    def test_says_what_every_tag_means(self, document) -> None:
+        described = {tag["name"] for tag in document["tags"]}
+        used = {tag for _, operation in operations(document) for tag in operation.get("tags", ())}
+        assert used == described
+
+    def test_requires_if_match_wherever_a_change_without_it_is_refused(self, document) -> None:
+        for name, operation in operations(document):
+            [*found] = (one for one in operation["parameters"] if one["name"] == "If-Match")
+            assert bool(found) == ("428" in operation["responses"]), name
+            assert all(one["required"] for one in found), name
+
+    def test_gives_every_operation_a_name_of_its_own(self, document) -> None:
+        names = [operation["operationId"] for _, operation in operations(document)]
+        assert len(set(names)) == len(names)
+        # A verb alone says nothing in a generated client.
+        assert [name for name in names if name.islower()] == []
+
+    def test_describes_an_edit_of_the_ball_as_one_of_three_things(self, document) -> None:
+        edit = document["components"]["schemas"]["BallEdit"]
+        assert set(edit) <= {"title", "description", "examples", "oneOf"}
+        assert [one["required"] for one in edit["oneOf"]] == [["box"], ["point"], ["out_of_view"]]
+        assert all(one["additionalProperties"] is False for one in edit["oneOf"])
+
+    def test_types_the_data_of_every_event(self, document) -> None:
+        stream = document["paths"]["/api/v1/events"]["get"]["responses"]["200"]["content"]
+        kinds = stream["text/event-stream"]["x-events"]
+        assert set(kinds) == {"group", "dataset", "job", "work", "maintenance"}
+        for reference in kinds.values():
+            assert reference["$ref"].rpartition("/")[2] in document["components"]["schemas"]
+
+    def test_gives_every_operation_a_summary_of_its_own(self, document) -> None:
+        summaries = [operation["summary"] for _, operation in operations(document)]
+        assert len(set(summaries)) == len(summaries)
+        assert "List saved views" in summaries
+
+    def test_describes_every_parameter(self, document) -> None:
+        for name, operation in operations(document):
+            for one in operation["parameters"]:
+                assert one.get("description"), f"{name}: say what {one['name']} is"
+
+    def test_describes_every_property(self, document) -> None:
+        for name, schema in document["components"]["schemas"].items():
+            for key, one in schema.get("properties", {}).items():
+                told = f"{name}.{key}: describe it in its model or in property_words.py"
+                assert one.get("description"), told
+
+    def test_every_shared_description_is_used(self, document) -> None:
+        said = {
+            (name, key, one["description"])
+            for name, schema in document["components"]["schemas"].items()
+            for key, one in schema.get("properties", {}).items()
+        }
+        used = {key for _, key, text in said if PROPERTIES.get(key) == text}
+        used |= {f"{n}.{key}" for n, key, text in said if PROPERTIES.get(f"{n}.{key}") == text}
+        assert set(PROPERTIES) == used
+        there = {
+            (one["name"], one["description"])
+            for _, operation in operations(document)
+            for one in operation["parameters"]
+        }
+        assert set(PARAMETERS.items()) <= there
+
+    def test_gives_every_answer_in_json_an_example_that_fits_it(self, document) -> None:
+        count = 0
+        for name, operation in operations(document):
+            for status, answer in operation["responses"].items():
+                content = answer.get("content", {}).get("application/json")
+                if not status.startswith("2") or content is None:
+                    continue
+                examples = [one["value"] for one in content.get("examples", {}).values()]
+                examples += [content["example"]] if "example" in content else []
+                assert examples, name
+                schema = {**content["schema"], "components": document["components"]}
+                for one in examples:
+                    Draft202012Validator(schema).validate(one)
+                    count += 1
+        assert count > 100
+
+    def test_says_with_what_one_may_ask(self, document) -> None:
+        schemes = document["components"]["securitySchemes"]
+        assert (schemes["session"]["in"], schemes["token"]["scheme"]) == ("cookie", "bearer")
+        assert document["security"] == [{"session": []}, {"token": []}, {}]
+        for name, operation in operations(document):
+            assert (operation.get("security") == []) == (RULES[name] is OPEN), name

@@ -1,0 +1,117 @@
+"""Where batches are solved, as the settings say, and processes that solve."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable
+from concurrent.futures import Executor
+from contextlib import contextmanager
+from multiprocessing import active_children
+from pathlib import Path
+
+import pytest
+
+from app.config import Settings
+from app.errors import InputError
+from app.workers import executors
+from app.workers.executors import executor_of, process_pool, server_pool
+from tests.waiting import SECONDS
+
+
+@pytest.fixture
+def opened(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """How many processes each pool that was opened has; none is started."""
+    counts: list[int] = []
+
+    @contextmanager
+    def pretend(workers: int):
+        counts.append(workers)
+        with Executor() as pool:
+            yield pool
+
+    monkeypatch.setattr(executors, "process_pool", pretend)
+    return counts
+
+
+@pytest.mark.parametrize(
+    ("own", "asked", "expected"),
+    [(3, None, [3]), (3, 2, [2]), (3, 1, []), (1, None, []), (1, 4, [4])],
+)
+def test_a_command_has_as_many_processes_as_it_asks_for_else_as_the_settings_say(
+    tmp_path: Path, opened: list[int], own: int, asked: int | None, expected: list[int]
+) -> None:
+    with executor_of(Settings(home=tmp_path, workers=own), asked) as executor:
+        assert (executor is None) == (not expected)
+    assert opened == expected
+
+
+@pytest.mark.parametrize(("own", "left"), [(8, 7), (2, 1), (1, 1)])
+def test_a_server_leaves_one_processor_for_requests_and_opens_nothing_before_there_is_a_job(
+    tmp_path: Path, opened: list[int], own: int, left: int
+) -> None:
+    pool = server_pool(Settings(home=tmp_path, workers=own))
+    assert opened == []
+    with pool():
+        assert opened == [left]
+
+
+def test_where_a_cluster_is_named_it_solves_and_no_process_of_this_machine(
+    tmp_path: Path, opened: list[int]
+) -> None:
+    settings = Settings(home=tmp_path, workers=3, cluster="nonsense")
+    with pytest.raises(InputError, match="nonsense"), executor_of(settings, 2):
+        pass
+    with pytest.raises(InputError, match="nonsense"), server_pool(settings)():
+        pass
+    assert opened == []
+
+
+class TestProcessPool:
+    def test_who_stands_in_a_folder_that_they_may_not_enter_is_told_before_processes_start(
+        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        """As with sudo from somebody else's home: each process would end with a traceback."""
+
+        def solve() -> str:
+            with pytest.raises(InputError) as refused, process_pool(2):
+                pass
+            return f"{refused.value.message} {refused.value.hint}"
+
+        closed = tmp_path / "closed"
+        closed.mkdir()
+        monkeypatch.chdir(closed)
+        closed.chmod(0)
+        said = as_nobody(solve)
+        closed.chmod(0o700)
+        assert "may not enter the folder" in said
+        assert "cd /" in said
+
+    def test_processes_end_with_the_work_that_fails_however_much_they_have_to_do(self) -> None:
+        end = time.monotonic() + SECONDS
+        with pytest.raises(LookupError), process_pool(1) as pool:
+            pid = pool.submit(os.getpid).result()
+            pool.submit(time.sleep, 3 * SECONDS)
+            pool.submit(time.sleep, 3 * SECONDS)
+            raise LookupError
+        while pid in {child.pid for child in active_children()}:
+            time.sleep(0.01)
+        assert time.monotonic() < end
+
+
+def as_nobody(work: Callable[[], str]) -> str:
+    """What a function says in a process of somebody else than root."""
+    read, write = os.pipe()
+    child = os.fork()
+    if not child:
+        try:
+            if os.getuid() == 0:
+                os.setuid(65534)
+            os.write(write, work().encode())
+        finally:
+            os._exit(0)
+    os.close(write)
+    with os.fdopen(read, encoding="utf-8") as said:
+        found = said.read()
+    os.waitpid(child, 0)
+    return found
