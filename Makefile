@@ -70,7 +70,7 @@ test-browser:
 test-late: setup chromium
 	@TOUCHLINE_SLOW_PAGES=$(or $(MS),300) $(PYTEST) tests/e2e
 
-# All tests but those of the browser with every home on a private PostgreSQL: WHAT=tests/unit/store a part, WHAT=tests/e2e those of
+# All tests but those of the browser with every home on a private PostgreSQL: WHAT=tests/unit/db a part, WHAT=tests/e2e those of
 # the browser. What is about the file of SQLite is left out; each says why.
 test-postgresql: setup postgresql generators readers moto
 	@$(BIN)/python -m tests.compiled

@@ -1,8 +1,8 @@
-"""Alembic's entry: runs on the connection and in the transaction that app.store.migrate opens."""
+"""Alembic's entry: runs on the connection and in the transaction that app.db.migrate opens."""
 
 from alembic import context
 
-from app.store.tables import Base
+from app.features.tables import Base
 
 context.configure(
     connection=context.config.attributes["connection"],
