@@ -8,12 +8,12 @@ from dataclasses import dataclass, field
 from pathlib import PurePosixPath
 from typing import Any
 
-from app.datasets.issia_people import mirrored_people, turned
 from app.formats.cameras_reader import cameras_of
 from app.formats.file_tree import DEFAULT_LIMITS, FileTree, Limits, Root
 from app.formats.folder_tree import FolderTree
 from app.formats.frame_names import IMAGE_SUFFIXES, VIDEO_SUFFIXES
 from app.formats.issia import CALIBRATION, DEFAULT_OFFSET, DEFAULT_SIZE, MATCH, FramePersons
+from app.formats.issia_people import mirrored_people, turned
 from app.formats.report import Report
 from app.formats.sn_calibration import LineFile
 from app.formats.sn_calibration_reader import line_files_of, read_line_files

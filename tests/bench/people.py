@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from app.datasets.issia_people import MIRRORED, on_grass, turned
+from app.formats.issia_people import MIRRORED, on_grass, turned
 from app.formats.issia_reader import IssiaFolder, IssiaOptions, open_issia
 from app.formats.report import Report
 from tests.bench.table import print_table

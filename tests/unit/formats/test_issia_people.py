@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.datasets.issia_people import MIRRORED, mirrored_people, turned
 from app.formats.camera_json import camera_to_json
+from app.formats.issia_people import MIRRORED, mirrored_people, turned
 from app.formats.issia_reader import IssiaFolder, IssiaOptions, open_issia
 from app.formats.issia_writer import write_issia
 from app.formats.report import Report

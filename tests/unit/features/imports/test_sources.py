@@ -11,7 +11,6 @@ import pytest
 from PIL import Image
 from sqlalchemy import select
 
-from app.datasets import issia_people
 from app.db.log import LogModel
 from app.db.store import Store
 from app.errors import InputError
@@ -25,6 +24,7 @@ from app.features.imports.sources import FORMATS, USERS, Source, import_source
 from app.features.imports.spare import SpareFrame, ingest_spare, spare_frames
 from app.features.queue.service import list_groups
 from app.features.solutions.service import solve_dataset
+from app.formats import issia_people
 from app.formats.soccernet_v3_writer import write_soccernet_v3
 from app.soccer.annotation import BallAnnotation, Extras, make_lines
 from app.soccer.frames import Box, ImageSize
