@@ -354,7 +354,8 @@ class TestYieldStore:
         fill(make_group(7), make_group(8))
         yields = YieldStore(store)
         before = yields.snapshot(1)
-        change_policy(store, "demo", replace(STRICT, max_sigma_m=1e-6), if_match=None, actor="ann")
+        narrow = replace(PAPER, min_parallax_degrees=5.0, max_sigma_m=1e-6)
+        change_policy(store, "demo", narrow, if_match=None, actor="ann")
         found = get_yield(yields, 1)
         assert (found.unsolved, found.passing) == (0, 0)
         assert yields.snapshot(1).blocks[0].table is before.blocks[0].table
