@@ -48,8 +48,8 @@ describe('isGrave', () => {
 
 describe('doubt', () => {
 	it('names what makes the ball unusable, whatever else there is', () => {
-		const findings = [{ kind: 'implausible_ball', sentence: 'It lies 10.2 m below the grass. Check it.', unusable_ball: true }];
-		for (const passes of [true, false]) assert.equal(doubt({ passes, findings }), 'the ball cannot be used: it lies 10.2 m below the grass');
+		const findings = [{ kind: 'implausible_ball', sentence: 'It lies 10.20 m below the grass. Check it.', unusable_ball: true }];
+		for (const passes of [true, false]) assert.equal(doubt({ passes, findings }), 'the ball cannot be used: it lies 10.20 m below the grass');
 	});
 
 	it('names swapped sides of a group that passes, and nothing of one that fails', () => {

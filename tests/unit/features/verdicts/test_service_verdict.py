@@ -82,7 +82,9 @@ class TestSetVerdict:
     ) -> None:
         below = load(store, fill(make_group(9, ball=(5.0, 2.0, 10.2)))[0])
         assert below.solution.passes
-        with pytest.raises(InputError, match=r"cannot be used .*10\.20 m below the grass") as caught:
+        with pytest.raises(
+            InputError, match=r"cannot be used .*10\.20 m below the grass"
+        ) as caught:
             judge(store, below, "accepted")
         assert caught.value.pointer == "/note"
         after = judge(store, below, "accepted", note="a hole")

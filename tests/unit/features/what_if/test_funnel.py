@@ -23,7 +23,7 @@ from app.features.what_if.table import YieldTable
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import Box
 from app.soccer.group import Group
-from app.soccer.policy import PAPER, STRICT, THRESHOLDS, CalibrationPolicy, Policy
+from app.soccer.policy import PAPER, THRESHOLDS, CalibrationPolicy, Policy
 from app.soccer.solution import GATES, PaintFit, Solution
 from app.solving.ball_covariance import MeanCovariance
 from app.solving.facts import group_facts, join
