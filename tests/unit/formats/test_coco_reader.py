@@ -344,10 +344,8 @@ class TestReadCoco:
         (group,) = read(json.dumps(foreign()).replace("[1, 2, 3, 4]", "[1, 2, Infinity, 4]"))
         assert group.views[0].balls == ()
         assert len(group.views[0].extras.boxes) == 1
-        assert [(item.record, item.field) for item in report.problems][:2] == [
-            ("annotations[0]", "bbox[2]"),
-            ("annotations[0]", "bbox"),
-        ]
+        assert ("annotations[0]", "bbox") in [(item.record, item.field) for item in report.problems]
+        assert any("not finite" in remark for remark in report.remarks)
 
 
 class TestJoins:
