@@ -345,7 +345,7 @@ class TestReadCoco:
         assert group.views[0].balls == ()
         assert len(group.views[0].extras.boxes) == 1
         assert ("annotations[0]", "bbox") in [(item.record, item.field) for item in report.problems]
-        assert any("not finite" in remark for remark in report.remarks)
+        assert any("read as missing" in remark for remark in report.remarks)
 
 
 class TestJoins:

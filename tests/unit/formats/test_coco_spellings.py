@@ -125,7 +125,7 @@ def test_the_ball_is_where_it_is_and_the_pictures_are_found(
     assert solution.ball is not None
     assert np.abs(np.array(solution.ball.point) - BALL).max() < 1e-6
     assert report.problems == []
-    assert any("not finite" in remark for remark in report.remarks) == (
+    assert any("read as missing" in remark for remark in report.remarks) == (
         shape == "area not a number"
     )
     assert any("is the ball (2 annotations)" in remark for remark in report.remarks)
