@@ -23,8 +23,8 @@ from app.features.imports.jobs import resume_imports
 from app.features.jobs.service import Jobs, Pool
 from app.features.jobs.shared import SharedJobs
 from app.features.match_estimates.jobs import PICTURES, POSITIONS, make_rigs
-from app.features.match_estimates.noise import NoiseStore
 from app.features.paint.jobs import PAINT, PROPOSALS
+from app.features.policies.noise import NoiseStore
 from app.features.practice.service import resume_practice
 from app.features.predictions.jobs import resume_evaluations
 from app.features.predictions.reader import PredictionReader

@@ -26,7 +26,6 @@ from app.features.jobs.queries import Job
 from app.features.jobs.records import need_job
 from app.features.jobs.run import JobProgress, Work, counting
 from app.features.jobs.service import Jobs
-from app.features.match_estimates.noise import Noise, accept_noise
 from app.features.match_estimates.pictures import apply_pictures, estimate_pictures
 from app.features.match_estimates.positions import (
     apply_take_back,
@@ -34,6 +33,7 @@ from app.features.match_estimates.positions import (
     share_positions,
 )
 from app.features.match_estimates.rig import accept, adjustable, proposal_values, propose, take_back
+from app.features.policies.noise import Noise, accept_noise
 from app.features.policies.service import read_policy
 from app.features.solve.jobs import request_solve, solve_after
 from app.soccer.picture import PictureGeometry

@@ -14,7 +14,7 @@ from app.terminal.options import Dataset, Json, acting
 from app.terminal.terminal import print_json, print_values, say
 
 if TYPE_CHECKING:
-    from app.features.match_estimates.noise import Noise
+    from app.features.policies.noise import Noise
 
 commands = typer.Typer()
 _FACTORS = "factors", "used"
@@ -37,7 +37,7 @@ def noise(
     json_: Json = False,
 ) -> None:
     """Estimate how noisy a dataset's balls and lines are, from what its views disagree about."""
-    from app.features.match_estimates.noise import apply_noise, read_noise, take_noise_back
+    from app.features.policies.noise import apply_noise, read_noise, take_noise_back
 
     if apply and alike:
         raise typer.BadParameter("--apply and --alike contradict each other")

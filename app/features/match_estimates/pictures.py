@@ -16,7 +16,6 @@ from app.db.session import Session
 from app.db.store import Store
 from app.errors import GeometryError
 from app.features.datasets.service import need_dataset, read_dataset_head, require_matches
-from app.features.file_tools.score import fan_out
 from app.features.groups.edit import SetPicture
 from app.features.groups.group_edits import give_edits
 from app.features.groups.queries import StoredGroup, read_groups
@@ -27,6 +26,7 @@ from app.soccer.group import Group, View
 from app.soccer.picture import PictureGeometry
 from app.soccer.policy import CalibrationPolicy
 from app.solving.match_picture import PictureEstimate, PictureFrame, estimate_match_picture
+from app.workers.fan_out import fan_out
 
 _BATCH = 100
 

@@ -18,7 +18,6 @@ from app.db.session import Session
 from app.db.store import Store
 from app.errors import ConflictError, NotFoundError
 from app.features.datasets.service import DatasetHead, read_dataset_head
-from app.features.file_tools.score import fan_out
 from app.features.groups.digest import digest
 from app.features.groups.edit import Edit, SetPositions
 from app.features.groups.edit_codec import edit_from_json
@@ -40,6 +39,7 @@ from app.soccer.solution import SOLVER_VERSION, Calibration
 from app.solving.calibrate import calibrate_station, calibration_key
 from app.solving.match_model import FramePlace
 from app.solving.match_position import Places, pan_of, place_of
+from app.workers.fan_out import fan_out
 
 _BATCH = 100
 _DIGITS = 4

@@ -17,7 +17,6 @@ from app.features.match_estimates.jobs import (
     take_positions_back,
     take_rig_back,
 )
-from app.features.match_estimates.noise import Noise
 from app.features.match_estimates.pictures import read_pictures
 from app.features.match_estimates.positions import get_positions
 from app.features.match_estimates.schemas import (
@@ -30,6 +29,7 @@ from app.features.match_estimates.schemas import (
     RigTakenBack,
     SharedPositionsDocument,
 )
+from app.features.policies.noise import Noise
 from app.http.cursor import paged
 from app.http.deps import Actor, AppServices, AppStore, DatasetPath
 from app.http.job_responses import by_job, job_answer

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from app.features.groups.schemas import PictureDocument, PictureEdit
-from app.features.match_estimates.noise import Advice
+from app.features.policies.noise import Advice
 from app.http.documents import Document, ListDocument
 from app.solving.ball_noise import Sigma
 from app.solving.line_noise import Interval

@@ -18,7 +18,6 @@ from app.db.store import Store
 from app.errors import GeometryError, InputError
 from app.features.datasets.match_choice import need_match
 from app.features.datasets.service import read_dataset_head
-from app.features.file_tools.score import fan_out
 from app.features.groups.digest import digest
 from app.features.groups.edit import SetPitch
 from app.features.groups.edit_codec import edit_from_json
@@ -42,6 +41,7 @@ from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy, digested_calibration
 from app.soccer.solution import SOLVER_VERSION
 from app.solving.pitch_size import PitchEstimate, PitchFrame, estimate_pitch
+from app.workers.fan_out import fan_out
 
 
 @dataclass(frozen=True)

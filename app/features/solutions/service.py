@@ -19,12 +19,12 @@ from app.features.datasets.service import (
     need_dataset,
     read_dataset_head,
 )
-from app.features.file_tools.score import fan_out
 from app.features.groups.codecs import group_from_json, group_to_json
 from app.features.groups.queries import read_groups
 from app.features.groups.view_queries import read_stations, station_pitches
 from app.features.policies.queries import policy_history
 from app.features.queue.queries import refresh_queue
+from app.features.solutions.given_cameras import contradicted, sentence_of
 from app.features.solutions.kept_queries import KeptSolution, kept_solutions
 from app.features.solutions.queries import (
     EncodedSolution,
@@ -38,7 +38,6 @@ from app.features.solutions.queries import (
     read_calibrations,
     unsolved_groups,
 )
-from app.features.stations.given_cameras import contradicted, sentence_of
 from app.plural import plural
 from app.progress import TellProgress
 from app.soccer.group import Group, Station
@@ -49,6 +48,7 @@ from app.solving.another_tau import alike_under, has_smaller_tau, retold
 from app.solving.calibrate import calibrate_station, calibration_key, view_keys
 from app.solving.facts_codec import facts_from_bytes, facts_to_bytes
 from app.solving.solve import solve_with_facts
+from app.workers.fan_out import fan_out
 
 
 def calibration_keys(groups: Iterable[Group], policy: Policy) -> set[str]:

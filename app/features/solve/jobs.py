@@ -17,13 +17,13 @@ from app.features.jobs.queries import Job
 from app.features.jobs.records import Then
 from app.features.jobs.run import JobProgress, Work, counting
 from app.features.jobs.service import Jobs, Pool
-from app.features.match_estimates.noise import follow_noise, is_followed, noise_sample
 from app.features.pitches.service import (
     DatasetPitches,
     apply_pitches,
     estimate_pitches,
     stale_matches,
 )
+from app.features.policies.noise import follow_noise, is_followed, noise_sample
 from app.features.policies.service import PolicyState, apply_policy
 from app.features.solutions.queries import unsolved_groups
 from app.features.solutions.service import SolveReport, solve_dataset, stale_groups

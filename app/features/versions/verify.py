@@ -14,7 +14,6 @@ from app.db.json_columns import Json
 from app.db.session import Session
 from app.db.store import Store
 from app.errors import DamagedError, JobCancelled, ReviewError, StorageError
-from app.features.file_tools.score import fan_out
 from app.features.solutions.queries import decode_calibration, encode_calibration, encode_solution
 from app.features.versions.frozen_queries import (
     CALIBRATION,
@@ -41,6 +40,7 @@ from app.soccer.solution import SOLVER_VERSION, Calibration
 from app.soccer.split import Splitter
 from app.solving.calibrate import calibrate_station, calibration_key
 from app.solving.solve import solve
+from app.workers.fan_out import fan_out
 
 CHUNK = 40
 """Groups a task."""

@@ -3,7 +3,7 @@ from __future__ import annotations
 from concurrent.futures import ThreadPoolExecutor
 from threading import Event
 
-from app.features.file_tools.score import AHEAD, fan_out
+from app.workers.fan_out import AHEAD, fan_out
 from tests.waiting import SECONDS
 
 

@@ -16,13 +16,8 @@ from app.features.groups.edit_codec import edit_to_json
 from app.features.groups.state import GroupState, read_states
 from app.features.groups.submit import submit
 from app.features.imports.ingest import ensure_dataset, ingest
-from app.features.match_estimates import noise
-from app.features.match_estimates.noise import (
-    ASSUMED_WORDS,
-    apply_noise,
-    read_noise,
-    take_noise_back,
-)
+from app.features.policies import noise
+from app.features.policies.noise import ASSUMED_WORDS, apply_noise, read_noise, take_noise_back
 from app.features.policies.service import change_policy, read_policy
 from app.features.policies.text import policy_with
 from app.features.solutions import service as recompute
