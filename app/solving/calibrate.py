@@ -371,10 +371,12 @@ def clicks_key(group: Group, view: View, policy: CalibrationPolicy) -> str:
 def sought_key(group: Group, view: View, policy: CalibrationPolicy) -> str:
     """Digest of what the camera depends on from which the paint of a view's picture is sought.
 
-    How that camera is measured has no part in it: what counts as missing moves no camera.
+    How that camera is measured has no part in it, nor how noisy its clicks are: neither what counts
+    as missing nor the estimated noise of a dataset moves a camera.
     """
     shared = _shared(group, view, policy)
-    return _key(_camera_parts(START_VERSION, view.station, group.pitch, policy, shared))
+    quiet = replace(policy, line_sigma_px=None, line_share=None)
+    return _key(_camera_parts(START_VERSION, view.station, group.pitch, quiet, shared))
 
 
 def is_lone(group: Group, view: View, policy: CalibrationPolicy) -> bool:

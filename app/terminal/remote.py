@@ -103,7 +103,9 @@ def solve_values(
     sentence = outcome_sentence(result["solved"], result["passed"], result["failed"], failing)
     if result["advice"]:
         sentence += f". {result['advice']}"
-    return {**values, "failed": failed, "failing": failing, "advice": result["advice"]}, sentence
+    for name in ("estimated", "proposed", "failing", "advice"):
+        values[name] = result[name]
+    return {**values, "failed": failed}, sentence
 
 
 def policy_values(client: Client, dataset: str) -> tuple[str, dict[str, Any]]:

@@ -40,7 +40,7 @@ def sentence_of(off: Mapping[str, float], where: str, how: str) -> str:
     low, high = (f"{jac:.2f}" for jac in (min(off.values()), max(off.values())))
     return (
         f"The lines of {', '.join(sorted(off))} do not fit the given "
-        f"{'camera' if len(off) == 1 else 'cameras'} (JaC {low if low == high else f'{low} to {high}'}): "
+        f"calibration (JaC {low if low == high else f'{low} to {high}'}): "
         f"{where}. Were they drawn on another day, {how} takes the given cameras as they are and "
         "leaves their lines aside."
     )

@@ -179,6 +179,13 @@ class TestKey:
         before = replace(TOLD, goal="inner")
         assert sought_key(group, group.views[0], before) == "5e1cff3d68f54b070aa1f12d1f685e29"
 
+    def test_the_noise_that_a_dataset_shows_moves_no_camera_and_makes_no_reading_stale(self):
+        group, noise = clicked(), {"line_sigma_px": 2.5, "line_share": 0.4}
+        quiet, noisy = sought_key(group, group.views[0], TOLD), replace(TOLD, **noise)
+        assert sought_key(group, group.views[0], noisy) == quiet
+        found, other = first(group, CLICKS), first(group, replace(CLICKS, **noise))
+        assert found.camera == other.camera and found.covariance != other.covariance
+
     def test_the_camera_of_the_clicks_is_what_its_version_says(self):
         """A change here asks for another ``START_VERSION``."""
         camera = first(clicked(), CLICKS).camera

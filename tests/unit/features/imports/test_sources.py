@@ -479,7 +479,7 @@ class TestLinesOfAnotherDay:
         imported = import_source(store, "old", source, store.settings)
         (told,) = [text for text in imported.report.remarks if "do not fit" in text]
         assert told.startswith(
-            "The lines of cam1, cam2 do not fit the given cameras (JaC 0.00): 1 of 1"
+            "The lines of cam1, cam2 do not fit the given calibration (JaC 0.00): 1 of 1"
         )
         assert (
             f"`touchline import issia {source.path} --dataset old --lines {source.lines} "
