@@ -312,6 +312,6 @@ def compared_texts(solution: Json, solved: Json) -> dict[str, str]:
         "x": fixed(ball["point"][0], 2, " m"),
         "y": fixed(ball["point"][1], 2, " m"),
         "height": fixed(ball["height_m"], 2, " m"),
-        "sigma": fixed(ball["sigma_m"], 3, " m"),
+        "sigma": fixed(ball["sigma_m"], 2, " m"),
         "parallax": fixed(ball["parallax_degrees"], 1, "°"),
     }

@@ -83,7 +83,7 @@ describe('gradeOfView', () => {
 	it('never calls a camera well that its lines do not determine', () => {
 		const open = { calibration: { camera: {}, source: 'lines', unobservable: ['position'] } };
 		assert.deepEqual(gradeOfView(picture({ error: 2, solved: open })), { grade: 'warn', sentence: 'camera uncertain' });
-		assert.deepEqual(gradeOfView(picture({ error: 2, solved: open, view: { balls: [] } })), { grade: 'warn', sentence: 'camera uncertain, no ball' });
+		assert.deepEqual(gradeOfView(picture({ error: 2, solved: open, view: { balls: [] } })), { grade: 'warn', sentence: 'uncertain, no ball' });
 	});
 
 	it('says that a ball was placed and does not count', () => {
