@@ -19,7 +19,7 @@ export TOUCHLINE_HOME ?= $(CURDIR)/.touchline
 unexport PYTHONDONTWRITEBYTECODE
 NPM := PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/npm
 
-.PHONY: setup run test test-python test-browser test-late test-postgresql check audit release generators readers moto bench mutate torture fuzz paper chromium postgresql clean
+.PHONY: setup run test test-all test-python test-browser test-late test-postgresql check audit release generators readers moto bench mutate torture fuzz paper chromium postgresql clean
 .DEFAULT_GOAL := run
 
 setup: .venv/ready static/node_modules/.ready static/built/about.json
@@ -54,17 +54,27 @@ PROCESSES = $(shell n=$$(getconf _NPROCESSORS_ONLN); echo $$(( n < 2 ? 2 : n < 8
 ROOMY = $(shell df -Pk /dev/shm 2>/dev/null | awk 'NR == 2 && $$4 > 8000000 { print "yes" }')
 PYTEST = $(if $(ROOMY),PYTEST_DEBUG_TEMPROOT=/dev/shm) $(BIN)/python -m pytest --numprocesses=$(PROCESSES) --dist=loadfile --no-loadscope-reorder
 
-# What numba compiles is compiled before: every process would do it anew, until one has saved it.
-test: setup chromium postgresql generators readers moto
+# What proves the product on one machine. What numba compiles is compiled before: every process would do
+# it anew, until one has saved it.
+test: QUICK = --quick
+test: setup chromium postgresql readers moto
+	@$(BIN)/python -m tests.compiled
+	@$(MAKE) --no-print-directory -j2 QUICK=$(QUICK) test-python test-browser
+	@echo "Every test has passed."
+
+# The same and what is slow and broad (`BROAD` in tests/conftest.py): torture in its short form, every upgrade, wheels, generated
+# clients, a cluster, the twins on PostgreSQL, hostile requests to every operation; and late pages. For every night.
+test-all: setup chromium postgresql generators readers moto
 	@$(BIN)/python -m tests.compiled
 	@$(MAKE) --no-print-directory -j2 test-python test-browser
+	@$(MAKE) --no-print-directory test-late
 	@echo "Every test has passed."
 
 test-python:
-	@$(PYTEST) --ignore=tests/e2e 2>&1 | sed -u 's/^/python  | /'
+	@$(PYTEST) $(QUICK) --ignore=tests/e2e 2>&1 | sed -u 's/^/python  | /'
 
 test-browser:
-	@{ $(BIN)/npm --prefix static test && $(PYTEST) tests/e2e; } 2>&1 | sed -u 's/^/browser | /'
+	@{ $(BIN)/npm --prefix static test && $(PYTEST) $(QUICK) tests/e2e; } 2>&1 | sed -u 's/^/browser | /'
 
 # The browser tests before pages whose every request, frame, picture and event is late: who does not wait falls.
 test-late: setup chromium

@@ -19,6 +19,19 @@ make_once()
 if sys.platform == "linux":
     start_loaded(lambda: nursery().children)
 
+BROAD = (
+    "[postgresql",
+    "tests/integration/test_cluster.py",
+    "tests/integration/test_generated_clients.py",
+    "tests/integration/test_installation.py",
+    "tests/integration/test_openapi.py::TestOperations",
+    "tests/integration/test_torture.py",
+    "tests/integration/test_web_processes.py::TestMetrics",
+    "tests/unit/db/test_migrate.py::TestOldHomes",
+    "tests/unit/features/integrity/test_upgrades.py",
+)
+"""What `make test` leaves to `make test-all`, by parts of the names of tests: slow, broad, or the same once more on
+another database."""
 YOUNG = 50_000
 """New objects before the collector looks at them: seventy times as many as by default."""
 
@@ -36,6 +49,11 @@ def _require_alike(
     assert all(row.keys() == rows[0].keys() for row in rows), "rows of one statement are not alike"
 
 
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """`--quick`: without what is slow and broad."""
+    parser.addoption("--quick", action="store_true", help="leave out what `make test-all` adds")
+
+
 def pytest_configure() -> None:
     """Look for no garbage while modules and tests are collected: none of them is."""
     gc.disable()
@@ -44,8 +62,12 @@ def pytest_configure() -> None:
         setattr(DEFAULT_TIMEOUT_CONFIG, part, SECONDS)
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Leave out what is about the file of SQLite where there is none."""
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Leave out what is broad where that is asked for, and what is about the file of SQLite where there is none."""
+    if config.getoption("--quick"):
+        broad = [item for item in items if any(part in item.nodeid for part in BROAD)]
+        config.hook.pytest_deselected(items=broad)
+        items[:] = [item for item in items if item not in set(broad)]
     for item in items if cluster is not None else ():
         if (mark := item.get_closest_marker(MARK)) is not None:
             item.add_marker(pytest.mark.skip(reason=f"of SQLite alone: {mark.args[0]}"))
