@@ -161,7 +161,7 @@ class TestSayingOneThing:
         Screen(page).ready()
         state = page.locator('[data-view="B"] .caption__state').first
         expect(state).to_have_attribute("data-grade", "warn")
-        expect(state).to_contain_text("camera uncertain")
+        expect(state).to_contain_text("uncertain, no ball")
         gate = page.locator('[data-gate="calibratable"]')
         expect(gate).to_have_attribute("data-state", "doubt")
         expect(gate).to_contain_text("in 4 of 4 views, B uncertain")
