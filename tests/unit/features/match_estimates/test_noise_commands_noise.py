@@ -14,8 +14,8 @@ from app.config import Settings
 from app.db.store import Store
 from app.features.imports.ingest import ingest
 from app.features.solutions.service import solve_dataset
-from tests.unit.features.match_estimates.test_noise import blurred
 from tests.unit.features.policies.test_commands import Run, run  # noqa: F401
+from tests.unit.features.policies.test_noise import blurred
 
 
 class TestNoise:

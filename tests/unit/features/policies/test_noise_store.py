@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import pytest
-from tests.unit.features.match_estimates.test_noise import make
 
 from app.db.store import Store
 from app.errors import NotFoundError
@@ -11,6 +10,7 @@ from app.features.imports.ingest import ensure_dataset
 from app.features.policies import noise as noise_store
 from app.features.policies.noise import NoiseStore, apply_noise
 from app.features.solutions.service import solve_dataset
+from tests.unit.features.policies.test_noise import make
 
 
 class TestNoiseStore:
