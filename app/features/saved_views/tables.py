@@ -1,4 +1,4 @@
-"""Tables around the queue: its saved views, batches of verdicts, and ids that are used up."""
+"""The table of saved views: queries of the queue under names."""
 
 from __future__ import annotations
 
