@@ -1,6 +1,6 @@
-"""The base of every table, the table that tells one installation from all others.
+"""The base of every table.
 
-Ids that are used up.
+It has the table that tells one installation from all others, and the ids that are used up.
 """
 
 from __future__ import annotations

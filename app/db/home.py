@@ -1,6 +1,6 @@
 """The home folder: made private, refused on network file systems.
 
-And the keys of the installation, which are in no backup.
+Its keys belong to the installation and are in no backup.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Fields of records: read with a clear error, written exactly.
 
-And the size that a record declares.
+A record may declare the size of its picture.
 """
 
 from __future__ import annotations

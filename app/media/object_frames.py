@@ -1,6 +1,6 @@
-"""Frames in object stores.
+"""Frames in object stores: fetched once, checked, kept in a cache.
 
-Fetched once, checked, kept in a cache; and open zip archives, of which a few are kept open.
+A few zip archives are kept open, because opening one reads its whole directory.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Videos: opened as files of known containers.
 
-An index of when each frame is shown, by which it is found again exactly.
+An index says when each frame is shown, so that a frame is found again exactly.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """What the product asks of a database engine that SQLite and PostgreSQL do differently.
 
-What processes with one database tell each other.
+Processes with one database tell each other what they have changed through it.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
-"""PostgreSQL: connections, what SQLAlchemy compiles differently for it.
+"""PostgreSQL: its connections, and what SQLAlchemy compiles differently for it.
 
-The triggers of migrations.
+Migrations get their triggers here.
 """
 
 from __future__ import annotations

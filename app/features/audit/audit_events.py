@@ -1,6 +1,6 @@
 """Audit events: what people do that changes no group.
 
-And what was done before there were accounts.
+What was done before there were accounts is shown as a person's, once.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
-"""Datasets: names, policies, groups.
+"""Datasets in the database: names, policies, groups.
 
-The dataset that a named thing belongs to; and the removal of all that belongs to one.
+They also find the dataset that a named thing belongs to, and delete all that belongs to one.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Tables of datasets, their cameras, groups and views as they are now.
 
-The marks of groups that changed.
+Marks tell which groups have changed, in the order of their last change.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Matches of line files.
 
-Which frames are of one match, its pitch, and how its pictures were stretched.
+They say which frames are of one match, its pitch, and how its pictures were stretched.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
-"""The edits that a finding or suggestion proposes.
+"""The edits that a finding or a suggestion proposes.
 
-What a camera would be without each of its markings.
+An influence is what a camera would be without one of its markings.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
-"""What the log keeps of an import of a group, groups that are not brought any more.
+"""What the log keeps of an import of a group.
 
-How large a group may be.
+Limits say how large a group may be; groups that are not brought any more are named.
 """
 
 from __future__ import annotations

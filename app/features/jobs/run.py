@@ -1,6 +1,6 @@
-"""The work of one job: in this process or one of its own.
+"""The work of one job, in this process or one of its own.
 
-How far it is, how it ended and what it says then.
+It tells how far it is, how it ended and what it says then.
 """
 
 from __future__ import annotations

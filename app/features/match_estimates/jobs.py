@@ -1,6 +1,6 @@
 """Jobs that estimate something of matches, accept it or take it back.
 
-Solve what that leaves stale.
+Each of them solves what it leaves stale.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Devices from which a person has logged in.
 
-Attempts counted against a limit, challenges and codes.
+Attempts are counted against a limit; challenges and codes are good once.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """The provider of single sign-on (OpenID Connect).
 
-Where it is asked, and its answers, read with limits.
+Its answers are read with limits.
 """
 
 from __future__ import annotations

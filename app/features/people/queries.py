@@ -1,6 +1,6 @@
-"""People, their roles in datasets, their second factors.
+"""People in the database: accounts, roles in datasets, second factors.
 
-What a request needs to know of its person, in one statement.
+One statement reads all that a request needs to know of its person.
 """
 
 from __future__ import annotations

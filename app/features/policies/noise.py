@@ -1,6 +1,6 @@
 """The noise of a dataset.
 
-Estimated from its own residuals, put into its policy, kept until something changes.
+It is estimated from its own residuals, put into its policy, and kept until something changes.
 """
 
 from __future__ import annotations

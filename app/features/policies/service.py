@@ -1,6 +1,6 @@
 """The policy of a dataset.
 
-The first one, the present one, those before it, and the change to another.
+Datasets have a first policy, a present one and those before it, and change to another.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Statistics and the timeline of a dataset.
 
-How its numbers are spread, and how they run over its groups.
+They say how its numbers are spread, and how they run over its groups.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """What a server puts in order while nobody waits for it.
 
-The few numbers that tell how a home is doing.
+Vitals are the few numbers that tell how a home is doing.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
-"""Verdicts: everyone's are kept, the newest counts.
+"""Verdicts in the database: everyone's are kept, the newest counts.
 
-And batches of verdicts that were given at once.
+Batches of verdicts were given at once and are undone at once.
 """
 
 from __future__ import annotations

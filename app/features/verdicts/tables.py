@@ -1,6 +1,6 @@
 """Tables of verdicts: they only grow, the last one of a group counts.
 
-And of batches that were given at once.
+A batch holds verdicts that were given at once.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
-"""Webhooks: who is told, what waits to be sent, written in the transaction that it tells of.
+"""Webhooks in the database: who is told, and what waits to be sent.
 
-How sending went.
+A message is written in the transaction that it tells of.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """The groups of a dataset in blocks.
 
-Kept in step with the database, with the facts that stand beside their solutions.
+Blocks are kept in step with the database and hold the facts that stand beside solutions.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """What is counted of a block of groups under a policy.
 
-Matches whose groups lie in several splits.
+Matches whose groups lie in several splits are counted apart.
 """
 
 from __future__ import annotations
