@@ -63,10 +63,10 @@ export function gradeOfView(picture) {
 	if (!view.included) return { grade: 'unseen', sentence: leftOutText(view.left_out) };
 	if (!solved) return { grade: 'unseen', sentence: 'not solved' };
 	if (!solved.calibration.camera) return { grade: 'bad', sentence: 'no camera' };
-	const guess = guessOf(solved) && 'camera uncertain';
+	const guess = guessOf(solved) && 'uncertain';
 	const given = solved.calibration.source === 'given' && jacOf(solved) === null ? 'camera given' : '';
 	if (solved.failed) return { grade: 'bad', sentence: FAILED[solved.failed] ?? solved.failed };
-	if (!view.balls.length) return { grade: 'warn', sentence: guess ? 'uncertain, no ball' : 'no ball' };
+	if (!view.balls.length) return { grade: 'warn', sentence: guess || 'no ball' };
 	if (view.balls.some(({ inferred }) => inferred)) return { grade: 'warn', sentence: 'ball placed, not counted' };
 	// A ball that no other view confirms is not well, wherever the camera comes from.
 	const error = errorOf(picture).px;

@@ -161,7 +161,7 @@ class TestSayingOneThing:
         Screen(page).ready()
         state = page.locator('[data-view="B"] .caption__state').first
         expect(state).to_have_attribute("data-grade", "warn")
-        expect(state).to_contain_text("uncertain, no ball")
+        expect(state).to_contain_text("uncertain")
         gate = page.locator('[data-gate="calibratable"]')
         expect(gate).to_have_attribute("data-state", "doubt")
         expect(gate).to_contain_text("in 4 of 4 views, B uncertain")
@@ -472,7 +472,7 @@ class TestVerdicts:
         card = page.get_by_role("region", name="Result")
         expect(card).to_have_attribute("data-tone", "bad")
         expect(card).to_contain_text("Passes, but the ball cannot be used")
-        expect(card.locator(".verdict-card__text")).to_contain_text("lies 3.0 m below the grass")
+        expect(card.locator(".verdict-card__text")).to_contain_text("lies 3.00 m below the grass")
         assert serious_in_both(page) == []
         screen.press("a")
         note = page.get_by_label("Say why.")
