@@ -170,8 +170,8 @@ def _aimed(
     rng: np.random.Generator,
     place: FloatArray,
     ball: FloatArray,
-    field_m: tuple[float, float],
-    kappa: tuple[float, float],
+    field_m: tuple[float, float] = FIELD_M,
+    kappa: tuple[float, float] = KAPPA,
 ) -> Camera:
     """A camera that looks near the ball."""
     toward = ball + rng.normal(0, 3, 3) * (1, 1, 0) - place
