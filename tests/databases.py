@@ -80,6 +80,9 @@ class Files:
         """See ``Databases``."""
         # What the home knows of the database that was there before is not true of this one.
         store.settings.database_file.with_name("home.json").unlink(missing_ok=True)
+        # Whoever reads the files beside an open database ends this process's locks on them; then the
+        # next process that opens it would cut off what is mapped here. New connections lock anew.
+        store._engine.dispose()
         _copy(kept, store.settings.database_file)
 
 
