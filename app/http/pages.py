@@ -8,7 +8,6 @@ from contextlib import suppress
 from pathlib import Path
 
 from fastapi import APIRouter, FastAPI, Request
-from fastapi import Response as fastapi_Response
 from starlette.convertors import StringConvertor, register_url_convertor
 from starlette.exceptions import HTTPException
 from starlette.responses import FileResponse, Response
@@ -178,7 +177,7 @@ def install_pages(
             raise HTTPException(status_code=404)
         return index
 
-    def page(request: Request) -> fastapi_Response:
+    def page(request: Request) -> Response:
         index = found()
         if moment is not None:
             # A page without it asks once more for what it has read when its stream begins.
@@ -186,19 +185,19 @@ def install_pages(
                 index = index.at(moment(), banner())
         headers = {"ETag": index.etag, "Cache-Control": REVALIDATED}
         if index.etag in request.headers.get("if-none-match", ""):
-            return fastapi_Response(status_code=304, headers=headers)
-        return fastapi_Response(index.html, media_type="text/html", headers=headers)
+            return Response(status_code=304, headers=headers)
+        return Response(index.html, media_type="text/html", headers=headers)
 
-    def styles(version: str) -> fastapi_Response:
+    def styles(version: str) -> Response:
         content = found().styles
         headers = {"Cache-Control": FOR_GOOD if version == site.version else REVALIDATED}
-        return fastapi_Response(content, media_type="text/css", headers=headers)
+        return Response(content, media_type="text/css", headers=headers)
 
-    def elsewhere(request: Request) -> fastapi_Response:
+    def elsewhere(request: Request) -> Response:
         """People who mistyped an address are told so by the page, programs by a problem."""
         if "text/html" not in request.headers.get("accept", ""):
             raise HTTPException(status_code=404)
-        return fastapi_Response(found().html, status_code=404, media_type="text/html")
+        return Response(found().html, status_code=404, media_type="text/html")
 
     for path in PAGES:
         router.add_api_route(path, page, methods=["GET", "HEAD"])

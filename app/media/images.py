@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from io import BytesIO
 from itertools import islice
 
-from PIL import Image as PIL_Image
+from PIL import Image
 
 from app.config import Settings
 from app.errors import ImageError, TooLargeError
@@ -35,7 +35,7 @@ _MARKER = re.compile(rb"\xff([\xc0-\xcf\xd9-\xfe])")
 restart of it, nor one of the reserved ones, which a decoder that looks for a restart passes over."""
 
 # The limits are those of the settings, see ``check_size``.
-PIL_Image.MAX_IMAGE_PIXELS = None
+Image.MAX_IMAGE_PIXELS = None
 
 
 @dataclass(frozen=True)
@@ -68,7 +68,7 @@ def read_header(data: bytes, name: str = "the image") -> ImageHeader:
         ImageError: Neither JPEG, PNG nor WebP, or its header is damaged.
     """
     try:
-        with PIL_Image.open(BytesIO(data), formats=("JPEG", "PNG", "WEBP")) as image:
+        with Image.open(BytesIO(data), formats=("JPEG", "PNG", "WEBP")) as image:
             kind, (width, height) = _KINDS[image.format or ""], image.size
             exif = b"" if kind == WEBP else image.info.get("exif", b"")
     except _BROKEN as error:

@@ -157,10 +157,10 @@ def picture(
         raise typer.BadParameter("--accept and --as-taken contradict each other")
     if as_taken and match is None:
         raise typer.BadParameter("--as-taken needs --match")
-    _of_dataset_of_picture(dataset or "", match, accept, as_taken, workers, json_)
+    _pictures_of_dataset(dataset or "", match, accept, as_taken, workers, json_)
 
 
-def _of_dataset_of_picture(
+def _pictures_of_dataset(
     dataset: str,
     match: str | None,
     accept: bool,

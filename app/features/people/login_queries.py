@@ -144,19 +144,19 @@ def delete_passkeys(session: Session, person_id: int) -> bool:
     return bool(session.scalars(statement.returning(PasskeyModel.id)).all())
 
 
-_ALL_of_identities = select(*IdentityModel.__table__.columns)
+_ALL_IDENTITIES = select(*IdentityModel.__table__.columns)
 
 
 def find_identity(session: Session, issuer: str, subject: str) -> Any | None:
     """The account of a subject at a provider, where it is somebody's."""
     same = (IdentityModel.issuer == issuer, IdentityModel.subject == subject)
-    return session.execute(_ALL_of_identities.where(*same)).one_or_none()
+    return session.execute(_ALL_IDENTITIES.where(*same)).one_or_none()
 
 
 def identity_of(session: Session, person_id: int) -> Any | None:
     """The account of a person."""
     return session.execute(
-        _ALL_of_identities.where(IdentityModel.person_id == person_id)
+        _ALL_IDENTITIES.where(IdentityModel.person_id == person_id)
     ).one_or_none()
 
 
@@ -192,7 +192,7 @@ def count_linked(session: Session, issuer: str, people: list[int]) -> int:
     return len(session.scalars(statement).all())
 
 
-_ALL_of_access_tokens = (
+_ALL_TOKENS = (
     select(
         *(column for column in AccessTokenModel.__table__.c if column.name != "token_hash"),
         PersonModel.name.label("person"),
@@ -216,12 +216,12 @@ def find_access_token(
     """The token under a hash with its person and their rights (``rights_in``), unless it has expired
     or the person is disabled; ``leading`` are the roles that lead a dataset."""
     given = {"token_hash": token_hash, "at": at}
-    return session.execute(_found_of_access_tokens(tuple(leading)), given).one_or_none()
+    return session.execute(_found_tokens(tuple(leading)), given).one_or_none()
 
 
 @cache
-def _found_of_access_tokens(leading: tuple[str, ...]) -> Select[*tuple[Any, ...]]:
-    return with_rights(_ALL_of_access_tokens, leading).where(
+def _found_tokens(leading: tuple[str, ...]) -> Select[*tuple[Any, ...]]:
+    return with_rights(_ALL_TOKENS, leading).where(
         AccessTokenModel.token_hash == bindparam("token_hash"),
         AccessTokenModel.expires > bindparam("at"),
         PersonModel.disabled.is_(False),
@@ -230,7 +230,7 @@ def _found_of_access_tokens(leading: tuple[str, ...]) -> Select[*tuple[Any, ...]
 
 def access_tokens(session: Session, person_id: int | None = None) -> Sequence[Any]:
     """The tokens of a person, or of everybody, expired ones too; the newest of each first."""
-    statement = _ALL_of_access_tokens.order_by(PersonModel.name, AccessTokenModel.id.desc())
+    statement = _ALL_TOKENS.order_by(PersonModel.name, AccessTokenModel.id.desc())
     mine = AccessTokenModel.person_id == person_id
     return session.execute(statement if person_id is None else statement.where(mine)).all()
 
