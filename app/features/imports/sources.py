@@ -409,7 +409,7 @@ def _static(source: Source, report: Report, limits: Limits) -> IssiaFolder:
 
 def _tell_contradicted(folder: IssiaFolder, dataset: str, source: Source, report: Report) -> None:
     """Say of which static cameras the lines do not fit the given camera, and what to do."""
-    from app.features.solutions.given_cameras import contradicted, sentence_of
+    from app.features.solutions.service import contradicted, sentence_of
 
     stations = {station.key: number for number, station in folder.stations.items()}
     off = contradicted(((one, Pitch()) for one in folder.stations.values()), PAPER)

@@ -85,7 +85,7 @@ def _of_dataset(
 
 
 def _print(found: DatasetPitches, match: str | None, json_: bool) -> None:
-    from app.features.datasets.match_choice import of_match
+    from app.features.datasets.service import of_match
 
     items = of_match(found.items, match)
     if json_:
@@ -169,7 +169,7 @@ def _pictures_of_dataset(
     workers: int | None,
     json_: bool,
 ) -> None:
-    from app.features.datasets.match_choice import need_match
+    from app.features.datasets.service import need_match
     from app.features.match_estimates.pictures import (
         change_pictures,
         estimate_pictures,
@@ -237,7 +237,7 @@ def positions(
     Without --match it is shared where what it was estimated from has changed since. The policy
     must say calibration.share_position; `touchline solve` computes what follows.
     """
-    from app.features.datasets.match_choice import of_match
+    from app.features.datasets.service import of_match
     from app.features.match_estimates.positions import (
         get_positions,
         share_positions,

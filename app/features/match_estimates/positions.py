@@ -24,7 +24,7 @@ from app.features.groups.edit_codec import edit_from_json
 from app.features.groups.group_edits import give_edits
 from app.features.groups.queries import StoredGroup, read_groups
 from app.features.jobs.queries import Job
-from app.features.match_estimates.picture_queries import (
+from app.features.match_estimates.queries import (
     POSITION,
     MatchPositions,
     last_share,
@@ -40,7 +40,7 @@ from app.soccer.solution import SOLVER_VERSION, Calibration
 from app.solving.calibrate import calibrate_station, calibration_key
 from app.solving.match_model import FramePlace
 from app.solving.match_position import Places, pan_of, place_of
-from app.workers.fan_out import fan_out
+from app.workers.executors import fan_out
 
 _BATCH = 100
 _DIGITS = 4
