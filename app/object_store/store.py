@@ -15,9 +15,9 @@ from datetime import timedelta
 from functools import lru_cache
 from typing import IO, TYPE_CHECKING, Any, cast
 
+from app.durable import is_open_to_others
 from app.errors import InputError, NotFoundError, StorageError, TooLargeError
 from app.object_store.address import SCHEME
-from app.private_file import is_open_to_others
 
 if TYPE_CHECKING:
     from app.config import Settings, StoreSettings

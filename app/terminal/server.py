@@ -15,9 +15,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 from urllib.parse import urlsplit
 
+from app.durable import is_open_to_others
 from app.errors import InputError, ReviewError
 from app.formats.plain_file import open_plain
-from app.private_file import is_open_to_others
 
 if TYPE_CHECKING:
     from touchline.client import Client

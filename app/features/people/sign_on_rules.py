@@ -12,6 +12,7 @@ from urllib.parse import urlsplit
 from app.config import Settings
 from app.db.session import Session
 from app.db.store import Store
+from app.durable import read_private
 from app.errors import ConflictError, ForbiddenError, InputError, NotFoundError, NotLoggedInError
 from app.features.people.login_queries import (
     count_linked,
@@ -23,7 +24,6 @@ from app.features.people.logins import Login, Way
 from app.features.people.queries import all_people, count_able, person_by_id
 from app.features.people.roles import Role, note, require_no_token
 from app.features.people.second_factor import require_password
-from app.private_file import read_private
 
 ALL = "*"
 """In the place of a domain: whoever the provider knows."""
