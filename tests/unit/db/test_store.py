@@ -24,7 +24,6 @@ from app.errors import BusyError, DamagedError, InputError, StorageError
 from tests.databases import said_for_sqlite
 from tests.unit.db.homes import INSERT, add, names
 
-
 _LOCKING = """
 import fcntl, sys
 with open(sys.argv[1], "r+b") as file:
