@@ -212,7 +212,7 @@ def print_sentences(states: Iterable[Any], as_json: bool) -> None:
     print_rows(
         states,
         as_json,
-        lambda state: {**asdict(state), "sentence": state.sentence},
+        asdict,
         lambda state: f"{state.match}: {state.sentence}" if state.match else state.sentence,
     )
 
