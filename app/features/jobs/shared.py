@@ -185,7 +185,9 @@ class SharedJobs(Jobs):
         try:
             self._store.say(f"{_WORD} {job.id}")
         except StorageError as error:
-            log.warning("other processes were not told of a job", job=job.id, error=error.message)
+            log.warning(
+                "other processes were not notified of a job", job=job.id, error=error.message
+            )
 
     def _hear(self, word: str) -> None:
         kind, _, number = word.partition(" ")
@@ -280,7 +282,7 @@ class SharedJobs(Jobs):
             work = maker(job)
         except Exception:
             log.exception("the work of a job could not be made", job=job.id)
-            sentence = "It could not be read what was asked for. Ask for it again."
+            sentence = "The request of the job could not be read. Start it again."
             problem = {"detail": sentence, "hint": None, "pointer": None}
             ended: dict[str, Any] = {"state": FAILED, "ended": now(), "sentence": sentence}
             self._save_end(job.id, **ended, problem=problem)

@@ -108,7 +108,7 @@ class ProposalDocument(Document):
 
     outcome: ProposalOutcome
     sentence: str = Field(
-        description="Why nothing is proposed, or which drawn lines lie elsewhere; else empty."
+        description="Why no lines are proposed, or which drawn lines contradict the proposal; else empty."
     )
     lines: dict[str, list[Point]] = Field(
         description="Points on the paint, pixels of the annotated size; none unless proposed, and "
@@ -183,11 +183,13 @@ class GroupProposal(BaseModel):
     )
     outcome: ProposalOutcome
     sentence: str = Field(
-        description="Why nothing is proposed, or which drawn lines lie elsewhere; else empty."
+        description="Why no lines are proposed, or which drawn lines contradict the proposal; else empty."
     )
     lines: LineDocuments = Field(
-        description="Points on the paint of markings that nobody drew, pixels of the annotated "
-        "size; none unless proposed."
+        description=(
+            "Points on the paint of markings that are not drawn yet, pixels of the annotated size; "
+            "empty unless proposed."
+        )
     )
     supported: float | None = Field(description="Share of the visible markings that has paint.")
     explained: float | None = Field(description="Share of line-like paint that has a marking.")
