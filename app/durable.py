@@ -31,7 +31,10 @@ def read_private(path: Path, variable: str) -> str:
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(
             f"{path}, which {variable} names, cannot be read",
-            hint="Is it there, and a plain text file of whoever runs Touchline?",
+            hint=(
+                "Check that it exists and is a plain text file owned by the user that runs "
+                "Touchline."
+            ),
         ) from error
 
 

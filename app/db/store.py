@@ -224,7 +224,7 @@ class Store:
             try:
                 listener()
             except Exception:
-                log.exception("a change was saved, and somebody could not be told")
+                log.exception("a change was saved, but a listener could not be notified")
 
     @property
     def is_damaged(self) -> bool:

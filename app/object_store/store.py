@@ -29,7 +29,7 @@ PART_SECONDS = 120.0
 """Longest time that a part may take to be written."""
 LISTED = 1000
 """Objects that one request lists."""
-OPERATOR = "Ask the operator: touchline doctor says what is wrong with a store."
+OPERATOR = "Ask the operator: touchline doctor reports what is wrong with a store."
 _CODE = re.compile(r"<Code>(\w{1,60})</Code>")
 _KEYS_REFUSED = frozenset(
     {"AccessDenied", "ExpiredToken", "InvalidAccessKeyId", "InvalidToken", "SignatureDoesNotMatch", "TokenRefreshRequired"}

@@ -118,7 +118,8 @@ def read_place(address: str, keys: Path | None) -> SchedulerPlace:
     if parts.scheme == "tcp":
         if not is_local(parts.hostname or ""):
             raise InputError(
-                f"{address} is not encrypted: whoever reaches it could run programs on every worker",
+                f"{address} is not encrypted: anyone who reaches it could run programs on every "
+                f"worker",
                 hint="Write tls://HOST:PORT, and name a folder with certificates (TOUCHLINE_CLUSTER_KEYS).",
             )
         return SchedulerPlace(f"tcp://{parts.netloc}")

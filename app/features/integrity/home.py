@@ -36,8 +36,8 @@ from app.plural import plural
 KEYS = "Correct TOUCHLINE_STORES or the file of keys: docs/operations.md says what a store needs."
 CONDITIONS = "Update the store, or use another one: docs/operations.md says which."
 _UNCONDITIONAL = (
-    "reads whatever is there, although another content was asked for (If-Match): a frame that was"
-    " changed would be shown as the imported one"
+    "ignores If-Match and returns changed content: a changed frame would be shown as the imported "
+    "one"
 )
 _PROBE = ".touchline-check"
 _NO_CONTENT = '"touchline-asks-for-no-content"'
@@ -241,7 +241,7 @@ def _leftovers(settings: Settings) -> Check:
 def _calibrations(session: Session) -> Check:
     count = len(spare_calibrations(session))
     mend = "The server deletes them when it has nothing to do." if count else None
-    return Check("spare calibrations", True, f"{count:,} that no solution rests on", mend)
+    return Check("unused calibrations", True, f"{count:,} that no solution rests on", mend)
 
 
 def _uploads(session: Session, settings: Settings) -> Check:

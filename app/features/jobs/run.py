@@ -168,7 +168,7 @@ _MEMORY = f"{_AGAIN} Where it happens often, give more memory."
 _ENDS: dict[EndReason, tuple[str, str]] = {
     "memory": ("needs more memory than there is", _MEMORY),
     "killed": ("was killed, most likely for want of memory", _MEMORY),
-    "terminated": ("was told to end", _AGAIN),
+    "terminated": ("was stopped", _AGAIN),
     "crash": ("crashed", f"{_AGAIN} Where it crashes again, report it."),
     "processor": ("took too long to work out", _AGAIN),
     "silence": ("came to no next step", f"{_AGAIN} The disk or a store may not answer."),

@@ -310,7 +310,7 @@ class Jobs(JobRecords):
             )
         if own >= self._capacity - self._capacity // LEFT_TO_OTHERS:
             raise OverloadedError(
-                f"{own} jobs that you asked for wait already",
+                f"{own} of your jobs are already waiting",
                 hint="Send it again when some of them are done.",
             )
 

@@ -185,7 +185,9 @@ class SharedJobs(Jobs):
         try:
             self._store.say(f"{_WORD} {job.id}")
         except StorageError as error:
-            log.warning("other processes were not told of a job", job=job.id, error=error.message)
+            log.warning(
+                "other processes were not notified of a job", job=job.id, error=error.message
+            )
 
     def _hear(self, word: str) -> None:
         kind, _, number = word.partition(" ")

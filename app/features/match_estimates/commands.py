@@ -28,7 +28,7 @@ def pitch(
         str | None,
         typer.Argument(
             metavar="[IN]",
-            help="Folder or zip of line files; the name of a dataset, where nothing is called so.",
+            help="Folder or zip of line files, or else the name of a dataset.",
         ),
     ] = None,
     *,

@@ -108,7 +108,7 @@ class ProposalDocument(Document):
 
     outcome: ProposalOutcome
     sentence: str = Field(
-        description="Why nothing is proposed, or which drawn lines lie elsewhere; else empty."
+        description="Why no lines are proposed, or which drawn lines contradict the proposal; else empty."
     )
     lines: LineDocuments = Field(
         description="Points on the paint, pixels of the annotated size; none unless proposed, and "

@@ -292,7 +292,9 @@ def unlink_person(store: Store, person_id: int, *, actor: str) -> None:
     with store.write() as session:
         person = person_by_id(session, person_id)
         if person is not None and person.name == actor:
-            raise ForbiddenError("nobody unlinks themselves so", hint="Do it under Account.")
+            raise ForbiddenError(
+                "you cannot unlink your own account here", hint="Do it under Account."
+            )
         if person is None or delete_identity(session, person_id) is None:
             raise NotFoundError("no account of a provider is linked with that person")
         if person.role == Role.ADMIN and not count_able(session, Role.ADMIN):

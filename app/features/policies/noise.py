@@ -86,7 +86,7 @@ class Noise:
     Attributes:
         groups: Groups that were looked at, of ``solved`` ones.
         stations: Noise of the balls of static cameras of which enough is seen.
-        people: The same of who placed balls last.
+        people: The same for the people who placed the balls last.
         factors: How noisy balls of both together are, where anything is unlike the dataset.
         used: The factors that the views of the dataset carry.
         follows: Whether the policy takes the estimates over with each solve of the dataset.

@@ -104,7 +104,7 @@ class TestRunQueue:
         assert first.started.wait(SECONDS)
         for _ in range(6):
             submit(jobs, lambda _: None)
-        with pytest.raises(OverloadedError, match="6 jobs that you asked for wait already"):
+        with pytest.raises(OverloadedError, match="6 of your jobs are already waiting"):
             submit(jobs, lambda _: None)
         jobs.submit("bulk", "Some work", lambda _: None, actor="bob")
         first.finish.set()
@@ -231,5 +231,5 @@ class TestRunJobInWorker:
         self, store: Store, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         monkeypatch.setattr(module, "STOP_SECONDS", 0.0)
-        with pytest.raises(OverloadedError, match=r"^the process of the export was told to end$"):
+        with pytest.raises(OverloadedError, match=r"^the process of the export was stopped$"):
             run_job(store, be_told_to_end, dataset_id=None)
