@@ -67,17 +67,12 @@ class RequestDigest:
         is_streamed: bool = False,
     ):
         self.is_streamed = is_streamed
-        self._receive = request.receive
+        self._request, self._value, self._has_value = request, value, has_value
         self._sum, self._ended = hashlib.sha256(), not is_streamed
-        place = [request.method, request.scope["path"], request.scope["query_string"].decode()]
-        place += request.headers.getlist(ACTOR_HEADER)
-        # The same change of another state is another request.
-        place += [f"If-Match: {tag}" for tag in request.headers.getlist("if-match")]
-        self._place, self._body = place, canonical(value) if has_value else ""
 
     async def receive(self) -> Message:
         """The next message of a body of bytes."""
-        message = await self._receive()
+        message = await self._request.receive()
         if message["type"] == "http.request":
             self._sum.update(message.get("body", b""))
             self._ended = self._ended or not message.get("more_body", False)
@@ -89,8 +84,16 @@ class RequestDigest:
         """The digest, once all of the body has passed."""
         while not self._ended:
             await self.receive()
-        body = self._sum.hexdigest() if self.is_streamed else self._body
-        return hashlib.sha256(canonical([*self._place, body]).encode()).hexdigest()
+        scope, headers = self._request.scope, self._request.headers
+        place = [scope["method"], scope["path"], scope["query_string"].decode()]
+        place += headers.getlist(ACTOR_HEADER)
+        # The same change of another state is another request.
+        place += [f"If-Match: {tag}" for tag in headers.getlist("if-match")]
+        if self.is_streamed:
+            body = self._sum.hexdigest()
+        else:
+            body = canonical(self._value) if self._has_value else ""
+        return hashlib.sha256(canonical([*place, body]).encode()).hexdigest()
 
 
 class Idempotency:
