@@ -242,4 +242,4 @@ class _WhileAllowed(Response):
 
 
 def _nobody() -> NotLoggedInError:
-    return NotLoggedInError("nobody is logged in here", hint="Log in first.")
+    return NotLoggedInError("you are not logged in", hint="Log in first.")

@@ -70,6 +70,9 @@ class ImportOptions(BaseModel):
         description="frames: which pictures are one group: `folder`, or a pattern of their names such "
         "as `{instant}_{camera}.jpg`; empty: each picture is a group.",
     )
+    propose: StrictBool = Field(
+        default=True, description="frames: whether a job proposes cameras for them afterwards."
+    )
     lines: ImportPlace | None = Field(
         default=None, description="ISSIA: line files of the static cameras."
     )
@@ -102,8 +105,10 @@ class ImportBody(BaseModel):
     options: ImportOptions = ImportOptions()
     policy: PolicyName | None = Field(
         default=None,
-        description="Of a dataset that is made; null: `touchline` where most of its views have a "
-        "picture whose paint can place their camera, else `paper`.",
+        description=(
+            "Policy of a new dataset; null: `touchline` if most views have a picture with enough "
+            "paint to place the camera, else `paper`."
+        ),
     )
     dry_run: StrictBool = Field(
         default=False, description="The same as the parameter: report, and save nothing."
