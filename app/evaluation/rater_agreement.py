@@ -72,7 +72,9 @@ def fleiss_kappa(rated: Rated) -> Coefficient:
     Source: Fleiss, "Measuring nominal scale agreement among many raters", 1971, eq. 2-7.
     """
     if len({len(row) for row in rated}) > 1 or (rated and len(rated[0]) < 2):
-        raise ValueError("Fleiss' kappa asks for equally many judgements of each item, two or more")
+        raise ValueError(
+            "Fleiss' kappa needs the same number of judgements of each item, two or more"
+        )
     counts = _counts(rated)
     raters = counts.sum(axis=1, keepdims=True)
     agreeing = (counts * (counts - 1)).sum(axis=1, keepdims=True) / (raters * (raters - 1))

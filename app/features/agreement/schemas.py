@@ -139,7 +139,7 @@ class CoefficientDocument(Document):
     """A coefficient of agreement: 1 is complete, 0 what chance gives."""
 
     name: Literal["cohen", "fleiss", "krippendorff"]
-    value: float | None = Field(description="Null where nobody could have disagreed.")
+    value: float | None = Field(description="Null where too few people annotated to disagree.")
     low: float | None = Field(description="Lower end of the 95 % interval.")
     high: float | None
     observed: float | None = Field(description="Share of pairs of verdicts that agree.")
@@ -190,7 +190,7 @@ class AgreementDocument(Document):
     """How far the people of a dataset agree."""
 
     agreed: int = Field(
-        description="Groups whose annotations agree, so that the first one was taken over."
+        description="Groups whose annotations agree; the first annotation was adopted."
     )
     open: int = Field(description="Groups that wait for a decision.")
     decided: int
@@ -227,8 +227,12 @@ class CaseDocument(Document):
     batch: int | None
     takes: list[CaseTake]
     comparison: GroupComparisonDocument
-    refused: str | None = Field(description="Why whoever asks may not decide; null: they may.")
-    own: bool = Field(description="They annotated it themselves, and nobody else is there.")
+    refused: str | None = Field(
+        description="Why the logged-in person may not decide; null: they may."
+    )
+    own: bool = Field(
+        description="They annotated the group themselves, and no other reviewer exists."
+    )
 
     @staticmethod
     def of(case: Case) -> CaseDocument:

@@ -15,7 +15,9 @@ class AuditEntryDocument(Document, shows=AuditEntry):
     """One thing that somebody said or did."""
 
     at: datetime
-    actor: str = Field(description="The person, with the name of the token where a script asked.")
+    actor: str = Field(
+        description="Name of the person, with the name of the token for a script's request."
+    )
     kind: str = Field(description="Of the entry in the log.")
     dataset: str | None = Field(description="null: of none, or it is gone.")
     network: str | None = Field(description="From which address, where that is known.")

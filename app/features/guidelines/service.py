@@ -46,7 +46,7 @@ class Guidelines:
 
     Attributes:
         dataset: Id of the dataset whose guidelines they are.
-        number: Of this version; 0: nobody has written any.
+        number: Of this version; 0: there are no guidelines.
         text: In Markdown; ``![words](DIGEST)`` shows a picture.
         versions: All of them, the newest first.
     """

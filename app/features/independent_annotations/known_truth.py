@@ -193,7 +193,8 @@ def _nothing(source: TruthSource) -> InputError:
             pointer="/source",
         )
     return InputError(
-        "this version holds none of these groups as several people agreed on it, or as somebody decided",
+        "none of these groups in this version was agreed on by several people or decided by a "
+        "reviewer",
         hint="Let several people annotate them in a batch first.",
         pointer="/version",
     )

@@ -37,7 +37,7 @@ class HandBack(BaseModel):
     )
 
     reason: Annotated[str, Field(max_length=MAX_REASON)] = Field(
-        default="", description="A sentence for whoever has it back."
+        default="", description="A sentence for the person who gets the group back."
     )
 
 
@@ -69,7 +69,7 @@ class TakeDocument(Document, shows=TakeView):
     begun: datetime
     handed_in: datetime | None
     settled: datetime | None = Field(
-        description="When something was decided about it; null: not yet, or its person is not told."
+        description="When it was decided; null: not yet, or not disclosed to its person."
     )
     handed_back: HandedBackDocument | None = Field(
         description="Why its person has it back; null: they have not."
@@ -128,7 +128,7 @@ class GoldChosenDocument(Document):
     """What came of it."""
 
     groups: list[int] = Field(description="Groups that are gold by now.")
-    left_out: int = Field(description="Groups of which nothing is known that could be the truth.")
+    left_out: int = Field(description="Groups without known true values.")
 
 
 class GoldGroupDocument(Document, shows=GoldGroup):
@@ -199,7 +199,7 @@ class GuidelinesDocument(Document):
     dataset: int = Field(
         description="Whose guidelines they are; copies have those of what they copy."
     )
-    number: int = Field(description="0: nobody has written any.")
+    number: int = Field(description="0: there are no guidelines.")
     text: str = Field(description="Markdown; `![words](DIGEST)` in a line of its own is a picture.")
     versions: list[GuidelineVersionDocument]
 

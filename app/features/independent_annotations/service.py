@@ -241,7 +241,7 @@ def get_take_of(store: Store, copy_id: int) -> Take:
         there = bool(read_groups(session, [copy_id]))
     if not there:
         raise NotFoundError.group(copy_id)
-    raise NotFoundError(f"group {copy_id} is nobody's own annotation")
+    raise NotFoundError(f"group {copy_id} is not an independent annotation")
 
 
 def find_take_of(store: Store, copy_id: int) -> Take | None:

@@ -36,8 +36,10 @@ class NewSession(BaseModel):
     password: Password
     code: Code | None = Field(
         default=None,
-        description="Of the second factor, or a recovery code; asked for by 401 with the pointer "
-        "`/code` where somebody has one.",
+        description=(
+            "Of the second factor, or a recovery code; requested by 401 with the pointer `/code` "
+            "if the person has one."
+        ),
     )
 
 
@@ -153,7 +155,7 @@ class SessionDocument(Document):
     """Who asks."""
 
     team: bool = Field(description="People log in; else one person runs the server alone.")
-    name: str | None = Field(description="Null: nobody is logged in.")
+    name: str | None = Field(description="Null: not logged in.")
     role: Role | None = Field(description="In every dataset that `datasets` does not name.")
     enrol: bool = Field(
         default=False, description="They must make a second factor before anything else."
@@ -162,12 +164,14 @@ class SessionDocument(Document):
         default=None, description="How this session began; null: there is none."
     )
     ways: WaysIn | None = Field(
-        default=None, description="How people log in; told to whoever asks who they are."
+        default=None, description="How people log in; only for requests without a login."
     )
     moment: str | None = Field(
         default=None,
-        description="How things stand, for `since` of the events: what comes after this answer is "
-        "told then. Null: nobody is logged in, or they have just come.",
+        description=(
+            "Moment of this response, for `since` of the events: they begin after it. Null: not "
+            "logged in, or logged in just now."
+        ),
     )
     maintenance: BannerDocument | None = Field(
         default=None, description="The notice that everybody is shown; null: there is none."
@@ -176,16 +180,14 @@ class SessionDocument(Document):
     datasets: list[SingleRoleDocument] = Field(
         default=[], description="Where they are something else."
     )
-    allows: dict[Role, list[Action]] = Field(
-        default={}, description="What each role lets somebody do."
-    )
+    allows: dict[Role, list[Action]] = Field(default={}, description="What each role allows.")
 
 
 class OpenSessionDocument(Document):
     """A session of one's own."""
 
     id: int
-    this: bool = Field(description="It is the one that asks.")
+    this: bool = Field(description="Whether it is the session of this request.")
     browser: str = Field(description="What the browser called itself.")
     address: str
     created: datetime
@@ -267,8 +269,7 @@ class InvitationDocument(Document):
         description="`possible`: they would be invited, says a dry run."
     )
     link: str | None = Field(
-        description="For whoever invites to hand over, shown this once; null: it went by mail, or "
-        "there is none."
+        description="Link to pass on to the person, shown only this once; null: sent by mail, or none."
     )
     expires: datetime | None = Field(description="Until when the link is good.")
     mailed: bool = Field(description="The mail server has taken the letter with the link.")
@@ -304,12 +305,12 @@ class UserDocument(Document):
     name: str
     role: Role
     disabled: bool
-    joined: bool = Field(description="They have chosen a password, or come by single sign-on.")
+    joined: bool = Field(description="Whether they have chosen a password or use single sign-on.")
     invited: bool = Field(description="A link waits for them with which they can.")
     created: datetime
     created_by: str
     seen: datetime | None = Field(description="When a session was used last; null: none is open.")
-    second_factor: bool = Field(description="More is asked for than their password.")
+    second_factor: bool = Field(description="Whether they log in with a second factor.")
     tokens: int = Field(description="How many tokens of scripts they have.")
     sign_on: str | None = Field(
         default=None,
@@ -325,7 +326,7 @@ class UserList(ListDocument[UserDocument]):
 
     adopted_by: str | None = Field(
         default=None,
-        description="As whose that is shown which was done before there were accounts.",
+        description="Person to whom work from before there were accounts is attributed.",
     )
     mail: bool = Field(default=False, description="Invitations can go by mail here.")
 
@@ -362,8 +363,8 @@ class MemberDocument(Document):
     id: int
     name: str
     role: Role = Field(description="What they are here.")
-    everywhere: Role = Field(description="What they are where nothing else is said.")
-    single: Role | None = Field(description="What is said of this dataset; null: nothing.")
+    everywhere: Role = Field(description="Their role in datasets without a role of their own.")
+    single: Role | None = Field(description="Their role in this dataset; null: none of its own.")
 
 
 class MemberList(ListDocument[MemberDocument]):

@@ -159,7 +159,7 @@ class SecondFactors:
                 raise NotFoundError.person(person_id)
             if person.name == actor:
                 raise ForbiddenError(
-                    "nobody takes away their own second factor so", hint="Do it under Account."
+                    "you cannot remove your own second factor here", hint="Do it under Account."
                 )
             had = delete_second_factor(session, person_id)
             if delete_passkeys(session, person_id) or had:

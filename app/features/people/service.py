@@ -39,7 +39,7 @@ class Person:
     """Somebody with an account.
 
     Attributes:
-        joined: They have chosen a password, or come by single sign-on.
+        joined: Whether they have chosen a password or use single sign-on.
         invited: A link waits for them with which they can.
         seen: When a session of theirs was used last, in UTC; None: none is open.
     """
@@ -94,7 +94,7 @@ def require_no_people(store: Store) -> None:
     """
     if has_people(store):
         raise InputError(
-            "people have accounts here: without --team nobody would be asked who they are",
+            "this home has accounts: without --team the server would not ask for a login",
             hint="Serve with --team; or with --alone, if only you can reach this machine.",
         )
 
@@ -141,7 +141,7 @@ def renew_link(store: Store, person_id: int, *, actor: str) -> tuple[Person, Lin
             )
         if person.name == actor:
             raise ForbiddenError(
-                "nobody makes a link for themselves", hint="Change the password under Account."
+                "you cannot create a link for yourself", hint="Change the password under Account."
             )
         if person.disabled:
             raise ConflictError(f"{person.name} is disabled", hint="Enable them first.")

@@ -43,7 +43,7 @@ class SavedViewList(ListDocument[SavedViewDocument]):
 class ReviewerDocument(Document, shows=Reviewer):
     """One person's verdicts."""
 
-    accepted: int = Field(description="Groups whose verdict is this person's now.")
+    accepted: int = Field(description="Groups whose current verdict is this person's.")
     today: int = Field(description="Groups judged since midnight UTC.")
     last: datetime = Field(description="Time of the last verdict.")
 

@@ -109,8 +109,7 @@ class BulkResult(Document):
     would_change: int | None = Field(description="Dry run only, like `sample`.")
     sample: list[SampleDocument] | None
     batch: int | None = Field(
-        description="What `POST /verdict-batches/{batch}/undo` takes back; null when nothing "
-        "changed."
+        description="Batch that `POST /verdict-batches/{batch}/undo` undoes; null when nothing changed."
     )
     changed: int
     refused: list[RefusalDocument]
@@ -154,15 +153,15 @@ class UndoDocument(Document):
 
     batch: int
     restored: int = Field(description="Groups that have the verdict of before again.")
-    kept: int = Field(description="Groups that somebody has judged since.")
+    kept: int = Field(description="Groups that a person has judged since.")
 
 
 class RedoDocument(Document):
     """What giving a batch again did."""
 
     batch: int | None = Field(
-        description="The new batch, which can be taken back; null when nothing changed."
+        description="The new batch, which can be undone; null when nothing changed."
     )
     changed: int = Field(description="Groups that have the verdict again.")
-    kept: int = Field(description="Groups that somebody has judged or edited since.")
+    kept: int = Field(description="Groups that a person has judged or edited since.")
     refused: list[RefusalDocument]

@@ -131,8 +131,8 @@ def _require_seen(group: Group, verdict: Verdict) -> None:
     seen = any(view.media is not None for view in group.views)
     if verdict.state == "accepted" and verdict.note is None and not seen:
         raise InputError(
-            "this group has no picture in any view, so nobody can have looked at it; accepting "
-            "it needs a note that says what it was judged by",
+            "this group has no picture in any view; accepting it needs a note that says what it "
+            "was judged by",
             hint="Import it again with its frames, or say in the note why it is right.",
             pointer="/note",
         )

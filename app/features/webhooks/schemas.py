@@ -39,7 +39,7 @@ class WebhookEdit(BaseModel):
     kinds: Kinds | None = None
     on: bool | None = Field(
         default=None,
-        description="Off: it is told nothing, and what happens meanwhile is not told later either.",
+        description="Off: it gets no messages, and events of that time are not sent later.",
     )
 
 
@@ -49,7 +49,7 @@ class WebhookDocument(Document):
     id: int
     url: str
     kinds: list[Kind]
-    off: str | None = Field(description="Why nothing is sent any more; null: it is.")
+    off: str | None = Field(description="Why sending was stopped; null: it is on.")
     created: datetime
     created_by: str
     waiting: int = Field(description="Messages that wait to be sent, or sent again.")
@@ -61,7 +61,7 @@ class WebhookList(ListDocument[WebhookDocument]):
     """Webhooks of a dataset, and what they may be."""
 
     allowed: list[str] = Field(description="How the operator lets addresses begin.")
-    kinds: list[Kind] = Field(description="What a webhook may be told.")
+    kinds: list[Kind] = Field(description="Kinds of messages a webhook can get.")
 
 
 class WebhookWithSecret(Document):

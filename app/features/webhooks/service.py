@@ -200,7 +200,9 @@ def send_ping(store: Store, dataset: str, webhook_id: int, *, actor: str) -> Del
 
 def _require_on(webhook: Webhook) -> None:
     if webhook.off is not None:
-        raise ConflictError(f"nothing is sent there: {webhook.off}", hint="Turn it on first.")
+        raise ConflictError(
+            f"the server does not send to this address: {webhook.off}", hint="Turn it on first."
+        )
 
 
 def _turned_on(session: Session) -> Mapping[str, Any]:
