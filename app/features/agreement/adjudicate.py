@@ -18,7 +18,7 @@ from app.features.independent_annotations.adopt import adopt_take
 from app.features.independent_annotations.return_work import hand_back_take
 from app.features.independent_annotations.service import Take, TakeView
 from app.features.people.members import list_members
-from app.features.people.roles import Action, may
+from app.features.people.roles import Action, lets
 from app.soccer.actors import LOCAL_USER, person_of
 
 
@@ -189,7 +189,7 @@ def _others(store: Store, dataset: int, takes: Sequence[Take]) -> list[str]:
     return [
         one.name
         for one in list_members(store, dataset)
-        if may(one.role, Action.REVIEW) and one.name not in takers
+        if lets(one.role, Action.REVIEW) and one.name not in takers
     ]
 
 

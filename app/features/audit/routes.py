@@ -21,9 +21,11 @@ from app.formats.csv_text import csv_line
 from app.http.access import login_of
 from app.http.cursor import Before, Cursor, first_below
 from app.http.deps import AppStore
+from app.http.permissions import Action, OwnedKind, Where, may
 from app.http.problem import responses
+from app.http.route import Route
 
-router = APIRouter(prefix="/audit", tags=["users"])
+router = APIRouter(prefix="/audit", tags=["users"], route_class=Route)
 COLUMNS = tuple(AuditEntryDocument.model_fields)
 
 
@@ -84,6 +86,7 @@ Search = Annotated[
 
 
 @router.get("", operation_id="getAudit", response_model=AuditDocument, responses=responses(404))
+@may(Action.LEAD, dataset=OwnedKind.DATASET, group=OwnedKind.GROUP, where=Where.SOMEWHERE)
 def get_audit(
     store: AppStore,
     led: Led,
@@ -112,6 +115,7 @@ def get_audit(
         200: {"content": {"text/csv": {}, "application/x-ndjson": {}}, "description": "The file."},
     },
 )
+@may(Action.LEAD, dataset=OwnedKind.DATASET, group=OwnedKind.GROUP, where=Where.SOMEWHERE)
 def export_audit(
     ending: Literal["csv", "jsonl"], store: AppStore, led: Led, asked: Asked, search: Search = ""
 ) -> StreamingResponse:
