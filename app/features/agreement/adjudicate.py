@@ -19,6 +19,7 @@ from app.features.independent_annotations.return_work import hand_back_take
 from app.features.independent_annotations.service import Take, TakeView
 from app.features.people.members import list_members
 from app.features.people.roles import Action, may
+from app.finite import Moment
 from app.soccer.actors import LOCAL_USER, person_of
 
 
@@ -36,7 +37,7 @@ class OpenCase:
     people: tuple[str, ...]
     worst: float
     disagreements: int
-    since: str
+    since: Moment
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,6 @@ from app.features.agreement.schemas import (
     CaseDocument,
     Decision,
     GroupComparisonDocument,
-    LimitsDocument,
     LimitsEdit,
     WaitingList,
 )
@@ -29,7 +28,7 @@ from app.finite import MAX_ID
 from app.http.cursor import paged
 from app.http.deps import Actor, AppServices, AppStore, DatasetPath, Id
 from app.http.problem import responses
-from app.http.respond import as_document, document, no_content, responds
+from app.http.respond import document, no_content, responds
 
 router = APIRouter(tags=["agreement"])
 CSV_FILE = "text/csv"
@@ -84,10 +83,10 @@ def get_agreement_file(dataset: DatasetPath, store: AppStore, of_batch: OfBatch 
 @router.put(
     "/datasets/{dataset}/agreement/limits",
     operation_id="setAgreementLimits",
-    response_model=LimitsDocument,
+    response_model=AgreementLimits,
     responses=responses(404, 413, 415),
 )
-@responds(as_document(LimitsDocument.model_validate))
+@responds(document)
 def put_limits(
     dataset: DatasetPath, edit: LimitsEdit, store: AppStore, actor: Actor
 ) -> AgreementLimits:

@@ -7,15 +7,15 @@ from typing import Annotated
 from fastapi import APIRouter, Path, Query, Request, Response
 
 from app.features.guidelines import service as guidelines
+from app.features.guidelines.service import Guidelines
 from app.features.independent_annotations.schemas import (
     GuidelinePictureDocument,
-    GuidelinesDocument,
     GuidelinesEdit,
     NewGuidelinePicture,
 )
 from app.http.deps import Actor, AppServices, AppStore, DatasetPath, etag_matches
 from app.http.problem import responses
-from app.http.respond import as_document, responds
+from app.http.respond import as_document, document, responds
 
 router = APIRouter(prefix="/datasets/{dataset}/guidelines", tags=["takes"])
 
@@ -25,7 +25,7 @@ Digest = Annotated[str, Path(pattern=r"^[0-9a-f]{64}$", description="SHA-256 of 
 @router.get(
     "",
     operation_id="getGuidelines",
-    response_model=GuidelinesDocument,
+    response_model=Guidelines,
     responses=responses(404),
 )
 def get_guidelines(
@@ -42,10 +42,10 @@ def get_guidelines(
 @router.put(
     "",
     operation_id="writeGuidelines",
-    response_model=GuidelinesDocument,
+    response_model=Guidelines,
     responses=responses(404, 409, 413, 415),
 )
-@responds(as_document(GuidelinesDocument.model_validate))
+@responds(document)
 def write_guidelines(
     dataset: DatasetPath, edit: GuidelinesEdit, store: AppStore, actor: Actor
 ) -> guidelines.Guidelines:

@@ -21,6 +21,7 @@ from app.features.guidelines.queries import (
     told_dataset,
 )
 from app.features.imports.upload_queries import upload_path
+from app.finite import Moment
 from app.media.frames import Frames
 from app.soccer.media import Media
 
@@ -36,7 +37,7 @@ class GuidelineVersion:
     """One version: its number from 1, and who wrote it when."""
 
     number: int
-    written: str
+    written: Moment
     written_by: str
 
 

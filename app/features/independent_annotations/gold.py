@@ -20,7 +20,7 @@ from app.features.groups.submit import load_solved
 from app.features.groups.view_queries import group_dataset
 from app.features.independent_annotations.copying import aligned
 from app.features.independent_annotations.errors import (
-    AnnotationError,
+    DistanceFromTruth,
     TrueView,
     error_of,
     world_error,
@@ -90,7 +90,7 @@ class GoldResult:
     verdict: str | None
     true_verdict: str
     right: bool | None
-    error: AnnotationError
+    error: DistanceFromTruth
     submissions: int = 1
 
 

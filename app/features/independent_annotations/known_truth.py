@@ -65,7 +65,12 @@ class GoldChoice:
 
 @dataclass(frozen=True)
 class GoldChosen:
-    """What came of it: groups that are gold by now, and how many of those asked for are not."""
+    """What came of it: groups that are gold by now, and how many of those asked for are not.
+
+    Attributes:
+        groups: Groups that are gold by now.
+        left_out: Groups of which nothing is known that could be the truth.
+    """
 
     groups: tuple[int, ...]
     left_out: int

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from fastapi import APIRouter, BackgroundTasks, Request
+from fastapi import APIRouter, BackgroundTasks, Request, Response
 
 from app.features.agreement.adjudicate import take_over
 from app.features.agreement.service import after_hand_in
@@ -15,20 +15,19 @@ from app.features.independent_annotations.known_truth import GoldChoice, GoldCho
 from app.features.independent_annotations.return_work import hand_back_take
 from app.features.independent_annotations.schemas import (
     GoldChoiceDocument,
-    GoldChosenDocument,
     GoldEdit,
     GoldGroupDocument,
     GoldReportDocument,
     HandBack,
-    TakeDocument,
     TakeList,
 )
+from app.features.independent_annotations.service import TakeView
 from app.features.people.roles import Action, may
 from app.http.access import login_of
 from app.http.cursor import paged
 from app.http.deps import Actor, AppServices, AppStore, DatasetPath, Id
 from app.http.problem import responses
-from app.http.respond import as_document, responds
+from app.http.respond import as_document, document, responds
 
 takes_router = APIRouter(tags=["takes"])
 
@@ -44,17 +43,21 @@ def list_takes(dataset: DatasetPath, store: AppStore, request: Request, actor: A
         lambda dataset_id: login is None or may(login.roles.role_in(dataset_id), Action.LEAD),
         person=actor,
     )
-    return TakeList(items=[TakeDocument.model_validate(one) for one in found])
+    return TakeList(items=found)
+
+
+def _begun(take: TakeView) -> Response:
+    return document(take, 201)
 
 
 @takes_router.post(
     "/groups/{group}/takes",
     operation_id="beginTake",
-    response_model=TakeDocument,
+    response_model=TakeView,
     status_code=201,
     responses=responses(404, 409),
 )
-@responds(as_document(TakeDocument.model_validate, 201))
+@responds(_begun)
 def begin(group: Id, store: AppStore, actor: Actor) -> takes.TakeView:
     """Begin an own annotation of a group, on a copy that nobody else sees; the one begun, if so."""
     return takes.begin_take(store, group, person=actor)
@@ -63,7 +66,7 @@ def begin(group: Id, store: AppStore, actor: Actor) -> takes.TakeView:
 @takes_router.get(
     "/groups/{group}/take",
     operation_id="getTake",
-    response_model=TakeDocument,
+    response_model=TakeView,
     responses=responses(404),
 )
 def get_take(group: Id, store: AppStore) -> takes.TakeView:
@@ -74,10 +77,10 @@ def get_take(group: Id, store: AppStore) -> takes.TakeView:
 @takes_router.post(
     "/groups/{group}/hand-in",
     operation_id="handInTake",
-    response_model=TakeDocument,
+    response_model=TakeView,
     responses=responses(403, 404, 409),
 )
-@responds(as_document(TakeDocument.model_validate))
+@responds(document)
 def hand_in(
     group: Id, services: AppServices, actor: Actor, background: BackgroundTasks
 ) -> takes.TakeView:
@@ -91,10 +94,10 @@ def hand_in(
 @takes_router.post(
     "/groups/{group}/hand-back",
     operation_id="handBackTake",
-    response_model=TakeDocument,
+    response_model=TakeView,
     responses=responses(404, 409, 413, 415),
 )
-@responds(as_document(TakeDocument.model_validate))
+@responds(document)
 def hand_back(
     group: Id, store: AppStore, actor: Actor, why: HandBack | None = None
 ) -> takes.TakeView:
@@ -136,10 +139,10 @@ def get_report(dataset: DatasetPath, store: AppStore) -> gold.GoldReport:
 @gold_router.post(
     "/datasets/{dataset}/gold",
     operation_id="chooseGoldGroups",
-    response_model=GoldChosenDocument,
+    response_model=GoldChosen,
     responses=responses(404, 409, 413, 415),
 )
-@responds(as_document(GoldChosenDocument.model_validate))
+@responds(document)
 def choose(
     dataset: DatasetPath, choice: GoldChoiceDocument, store: AppStore, actor: Actor
 ) -> GoldChosen:

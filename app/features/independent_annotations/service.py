@@ -36,6 +36,7 @@ from app.features.independent_annotations.queries import (
 from app.features.independent_annotations.submission_queries import RETURNED, submit_copy
 from app.features.people.visibility_queries import READER
 from app.features.queue.listing_queries import read_columns
+from app.finite import Moment
 from app.soccer.actors import person_of
 
 _KINDS = ("work", "take")
@@ -44,12 +45,18 @@ _KINDS = ("work", "take")
 
 @dataclass(frozen=True)
 class HandedBack:
-    """A group that was handed back: by whom, when, and why; the reason may be empty."""
+    """A group that was handed back: by whom, when, and why; the reason may be empty.
+
+    Attributes:
+        group: What they work on; of an annotation of their own, the copy.
+        by: Who handed it back.
+        reason: Why; may be empty.
+    """
 
     group: int
     title: str
     by: str
-    at: str
+    at: Moment
     reason: str
 
 
@@ -103,10 +110,12 @@ class TakeView:
     """A take as everybody may see it who sees its copy; that it is a gold one it does not say.
 
     Attributes:
+        batch: The batch that it is for; None: none.
         group: The copy.
         dataset: Of what it is a copy.
         of, number: The original, and its number in its dataset; None where its person is not told.
         title: What people call the group; where its person is not told, what they call the copy.
+        place: Which one of this person in this batch, from 1.
         settled: When something was decided about it; None: not yet, or its person is not told.
         handed_back: Why its person has it back; None: they have not, or handed it in again.
     """
@@ -120,10 +129,10 @@ class TakeView:
     title: str
     person: str
     place: int
-    begun: str
-    handed_in: str | None
+    begun: Moment
+    handed_in: Moment | None
     verdict: str | None
-    settled: str | None
+    settled: Moment | None
     handed_back: HandedBack | None = None
 
 

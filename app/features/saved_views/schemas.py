@@ -40,13 +40,5 @@ class SavedViewList(ListDocument[SavedViewDocument]):
     """Saved views, by name."""
 
 
-class ReviewerDocument(Document, shows=Reviewer):
-    """One person's verdicts."""
-
-    accepted: int = Field(description="Groups whose verdict is this person's now.")
-    today: int = Field(description="Groups judged since midnight UTC.")
-    last: datetime = Field(description="Time of the last verdict.")
-
-
-class ReviewerList(ListDocument[ReviewerDocument]):
+class ReviewerList(ListDocument[Reviewer]):
     """Everybody who has judged a group, the most active first."""

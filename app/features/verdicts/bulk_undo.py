@@ -31,7 +31,12 @@ from app.features.verdicts.service import check_verdict
 
 @dataclass(frozen=True)
 class UndoReport:
-    """What undoing a batch did; ``kept`` are groups that somebody has judged since."""
+    """What undoing a batch did; ``kept`` are groups that somebody has judged since.
+
+    Attributes:
+        restored: Groups that have the verdict of before again.
+        kept: Groups that somebody has judged since.
+    """
 
     batch: int
     restored: int

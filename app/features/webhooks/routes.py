@@ -9,10 +9,8 @@ from fastapi import APIRouter, Query
 from app.features.webhooks import service as webhooks
 from app.features.webhooks.messages import CHOSEN
 from app.features.webhooks.schemas import (
-    DeliveryDocument,
     DeliveryList,
     NewWebhook,
-    WebhookDocument,
     WebhookEdit,
     WebhookList,
     WebhookWithSecret,
@@ -27,7 +25,7 @@ router = APIRouter(prefix="/datasets/{dataset}/webhooks", tags=["webhooks"])
 
 def _with_secret(made: tuple[Webhook, str]) -> WebhookWithSecret:
     webhook, secret = made
-    return WebhookWithSecret(webhook=WebhookDocument.model_validate(webhook), secret=secret)
+    return WebhookWithSecret(webhook=webhook, secret=secret)
 
 
 @router.get("", operation_id="listWebhooks", responses=responses(404))
@@ -54,7 +52,7 @@ def make_webhook(
 @router.patch(
     "/{webhook}",
     operation_id="changeWebhook",
-    response_model=WebhookDocument,
+    response_model=Webhook,
     responses=responses(404, 409, 413, 415),
 )
 def change_webhook(
@@ -86,7 +84,7 @@ def renew_secret(
     "/{webhook}/ping",
     operation_id="pingWebhook",
     status_code=201,
-    response_model=DeliveryDocument,
+    response_model=Delivery,
     responses=responses(404, 409),
 )
 def ping_webhook(dataset: DatasetPath, webhook: Id, store: AppStore, actor: Actor) -> Delivery:
@@ -113,7 +111,7 @@ def list_deliveries(
 @router.post(
     "/{webhook}/deliveries/{delivery}",
     operation_id="sendWebhookDeliveryAgain",
-    response_model=DeliveryDocument,
+    response_model=Delivery,
     responses=responses(404, 409),
 )
 def send_again(dataset: DatasetPath, webhook: Id, delivery: Id, store: AppStore) -> Delivery:

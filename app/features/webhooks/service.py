@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 from app.canonical import canonical
 from app.db.json_columns import parse
@@ -33,6 +33,7 @@ from app.features.webhooks.queries import (
     webhooks_of,
 )
 from app.features.webhooks.sender import require_allowed
+from app.finite import Moment
 
 MOST = 20
 """Webhooks of one dataset."""
@@ -52,7 +53,7 @@ class Webhook:
     url: str
     kinds: list[Kind]
     off: str | None
-    created: str
+    created: Moment
     created_by: str
     waiting: int
     delivered: int
@@ -65,6 +66,7 @@ class Delivery:
 
     Attributes:
         message: Its id, the same however often it is sent.
+        body: The JSON that is sent, to the letter.
         next_at: When it is tried (again); None: never.
         status: What the receiver answered last.
         problem: Why the last try failed.
@@ -72,13 +74,13 @@ class Delivery:
 
     id: int
     message: str
-    kind: str
+    kind: Kind
     body: str
-    created: str
-    state: str
+    created: Moment
+    state: Literal["waiting", "delivered", "failed"]
     attempts: int
-    next_at: str | None
-    tried: str | None
+    next_at: Moment | None
+    tried: Moment | None
     status: int | None
     problem: str | None
 
@@ -241,4 +243,5 @@ def _webhook(row: Any, counts: Mapping[tuple[int, str], int]) -> Webhook:
 
 
 def _delivery(row: Any) -> Delivery:
-    return Delivery(**{name: getattr(row, name) for name in Delivery.__dataclass_fields__})
+    values = {name: getattr(row, name) for name in Delivery.__dataclass_fields__}
+    return Delivery(**{**values, "kind": Kind(row.kind)})
