@@ -46,13 +46,13 @@ static/built/about.json: static/build.mjs static/node_modules/.ready $(MODULES)
 run: setup
 	@$(BIN)/touchline serve --sample
 
-# Two halves side by side, each in as many processes as there are cores: servers and browsers that
-# are tested are processes too. Files in their order, so that the long ones (integration, security)
+# Two halves side by side, in as many processes as there are cores, and one more for the half that waits
+# for processes of its own: servers and browsers that are tested are processes too. Files in their order, so that the long ones (integration, security)
 # come first and no process is left with one at the end. Every line says which half speaks.
 PROCESSES = $(shell n=$$(getconf _NPROCESSORS_ONLN); echo $$(( n < 2 ? 2 : n < 8 ? n : 8 )))
 # What tests write lies in memory where that has much room: they wait for no disk.
 ROOMY = $(shell df -Pk /dev/shm 2>/dev/null | awk 'NR == 2 && $$4 > 8000000 { print "yes" }')
-PYTEST = $(if $(ROOMY),PYTEST_DEBUG_TEMPROOT=/dev/shm) $(BIN)/python -m pytest --numprocesses=$(PROCESSES) --dist=loadfile --no-loadscope-reorder
+PYTEST = $(if $(ROOMY),PYTEST_DEBUG_TEMPROOT=/dev/shm) $(BIN)/python -m pytest --dist=loadfile --no-loadscope-reorder
 
 # What proves the product on one machine. What numba compiles is compiled before: every process would do
 # it anew, until one has saved it.
@@ -71,14 +71,14 @@ test-all: setup chromium postgresql generators readers moto
 	@echo "Every test has passed."
 
 test-python:
-	@$(PYTEST) $(QUICK) --ignore=tests/e2e 2>&1 | sed -u 's/^/python  | /'
+	@$(PYTEST) --numprocesses=$$(( $(PROCESSES) + 1 )) $(QUICK) --ignore=tests/e2e 2>&1 | sed -u 's/^/python  | /'
 
 test-browser:
-	@{ $(BIN)/npm --prefix static test && $(PYTEST) $(QUICK) tests/e2e; } 2>&1 | sed -u 's/^/browser | /'
+	@{ $(BIN)/npm --prefix static test && $(PYTEST) --numprocesses=$(PROCESSES) $(QUICK) tests/e2e; } 2>&1 | sed -u 's/^/browser | /'
 
 # The browser tests before pages whose every request, frame, picture and event is late: who does not wait falls.
 test-late: setup chromium
-	@TOUCHLINE_SLOW_PAGES=$(or $(MS),300) $(PYTEST) tests/e2e
+	@TOUCHLINE_SLOW_PAGES=$(or $(MS),300) $(PYTEST) --numprocesses=$(PROCESSES) tests/e2e
 
 # All tests but those of the browser with every home on a private PostgreSQL: WHAT=tests/unit/db a part, WHAT=tests/e2e those of
 # the browser. What is about the file of SQLite is left out; each says why.

@@ -29,6 +29,7 @@ BROAD = (
     "tests/integration/test_web_processes.py::TestMetrics",
     "tests/unit/db/test_migrate.py::TestOldHomes",
     "tests/unit/features/integrity/test_upgrades.py",
+    "tests/unit/http/test_web_processes.py::TestServeWith",
 )
 """What `make test` leaves to `make test-all`, by parts of the names of tests: slow, broad, or the same once more on
 another database."""

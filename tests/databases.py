@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
+import subprocess
 from collections.abc import Collection, Iterator
 from contextlib import closing, contextmanager, nullcontext
 from pathlib import Path
@@ -80,9 +81,6 @@ class Files:
         """See ``Databases``."""
         # What the home knows of the database that was there before is not true of this one.
         store.settings.database_file.with_name("home.json").unlink(missing_ok=True)
-        # Whoever reads the files beside an open database ends this process's locks on them; then the
-        # next process that opens it would cut off what is mapped here. New connections lock anew.
-        store._engine.dispose()
         _copy(kept, store.settings.database_file)
 
 
@@ -204,9 +202,13 @@ def count_rows(home: Path, *tables: str) -> dict[str, int]:
 
 
 def all_that_is_kept(home: Path, *, but: Path | None = None) -> bytes:
-    """The files of a home but one, and every row of its database where that is a server's."""
+    """The files of a home but one, and every row of its database where that is a server's.
+
+    Another process reads them. A process that closes a file of a database ends its own locks on it: the
+    next one that opens the database would cut off the memory that is shared here.
+    """
     files = [path for path in home.iterdir() if path.is_file() and path != but]
-    kept = [path.read_bytes() for path in files]
+    kept = [subprocess.run(["cat", *files], check=True, capture_output=True).stdout]
     settings = Settings(home=home)
     if not dialect_of(settings).is_file:
         engine = make_engine(settings)

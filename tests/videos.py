@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
 import cv2
@@ -12,6 +12,7 @@ import numpy as np
 WIDTH, HEIGHT = 160, 96
 _BITS = 10
 _TIMES = (b"moov", b"trak", b"mdia", b"minf", b"stbl", b"stts")
+_DESCRIPTIONS = (b"moov", b"trak", b"mdia", b"minf", b"stbl", b"stsd")
 _EDITS = (b"moov", b"trak", b"edts")
 
 
@@ -22,10 +23,22 @@ def write_video(path: Path, codec: str, count: int = 200, rate: float = 25) -> P
         path: Its ending says the container.
         codec: Four letters; ``MPG2`` has B-frames and a key frame every twelve.
     """
-    video = cv2.VideoWriter(str(path), cv2.VideoWriter_fourcc(*codec), rate, (WIDTH, HEIGHT))
-    assert video.isOpened()
-    for number in range(count):
-        video.write(numbered(number))
+    return write_pictures(path, codec, map(numbered, range(count)), rate)
+
+
+def write_pictures(
+    path: Path, codec: str, pictures: Iterable[np.ndarray], rate: float = 25
+) -> Path:
+    """A video of these pictures, blue green red and of one size, at a constant rate."""
+    video = None
+    for picture in pictures:
+        if video is None:
+            height, width = picture.shape[:2]
+            four = cv2.VideoWriter_fourcc(*codec)
+            video = cv2.VideoWriter(str(path), four, rate, (width, height))
+            assert video.isOpened()
+        video.write(picture)
+    assert video is not None
     video.release()
     return path
 
@@ -68,6 +81,29 @@ def delay_start(path: Path, milliseconds: int) -> Path:
     entries += struct.pack(">IiI", 10**6, media_time, 0x10000)
     edits = _box(b"edts", _box(b"elst", struct.pack(">II", 0, 2) + entries))
     path.write_bytes(_replaced(data, _EDITS, edits))
+    return path
+
+
+def turn(path: Path, degrees: int) -> Path:
+    """Let an MP4 say that its frames are to be turned clockwise: 90, 180 or 270."""
+    data = bytearray(path.read_bytes())
+    start, _ = _place(bytes(data), (b"moov", b"trak", b"tkhd"))
+    cosine, sine = {90: (0, 1), 180: (-1, 0), 270: (0, -1)}[degrees]
+    one = 0x10000
+    matrix = (cosine * one, sine * one, 0, -sine * one, cosine * one, 0, 0, 0, 0x40000000)
+    data[start + 48 : start + 84] = struct.pack(">9i", *matrix)
+    path.write_bytes(data)
+    return path
+
+
+def stretch_pixels(path: Path, over: int, under: int) -> Path:
+    """Let an MP4 say how wide its pixels are by their height."""
+    data = path.read_bytes()
+    start, end = _place(data, _DESCRIPTIONS)
+    (kind, _, _), *_ = _boxes(data, start + 16, end)
+    described = data[start + 24 : end] + _box(b"pasp", struct.pack(">II", over, under))
+    descriptions = _box(b"stsd", data[start + 8 : start + 16] + _box(kind, described))
+    path.write_bytes(_replaced(data, _DESCRIPTIONS, descriptions))
     return path
 
 

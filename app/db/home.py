@@ -145,9 +145,14 @@ def refused(path: Path, error: OSError, hint: str = WRITABLE) -> StorageError:
 
 
 def make_file(path: Path) -> None:
-    """An empty file for its owner alone, where there is none."""
+    """An empty file for its owner alone, where there is none.
+
+    One that is there is not opened: closing it would end the locks of SQLite on it in this process.
+    """
     try:
-        os.close(os.open(path, os.O_WRONLY | os.O_CREAT, 0o600))
+        os.close(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600))
+    except FileExistsError:
+        return
     except OSError as error:
         raise refused(path, error) from error
 

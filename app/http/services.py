@@ -22,7 +22,7 @@ from app.features.groups.view_paint import PaintFollower
 from app.features.imports.jobs import resume_imports
 from app.features.jobs.service import Jobs, Pool
 from app.features.jobs.shared import SharedJobs
-from app.features.match_estimates.jobs import PICTURES, POSITIONS, make_rigs
+from app.features.match_estimates.jobs import PICTURES, POSITIONS, RIG
 from app.features.paint.jobs import PAINT, PROPOSALS
 from app.features.policies.noise import NoiseStore
 from app.features.practice.service import resume_practice
@@ -120,16 +120,13 @@ class Services:
         Thread(target=self._keep_large_up, name="yield", daemon=True).start()
         self.frames.warm()
         resume_solving(self.jobs, self.store)
-        for kind in (PAINT, PROPOSALS, PICTURES):
-            kind.resume(self.jobs, self.store)
-        # Begun again, a share would be one more to take back.
-        POSITIONS.make(self.jobs, self.store)
+        for kind in (PAINT, PROPOSALS, PICTURES, POSITIONS, RIG):
+            kind.take_up(self.jobs, self.store)
         resume_exports(self.jobs, self.store, self.exports, self.frames)
         resume_versions(self.jobs, self.store)
         resume_imports(self.jobs, self.store, self.settings)
         resume_evaluations(self.jobs, self.store)
         resume_practice(self.jobs, self.store)
-        make_rigs(self.jobs, self.store)
         self.jobs.on_lead(self._lead)
         self.jobs.start()
         self.store.follow()

@@ -8,8 +8,8 @@ from __future__ import annotations
 import hashlib
 import os
 from collections import OrderedDict
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, closing, contextmanager, suppress
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -29,12 +29,17 @@ _OPTIONS = f"format_whitelist;{_CONTAINERS}|protocol_whitelist;file"
 
 
 @contextmanager
-def open_video(path: Path) -> Iterator[cv2.VideoCapture]:
-    """A video, opened or not (``isOpened``), and closed again."""
+def open_video(path: Path, options: Sequence[int] = ()) -> Iterator[cv2.VideoCapture]:
+    """A video, opened or not (``isOpened``), and closed again.
+
+    Args:
+        path: The file.
+        options: Properties of OpenCV and their values, one after the other.
+    """
     # Read by OpenCV at each opening. No other backend: one of them takes "%d" in a name for a
     # row of files.
     os.environ["OPENCV_FFMPEG_CAPTURE_OPTIONS"] = _OPTIONS
-    video = cv2.VideoCapture(str(path), cv2.CAP_FFMPEG)
+    video = cv2.VideoCapture(str(path), cv2.CAP_FFMPEG, list(options))
     try:
         yield video
     finally:
@@ -49,6 +54,8 @@ _VERSION = 1
 _MARGINS = (32, 256)
 """Frames before the one that is sought from which decoding starts: behind a jump some decoders return
 frames whose references they have not seen."""
+_SAME_TIME = 1e-5
+"""Milliseconds; the finest time bases of containers tick a hundred times as slowly."""
 
 Times = npt.NDArray[np.float64]
 """Presentation time of each frame as the decoder returns them, milliseconds, shape (N,)."""
@@ -122,17 +129,103 @@ def frame_at(path: Path, number: int, times: Times) -> Any:
     Raises:
         ImageError: It is no video that can be read.
     """
-    if number > _MARGINS[0]:
-        with _opened(path) as video:
-            for margin in _MARGINS:
-                if number > margin and _jump(video, number - margin, number, times):
-                    return _retrieved(video)
-    # Opened anew: sent back to its start, a decoder may land behind the first frame.
-    with _opened(path) as video:
-        for _ in range(number + 1):
+    with closing(FrameReader(path, times)) as reader:
+        return reader.read(number)
+
+
+class FrameReader:
+    """Reads frames of one video by their numbers; frames that follow each other are not sought anew.
+
+    Args:
+        path: The video.
+        times: Index of the video.
+        keys: Numbers of the key frames, ascending, of a container that has no table of them: a jump
+            is then believed only where a key frame lies between it and the frame. None: it has one.
+    """
+
+    def __init__(self, path: Path, times: Times, keys: npt.NDArray[np.int64] | None = None):
+        self._path, self._times, self._keys = path, times, keys
+        self._video: cv2.VideoCapture | None = None
+        self._next = 0
+        self._opening: ExitStack | None = None
+
+    def close(self) -> None:
+        """Close the video."""
+        if self._opening is not None:
+            self._opening.close()
+        self._opening = self._video = None
+
+    def read(self, number: int) -> Any:
+        """The frame of that number, blue green red, or None where it cannot be decoded.
+
+        Args:
+            number: From 0, below ``len(times)``.
+
+        Raises:
+            ImageError: It is no video that can be read.
+        """
+        if self._video is not None and self._next <= number <= self._next + _MARGINS[0]:
+            if self._advance(number):
+                return _retrieved(self._video)
+        elif number > _MARGINS[0]:
+            for start in self._starts(number):
+                if self._jump(start, number):
+                    return _retrieved(self._video)
+        # Opened anew: sent back to its start, a decoder may land behind the first frame.
+        self.close()
+        video = self._opened()
+        while self._next <= number:
             if not video.grab():
+                self.close()
                 return None
+            self._next += 1
         return _retrieved(video)
+
+    def _opened(self) -> cv2.VideoCapture:
+        if self._video is None:
+            self._opening = ExitStack()
+            self._video = self._opening.enter_context(_opened(self._path))
+            self._next = 0
+        return self._video
+
+    def _key_before(self, number: int, keys: npt.NDArray[np.int64]) -> int:
+        return int(keys[max(int(np.searchsorted(keys, number, "right")) - 1, 0)])
+
+    def _starts(self, number: int) -> list[int]:
+        """Frames to jump to on the way to another one, the nearest first."""
+        nearest = number if self._keys is None else self._key_before(number, self._keys)
+        starts = [nearest - margin for margin in _MARGINS if nearest > margin]
+        return starts if self._keys is None or nearest == number else [nearest, *starts]
+
+    def _jump(self, start: int, number: int) -> bool:
+        """Go to a frame from about another one; whether every frame on the way came when it should."""
+        video = self._opened()
+        video.set(cv2.CAP_PROP_POS_MSEC, self._times[start])
+        if not video.grab():
+            return False
+        places = np.flatnonzero(_same_time(self._times, video.get(cv2.CAP_PROP_POS_MSEC)))
+        # Where the jump led too far, or two frames have one time, nothing says which one this is.
+        if len(places) != 1:
+            return False
+        place, latest = int(places[0]), number - _MARGINS[0] // 2
+        if self._keys is not None:
+            latest = self._key_before(number, self._keys)
+        if place > latest:
+            return False
+        self._next = place + 1
+        return self._advance(number)
+
+    def _advance(self, number: int) -> bool:
+        """Decode on to a frame; whether every frame on the way came when it should."""
+        video = self._opened()
+        while self._next <= number:
+            came = video.grab()
+            if not came or not _same_time(
+                self._times[self._next], video.get(cv2.CAP_PROP_POS_MSEC)
+            ):
+                return False
+            self._next += 1
+        return True
 
 
 @contextmanager
@@ -143,22 +236,12 @@ def _opened(path: Path) -> Iterator[cv2.VideoCapture]:
         yield video
 
 
-def _jump(video: cv2.VideoCapture, start: int, number: int, times: Times) -> bool:
-    """Go to a frame from about another one; whether every frame on the way came when it should."""
-    video.set(cv2.CAP_PROP_POS_MSEC, times[start])
-    if not video.grab():
-        return False
-    places = np.flatnonzero(times == video.get(cv2.CAP_PROP_POS_MSEC))
-    # Where the jump led too far, or two frames have one time, nothing says which one this is.
-    if len(places) != 1 or places[0] > number - _MARGINS[0] // 2:
-        return False
-    for expected in times[places[0] + 1 : number + 1]:
-        if not video.grab() or video.get(cv2.CAP_PROP_POS_MSEC) != expected:
-            return False
-    return True
+def _same_time(time: Any, other: float) -> Any:
+    """Whether times are the same, in milliseconds; an index may keep them as fractions."""
+    return np.abs(time - other) < _SAME_TIME
 
 
-def _retrieved(video: cv2.VideoCapture) -> Any:
+def _retrieved(video: Any) -> Any:
     done, picture = video.retrieve()
     return picture if done else None
 

@@ -1,7 +1,7 @@
 // @ts-check
 /** What can be imported, and what each format does not say itself. */
 
-/** @typedef {{name: string, label: string, hint: string, kind: 'size' | 'calibration' | 'offset' | 'cameras' | 'grouping' | 'text'}} FormatOption */
+/** @typedef {{name: string, label: string, hint: string, kind: 'size' | 'calibration' | 'offset' | 'cameras' | 'grouping' | 'switch' | 'text'}} FormatOption */
 /** @typedef {{name: string, label: string, note: string, options: FormatOption[], lines?: boolean, keepsPolicy?: boolean}} ImportFormat   `lines`: static cameras, whose lines are files of their own; `keepsPolicy`: no policy is chosen for it */
 
 /** @type {FormatOption} */
@@ -18,6 +18,9 @@ const FLIPPED = { name: 'flipped', label: 'Mirrored cameras', hint: 'numbers, fo
 /** @type {FormatOption} */
 const GROUPING = { name: 'grouping', label: 'Which pictures are one group', hint: 'a pattern of their names, with {instant} and {camera}', kind: 'grouping' };
 
+/** @type {FormatOption} */
+const PROPOSE = { name: 'propose', label: 'Propose cameras afterwards', hint: 'from the painted lines of the pictures; a job, which can be cancelled', kind: 'switch' };
+
 /** @type {ImportFormat[]} */
 export const IMPORT_FORMATS = [
 	{ name: 'soccernet-v3', label: 'SoccerNet-v3', note: 'a folder or zip with Labels-v3.json', options: [] },
@@ -29,7 +32,7 @@ export const IMPORT_FORMATS = [
 	{ name: 'gamestate', label: 'sn-gamestate', note: 'Labels-GameState.json', options: [CALIBRATION] },
 	{ name: 'coco', label: 'COCO', note: 'as Touchline, CVAT, Label Studio, Roboflow or FiftyOne export it', options: [CALIBRATION, CATEGORY] },
 	{ name: 'parquet', label: 'Parquet', note: 'as Touchline exports it', options: [] },
-	{ name: 'frames', label: 'Pictures', note: 'without annotations: they become groups, cameras are proposed', options: [GROUPING] },
+	{ name: 'frames', label: 'Pictures', note: 'without annotations: they become groups, cameras are proposed', options: [GROUPING, PROPOSE] },
 	{ name: 'touchline', label: 'Touchline', note: 'edits and verdicts of another installation', options: [], keepsPolicy: true },
 ];
 

@@ -6,7 +6,7 @@ import { useEffect, useState } from 'preact/hooks';
 
 import { postImport } from '../api/imports.js';
 import { sentenceOf } from '../api/problem.js';
-import { withValue } from '../lib/field.js';
+import { withTick, withValue } from '../lib/field.js';
 import { param } from '../lib/router.js';
 import { datasets, loadDatasets } from '../state/datasets.js';
 import { IMPORT_FORMATS, optionValue } from '../state/import_formats.js';
@@ -56,6 +56,13 @@ function GroupingField({ option, change }) {
 function OptionField({ option, apart, change }) {
 	const id = `option-${option.name}`;
 	if (option.kind === 'grouping') return html`<${GroupingField} option=${option} change=${change} />`;
+	if (option.kind === 'switch') {
+		return html`
+			<div class="form__row">
+				<label class="form__check"><input type="checkbox" defaultChecked=${true} onChange=${withTick((on) => change(on ? undefined : false))} /><span>${option.label}<small>${option.hint}</small></span></label>
+			</div>
+		`;
+	}
 	if (option.kind === 'calibration') {
 		return html`
 			<div class="form__row">

@@ -35,10 +35,10 @@ PLAIN_WORDS = """
     empty engine enrol ephemeral errors estimator evaluate event events executors existence export exports facets
     facts fair faults fields figure figures files finder finite first fit fixture folder folders form format formats
     frozen gestures give glossary gold grass grid guess guide guideline guidelines hand header headers heat help hide
-    histograms history hit home hooks hosts idempotency identity ids if image images import imports info init insert
+    histograms history hit home hooks hosts idempotency identity ids if image images import imports index indexing info init insert
     insight invitation invitations invite items jaccard join joins json kept kernels key keys known konva last latest
     lazy lease leases least leftovers legend lens lesson lessons letter like limits links list listing live local
-    locks login logins lone look loupe mail main maintenance many map markdown marks match matches matrix me
+    locks login logins lone look loupe mail main maintenance many map markdown marks match matches matrix me measures
     membership mentions menu merge messages metrics migrate mini model name names navigation needs neighbours notice
     nudge numbers object observability on open openapi opened options order origin other output overlap own ownership
     packing page pages paint palette panel parameters parquet parse parts past patch path pen people pins pitch

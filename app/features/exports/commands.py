@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -26,7 +27,7 @@ from app.terminal.options import (
     read_settings,
 )
 from app.terminal.server import connected, given_server
-from app.terminal.terminal import complain, print_export, print_import, show_progress
+from app.terminal.terminal import complain, print_export, print_import, say, show_progress
 
 if TYPE_CHECKING:
     from app.config import Settings
@@ -82,6 +83,10 @@ def import_(
             "{instant}_{camera}.jpg; default: each is one.",
         ),
     ] = "",
+    propose: Annotated[
+        bool,
+        typer.Option("--propose/--no-propose", help="frames: propose cameras for them afterwards."),
+    ] = True,
     policy: Annotated[
         str | None,
         typer.Option(
@@ -117,6 +122,7 @@ def import_(
             "size": None if size is None else [size.width, size.height],
             **({"ball_category": ball_category} if ball_category else {}),
             **({"grouping": group_by} if group_by else {}),
+            **({} if propose else {"propose": False}),
         }
         with connected(server) as client, show_progress("Importing") as progress:
             values, nothing = remote_files.import_values(
@@ -144,6 +150,7 @@ def import_(
         frames=None if frames is None else _root(settings, frames),
         ball_category=ball_category,
         grouping=group_by,
+        propose=propose,
     )
     source.check(policy=policy is not None)
     chosen = read_policy_option(policy or "paper")
@@ -156,6 +163,19 @@ def import_(
     if not imported.something:
         complain(*imported.nothing_read())
         raise typer.Exit(1)
+    if format_ == "frames" and propose and not dry_run:
+        _propose(dataset, settings, silent=json_)
+
+
+def _propose(dataset: str, settings: Settings, *, silent: bool) -> None:
+    """Propose cameras for pictures that were imported; Ctrl+C keeps what was found until then."""
+    from app.features.jobs.run import ending
+    from app.features.paint.proposals import propose_views
+
+    with opened_store(settings) as store, show_progress("Proposing cameras") as progress:
+        run = propose_views(store, dataset, progress=progress)
+    if not silent:
+        say(ending("proposals", asdict(run)) or "")
 
 
 def _usual_policy(format_: str) -> str | None:

@@ -47,7 +47,7 @@ class ImportRequest:
         lines: The same for ISSIA's line files, or None.
         frames: The same for a list of frames, or None.
         options: ``calibration``, ``frame_offset``, ``flipped``, ``size`` ([width, height]),
-            ``ball_category``, ``grouping``.
+            ``ball_category``, ``grouping``, ``propose``.
         policy: Name of a shipped one for a dataset that is made; None: as its pictures suggest.
     """
 
@@ -226,6 +226,8 @@ def _following(
     found = get_dataset_head(store, request.dataset)
     solve, paint = request_solve(jobs, store, found.id, actor=actor), None
     if request.format == "frames":
+        if not request.options.get("propose", True):
+            return {"solve_job": solve.id}
         proposals = PROPOSALS.request(jobs, store, found.id, None, actor=actor)
         return {"solve_job": solve.id, "proposals_job": proposals.id}
     if found.policy.calibration.source == "paint" and has_pictures(store, found.id):
@@ -294,6 +296,7 @@ def source_of(settings: Settings, request: ImportRequest) -> Source:
         name=name,
         ball_category=options.get("ball_category", ""),
         grouping=options.get("grouping", ""),
+        propose=options.get("propose", True),
     )
     source.check(policy=request.policy is not None)
     return source

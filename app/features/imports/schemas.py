@@ -70,6 +70,9 @@ class ImportOptions(BaseModel):
         description="frames: which pictures are one group: `folder`, or a pattern of their names such "
         "as `{instant}_{camera}.jpg`; empty: each picture is a group.",
     )
+    propose: StrictBool = Field(
+        default=True, description="frames: whether a job proposes cameras for them afterwards."
+    )
     lines: ImportPlace | None = Field(
         default=None, description="ISSIA: line files of the static cameras."
     )

@@ -53,6 +53,7 @@ USERS: Mapping[str, tuple[str, ...]] = {
     "flipped": STATIC,
     "ball_category": ("coco",),
     "grouping": ("frames",),
+    "propose": ("frames",),
     "frames": _OF_GROUPS,
     "policy": _OF_GROUPS,
 }
@@ -61,6 +62,7 @@ _TYPED = {
     "ball_category": "--ball-category",
     "frame_offset": "--frame-offset",
     "grouping": "--group-by",
+    "propose": "--no-propose",
     "flipped": "--flip",
 }
 
@@ -127,6 +129,7 @@ class Source:
         name: What people call it; the log keeps it. Empty: the path.
         ball_category: COCO: name or id of the category that is the ball; empty: by its name.
         grouping: Pictures: which are one group (``frames_reader``); empty: each is one.
+        propose: Pictures: whether cameras are proposed for them once they are imported.
     """
 
     format: str
@@ -140,6 +143,7 @@ class Source:
     name: str = ""
     ball_category: str = ""
     grouping: str = ""
+    propose: bool = True
 
     def check(self, *, policy: bool = False) -> None:
         """Refuse an option that the format does not use.

@@ -80,7 +80,8 @@ def _of_dataset(
         wanted = sizes_asked(found, match, accept=accept, size=size)
         if not wanted:
             return found
-        return change_pitches(store, dataset, wanted, if_match=found.etag, actor=acting())
+        with store.write() as session:
+            return change_pitches(session, dataset, wanted, if_match=found.etag, actor=acting())
 
 
 def _print(found: DatasetPitches, match: str | None, json_: bool) -> None:
@@ -179,7 +180,10 @@ def _pictures_of_dataset(
         found = estimate_pictures(store, dataset, executor, progress)
         chosen = need_match(found, match, dataset)
         wanted = pictures_asked(chosen, accept=accept, as_taken=as_taken)
-        changed = change_pictures(store, dataset, wanted, actor=acting()) if wanted else 0
+        changed = 0
+        if wanted:
+            with store.write() as session:
+                changed = change_pictures(session, dataset, wanted, actor=acting())
     if json_:
         print_json([{**_values(item), "changed": item.match in wanted} for item in chosen])
         return
@@ -252,9 +256,8 @@ def positions(
             )
     else:
         with opened_store() as store:
-            found = (
-                take_back_positions(store, dataset, match or "", actor=acting())
-                if undo
-                else get_positions(store, dataset)
-            )
+            if undo:
+                with store.write() as session:
+                    take_back_positions(session, dataset, match, actor=acting())
+            found = get_positions(store, dataset)
     print_sentences(of_match(found.items, match), json_)

@@ -5,8 +5,9 @@ Each of them solves what it leaves stale.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 from app.db.idempotency import without_response
 from app.db.json_columns import Json
@@ -20,23 +21,25 @@ from app.features.datasets.service import (
     get_dataset_head,
     require_matches,
 )
-from app.features.groups.ball_noise import give_factors
 from app.features.groups.codecs import picture_to_json
 from app.features.jobs.queries import Job
 from app.features.jobs.records import need_job
 from app.features.jobs.run import JobProgress, Work, counting
 from app.features.jobs.service import Jobs
-from app.features.match_estimates.pictures import apply_pictures, estimate_pictures
+from app.features.match_estimates.pictures import estimate_pictures
 from app.features.match_estimates.positions import (
-    apply_take_back,
     require_sharable,
     share_positions,
+    take_back_positions,
 )
-from app.features.match_estimates.rig import accept, adjustable, proposal_values, propose, take_back
-from app.features.policies.noise import Noise, accept_noise
-from app.features.policies.service import read_policy
-from app.features.solve.jobs import request_solve, solve_after
-from app.soccer.picture import PictureGeometry
+from app.features.match_estimates.rig import (
+    accept,
+    proposal_values,
+    propose,
+    require_adjustable,
+    take_back,
+)
+from app.features.solve.jobs import change_and_solve, request_solve
 
 
 @dataclass(frozen=True)
@@ -47,22 +50,26 @@ class MatchesAsked:
         jobs: Where it runs, and where what follows from it is queued.
         store: The database.
         dataset_id: The dataset.
-        match: By name; None: all.
+        request: As its row keeps it, the same after a restart: ``match`` by name (none: all), and
+            what else its kind takes.
         actor: Who wants it.
-        run: The job's name for itself, the same after a restart; None unless its kind has one.
     """
 
     jobs: Jobs
     store: Store
     dataset_id: int
-    match: str | None
+    request: dict[str, Json]
     actor: str
-    run: str | None = None
 
     @property
     def matches(self) -> list[str] | None:
         """The matches by name; None: all."""
-        return None if self.match is None else [self.match]
+        match = self.request.get("match")
+        return None if match is None else [match]
+
+    def solve(self) -> None:
+        """Solve what it leaves stale, soon."""
+        request_solve(self.jobs, self.store, self.dataset_id, actor=self.actor)
 
 
 def with_matches(store: Store, dataset: str | int, matches: Collection[str] | None) -> DatasetHead:
@@ -75,6 +82,30 @@ def with_matches(store: Store, dataset: str | int, matches: Collection[str] | No
         return require_matches(session, dataset, matches)
 
 
+class TakeBack(Protocol):
+    """Takes back what jobs of a kind gave last.
+
+    Args:
+        session: A write session.
+        dataset: Id of the dataset.
+        match: By name; None: all.
+        actor: Who wants it.
+        stopped: Jobs that waited or ran, and end with it: the last of them is what is taken back
+            as far as it came, and where none came to anything no earlier one is.
+    """
+
+    def __call__(
+        self,
+        session: Session,
+        dataset: int,
+        match: str | None,
+        /,
+        *,
+        actor: str,
+        stopped: Sequence[Job],
+    ) -> None: ...
+
+
 @dataclass(frozen=True)
 class MatchJob:
     """A kind of job over one match of a dataset, or all.
@@ -84,7 +115,9 @@ class MatchJob:
         title: What it is, for people; braces stand for the dataset's name.
         work: Does it, and returns its result.
         require: The dataset, unless such a job is refused.
+        undo: Takes its work back, where that can be.
         has_runs: Whether what a job gives bears a name, by which it is taken back.
+        resumes: Whether the next server goes on with it; its work leaves alone what is done.
     """
 
     kind: str
@@ -93,131 +126,74 @@ class MatchJob:
     require: Callable[[Store, str | int, Collection[str] | None], Dataset | DatasetHead] = (
         with_matches
     )
+    undo: TakeBack | None = None
     has_runs: bool = False
+    resumes: bool = True
 
     def request(
-        self, jobs: Jobs, store: Store, dataset: str | int, match: str | None, *, actor: str
-    ) -> Job:
-        """Have it done soon, in one match or all.
-
-        Raises:
-            ConflictError, NotFoundError: As ``require`` does, at once.
-        """
-        found = self.require(store, dataset, None if match is None else [match])
-        run = now() if self.has_runs else None
-        asked = MatchesAsked(jobs, store, found.id, match, actor, run)
-        return jobs.submit(
-            self.kind,
-            self.title.format(found.name),
-            self._work(asked),
-            dataset_id=found.id,
-            actor=actor,
-            request={"match": match} if run is None else {"match": match, "run": run},
-        )
-
-    def resume(self, jobs: Jobs, store: Store) -> None:
-        """Let what an earlier server was at go on; its work leaves alone what is done."""
-        jobs.resumes(self.kind, self._work_of(jobs, store))
-
-    def make(self, jobs: Jobs, store: Store) -> None:
-        """Let another process carry out what this one is asked for; after a death nothing goes on."""
-        jobs.makes(self.kind, self._work_of(jobs, store))
-
-    def _work_of(self, jobs: Jobs, store: Store) -> Callable[[Job], Work]:
-        def work_of(job: Job) -> Work:
-            match, run = job.request["match"], job.request.get("run")
-            return self._work(MatchesAsked(jobs, store, job.dataset_id or 0, match, job.actor, run))
-
-        return work_of
-
-    def take_back(
         self,
         jobs: Jobs,
         store: Store,
         dataset: str | int,
-        apply: Callable[[Session, int, list[Job]], list[Job]],
+        match: str | None = None,
         *,
         actor: str,
+        **beside: Json,
+    ) -> Job:
+        """Have it done soon, in one match or all; ``beside`` is what else its work is asked for.
+
+        Raises:
+            ReviewError: As ``require`` does, at once.
+        """
+        found = self.require(store, dataset, None if match is None else [match])
+        request = {"match": match, **beside, **({"run": now()} if self.has_runs else {})}
+        return jobs.submit(
+            self.kind,
+            self.title.format(found.name),
+            self._work(MatchesAsked(jobs, store, found.id, request, actor)),
+            dataset_id=found.id,
+            actor=actor,
+            request=request,
+        )
+
+    def take_up(self, jobs: Jobs, store: Store) -> None:
+        """Let another process carry out what this one is asked for, or the next one go on with it."""
+
+        def work_of(job: Job) -> Work:
+            return self._work(
+                MatchesAsked(jobs, store, job.dataset_id or 0, job.request, job.actor)
+            )
+
+        (jobs.resumes if self.resumes else jobs.makes)(self.kind, work_of)
+
+    def take_back(
+        self, jobs: Jobs, store: Store, dataset: str | int, match: str | None = None, *, actor: str
     ) -> Job:
         """Take back what such jobs gave, end those at it, and solve what that leaves stale, soon:
         all of it, or nothing.
 
-        Args:
-            jobs: Where they wait or run.
-            store: The database.
-            dataset: By name or id.
-            apply: Takes back from the dataset of an id, given the jobs that wait or run; returns
-                those of them that end.
-            actor: Who wants it.
+        Raises:
+            ConflictError, NotFoundError: As ``undo`` does.
         """
-        number = dataset_id(store, dataset)
+        number, undo = dataset_id(store, dataset), self.undo
+        assert undo is not None
         ended: list[int] = []
 
-        def change(session: Session, job: Job) -> Job:
+        def change(session: Session) -> None:
             present = [need_job(session, other) for other in jobs.ids_of(number, self.kind)]
-            ended.extend(item.id for item in apply(session, number, present))
+            wanted = (None, match)
+            stopped = [job for job in present if match is None or job.request["match"] in wanted]
+            undo(session, number, match, actor=actor, stopped=stopped)
+            ended.extend(job.id for job in stopped)
             # Whoever is at it waits for this transaction, and asks in the next whether to go on.
             jobs.end_with(session, ended)
-            return job
 
-        job = solve_after(jobs, store, number, change, actor=actor)
+        job = change_and_solve(jobs, store, number, change, actor=actor)
         jobs.cancel_each(ended)
         return job
 
     def _work(self, asked: MatchesAsked) -> Work:
         return lambda progress: self.work(asked, progress)
-
-
-def request_noise(jobs: Jobs, store: Store, noise: Noise, *, actor: str) -> Job:
-    """Judge a dataset by the noise that was estimated, and solve it, soon.
-
-    Raises:
-        StaleRevisionError: The policy is another by now.
-    """
-    state = read_policy(store, noise.dataset_id)
-
-    def change(session: Session, job: Job) -> Job:
-        accept_noise(session, noise, state, actor)
-        return job
-
-    return solve_after(jobs, store, noise.dataset_id, change, actor=actor)
-
-
-def request_noise_back(jobs: Jobs, store: Store, dataset: str | int, *, actor: str) -> Job:
-    """Take all balls to be as noisy as their dataset's, and solve it, soon.
-
-    Raises:
-        NotFoundError: There is no such dataset.
-    """
-    number = dataset_id(store, dataset)
-
-    def change(session: Session, job: Job) -> Job:
-        give_factors(session, number, (), actor)
-        return job
-
-    return solve_after(jobs, store, number, change, actor=actor)
-
-
-def request_pictures(
-    jobs: Jobs,
-    store: Store,
-    dataset: str | int,
-    wanted: Mapping[str, PictureGeometry | None],
-    *,
-    actor: str,
-) -> Job:
-    """Say what main cameras' pictures of matches are, and solve what that leaves stale, soon.
-
-    Raises:
-        NotFoundError: There is no such dataset or match.
-    """
-    number = dataset_id(store, dataset)
-
-    def change(session: Session, job: Job) -> Job:
-        apply_pictures(session, number, wanted, actor=actor)
-        return job
-
-    return solve_after(jobs, store, number, change, actor=actor)
 
 
 def _estimate(asked: MatchesAsked, progress: JobProgress) -> Json:
@@ -243,27 +219,6 @@ def _estimate(asked: MatchesAsked, progress: JobProgress) -> Json:
 PICTURES = MatchJob("pictures", "Estimate the pictures of {}", _estimate)
 
 
-def take_positions_back(
-    jobs: Jobs, store: Store, dataset: str | int, match: str, *, actor: str
-) -> Job:
-    """Take shared positions of a match back, and solve its dataset, soon.
-
-    A share of it, or of all matches, that waits or runs is cancelled and gives nothing afterwards;
-    it is the last one.
-
-    Raises:
-        ConflictError, NotFoundError: As ``editing.positions.take_back_positions`` does.
-    """
-
-    def apply(session: Session, number: int, present: list[Job]) -> list[Job]:
-        ended = [job for job in present if job.request["match"] in (None, match)]
-        stopped = [job.started for job in ended]
-        apply_take_back(session, number, match, actor=actor, stopped=stopped)
-        return ended
-
-    return POSITIONS.take_back(jobs, store, dataset, apply, actor=actor)
-
-
 def _share(asked: MatchesAsked, progress: JobProgress) -> Json:
     try:
         with asked.jobs.pool() as executor:
@@ -278,54 +233,41 @@ def _share(asked: MatchesAsked, progress: JobProgress) -> Json:
             )
     finally:
         # What some matches were given before it ended is solved, however it ended.
-        request_solve(asked.jobs, asked.store, asked.dataset_id, actor=asked.actor)
+        asked.solve()
     return {"matches": len(found.items), "shared": sum(item.shared for item in found.items)}
 
 
+# Begun again, a share would be one more to take back.
 POSITIONS = MatchJob(
-    "positions", "Share the main cameras' positions of {}", _share, require_sharable
+    "positions",
+    "Share the main cameras' positions of {}",
+    _share,
+    require_sharable,
+    take_back_positions,
+    resumes=False,
 )
 
 
-KIND = "rig"
+def _adjust(asked: MatchesAsked, progress: JobProgress) -> Json:
+    """The proposal and what of it was saved; ``what`` is asked for as ``rig.accept`` takes it (none:
+    nothing), with the ``inputs`` of the proposal that a person saw: no other one is saved."""
+    what, inputs = asked.request["what"], asked.request["inputs"]
+    progress(0, None, "Adjusting cameras to lines and balls.")
+    with asked.jobs.pool() as executor:
+        proposed = propose(asked.store, asked.dataset_id, executor=executor)
+    progress.check()
+    if what is not None:
+        if inputs != proposed.inputs:
+            raise ConflictError(
+                "balls, lines or cameras have changed since that proposal",
+                hint="Look at a new one, and accept that.",
+            )
+        accept(asked.store, proposed, what, actor=asked.actor)
+        asked.solve()
+    return {**proposal_values(proposed), "accepted": what}
 
 
-def request_rig(
-    jobs: Jobs, store: Store, dataset: str, *, what: str | None, inputs: str | None, actor: str
-) -> Job:
-    """Adjust the static cameras of a dataset, soon; what can be refused is refused at once.
-
-    Args:
-        jobs: Where it is queued.
-        store: The database.
-        dataset: Name or id.
-        what: What of the proposal is saved, as ``editing.rig.accept`` takes it; None: nothing.
-        inputs: Of the proposal that a person saw; no other one is saved.
-        actor: Who wants it.
-
-    Raises:
-        InputError, ConflictError: As ``editing.rig.adjustable`` does.
-    """
-    found = get_dataset_head(store, dataset)
-    adjustable(store, found.id)
-    return jobs.submit(
-        KIND,
-        f"Adjust the cameras of {found.name}",
-        rig_work(jobs, store, found.id, what, inputs, actor),
-        dataset_id=found.id,
-        actor=actor,
-        request={"what": what, "inputs": inputs},
-    )
-
-
-def make_rigs(jobs: Jobs, store: Store) -> None:
-    """Let another process adjust the cameras than the one that was asked."""
-
-    def work_of(job: Job) -> Work:
-        what, inputs = job.request["what"], job.request["inputs"]
-        return rig_work(jobs, store, job.dataset_id or 0, what, inputs, job.actor)
-
-    jobs.makes(KIND, work_of)
+RIG = MatchJob("rig", "Adjust the cameras of {}", _adjust, require_adjustable, resumes=False)
 
 
 def take_rig_back(jobs: Jobs, store: Store, dataset: str, *, actor: str) -> int:
@@ -339,26 +281,3 @@ def take_rig_back(jobs: Jobs, store: Store, dataset: str, *, actor: str) -> int:
     with without_response():
         request_solve(jobs, store, found.id, actor=actor)
     return count
-
-
-def rig_work(
-    jobs: Jobs, store: Store, dataset_id: int, what: str | None, inputs: str | None, actor: str
-) -> Work:
-    """The work itself; its result is the proposal and what of it was saved."""
-
-    def work(progress: JobProgress) -> Json:
-        progress(0, None, "Adjusting cameras to lines and balls.")
-        with jobs.pool() as executor:
-            proposed = propose(store, dataset_id, executor=executor)
-        progress.check()
-        if what is not None:
-            if inputs != proposed.inputs:
-                raise ConflictError(
-                    "balls, lines or cameras have changed since that proposal",
-                    hint="Look at a new one, and accept that.",
-                )
-            accept(store, proposed, what, actor=actor)
-            request_solve(jobs, store, dataset_id, actor=actor)
-        return {**proposal_values(proposed), "accepted": what}
-
-    return work

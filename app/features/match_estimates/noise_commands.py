@@ -43,7 +43,8 @@ def noise(
         raise typer.BadParameter("--apply and --alike contradict each other")
     with opened_store() as store:
         if alike:
-            take_noise_back(store, dataset, actor=acting())
+            with store.write() as session:
+                take_noise_back(session, dataset, actor=acting())
         found = read_noise(store, dataset)
         policy = apply_noise(store, found, actor=acting()).policy if apply else None
     if json_:

@@ -118,27 +118,6 @@ def estimate_pictures(
     return sorted(states, key=lambda state: state.match)
 
 
-def change_pictures(
-    store: Store,
-    dataset: str | int,
-    wanted: Mapping[str, PictureGeometry | None],
-    *,
-    actor: str,
-) -> int:
-    """Say what the main cameras' pictures of matches are; how many views that changed.
-
-    Their groups are stale until they are solved again. Each gets an edit that it can undo.
-
-    Args:
-        store: The database.
-        dataset: Name or id.
-        wanted: Pictures by match; None: as they were taken.
-        actor: Who says so.
-    """
-    with store.write() as session:
-        return apply_pictures(session, dataset, wanted, actor=actor)
-
-
 def pictures_asked(
     chosen: Iterable[PictureState], *, accept: bool = False, as_taken: bool = False
 ) -> dict[str, PictureGeometry | None]:
@@ -154,14 +133,22 @@ def pictures_asked(
     return {item.match: item.proposed for item in chosen if accept and item.proposed}
 
 
-def apply_pictures(
+def change_pictures(
     session: Session,
     dataset: str | int,
     wanted: Mapping[str, PictureGeometry | None],
     *,
     actor: str,
 ) -> int:
-    """``change_pictures`` within a write session.
+    """Say what the main cameras' pictures of matches are; how many views that changed.
+
+    Their groups are stale until they are solved again. Each gets an edit that it can undo.
+
+    Args:
+        session: A write session.
+        dataset: Name or id.
+        wanted: Pictures by match; None: as they were taken.
+        actor: Who says so.
 
     Raises:
         NotFoundError: There is no such dataset or match.

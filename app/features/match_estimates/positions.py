@@ -23,6 +23,7 @@ from app.features.groups.edit import Edit, SetPositions
 from app.features.groups.edit_codec import edit_from_json
 from app.features.groups.group_edits import give_edits
 from app.features.groups.queries import StoredGroup, read_groups
+from app.features.jobs.queries import Job
 from app.features.match_estimates.picture_queries import (
     POSITION,
     MatchPositions,
@@ -191,39 +192,36 @@ def require_sharable(
 
 
 def take_back_positions(
-    store: Store, dataset: str | int, match: str, *, actor: str
-) -> DatasetPositions:
+    session: Session,
+    dataset: str | int,
+    match: str | None,
+    *,
+    actor: str,
+    stopped: Sequence[Job] = (),
+) -> None:
     """Give a match the positions that it had before they were shared last.
 
     Once more takes back the share before that one.
+
+    Args:
+        session: A write session.
+        dataset: Name or id.
+        match: Its name.
+        actor: Who wants it.
+        stopped: Shares that were stopped for it. One that came to the match is taken back, and
+            where none did no earlier one is.
 
     Raises:
         ConflictError: Nothing is shared, or all of it is taken back.
         NotFoundError: There is no such dataset or match.
     """
-    with store.write() as session:
-        apply_take_back(session, dataset, match, actor=actor)
-    return get_positions(store, dataset)
-
-
-def apply_take_back(
-    session: Session,
-    dataset: str | int,
-    match: str,
-    *,
-    actor: str,
-    stopped: Sequence[str | None] = (),
-) -> None:
-    """``take_back_positions`` within a write session.
-
-    Args:
-        stopped: When shares that were stopped for it had begun; None: never. One that came to the
-            match is taken back, and where none did no earlier one is.
-    """
+    match = match or ""
     found = read_dataset_head(session, dataset)
     _chosen(session, found, [match])
     entries = last_share(session, found.id, match)
-    if stopped and not any(begun and entries and begun <= entries[0].at for begun in stopped):
+    if stopped and not any(
+        job.started and entries and job.started <= entries[0].at for job in stopped
+    ):
         return
     if not entries:
         raise ConflictError(f"nothing is shared in {match}")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
@@ -12,7 +12,7 @@ from app.db.log import read_entry
 from app.db.session import Session
 from app.db.store import Store
 from app.errors import ConflictError, InputError
-from app.features.datasets.service import need_dataset, read_dataset_head
+from app.features.datasets.service import DatasetHead, need_dataset, read_dataset_head
 from app.features.groups.codecs import lines_to_json
 from app.features.groups.digest import digest
 from app.features.groups.edit import SetStationCamera
@@ -135,6 +135,16 @@ def adjustable(store: Store, dataset: str | int) -> tuple[list[StationState], Pi
             hint="Cameras are adjusted together where they look at one pitch.",
         )
     return states, pitches.pop(), found.policy
+
+
+def require_adjustable(
+    store: Store, dataset: str | int, _matches: Collection[str] | None = None
+) -> DatasetHead:
+    """The dataset, unless its cameras cannot be adjusted; raises as ``adjustable`` does."""
+    with store.read() as session:
+        found = read_dataset_head(session, dataset)
+    adjustable(store, found.id)
+    return found
 
 
 def accept(store: Store, proposed: ProposedRig, what: str, *, actor: str) -> None:

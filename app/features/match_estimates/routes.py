@@ -6,30 +6,23 @@ from typing import Annotated
 
 from fastapi import APIRouter, Query, Response
 
+from app.db.session import Session
 from app.features.jobs.queries import Job
-from app.features.match_estimates.jobs import (
-    PICTURES,
-    POSITIONS,
-    request_noise,
-    request_noise_back,
-    request_pictures,
-    request_rig,
-    take_positions_back,
-    take_rig_back,
-)
-from app.features.match_estimates.pictures import read_pictures
+from app.features.match_estimates.jobs import PICTURES, POSITIONS, RIG, take_rig_back
+from app.features.match_estimates.pictures import change_pictures, read_pictures
 from app.features.match_estimates.positions import get_positions
 from app.features.match_estimates.schemas import (
     MatchPictureChange,
     MatchPicturesDocument,
+    MatchRequest,
     NoiseDocument,
-    PictureEstimateRequest,
-    PositionsRequest,
     RigRequest,
     RigTakenBack,
     SharedPositionsDocument,
 )
-from app.features.policies.noise import Noise
+from app.features.policies import noise as noises
+from app.features.policies.service import read_policy
+from app.features.solve.jobs import change_and_solve
 from app.http.cursor import paged
 from app.http.deps import Actor, AppServices, AppStore, DatasetPath
 from app.http.job_responses import by_job, job_answer
@@ -46,28 +39,21 @@ def list_positions(dataset: DatasetPath, store: AppStore) -> SharedPositionsDocu
     return SharedPositionsDocument.model_validate(get_positions(store, dataset))
 
 
-@positions_router.post(
-    "",
-    operation_id="sharePositions",
-    **by_job(404, 409, 413, 415),
-)
+@positions_router.post("", operation_id="sharePositions", **by_job(404, 409, 413, 415))
 @responds(job_answer)
 def share_positions(
-    dataset: DatasetPath, request: PositionsRequest, services: AppServices, actor: Actor
+    dataset: DatasetPath, request: MatchRequest, services: AppServices, actor: Actor
 ) -> Job:
     """Estimate where main cameras stand and give each picture what its match's others say of it.
 
-    Their groups are solved again. An edit of lines never renews it; this does. 409 while the
-    policy does not use it.
+    Without a match it is shared in all where what it was estimated from has changed. Their groups
+    are solved again. An edit of lines never renews it; this does. 409 while the policy does not
+    use it.
     """
     return POSITIONS.request(services.jobs, services.store, dataset, request.match, actor=actor)
 
 
-@positions_router.delete(
-    "",
-    operation_id="takePositionsBack",
-    **by_job(404, 409),
-)
+@positions_router.delete("", operation_id="takePositionsBack", **by_job(404, 409))
 @responds(job_answer)
 def take_back_positions(
     dataset: DatasetPath,
@@ -79,17 +65,13 @@ def take_back_positions(
 
     Once more takes back the share before that one; 409 when nothing is shared any more.
     """
-    return take_positions_back(services.jobs, services.store, dataset, match, actor=actor)
+    return POSITIONS.take_back(services.jobs, services.store, dataset, match, actor=actor)
 
 
 rig_router = APIRouter(tags=["stations"])
 
 
-@rig_router.post(
-    "/datasets/{dataset}/rig",
-    operation_id="adjustRig",
-    **by_job(404, 409, 413, 415),
-)
+@rig_router.post("/datasets/{dataset}/rig", operation_id="adjustRig", **by_job(404, 409, 413, 415))
 @responds(job_answer)
 def adjust_rig(
     dataset: DatasetPath, request: RigRequest, services: AppServices, actor: Actor
@@ -100,14 +82,8 @@ def adjust_rig(
     were used and on instants that were held out. With `accept` and the `inputs` of the
     proposal that was looked at it is saved as an edit of each camera.
     """
-    return request_rig(
-        services.jobs,
-        services.store,
-        dataset,
-        what=request.accept,
-        inputs=request.inputs,
-        actor=actor,
-    )
+    asked = {"what": request.accept, "inputs": request.inputs}
+    return RIG.request(services.jobs, services.store, dataset, actor=actor, **asked)
 
 
 def _taken_back(count: int) -> Response:
@@ -132,7 +108,7 @@ noise_router = APIRouter(prefix="/datasets/{dataset}/noise", tags=["policies"])
 @noise_router.get(
     "", operation_id="getNoise", response_model=NoiseDocument, responses=responses(404)
 )
-def get_noise(dataset: DatasetPath, services: AppServices) -> Noise:
+def get_noise(dataset: DatasetPath, services: AppServices) -> noises.Noise:
     """Sigma of balls, given cameras and field lines with intervals, and what the policy says.
 
     Changes nothing: to judge by the estimates, `POST` here, or send `values` alone to the dataset's
@@ -141,33 +117,34 @@ def get_noise(dataset: DatasetPath, services: AppServices) -> Noise:
     return services.noises.read(dataset)
 
 
-@noise_router.post(
-    "",
-    operation_id="acceptNoise",
-    **by_job(404, 412),
-)
+@noise_router.post("", operation_id="acceptNoise", **by_job(404, 412))
 @responds(job_answer)
 def accept_noise(dataset: DatasetPath, services: AppServices, actor: Actor) -> Job:
     """Judge by the estimates: `values` go into the policy, `factors` to the balls; the job solves.
 
     A ball that is placed later has the factor of its camera and of who places it.
     """
-    found = services.noises.read(dataset)
-    return request_noise(services.jobs, services.store, found, actor=actor)
+    found, store = services.noises.read(dataset), services.store
+    state = read_policy(store, found.dataset_id)
+
+    def change(session: Session) -> None:
+        noises.accept_noise(session, found, state, actor)
+
+    return change_and_solve(services.jobs, store, found.dataset_id, change, actor=actor)
 
 
-@noise_router.delete(
-    "",
-    operation_id="takeNoiseBack",
-    **by_job(404),
-)
+@noise_router.delete("", operation_id="takeNoiseBack", **by_job(404))
 @responds(job_answer)
 def take_noise_back(dataset: DatasetPath, services: AppServices, actor: Actor) -> Job:
     """Take the balls of all cameras and people to be as noisy as the dataset's; the job solves.
 
     The policy stays as it is.
     """
-    return request_noise_back(services.jobs, services.store, dataset, actor=actor)
+
+    def change(session: Session) -> None:
+        noises.take_noise_back(session, dataset, actor=actor)
+
+    return change_and_solve(services.jobs, services.store, dataset, change, actor=actor)
 
 
 pictures_router = APIRouter(prefix="/datasets/{dataset}/pictures", tags=["datasets"])
@@ -180,14 +157,10 @@ def list_match_pictures(dataset: DatasetPath, store: AppStore) -> MatchPicturesD
     return MatchPicturesDocument.model_validate({"items": read_pictures(store, dataset)})
 
 
-@pictures_router.post(
-    "",
-    operation_id="estimateMatchPictures",
-    **by_job(404, 413, 415),
-)
+@pictures_router.post("", operation_id="estimateMatchPictures", **by_job(404, 413, 415))
 @responds(job_answer)
 def estimate_match_pictures(
-    dataset: DatasetPath, request: PictureEstimateRequest, services: AppServices, actor: Actor
+    dataset: DatasetPath, request: MatchRequest, services: AppServices, actor: Actor
 ) -> Job:
     """Look at up to thirty frames of each match together; changes nothing.
 
@@ -197,11 +170,7 @@ def estimate_match_pictures(
     return PICTURES.request(services.jobs, services.store, dataset, request.match, actor=actor)
 
 
-@pictures_router.patch(
-    "",
-    operation_id="setMatchPicture",
-    **by_job(404, 413, 415),
-)
+@pictures_router.patch("", operation_id="setMatchPicture", **by_job(404, 413, 415))
 @responds(job_answer)
 def set_match_picture(
     dataset: DatasetPath, change: MatchPictureChange, services: AppServices, actor: Actor
@@ -211,6 +180,8 @@ def set_match_picture(
     Each group gets an edit that it can undo. Replays are left alone: each shot has its own.
     """
     picture = None if change.picture is None else change.picture.picture()
-    return request_pictures(
-        services.jobs, services.store, dataset, {change.match: picture}, actor=actor
-    )
+
+    def changed(session: Session) -> None:
+        change_pictures(session, dataset, {change.match: picture}, actor=actor)
+
+    return change_and_solve(services.jobs, services.store, dataset, changed, actor=actor)

@@ -29,8 +29,8 @@ class MatchPicturesDocument(ListDocument[MatchPictureDocument]):
     """The pictures of a dataset's matches, by name of the match."""
 
 
-class PictureEstimateRequest(BaseModel):
-    """Estimate what was done to the pictures of matches."""
+class MatchRequest(BaseModel):
+    """Which matches a job is to look at."""
 
     model_config = ConfigDict(extra="forbid", json_schema_extra={"examples": [{}]})
 
@@ -73,19 +73,6 @@ class SharedPositionsDocument(ListDocument[MatchPositionDocument]):
     """The shared positions of a dataset's matches, by name of the match."""
 
     used: bool = Field(description="Whether the policy uses them: `calibration.share_position`.")
-
-
-class PositionsRequest(BaseModel):
-    """Share the position of main cameras with the pictures of their match."""
-
-    model_config = ConfigDict(extra="forbid", json_schema_extra={"examples": [{}]})
-
-    match: str | None = Field(
-        default=None,
-        min_length=1,
-        max_length=1000,
-        description="This match alone; null: all where what it was estimated from has changed.",
-    )
 
 
 class RigRequest(BaseModel):

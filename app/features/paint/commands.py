@@ -49,8 +49,9 @@ def paint(
         raise typer.BadParameter("show what was read or take it back, one at a time")
     with opened_store() as store:
         if undo:
-            found = take_back_paint(store, dataset, actor=acting())
-        elif show:
+            with store.write() as session:
+                take_back_paint(session, dataset, actor=acting())
+        if undo or show:
             found = get_paint(store, dataset)
         else:
             with show_progress("Reading paint") as progress:

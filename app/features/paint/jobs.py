@@ -5,39 +5,19 @@ from __future__ import annotations
 from dataclasses import asdict
 
 from app.db.json_columns import Json
-from app.db.session import Session
 from app.db.store import Store
 from app.features.datasets.service import dataset_id
-from app.features.jobs.queries import Job
 from app.features.jobs.run import JobProgress, counting
 from app.features.jobs.service import Jobs
 from app.features.match_estimates.jobs import MatchesAsked, MatchJob
 from app.features.paint.proposals import forget_proposals, propose_views
-from app.features.paint.service import apply_take_back, read_paint, require_readable
-from app.features.solve.jobs import request_solve
+from app.features.paint.service import read_paint, require_readable, take_back_paint
 
 TOLD = (
     *("views", "without_picture", "read"),
     *("painted", "no_paint", "paint_disagrees", "no_frame"),
 )
 """What a result counts of all matches."""
-
-
-def take_paint_back(jobs: Jobs, store: Store, dataset: str | int, *, actor: str) -> Job:
-    """Take the last reading of a dataset's paint back, and solve it, soon.
-
-    One that waits or runs is cancelled and gives nothing afterwards; it is the last one.
-
-    Raises:
-        ConflictError, NotFoundError: As ``editing.paint.take_back_paint`` does.
-    """
-
-    def apply(session: Session, number: int, present: list[Job]) -> list[Job]:
-        stopped = {job.request["run"] for job in present}
-        apply_take_back(session, number, actor=actor, stopped=stopped)
-        return present
-
-    return PAINT.take_back(jobs, store, dataset, apply, actor=actor)
 
 
 def _read(asked: MatchesAsked, progress: JobProgress) -> Json:
@@ -47,18 +27,23 @@ def _read(asked: MatchesAsked, progress: JobProgress) -> Json:
             asked.dataset_id,
             asked.matches,
             actor=asked.actor,
-            run=asked.run,
+            run=asked.request["run"],
             progress=counting(progress, "groups looked at"),
             require_wanted=progress.require_wanted,
         )
     finally:
         # What some groups were given before it ended is solved, however it ended.
-        request_solve(asked.jobs, asked.store, asked.dataset_id, actor=asked.actor)
+        asked.solve()
     return {name: sum(getattr(item, name) for item in found.items) for name in TOLD}
 
 
 PAINT = MatchJob(
-    "paint", "Read the paint of the pictures of {}", _read, require_readable, has_runs=True
+    "paint",
+    "Read the paint of the pictures of {}",
+    _read,
+    require_readable,
+    take_back_paint,
+    has_runs=True,
 )
 
 

@@ -14,11 +14,11 @@ from app.features.groups.view_paint import PaintQuestion, paint_question, propos
 from app.features.groups.view_routes import CLIENT_GONE, told_with_view
 from app.features.jobs.queries import Job
 from app.features.jobs.schemas import JobDocument
-from app.features.paint.jobs import PAINT, PROPOSALS, stop_and_forget, take_paint_back
+from app.features.match_estimates.schemas import MatchRequest
+from app.features.paint.jobs import PAINT, PROPOSALS, stop_and_forget
 from app.features.paint.proposals import get_group_proposals, get_proposals
 from app.features.paint.schemas import (
     DatasetPaintDocument,
-    DatasetPaintRequest,
     DatasetProposalsDocument,
     DatasetProposalsRequest,
     ForgottenProposalsDocument,
@@ -47,14 +47,10 @@ def list_paint(dataset: DatasetPath, store: AppStore) -> DatasetPaintDocument:
     return DatasetPaintDocument.model_validate(get_paint(store, dataset))
 
 
-@paint_router.post(
-    "",
-    operation_id="readDatasetPaint",
-    **by_job(404, 409, 413, 415),
-)
+@paint_router.post("", operation_id="readDatasetPaint", **by_job(404, 409, 413, 415))
 @responds(job_answer)
 def read_paint(
-    dataset: DatasetPath, request: DatasetPaintRequest, services: AppServices, actor: Actor
+    dataset: DatasetPath, request: MatchRequest, services: AppServices, actor: Actor
 ) -> Job:
     """Read the paint of pictures and give it to their groups, which are solved again.
 
@@ -64,11 +60,7 @@ def read_paint(
     return PAINT.request(services.jobs, services.store, dataset, request.match, actor=actor)
 
 
-@paint_router.delete(
-    "",
-    operation_id="takeDatasetPaintBack",
-    **by_job(404, 409),
-)
+@paint_router.delete("", operation_id="takeDatasetPaintBack", **by_job(404, 409))
 @responds(job_answer)
 def take_back_paint(dataset: DatasetPath, services: AppServices, actor: Actor) -> Job:
     """Give all groups what they had before paint was read last; the job solves them.
@@ -76,7 +68,7 @@ def take_back_paint(dataset: DatasetPath, services: AppServices, actor: Actor) -
     Once more takes back the reading before that one; 409 when there is none any more. A reading
     that waits or runs is cancelled, and is the one that is taken back, as far as it came.
     """
-    return take_paint_back(services.jobs, services.store, dataset, actor=actor)
+    return PAINT.take_back(services.jobs, services.store, dataset, actor=actor)
 
 
 view_paint_router = APIRouter(prefix="/views", tags=["views"])

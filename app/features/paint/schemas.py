@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 from pydantic import BaseModel, ConfigDict, Field, StrictBool
 
 from app.features.groups.schemas import LineDocuments, LineEdits, Point, lines_document
+from app.features.match_estimates.schemas import MatchRequest
 from app.features.paint.proposal_queries import Proposal
 from app.http.documents import Document, ListDocument
 from app.paint.view_paint import ViewPaint
@@ -41,19 +42,6 @@ class DatasetPaintDocument(ListDocument[MatchPaintDocument]):
     """What was read of the paint in a dataset's pictures, by name of the match."""
 
     used: bool = Field(description="Whether the policy uses it: `calibration.source`.")
-
-
-class DatasetPaintRequest(BaseModel):
-    """Read the paint of pictures."""
-
-    model_config = ConfigDict(extra="forbid", json_schema_extra={"examples": [{}]})
-
-    match: str | None = Field(
-        default=None,
-        min_length=1,
-        max_length=1000,
-        description="This match alone; null: all.",
-    )
 
 
 Spot = Annotated[list[float], Field(min_length=2, max_length=2)]
@@ -163,14 +151,9 @@ class DatasetProposalsDocument(ListDocument[MatchProposalsDocument]):
     """What was proposed for the views of a dataset, by name of the match."""
 
 
-class DatasetProposalsRequest(BaseModel):
+class DatasetProposalsRequest(MatchRequest):
     """Look for cameras to propose."""
 
-    model_config = ConfigDict(extra="forbid", json_schema_extra={"examples": [{}]})
-
-    match: str | None = Field(
-        default=None, min_length=1, max_length=1000, description="This match alone; null: all."
-    )
     dry_run: StrictBool = Field(default=False, description="Count, and look at nothing.")
 
 

@@ -26,6 +26,7 @@ from app.features.groups.pictures import (
     read_view_paint,
 )
 from app.features.groups.queries import StoredGroup, read_groups
+from app.features.jobs.queries import Job
 from app.features.paint.queries import (
     PAINT,
     MatchPaint,
@@ -205,32 +206,33 @@ def require_readable(
     return found
 
 
-def take_back_paint(store: Store, dataset: str | int, *, actor: str) -> DatasetPaint:
+def take_back_paint(
+    session: Session,
+    dataset: str | int,
+    _match: str | None = None,
+    *,
+    actor: str,
+    stopped: Sequence[Job] = (),
+) -> None:
     """Give the groups of a dataset what they had before paint was read last.
 
     Once more takes back the reading before that one.
+
+    Args:
+        session: A write session.
+        dataset: Name or id.
+        actor: Who wants it.
+        stopped: Readings that were stopped for it: the last of those is taken back as far as it
+            came, and where none came to anything no earlier one is.
 
     Raises:
         ConflictError: Nothing was read, or all of it is taken back.
         NotFoundError: There is no such dataset.
     """
-    with store.write() as session:
-        apply_take_back(session, dataset, actor=actor)
-    return get_paint(store, dataset)
-
-
-def apply_take_back(
-    session: Session, dataset: str | int, *, actor: str, stopped: Collection[str] = ()
-) -> None:
-    """``take_back_paint`` within a write session.
-
-    Args:
-        stopped: Readings that were stopped for it: the last of those is taken back as far as it
-            came, and where none came to anything no earlier one is.
-    """
     found = require_matches(session, dataset)
     entries = last_run(session, found.id)
-    if stopped and not (entries and entries[0].body["run"] in stopped):
+    stopped_runs = {job.request["run"] for job in stopped}
+    if stopped and not (entries and entries[0].body["run"] in stopped_runs):
         return
     if not entries:
         raise ConflictError(f'no paint was read in "{found.name}"')

@@ -6,11 +6,12 @@ from typing import Annotated
 
 from fastapi import APIRouter, Query, Response
 
+from app.features.datasets.service import get_dataset_head
 from app.features.jobs.queries import Job
 from app.features.jobs.schemas import JobDocument
 from app.features.pitches.schemas import PitchChange, PitchDocument, PitchesDocument
 from app.features.pitches.service import DatasetPitches, read_pitches
-from app.features.solve.jobs import PitchJob, request_estimates, request_pitches
+from app.features.solve.jobs import PitchJob, request_pitches, request_solve
 from app.http.conflicts import current_state
 from app.http.cursor import paged
 from app.http.deps import Actor, AppServices, AppStore, DatasetPath, IfMatch
@@ -65,7 +66,9 @@ def estimate_pitches(dataset: DatasetPath, services: AppServices, actor: Actor) 
 
     The job solves what is stale, too: it is the one that follows an import.
     """
-    return request_estimates(services.jobs, services.store, dataset, actor=actor)
+    found = get_dataset_head(services.store, dataset)
+    title = f"Estimate the pitches of {found.name}"
+    return request_solve(services.jobs, services.store, found.id, actor=actor, title=title)
 
 
 def _sized(sized: PitchJob) -> Response:

@@ -163,7 +163,7 @@ def stale_matches(store: Store, dataset: str | int) -> list[str]:
 
 
 def change_pitches(
-    store: Store,
+    session: Session,
     dataset: str | int,
     wanted: dict[str, Pitch],
     *,
@@ -175,7 +175,7 @@ def change_pitches(
     Each group gets an entry of the log, from which the size before can be had back.
 
     Args:
-        store: The database.
+        session: A write session.
         dataset: Name or id.
         wanted: Sizes by match; the one in use changes nothing.
         if_match: ETag of the pitches that the change builds on; None: whatever they are.
@@ -185,19 +185,6 @@ def change_pitches(
         NotFoundError: There is no such dataset or match.
         StaleRevisionError: Somebody else was faster.
     """
-    with store.write() as session:
-        return apply_pitches(session, dataset, wanted, if_match=if_match, actor=actor)
-
-
-def apply_pitches(
-    session: Session,
-    dataset: str | int,
-    wanted: dict[str, Pitch],
-    *,
-    if_match: str | None,
-    actor: str,
-) -> DatasetPitches:
-    """``change_pitches`` within a write session."""
     state = _read(session, dataset)
     if if_match is not None:
         require_etag(state.etag, if_match, f'the pitches of "{state.dataset}"')

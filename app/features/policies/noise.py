@@ -222,14 +222,13 @@ def accept_noise(session: Session, noise: Noise, state: PolicyState, actor: str)
         give_factors(session, noise.dataset_id, noise.factors, actor)
 
 
-def take_noise_back(store: Store, dataset: str | int, *, actor: str) -> int:
-    """Take all balls to be as noisy as their dataset's; how many groups that changed.
+def take_noise_back(session: Session, dataset: str | int, *, actor: str) -> int:
+    """Take all balls to be as noisy as their dataset's, in a write session; how many groups change.
 
     Raises:
         NotFoundError: There is no such dataset.
     """
-    with store.write() as session:
-        return give_factors(session, need_dataset(session, dataset), (), actor)
+    return give_factors(session, need_dataset(session, dataset), (), actor)
 
 
 def _solved(store: Store, dataset_id: int) -> list[int]:

@@ -12,14 +12,14 @@ from app.db.json_columns import Json
 from app.db.session import Session
 from app.db.store import Store
 from app.features.datasets.queries import dataset_name, group_ids
-from app.features.datasets.service import get_dataset_head, list_datasets
+from app.features.datasets.service import dataset_id, get_dataset_head, list_datasets
 from app.features.jobs.queries import Job
 from app.features.jobs.records import Then
 from app.features.jobs.run import JobProgress, Work, counting
 from app.features.jobs.service import Jobs, Pool
 from app.features.pitches.service import (
     DatasetPitches,
-    apply_pitches,
+    change_pitches,
     estimate_pitches,
     stale_matches,
 )
@@ -184,6 +184,27 @@ def solve_after(
     return changed[0]
 
 
+def change_and_solve(
+    jobs: Jobs,
+    store: Store,
+    dataset: str | int,
+    change: Callable[[Session], object],
+    *,
+    actor: str,
+) -> Job:
+    """``solve_after`` by a dataset's name or id, answered with the job.
+
+    Raises:
+        NotFoundError: There is no such dataset.
+    """
+
+    def both(session: Session, job: Job) -> Job:
+        change(session)
+        return job
+
+    return solve_after(jobs, store, dataset_id(store, dataset), both, actor=actor)
+
+
 def request_policy(
     jobs: Jobs, store: Store, dataset_id: int, policy: Policy, *, if_match: str, actor: str
 ) -> PolicyJob:
@@ -217,23 +238,10 @@ def request_pitches(
     """
 
     def change(session: Session, job: Job) -> PitchJob:
-        state = apply_pitches(session, dataset_id, wanted, if_match=if_match, actor=actor)
+        state = change_pitches(session, dataset_id, wanted, if_match=if_match, actor=actor)
         return PitchJob(state, job)
 
     return solve_after(jobs, store, dataset_id, change, actor=actor)
-
-
-def request_estimates(jobs: Jobs, store: Store, dataset: str | int, *, actor: str) -> Job:
-    """Estimate the pitches of a dataset's matches that are not estimated yet, soon.
-
-    That is a part of solving; where the dataset is being solved already, that job does it.
-
-    Raises:
-        NotFoundError: There is no such dataset.
-    """
-    found = get_dataset_head(store, dataset)
-    title = f"Estimate the pitches of {found.name}"
-    return request_solve(jobs, store, found.id, actor=actor, title=title)
 
 
 def resume_solving(jobs: Jobs, store: Store) -> None:

@@ -24,6 +24,19 @@ from app.errors import BusyError, DamagedError, InputError, StorageError
 from tests.databases import said_for_sqlite
 from tests.unit.db.homes import INSERT, add, names
 
+_LOCKING = """
+import fcntl, sys
+with open(sys.argv[1], "r+b") as file:
+    fcntl.lockf(file, fcntl.LOCK_EX | fcntl.LOCK_NB, 510, 0x40000002)
+"""
+"""Take the bytes that SQLite locks while it has a database open."""
+
+
+def can_lock(database: Path) -> bool:
+    """Whether another process could take a database for its own."""
+    command = [sys.executable, "-c", _LOCKING, database]
+    return subprocess.run(command, capture_output=True, check=False).returncode == 0
+
 
 class TestOpen:
     @pytest.mark.usefixtures("every_migration")
@@ -32,6 +45,20 @@ class TestOpen:
         assert names(own_store) == []
         assert settings.home.stat().st_mode & 0o777 == 0o700
         own_store.close()
+
+    @pytest.mark.file_of_sqlite("locks of a file")
+    def test_a_second_one_in_this_process_leaves_the_locks_of_the_first(
+        self, own_store: Store, settings: Settings
+    ) -> None:
+        """Closing any descriptor of a file ends the locks that its process has on it."""
+        with own_store.read() as session:
+            session.execute(text("SELECT count(*) FROM sqlite_schema"))
+            assert not can_lock(settings.database_file)
+            Store.open(settings).close()
+            migrate(settings)
+            assert not can_lock(settings.database_file)
+        own_store.close()
+        assert can_lock(settings.database_file)
 
     @pytest.mark.parametrize("name", PRAGMAS)
     @pytest.mark.file_of_sqlite("PRAGMAs of a connection")

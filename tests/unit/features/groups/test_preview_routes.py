@@ -4,7 +4,7 @@ import os
 import signal
 import time
 from collections.abc import Iterator
-from contextlib import closing
+from contextlib import closing, contextmanager
 from dataclasses import replace
 from typing import Any
 
@@ -60,9 +60,19 @@ def large(app: FastAPI) -> Iterator[LargeEdits]:
         yield made
 
 
+def never_ready(_: Settings) -> None:
+    signal.pause()
+
+
 @pytest.fixture
 def apart(app: FastAPI, large: LargeEdits) -> Iterator[Previews]:
     """What a server of a team has."""
+    with server_of_team(app, large) as made:
+        yield made
+
+
+@contextmanager
+def server_of_team(app: FastAPI, large: LargeEdits) -> Iterator[Previews]:
     services = app.state.services
     with closing(Previews(settings_of_team(app), services.store, services.paint, large)) as made:
         app.state.services = replace(services, previews=made)
@@ -94,9 +104,13 @@ class TestAlone:
 
 
 class TestApart:
-    def test_who_begins_is_answered_before_the_process_is_there(self, apart, api) -> None:
-        answer = preview(api)
-        assert (answer.status_code, apart.workers[0].is_ready) == (200, False)
+    def test_who_begins_is_answered_before_the_process_is_there(
+        self, app, large, api, monkeypatch
+    ) -> None:
+        monkeypatch.setattr("app.features.groups.preview_routes.make_ready", never_ready)
+        with server_of_team(app, large) as apart:
+            answer = preview(api)
+            assert (answer.status_code, apart.workers[0].is_ready) == (200, False)
 
     def test_the_process_answers_as_the_server_does(self, app, ready, api, monkeypatch) -> None:
         asked = ({}, {"group": 99}, {"view": "no such view"})

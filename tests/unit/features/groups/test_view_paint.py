@@ -105,7 +105,8 @@ class TestFollow:
 
     def test_taking_back_a_reading_takes_back_the_one_of_the_dataset(self, painted, paint):
         change(painted, paint, without_a_line(painted))
-        take_back_paint(painted, "demo", actor="ann")
+        with painted.write() as session:
+            take_back_paint(session, "demo", actor="ann")
         solve_dataset(painted, "demo")
         assert {item.source for item in calibrations(painted)} == {"lines"}
 
@@ -153,7 +154,8 @@ class TestFollow:
         assert paint.follow(without, policy, {}) is without
 
     def test_after_its_reading_was_taken_back_an_edit_reads_no_paint(self, painted, paint, looked):
-        take_back_paint(painted, "demo", actor="ann")
+        with painted.write() as session:
+            take_back_paint(session, "demo", actor="ann")
         change(painted, paint, without_a_line(painted))
         assert looked == []
 

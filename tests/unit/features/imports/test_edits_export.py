@@ -482,4 +482,5 @@ SMALL = Pitch(100.0, 64.0)
 
 
 def resize(store: Store, pitch: Pitch) -> None:
-    change_pitches(store, "demo", {"cup": pitch}, if_match=None, actor="ann")
+    with store.write() as session:
+        change_pitches(session, "demo", {"cup": pitch}, if_match=None, actor="ann")

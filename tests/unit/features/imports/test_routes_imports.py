@@ -112,6 +112,9 @@ class TestStartImport:
         assert (sought.kind, sought.result["views"]) == ("proposals", 2)
         again = finished(app, api.post(API, json=body(format="frames"))).result
         assert (again["unchanged"], again["proposals_job"]) == (2, None)
+        off = body(dataset="off", format="frames", options={"propose": False})
+        left = finished(app, api.post(API, json=off)).result
+        assert (left["new"], left["proposals_job"]) == (2, None)
 
     def test_the_policy_that_is_named_judges_what_is_made_and_nothing_else(
         self, app, api, tree, group

@@ -421,6 +421,7 @@ class TestCheck:
             ("flipped", frozenset({2}), "--flip"),
             ("ball_category", "ball", "--ball-category"),
             ("frames", Path("list.json"), "--frames"),
+            ("propose", False, "--no-propose"),
         ],
     )
     def test_an_option_that_a_format_does_not_use_is_refused(
@@ -443,6 +444,7 @@ class TestCheck:
         text = Path("static/state/import_formats.js").read_text(encoding="utf-8")
         names = {"CALIBRATION": "calibration", "SIZE": "size", "OFFSET": "frame_offset"}
         names |= {"FLIPPED": "flipped", "CATEGORY": "ball_category", "GROUPING": "grouping"}
+        names["PROPOSE"] = "propose"
         offered = re.findall(
             r"name: '([a-z0-9-]+)', label: .*?, options: \[(.*?)\]( , lines|, lines)?", text
         )

@@ -9,15 +9,17 @@ from typing import Any, NoReturn
 
 import pytest
 
+from app.db.session import Session
 from app.db.store import Store
 from app.errors import NotFoundError
 from app.features.imports.ingest import ingest
 from app.features.jobs.queries import Job
 from app.features.jobs.service import Jobs
 from app.features.match_estimates import jobs as pictures_job
-from app.features.match_estimates.jobs import PICTURES, request_pictures
-from app.features.match_estimates.pictures import read_pictures
+from app.features.match_estimates.jobs import PICTURES
+from app.features.match_estimates.pictures import change_pictures, read_pictures
 from app.features.solutions.service import stale_groups
+from app.features.solve.jobs import change_and_solve
 from app.progress import TellProgress
 from app.soccer.group import Group, Station, View
 from app.soccer.picture import PictureGeometry
@@ -111,13 +113,20 @@ def test_one_match_is_looked_at_where_one_is_asked_for_in_a_process_of_its_own(t
     jobs.close()
 
 
+def say(jobs: Jobs, store: Store, wanted: dict[str, PictureGeometry | None]) -> Job:
+    def change(session: Session) -> None:
+        change_pictures(session, "demo", wanted, actor="lea")
+
+    return change_and_solve(jobs, store, "demo", change, actor="lea")
+
+
 def test_a_picture_that_is_said_is_solved_and_no_longer_proposed(jobs: Jobs, two: Store) -> None:
     said = items(jobs, two, WIDE)[WIDE]["proposed"]
     picture = PictureGeometry(said["aspect"], tuple(said["shift"]), tuple(said["sigma"]))
     kept: list[Job] = []
 
     with stored_by(lambda _session, job: kept.append(job)):
-        job = request_pictures(jobs, two, "demo", {WIDE: picture}, actor="lea")
+        job = say(jobs, two, {WIDE: picture})
     assert (finished(jobs, job).kind, [one.id for one in kept]) == ("solve", [job.id])
     assert aspects(two) == {WIDE: picture.aspect, PLAIN: None}
     assert stale_groups(two, "demo") == []
@@ -129,7 +138,7 @@ def test_a_match_that_is_not_there_asks_for_nothing(jobs: Jobs, two: Store) -> N
     with pytest.raises(NotFoundError):
         PICTURES.request(jobs, two, "demo", "final", actor="lea")
     with pytest.raises(NotFoundError):
-        request_pictures(jobs, two, "demo", {WIDE: DONE[WIDE], "final": None}, actor="lea")
+        say(jobs, two, {WIDE: DONE[WIDE], "final": None})
     assert jobs.find() == []
     assert aspects(two)[WIDE] is None
 
@@ -153,7 +162,7 @@ def test_a_server_that_stops_leaves_an_estimate_to_the_next_one(
         assert started.wait(SECONDS)
         first.close()
     second = Jobs(two)
-    PICTURES.resume(second, two)
+    PICTURES.take_up(second, two)
     second.start()
     assert [item["match"] for item in finished(second, job).result["items"]] == [WIDE]
     second.close()

@@ -11,7 +11,7 @@ from app.db.store import Store
 from app.features.imports.ingest import ingest
 from app.features.jobs.service import Jobs
 from app.features.match_estimates import positions as editing
-from app.features.match_estimates.jobs import POSITIONS, take_positions_back
+from app.features.match_estimates.jobs import POSITIONS
 from app.features.match_estimates.positions import get_positions
 from app.features.policies.service import change_policy
 from tests.unit.features.jobs.steps import Held
@@ -70,7 +70,7 @@ def test_a_share_that_is_taken_back_while_it_runs_gives_nothing_more(
     monkeypatch.setattr(editing, "_estimate", estimated)
     job = POSITIONS.request(jobs, two, "demo", None, actor="ann")
     estimated.wait()
-    take_positions_back(jobs, two, "demo", match, actor="ann")
+    POSITIONS.take_back(jobs, two, "demo", match, actor="ann")
     estimated.go_on.set()
     assert jobs.wait(job.id, SECONDS).state == "cancelled"
     assert [item.current for item in get_positions(two, "demo").items] == shared

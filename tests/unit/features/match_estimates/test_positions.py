@@ -153,7 +153,9 @@ class TestSharePositions:
         assert [entry.kind for entry in history(shared, 1)] == ["import", "position"]
 
     def test_another_size_of_the_pitch_makes_it_old(self, shared):
-        change_pitches(shared, "demo", {MATCH: Pitch(103.0, 66.0)}, if_match=None, actor="ann")
+        with shared.write() as session:
+            wanted = {MATCH: Pitch(103.0, 66.0)}
+            change_pitches(session, "demo", wanted, if_match=None, actor="ann")
         assert state(shared).current is False
 
     def test_too_few_pictures_share_nothing(self, store):
@@ -215,7 +217,7 @@ class TestSharePositions:
         monkeypatch.setattr(positions_in_store, "read_entries", counting)
         assert state(shared).current is True
         assert asked == [1]
-        take_back_positions(shared, "demo", MATCH, actor="ann")
+        take_back(shared, MATCH)
         assert max(asked) > 1
         assert state(shared).shared == 0
 
@@ -256,15 +258,20 @@ class TestSharePositions:
 
     def test_a_version_holds_it_and_is_verified_bit_for_bit(self, shared):
         version = freeze(shared, "demo", FreezeRequest("one", groups="passing"), actor="ann")
-        take_back_positions(shared, "demo", MATCH, actor="ann")
+        take_back(shared, MATCH)
         report = verify(shared, version.id)
         assert (report.ok, report.groups) == (True, 6)
+
+
+def take_back(store, name):
+    with store.write() as session:
+        take_back_positions(session, "demo", name, actor="ann")
 
 
 class TestTakeBackPositions:
     def test_cameras_are_again_what_their_lines_alone_make_them(self, shared):
         shared_keys = keys(shared)
-        take_back_positions(shared, "demo", MATCH, actor="ann")
+        take_back(shared, MATCH)
         assert (state(shared).shared, state(shared).current) == (0, None)
         solve_dataset(shared, "demo")
         alone = keys(shared)
@@ -272,9 +279,9 @@ class TestTakeBackPositions:
         assert keys(shared) == alone != shared_keys
 
     def test_a_take_back_is_not_taken_back(self, shared):
-        take_back_positions(shared, "demo", MATCH, actor="ann")
+        take_back(shared, MATCH)
         with pytest.raises(ConflictError, match="nothing is shared"):
-            take_back_positions(shared, "demo", MATCH, actor="ann")
+            take_back(shared, MATCH)
         assert (state(shared).shared, state(shared).current) == (0, None)
 
     def test_each_share_is_taken_back_once_the_newest_first(self, shared):
@@ -282,22 +289,22 @@ class TestTakeBackPositions:
         draw(shared, 1)
         share_positions(shared, "demo", actor="ann")
         assert load(shared, 2).group.positions != first
-        take_back_positions(shared, "demo", MATCH, actor="ann")
+        take_back(shared, MATCH)
         assert (load(shared, 2).group.positions, state(shared).current) == (first, False)
-        take_back_positions(shared, "demo", MATCH, actor="ann")
+        take_back(shared, MATCH)
         assert (state(shared).shared, state(shared).current) == (0, None)
         share_positions(shared, "demo", actor="ann")
-        take_back_positions(shared, "demo", MATCH, actor="ann")
+        take_back(shared, MATCH)
         with pytest.raises(ConflictError, match="nothing is shared"):
-            take_back_positions(shared, "demo", MATCH, actor="ann")
+            take_back(shared, MATCH)
 
     def test_what_a_group_had_in_another_match_is_not_taken_back(self, shared):
         first, *_ = match()
         ingest(shared, "demo", (replace(first, match="b"),), source="files", actor="ann")
         with pytest.raises(ConflictError, match="nothing is shared in b"):
-            take_back_positions(shared, "demo", "b", actor="ann")
+            take_back(shared, "b")
 
     def test_where_nothing_was_shared_it_is_refused(self, store):
         ingest(store, "demo", match(), source="files", actor="ann")
         with pytest.raises(ConflictError, match="nothing is shared"):
-            take_back_positions(store, "demo", MATCH, actor="ann")
+            take_back(store, MATCH)

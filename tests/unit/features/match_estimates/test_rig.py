@@ -196,7 +196,9 @@ class TestAccept:
 
     def test_a_pitch_that_has_changed_since_makes_another_proposal(self, store, proposed) -> None:
         etag = read_pitches(store, "demo").etag
-        change_pitches(store, "demo", {"rig": Pitch(104.0, 67.0)}, if_match=etag, actor="ann")
+        with store.write() as session:
+            wanted = {"rig": Pitch(104.0, 67.0)}
+            change_pitches(session, "demo", wanted, if_match=etag, actor="ann")
         with pytest.raises(ConflictError, match="size of the pitch has changed"):
             accept(store, proposed, CAMERAS, actor="ann")
         assert stations(store, proposed)["cam1"].given_covariance is None

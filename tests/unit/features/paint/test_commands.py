@@ -50,6 +50,18 @@ class TestPropose:
             "frame", "outcome", "supported", "explained", "points", "error_px", "runner_up", "ms",
         }  # fmt: skip
 
+    def test_for_pictures_that_are_imported_cameras_are_proposed_by_themselves(
+        self, tmp_path: Path, touchline: Run
+    ):
+        cv2.imwrite(str(tmp_path / "good.png"), lawn(drawn(TRUE, 3))[:, :, ::-1])
+        command = ("import", "frames", tmp_path / "good.png", "--dataset")
+        code, told, _ = touchline(*command, "made")
+        assert (code, "1 view looked at: 1 proposed" in told) == (0, True)
+        shown = ("propose", "--show", "--json", "--dataset")
+        assert json.loads(touchline(*shown, "made")[1])[0]["proposed"] == 1
+        assert "looked at" not in touchline(*command, "left", "--no-propose")[1]
+        assert json.loads(touchline(*shown, "left")[1])[0]["looked"] == 0
+
     def test_no_camera_is_written_of_which_it_is_unsure(
         self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, touchline: Run
     ):

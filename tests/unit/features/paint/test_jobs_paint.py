@@ -14,7 +14,7 @@ from app.features.jobs.queries import NewJob, insert_job
 from app.features.jobs.service import Jobs
 from app.features.paint import jobs as paint_job
 from app.features.paint import service as editing
-from app.features.paint.jobs import PAINT, take_paint_back
+from app.features.paint.jobs import PAINT
 from app.features.paint.service import get_paint
 from app.features.policies.service import change_policy
 from app.soccer.group import Group
@@ -53,7 +53,7 @@ def test_it_counts_solves_and_is_taken_back(asked: Store) -> None:
     assert done.sentence == "The paint of 12 pictures was read."
     (solve,) = jobs.find(kinds=["solve"])
     assert jobs.wait(solve.id, SECONDS).state == "done"
-    back = jobs.wait(take_paint_back(jobs, asked, "demo", actor="ann").id, SECONDS)
+    back = jobs.wait(PAINT.take_back(jobs, asked, "demo", actor="ann").id, SECONDS)
     assert (back.kind, get_paint(asked, "demo").items[0].read) == ("solve", 0)
     jobs.close()
 
@@ -67,7 +67,7 @@ def test_a_reading_that_is_taken_back_while_it_runs_gives_nothing_more(
     job = PAINT.request(jobs, asked, "demo", None, actor="ann")
     looked.wait()
     assert get_paint(asked, "demo").items[0].read > 0
-    take_paint_back(jobs, asked, "demo", actor="ann")
+    PAINT.take_back(jobs, asked, "demo", actor="ann")
     looked.go_on.set()
     assert jobs.wait(job.id, SECONDS).state == "cancelled"
     assert get_paint(asked, "demo").items[0].read == 0
@@ -84,7 +84,7 @@ def test_one_that_is_stopped_before_it_gave_anything_takes_no_earlier_one_along(
     monkeypatch.setattr(editing, "_readings", looked)
     job = PAINT.request(jobs, asked, "demo", None, actor="ann")
     looked.wait()
-    take_paint_back(jobs, asked, "demo", actor="ann")
+    PAINT.take_back(jobs, asked, "demo", actor="ann")
     looked.go_on.set()
     assert jobs.wait(job.id, SECONDS).state == "cancelled"
     assert get_paint(asked, "demo").items[0].read == 12
@@ -100,7 +100,7 @@ def test_one_that_runs_goes_on_where_the_take_back_is_not_kept(asked: Store, mon
     job = PAINT.request(jobs, asked, "demo", None, actor="ann")
     looked.wait()
     with pytest.raises(StorageError), stored_by(full):
-        take_paint_back(jobs, asked, "demo", actor="ann")
+        PAINT.take_back(jobs, asked, "demo", actor="ann")
     looked.go_on.set()
     assert jobs.wait(job.id, SECONDS).state == "done"
     assert get_paint(asked, "demo").items[0].read == 12
@@ -113,7 +113,7 @@ def test_a_record_that_nobody_works_on_keeps_nothing_from_being_taken_back(asked
     assert jobs.wait(job.id, SECONDS).state == "done"
     with asked.write() as session:
         insert_job(session, NewJob("paint", "Read", "ann", 1, {"match": None, "run": "lost"}))
-    take_paint_back(jobs, asked, "demo", actor="ann")
+    PAINT.take_back(jobs, asked, "demo", actor="ann")
     assert get_paint(asked, "demo").items[0].read == 0
     jobs.close()
 
@@ -124,7 +124,7 @@ def test_a_server_that_stops_leaves_it_to_the_next_one(asked: Store, monkeypatch
     with stopped_at_its_first_step(paint_job, "read_paint", first):
         job = PAINT.request(first, asked, "demo", None, actor="ann")
     second = Jobs(asked)
-    PAINT.resume(second, asked)
+    PAINT.take_up(second, asked)
     second.start()
     assert second.wait(job.id, SECONDS).state == "done"
     second.close()

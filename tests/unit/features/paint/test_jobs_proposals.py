@@ -81,7 +81,7 @@ def test_a_server_that_stops_leaves_it_to_the_next_one(gone: Store, monkeypatch)
         job = PROPOSALS.request(first, gone, "demo", None, actor="ann")
     assert get_proposals(gone, "demo").count("looked") == 1
     second = Jobs(gone)
-    PROPOSALS.resume(second, gone)
+    PROPOSALS.take_up(second, gone)
     second.start()
     assert second.wait(job.id, SECONDS).state == "done"
     second.close()

@@ -309,7 +309,7 @@ class TestReadPaint:
         assert [item.source for item in calibrations(painted)] == ["paint", "paint"]
         # What is had back was read beside those people, too.
         for _ in range(2):
-            take_back_paint(painted, "demo", actor="ann")
+            take_back(painted)
             solve_dataset(painted, "demo")
             assert [item.source for item in calibrations(painted)] == ["lines", "lines"]
         with painted.read() as session:
@@ -416,7 +416,7 @@ class TestKept:
 
     def test_a_version_holds_it_and_is_verified_without_pictures(self, painted, pictures):
         version = freeze(painted, "demo", FreezeRequest("one", groups="passing"), actor="ann")
-        take_back_paint(painted, "demo", actor="ann")
+        take_back(painted)
         report = verify(painted, version.id)
         assert (report.ok, report.groups) == (True, int(version.counts["groups"]))
         assert report.groups > 0
@@ -439,9 +439,14 @@ class TestKept:
             assert replay(session) == read_ledger(session)
 
 
+def take_back(store):
+    with store.write() as session:
+        take_back_paint(session, "demo", actor="ann")
+
+
 class TestTakeBackPaint:
     def test_cameras_are_again_those_of_the_clicks(self, painted):
-        take_back_paint(painted, "demo", actor="ann")
+        take_back(painted)
         solve_dataset(painted, "demo")
         assert (state(painted).read, load(painted, 1).group.paint) == (0, {})
         assert [item.source for item in calibrations(painted)] == ["lines", "lines"]
@@ -451,9 +456,9 @@ class TestTakeBackPaint:
         draw(painted, 1)
         read_paint(painted, "demo", actor="ann", run="second")
         assert load(painted, 1).group.paint != first
-        take_back_paint(painted, "demo", actor="ann")
+        take_back(painted)
         assert load(painted, 1).group.paint == first
-        take_back_paint(painted, "demo", actor="ann")
+        take_back(painted)
         assert state(painted).read == 0
         with pytest.raises(ConflictError, match="no paint was read"):
-            take_back_paint(painted, "demo", actor="ann")
+            take_back(painted)

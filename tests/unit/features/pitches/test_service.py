@@ -87,7 +87,8 @@ def sizes(store):
 
 def accept(store, match=SMALL, pitch=TRUE, **how):
     how = {"if_match": None, "actor": "ann", **how}
-    return change_pitches(store, "demo", {match: pitch}, **how)
+    with store.write() as session:
+        return change_pitches(session, "demo", {match: pitch}, **how)
 
 
 class TestEstimatePitches:

@@ -142,7 +142,8 @@ class TestReadNoise:
         again = read_noise(store, "demo")
         assert not again.is_new and again.used == found.factors
         assert _mean_sigma(store) > sigma
-        assert take_noise_back(store, "demo", actor="ben") == 40
+        with store.write() as session:
+            assert take_noise_back(session, "demo", actor="ben") == 40
         assert {view.noise for state in read_states_of(store) for view in state.group.views} == {1}
 
     def test_lines_of_many_images_know_their_noise_together(self, store: Store) -> None:

@@ -1,0 +1,250 @@
+"""Indexing: reads a recording once, frame after frame, and keeps what is small of each."""
+
+from __future__ import annotations
+
+import hashlib
+import struct
+from collections.abc import Callable
+from math import gcd
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import cv2
+import numpy as np
+
+from app.config import Settings
+from app.errors import ImageError, TooLargeError
+from app.geometry.arrays import FloatArray, IntArray
+from app.media.images import ImageHeader, check_size
+from app.media.video import MAX_FRAMES, open_video
+from app.video.index import RecordingFacts, RecordingIndex, time_base_of
+from app.video.measures import COMB_EVERY, COMB_SHARE, COMBED, FrameMeasurer, Rows, comb
+
+_A_WORD = 100
+"""Frames between two words of how far the decoding is."""
+_BLOCK = 4 * 2**20
+_MOST_ASPECT = 8
+"""Pixels wider or higher than that are a mistake of the container."""
+_LEAST_MOVING = 5
+"""Frames that move, of those that are looked at for combs."""
+_MOVING = 3.0
+"""Mean change from the frame before, grey levels, of a frame that moves."""
+
+
+def index_recording(
+    path: Path, settings: Settings, tell: Callable[[int, int | None], object] | None = None
+) -> RecordingIndex:
+    """The index of a recording: decodes it all, in this process.
+
+    Args:
+        path: The file.
+        settings: Limits on the size of pictures.
+        tell: Called every now and then with how many frames are decoded and about how many there
+            are (None: not known); what it raises ends it.
+
+    Raises:
+        ImageError: It is no video that can be read, or a part of its file is missing.
+        TooLargeError: Its frames are larger than the limits, or too many.
+    """
+    _require_whole(path)
+    sha256, size = _digest(path)
+    has_table, key_times = _has_seek_table(path), _key_times(path)
+    rows, combs = Rows(), list[float]()
+    times, intra = list[float](), list[bool]()
+    measurer = FrameMeasurer()
+    with open_video(path) as video:
+        if not video.isOpened():
+            raise ImageError(f"{path.name} is no video that can be read")
+        coded = _coded_size(video)
+        check_size(ImageHeader("video", *coded), settings, path.name)
+        rotation = int(video.get(cv2.CAP_PROP_ORIENTATION_META)) % 360
+        aspect = _pixel_aspect(video, rotation)
+        total = int(video.get(cv2.CAP_PROP_FRAME_COUNT))
+        while video.grab():
+            done, picture = video.retrieve()
+            if not done:
+                raise ImageError(f"frame {len(times)} of {path.name} cannot be decoded")
+            _require_size(picture, coded, len(times), path)
+            times.append(video.get(cv2.CAP_PROP_POS_MSEC))
+            intra.append(video.get(cv2.CAP_PROP_FRAME_TYPE) == ord("I"))
+            row, before = rows.add()
+            measurer.measure(np.asarray(picture, np.uint8), row, before)
+            if len(times) % COMB_EVERY == 0 and row["change"] > _MOVING:
+                combs.append(comb(np.asarray(picture, np.uint8)))
+            if len(times) > MAX_FRAMES:
+                raise TooLargeError(f"{path.name} has more than {MAX_FRAMES:,} frames")
+            if tell is not None and len(times) % _A_WORD == 0:
+                tell(len(times), max(total, len(times)) if total > 0 else None)
+    if not times:
+        raise ImageError(f"{path.name} has no frame that can be decoded")
+    shown = _repaired(np.array(times))
+    base, pts = time_base_of(shown)
+    width, height = _square(coded, aspect)
+    facts = RecordingFacts(
+        sha256=sha256,
+        bytes=size,
+        width=width,
+        height=height,
+        coded_width=coded[0],
+        coded_height=coded[1],
+        rotation=rotation,
+        pixel_aspect=aspect,
+        interlaced=_is_interlaced(combs),
+        time_base=base,
+        has_seek_table=has_table,
+        decoder=f"OpenCV {cv2.__version__}",
+    )
+    return RecordingIndex(facts, pts, _keys(shown, key_times, np.array(intra)), rows.all())
+
+
+def _digest(path: Path) -> tuple[str, int]:
+    digest, size = hashlib.sha256(), 0
+    with path.open("rb") as file:
+        while block := file.read(_BLOCK):
+            digest.update(block)
+            size += len(block)
+    return digest.hexdigest(), size
+
+
+def _coded_size(video: cv2.VideoCapture) -> tuple[int, int]:
+    return int(video.get(cv2.CAP_PROP_FRAME_WIDTH)), int(video.get(cv2.CAP_PROP_FRAME_HEIGHT))
+
+
+def _require_size(picture: Any, coded: tuple[int, int], number: int, path: Path) -> None:
+    height, width = picture.shape[:2]
+    if (width, height) != coded:
+        raise ImageError(
+            f"frame {number} of {path.name} has {width} x {height} pixels, frames before it "
+            f"{coded[0]} x {coded[1]}",
+            hint="Cut the recording there: frames of one recording have one size.",
+        )
+
+
+def _pixel_aspect(video: cv2.VideoCapture, rotation: int) -> tuple[int, int]:
+    """Width of a pixel by its height, as decoded and turned upright."""
+    over, under = (int(video.get(name)) for name in (cv2.CAP_PROP_SAR_NUM, cv2.CAP_PROP_SAR_DEN))
+    if over <= 0 or under <= 0 or not 1 / _MOST_ASPECT <= over / under <= _MOST_ASPECT:
+        return 1, 1
+    if rotation in (90, 270):
+        over, under = under, over
+    common = gcd(over, under)
+    return over // common, under // common
+
+
+def _square(coded: tuple[int, int], aspect: tuple[int, int]) -> tuple[int, int]:
+    """Size with square pixels; nothing becomes smaller."""
+    width, height = coded
+    over, under = aspect
+    if over >= under:
+        return round(width * over / under), height
+    return width, round(height * under / over)
+
+
+def _key_times(path: Path) -> FloatArray:
+    """Times of the key frames in milliseconds, without decoding anything."""
+    found = []
+    with open_video(path, [cv2.CAP_PROP_FORMAT, -1]) as packets:
+        while packets.grab():
+            if packets.get(cv2.CAP_PROP_LRF_HAS_KEY_FRAME):
+                found.append(packets.get(cv2.CAP_PROP_POS_MSEC))
+    return np.array(found)
+
+
+def _keys(times: FloatArray, key_times: FloatArray, intra: Any) -> IntArray:
+    """Numbers of the key frames: those that the container marks, and that are coded by themselves.
+
+    Where an edit leaves the first packets out, times of packets begin earlier than those of frames;
+    then what is coded by itself decides.
+    """
+    marked = np.isin(np.rint(times * 1000), np.rint(key_times * 1000)) & intra
+    return np.flatnonzero(marked if marked.sum() * 2 > len(key_times) else intra).astype(np.int64)
+
+
+def _repaired(times: FloatArray) -> FloatArray:
+    """Times where the last frame of a stream may have none, which then reads as 0."""
+    if len(times) > 2 and times[-1] == 0 and times[-2] > 0:
+        times[-1] = 2 * times[-2] - times[-3]
+    return times
+
+
+def _is_interlaced(combs: list[float]) -> bool | None:
+    if len(combs) < _LEAST_MOVING:
+        return None
+    return bool(np.mean(np.array(combs) > COMB_SHARE) > COMBED)
+
+
+_UNINDEXED = (b"\x47", b"\x00\x00\x01\xba")
+"""How MPEG transport and program streams begin: they have no table of key frames."""
+
+
+def _has_seek_table(path: Path) -> bool:
+    with path.open("rb") as file:
+        return not file.read(4).startswith(_UNINDEXED)
+
+
+def _require_whole(path: Path) -> None:
+    """Raise where a file ends before its own headers say: the rest of a copy is missing.
+
+    Raises:
+        ImageError: It does, is empty, or cannot be read.
+    """
+    try:
+        size = path.stat().st_size
+        if not size:
+            raise ImageError(f"{path.name} is empty")
+        with path.open("rb") as file:
+            declared = _declared_size(file, size)
+    except OSError as error:
+        raise ImageError(f"{path.name} cannot be read ({error.strerror})") from error
+    if declared > size:
+        raise ImageError(
+            f"{path.name} is cut off: {size:,} of its {declared:,} bytes are there",
+            hint="Copy the file again, or repair it with a tool of your recorder.",
+        )
+
+
+def _declared_size(file: BinaryIO, size: int) -> int:
+    """Size that MP4, AVI and Matroska files declare, bytes; of others, and where they say none, 0."""
+    head = file.read(12)
+    if head[:4] == b"RIFF" and head[8:] == b"AVI ":
+        return 8 + int.from_bytes(head[4:8], "little")
+    if head[:4] == b"\x1a\x45\xdf\xa3":
+        return _matroska_size(file)
+    place = 0
+    if head[4:8] not in _FIRST_BOXES:
+        return 0
+    while head[4:8].isalnum() and place < size:
+        file.seek(place)
+        head = file.read(16)
+        if len(head) < 8:
+            return place + 8
+        (length,) = struct.unpack(">I", head[:4])
+        if length == 1 and len(head) == 16:
+            (length,) = struct.unpack(">Q", head[8:])
+        if length < 8:
+            return place
+        place += length
+    return place
+
+
+_FIRST_BOXES = (b"ftyp", b"moov", b"mdat", b"free", b"skip", b"wide", b"styp")
+"""With which MP4 and QuickTime files begin."""
+
+
+def _matroska_size(file: BinaryIO) -> int:
+    file.seek(4)
+    place = 4
+    for identity in (b"", b"\x18\x53\x80\x67"):
+        file.seek(place)
+        if file.read(len(identity)) != identity:
+            return 0
+        first = file.read(1)
+        if not first or not first[0]:
+            return 0
+        length = 9 - first[0].bit_length()
+        value = int.from_bytes(bytes([first[0] & (0xFF >> length)]) + file.read(length - 1), "big")
+        place += len(identity) + length + value
+        # All ones: the size is not known.
+        if value == (1 << 7 * length) - 1:
+            return 0
+    return place

@@ -1,0 +1,171 @@
+"""Measures: what is kept of each frame of a recording, small enough to keep for every frame.
+
+All are made of a picture of ``SMALL`` pixels, whatever the size and shape of the recording.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+SMALL = (160, 90)
+"""Width and height of the picture that is measured, pixels."""
+CELLS = (16, 9)
+"""Columns and rows of cells whose mean colours are kept."""
+HASH_SIDE, HASHED = 32, 8
+"""Side of the picture that is hashed, and of the square of its lowest frequencies."""
+BINS = 8
+"""Of a channel in histograms."""
+MEASURES = np.dtype(
+    [
+        ("hash", np.uint64),
+        ("cells", np.uint8, (CELLS[1], CELLS[0], 3)),
+        ("change", np.float32),
+        ("histogram", np.float32),
+        ("residual", np.float32),
+        ("motion", np.float32),
+        ("blend", np.float32),
+        ("detail", np.float32),
+    ]
+)
+"""Of each frame:
+
+- ``hash``: perceptual hash; frames that look alike differ in few of its 64 bits.
+- ``cells``: mean colour of each cell, blue green red, 0 to 255.
+- ``change``: mean difference from the frame before, grey levels.
+- ``histogram``: share of the colours that is another one than in the frame before, 0 to 1.
+- ``residual``: what is left of ``change`` once everything has moved as optical flow says, by the
+  contrast of the two frames; about 1 and more: nothing of the one is seen in the other.
+- ``motion``: median length of that flow, pixels of the small picture.
+- ``blend``: how far the frame is from the mean of its neighbours, by how far they are from each
+  other; 0: it is a blend of them (or all three are equal).
+- ``detail``: mean absolute Laplacian, grey levels; small where a picture is blurred.
+
+Of the first frame everything that compares is 0.
+"""
+
+Measured = np.ndarray[Any, np.dtype[np.void]]
+"""Measures of frames, dtype ``MEASURES``, shape (N,)."""
+Picture = npt.NDArray[np.uint8]
+
+
+class FrameMeasurer:
+    """Measures frames one after the other; the last row of ``blend`` comes with the next frame."""
+
+    def __init__(self) -> None:
+        self._flow = cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_FAST)
+        self._before: tuple[Picture, Any] | None = None
+        self._two_before: Picture | None = None
+
+    def measure(self, picture: Picture, row: Any, row_before: Any) -> None:
+        """Measure a frame.
+
+        Args:
+            picture: Blue green red, shape (H, W, 3).
+            row: Gets its measures, a record of ``MEASURES``.
+            row_before: Record of the frame before, whose ``blend`` is now known; None: there is none.
+        """
+        small = cv2.resize(picture, SMALL, interpolation=cv2.INTER_AREA)
+        grey = np.asarray(cv2.cvtColor(small, cv2.COLOR_BGR2GRAY), np.uint8)
+        row["hash"] = perceptual_hash(grey)
+        row["cells"] = cv2.resize(small, CELLS, interpolation=cv2.INTER_AREA)
+        row["detail"] = np.abs(cv2.Laplacian(grey, cv2.CV_16S)).mean()
+        colours = cv2.calcHist([small], [0, 1, 2], None, [BINS] * 3, [0, 256] * 3)
+        if self._before is not None:
+            before, colours_before = self._before
+            row["change"] = cv2.absdiff(grey, before).mean()
+            row["histogram"] = np.abs(colours - colours_before).sum() / (2 * grey.size)
+            self._follow(before, grey, row)
+            if self._two_before is not None and row_before is not None:
+                row_before["blend"] = _blend(self._two_before, before, grey)
+            self._two_before = before
+        self._before = grey, colours
+
+    def _follow(self, before: Picture, grey: Picture, row: Any) -> None:
+        flow = self._flow.calc(grey, before, np.zeros((*grey.shape, 2), np.float32))
+        columns, rows = cv2.split(flow + _PLACES)
+        moved = cv2.remap(before, columns, rows, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+        contrast = (float(grey.std()) + float(before.std())) / 2
+        row["residual"] = cv2.absdiff(grey, moved).mean() / max(contrast, 1.0)
+        row["motion"] = np.median(np.hypot(flow[..., 0], flow[..., 1]))
+
+
+_PLACES = np.stack(np.meshgrid(np.arange(SMALL[0]), np.arange(SMALL[1])), axis=-1).astype(
+    np.float32
+)
+
+
+def perceptual_hash(grey: Picture) -> int:
+    """64 bits: which of the lowest frequencies of a picture are above their median.
+
+    Args:
+        grey: Grey levels, shape (H, W).
+
+    Source: C. Zauner, "Implementation and benchmarking of perceptual image hash functions" (2010), pHash.
+    """
+    side = (HASH_SIDE, HASH_SIDE)
+    small = cv2.resize(grey, side, interpolation=cv2.INTER_AREA).astype(np.float32)
+    lowest = np.asarray(cv2.dct(small))[:HASHED, :HASHED].ravel()
+    bits = lowest > np.median(lowest)
+    return int.from_bytes(np.packbits(bits).tobytes(), "big")
+
+
+def hash_distance(one: npt.NDArray[np.uint64], other: npt.NDArray[np.uint64]) -> Any:
+    """In how many of their 64 bits hashes differ."""
+    return np.bitwise_count(np.bitwise_xor(one, other))
+
+
+def _blend(before: Picture, grey: Picture, after: Picture) -> float:
+    apart = cv2.absdiff(before, after).mean()
+    middle = cv2.addWeighted(before, 0.5, after, 0.5, 0)
+    return float(cv2.absdiff(grey, middle).mean()) / max(float(apart), 0.5)
+
+
+COMB_EVERY = 25
+"""Frames between two that are looked at for combs."""
+COMB_SHARE, COMBED = 1.4, 0.15
+"""How much rougher lines of both fields are than those of one, and share of the moving frames
+that are so from which on a recording counts as interlaced."""
+_COMB_COLUMNS = 240
+
+
+def comb(picture: Picture) -> float:
+    """How much more neighbouring lines differ than lines two apart; above 1 lie two fields.
+
+    Args:
+        picture: Blue green red, in its coded size, shape (H, W, 3).
+    """
+    step = max(picture.shape[1] // _COMB_COLUMNS, 1)
+    green = picture[:, ::step, 1].astype(np.int16)
+    near = np.abs(green[1:-1] * 2 - green[:-2] - green[2:]) / 2
+    far = np.abs(green[2:] - green[:-2])
+    rough = np.percentile(near, 95), np.percentile(far, 95)
+    return float(rough[0] / max(rough[1], 4.0))
+
+
+class Rows:
+    """Measures of a recording whose length is not known beforehand."""
+
+    def __init__(self) -> None:
+        self._rows: Measured = np.zeros(1024, MEASURES)
+        self._count = 0
+
+    def __len__(self) -> int:
+        return self._count
+
+    def add(self) -> tuple[Any, Any]:
+        """A new record, and the one before it (None: it is the first)."""
+        if self._count == len(self._rows):
+            grown: Measured = np.zeros(len(self._rows) * 3 // 2, MEASURES)
+            grown[: self._count] = self._rows
+            self._rows = grown
+        self._count += 1
+        before = self._rows[self._count - 2] if self._count > 1 else None
+        return self._rows[self._count - 1], before
+
+    def all(self) -> Measured:
+        """All of them."""
+        return self._rows[: self._count]
