@@ -15,8 +15,9 @@ from app.features.groups.state import GroupState
 from app.features.groups.submit import load_solved
 from app.features.groups.view_paint import PaintFollower
 from app.features.independent_annotations.adopt import adopt_take
+from app.features.independent_annotations.queries import Take
 from app.features.independent_annotations.return_work import hand_back_take
-from app.features.independent_annotations.service import Take, TakeView
+from app.features.independent_annotations.service import TakeView
 from app.features.people.members import list_members
 from app.features.people.roles import Action, may
 from app.finite import Moment

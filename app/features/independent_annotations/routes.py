@@ -11,12 +11,12 @@ from app.features.groups.schemas import GroupDocument
 from app.features.groups.state import GroupState
 from app.features.independent_annotations import gold
 from app.features.independent_annotations import service as takes
+from app.features.independent_annotations.gold import GoldGroup
 from app.features.independent_annotations.known_truth import GoldChoice, GoldChosen, mark_known
 from app.features.independent_annotations.return_work import hand_back_take
 from app.features.independent_annotations.schemas import (
     GoldChoiceDocument,
     GoldEdit,
-    GoldGroupDocument,
     GoldReportDocument,
     HandBack,
     TakeList,
@@ -27,7 +27,7 @@ from app.http.access import login_of
 from app.http.cursor import paged
 from app.http.deps import Actor, AppServices, AppStore, DatasetPath, Id
 from app.http.problem import responses
-from app.http.respond import as_document, document, responds
+from app.http.respond import document, responds
 
 takes_router = APIRouter(tags=["takes"])
 
@@ -155,10 +155,10 @@ def choose(
 @gold_router.put(
     "/groups/{group}/gold",
     operation_id="markGold",
-    response_model=GoldGroupDocument,
+    response_model=GoldGroup,
     responses=responses(404, 409, 413, 415),
 )
-@responds(as_document(GoldGroupDocument.model_validate))
+@responds(document)
 def mark(group: Id, edit: GoldEdit, store: AppStore, actor: Actor) -> gold.GoldGroup:
     """Say that what a group holds now, with its verdict, is true."""
     return gold.mark(store, group, edit.start, actor=actor)
@@ -167,10 +167,10 @@ def mark(group: Id, edit: GoldEdit, store: AppStore, actor: Actor) -> gold.GoldG
 @gold_router.patch(
     "/groups/{group}/gold",
     operation_id="changeGold",
-    response_model=GoldGroupDocument,
+    response_model=GoldGroup,
     responses=responses(404, 413, 415),
 )
-@responds(as_document(GoldGroupDocument.model_validate))
+@responds(document)
 def change(group: Id, edit: GoldEdit, store: AppStore, actor: Actor) -> gold.GoldGroup:
     """Let annotators of a gold group begin with something else; what is true of it stays."""
     return gold.start_with(store, group, edit.start, actor=actor)
@@ -179,10 +179,10 @@ def change(group: Id, edit: GoldEdit, store: AppStore, actor: Actor) -> gold.Gol
 @gold_router.delete(
     "/groups/{group}/gold",
     operation_id="unmarkGold",
-    response_model=GoldGroupDocument,
+    response_model=GoldGroup,
     responses=responses(404),
 )
-@responds(as_document(GoldGroupDocument.model_validate))
+@responds(document)
 def unmark(group: Id, store: AppStore, actor: Actor) -> gold.GoldGroup:
     """Let a gold group be an ordinary one again; what people made of it is no longer shown."""
     return gold.unmark(store, group, actor=actor)

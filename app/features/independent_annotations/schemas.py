@@ -91,16 +91,6 @@ class GoldChoiceDocument(BaseModel):
     start: GoldStart = "imported"
 
 
-class GoldGroupDocument(Document, shows=GoldGroup):
-    """A group whose truth is known."""
-
-    marked: datetime
-    source: Literal["verdict", "sample", "version"] = Field(
-        description="Where its truth is from: what it held when it was marked, the sample's own files, "
-        "or a frozen version."
-    )
-
-
 class GoldResultDocument(Document, shows=GoldResult):
     """What one person made of a gold group."""
 
@@ -127,7 +117,7 @@ class PersonResultsDocument(Document, shows=PersonResults):
 class GoldReportDocument(Document):
     """The gold groups of a dataset, and how far each person is from what is true of them."""
 
-    groups: list[GoldGroupDocument]
+    groups: list[GoldGroup]
     people: list[PersonResultsDocument]
 
 

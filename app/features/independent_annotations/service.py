@@ -25,6 +25,7 @@ from app.features.independent_annotations.gold_queries import common_start
 from app.features.independent_annotations.queries import (
     GOLD,
     INDEPENDENT,
+    Take,
     count_takes,
     find_take,
     insert_take,
@@ -77,32 +78,6 @@ def read_handed_back(session: Session, group_ids: Sequence[int]) -> dict[int, Ha
         )
         for group, entry in last.items()
     }
-
-
-@dataclass(frozen=True)
-class Take:
-    """A person's own annotation of a group.
-
-    Attributes:
-        group_id: The original.
-        copy_id: The group that is the copy; it is opened and edited like any other.
-        kind: ``independent``, or ``gold`` where the original's truth is known: for leads alone.
-        place: Which one of this person in this batch it is, from 1.
-        verdict: What they judged; None: nothing.
-        settled: When something was decided about it; None: not yet.
-    """
-
-    id: int
-    batch_id: int | None
-    group_id: int
-    copy_id: int
-    person: str
-    kind: str
-    place: int
-    begun: str
-    handed_in: str | None
-    verdict: str | None
-    settled: str | None
 
 
 @dataclass(frozen=True)
@@ -184,7 +159,7 @@ def begin(
     others = [one for one in takes_of_group(session, group_id) if one.batch_id == batch_id]
     for one in others:
         if one.person == person:
-            return _take(one)
+            return one
     if take_of_copy(session, group_id) is not None:
         raise ConflictError(
             "this is an own annotation already", hint="Begin from the group that it is of."
@@ -256,8 +231,7 @@ def get_take_of(store: Store, copy_id: int) -> Take:
 def find_take_of(store: Store, copy_id: int) -> Take | None:
     """The take whose copy a group is; None for an ordinary group."""
     with store.glance() as session:
-        row = take_of_copy(session, copy_id)
-    return None if row is None else _take(row)
+        return take_of_copy(session, copy_id)
 
 
 def list_takes(
@@ -277,7 +251,7 @@ def list_takes(
     with store.read() as session:
         dataset_id = need_dataset(session, dataset)
         whose = None if sees_all(dataset_id) else person_of(person)
-        found = [_take(row) for row in takes_in(session, dataset_id, whose)]
+        found = takes_in(session, dataset_id, whose)
         return _shown(session, found)
 
 
@@ -338,8 +312,4 @@ def read_take(session: Session, take_id: int) -> Take:
     row = find_take(session, take_id)
     if row is None:
         raise NotFoundError(f"there is no annotation {take_id}")
-    return _take(row)
-
-
-def _take(row: Any) -> Take:
-    return Take(**row._mapping)
+    return row
