@@ -20,9 +20,9 @@ from pydantic import (
 )
 from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
 
+from app.durable import read_private
 from app.errors import InputError
 from app.log import LogFormat
-from app.private_file import read_private
 
 
 def _user_data_folder() -> Path:

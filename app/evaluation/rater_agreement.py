@@ -25,12 +25,11 @@ class Coefficient:
 
     Attributes:
         name: ``cohen``, ``fleiss`` or ``krippendorff``.
-        value: 1 is complete agreement, 0 what chance gives; None where nobody could disagree:
-            no item was judged twice, or all judgements are the same.
-        low: Lower end of the 95 % interval; None where there is none.
+        value: None where too few people annotated to disagree.
+        low: Lower end of the 95 % interval.
         high: Upper end.
-        observed: Share of pairs of judgements that agree; None without any pair.
-        items: How many items it was computed from.
+        observed: Share of pairs of verdicts that agree.
+        items: Groups that it is computed from.
     """
 
     name: Literal["cohen", "fleiss", "krippendorff"]
@@ -73,7 +72,9 @@ def fleiss_kappa(rated: Rated) -> Coefficient:
     Source: Fleiss, "Measuring nominal scale agreement among many raters", 1971, eq. 2-7.
     """
     if len({len(row) for row in rated}) > 1 or (rated and len(rated[0]) < 2):
-        raise ValueError("Fleiss' kappa asks for equally many judgements of each item, two or more")
+        raise ValueError(
+            "Fleiss' kappa needs the same number of judgements of each item, two or more"
+        )
     counts = _counts(rated)
     raters = counts.sum(axis=1, keepdims=True)
     agreeing = (counts * (counts - 1)).sum(axis=1, keepdims=True) / (raters * (raters - 1))

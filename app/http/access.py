@@ -111,7 +111,7 @@ async def require_decided(request: Request) -> None:
     own = request.scope["route"].path_format
     decided = {f"{request.scope['method']} {prefix}{own}" for prefix in ("", API)}
     if request.scope.get(RULE) not in decided:
-        raise ForbiddenError("no rule says who may ask for this address", hint=UNDECIDED)
+        raise ForbiddenError("no permission is defined for this address", hint=UNDECIDED)
 
 
 @dataclass(frozen=True)
@@ -371,7 +371,7 @@ def _is_decided(route: str, action: Action) -> bool:
 
 
 def _nobody() -> NotLoggedInError:
-    return NotLoggedInError("nobody is logged in here", hint="Log in first.")
+    return NotLoggedInError("you are not logged in", hint="Log in first.")
 
 
 def _refuse(error: StorageError | AccessError, scope: Scope) -> Response:

@@ -296,7 +296,7 @@ def require_allowed(
             if whole and item.ownership.dataset in roles.blind:
                 raise ForbiddenError(
                     "you annotate copies of groups of this dataset without seeing the originals",
-                    hint="What tells of all its groups is shown once the batch is closed.",
+                    hint="Numbers over all its groups are shown once the batch is closed.",
                 )
 
 

@@ -46,7 +46,7 @@ def _writer(kind: Any) -> TypeAdapter[Any]:
 class ListDocument(Document, Generic[Item]):
     """An answer of several things, in an order that its own words tell."""
 
-    items: list[Item] = Field(description="The things, of one page where a limit was asked for.")
+    items: list[Item] = Field(description="The items; one page of them if `limit` is given.")
     next: str | None = Field(
         default=None, description="`cursor` of the next page; null on the last one."
     )

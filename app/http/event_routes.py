@@ -59,16 +59,20 @@ class Start:
             str | None,
             Header(
                 alias="Last-Event-ID",
-                description="`id` of the last event that was seen: what came after it is told "
-                "first. Anything that is no such id counts as none.",
+                description=(
+                    "`id` of the last event received: later events are sent first. Anything else "
+                    "is ignored."
+                ),
             ),
         ] = None,
         since: Annotated[
             str | None,
             Query(
                 max_length=40,
-                description="`moment` of the session, or of the page: what came after it is told "
-                "first, where no `Last-Event-ID` says more. Anything else counts as none.",
+                description=(
+                    "`moment` of the session or of the page: later events are sent first, unless "
+                    "there is a `Last-Event-ID`. Anything else is ignored."
+                ),
             ),
         ] = None,
     ):

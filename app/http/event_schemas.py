@@ -44,7 +44,7 @@ class WorkEvent(BaseModel):
     batch: int
     group: int
     dataset: str | None
-    here: list[PresenceDocument] = Field(description="Everybody who has the group open now.")
+    here: list[PresenceDocument] = Field(description="People who have the group open now.")
 
 
 class MaintenanceEvent(BaseModel):

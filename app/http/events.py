@@ -244,7 +244,7 @@ class Events:
                 except StorageError as error:
                     log.warning("the log could not be read", error=str(error))
                 except Exception:
-                    log.exception("events could not be told")
+                    log.exception("events could not be sent")
                 idle = monotonic() - PING_SECONDS
                 _tell({feed: [KEEPALIVE_COMMENT] for feed in feeds if feed.told < idle})
                 self._closing.wait(PAUSE)

@@ -156,17 +156,17 @@ TAGS = {
     "views": "One image of an instant: its lines, its ball, its frame.",
     "stations": "Static cameras, whose lines many views share.",
     "findings": "What a person should look at.",
-    "insight": "What would mend a group, and which points move its ball most.",
+    "insight": "Suggestions for a group, and which points move its ball most.",
     "verdicts": "Many groups judged at once.",
-    "queue": "Saved queries, and who has reviewed how much.",
-    "work": "Batches of groups that leads give out, and who has which group open.",
-    "takes": "Own annotations that nobody else sees, groups whose truth is known, guidelines.",
+    "queue": "Saved queries, and how much each person has reviewed.",
+    "work": "Batches of groups that leads assign, and which person has which group open.",
+    "takes": "Independent annotations, gold groups whose true values are known, guidelines.",
     "yield": "What a policy lets through, and what another one would.",
-    "agreement": "How far people agree who annotated the same frames.",
-    "comments": "What people say to each other about groups, and what they are told.",
-    "webhooks": "Addresses that are told what happens in a dataset, each message signed.",
+    "agreement": "Agreement of people who annotated the same frames.",
+    "comments": "Comments on groups, and notifications.",
+    "webhooks": "Addresses that get signed messages about what happens in a dataset.",
     "imports": "Files and folders that become datasets.",
-    "predictions": "What detectors say, beside what people said.",
+    "predictions": "Predictions of detectors, beside the annotations of people.",
     "evaluations": "Detectors measured on what was accepted.",
     "versions": "Datasets as they were frozen.",
     "exports": "Datasets as files.",
@@ -175,10 +175,10 @@ TAGS = {
     "jobs": "Work that outlasts a request: how far it is and what came of it.",
     "events": "What changes, as it changes.",
     "pitch": "Names and shapes of the 26 markings.",
-    "sessions": "On a server of a team: who is logged in, and where.",
-    "tokens": "On a server of a team: with what scripts ask, in the name of a person.",
-    "users": "On a server of a team: who has an account, and which role.",
-    "health": "For whoever runs the service.",
+    "sessions": "On a team's server: login and open sessions.",
+    "tokens": "On a team's server: tokens for scripts that act in the name of a person.",
+    "users": "On a team's server: accounts and roles.",
+    "health": "For the operator of the service.",
 }
 
 
@@ -322,15 +322,18 @@ SCHEMES: dict[str, Any] = {
         "in": "cookie",
         "name": NAME,
         "description": "The session of a person who has logged in on a server of a team, set by"
-        " `POST /api/v1/session`; `__Host-` stands before its name where people come by TLS. A"
+        " `POST /api/v1/session`; `__Host-` stands before its name if the server is reached by "
+        "TLS. A"
         " change carries an `Origin` of the server, too.",
     },
     "token": {
         "type": "http",
         "scheme": "bearer",
         "bearerFormat": "tl_...",
-        "description": "A token of `POST /api/v1/tokens`, with which scripts ask in the name of a"
-        " person, within its scopes.",
+        "description": (
+            "A token of `POST /api/v1/tokens`, with which scripts act in the name of a person, "
+            "within its scopes."
+        ),
     },
 }
 KEY_PARAMETER: dict[str, Any] = {

@@ -112,6 +112,7 @@ def snap_reading(
     start_covariance: FloatArray | None = None,
     circles_count_twice: bool = False,
     position_is_known: bool = False,
+    most_surprising: float = MOST_SURPRISING,
 ) -> Snapped:
     """As ``snap``, for a picture that is prepared already.
 
@@ -121,6 +122,7 @@ def snap_reading(
             as much as two lines: with the middle line it determines a camera.
         position_is_known: Whether the start's covariance knows where the camera stands: that
             stands for a marking, as two lines then tell where it looks and how far it zooms.
+        most_surprising: How far the camera may leave a start that is known, squared sigmas.
     """
     least = LEAST_MARKINGS - position_is_known
     problem = ResectionProblem.of(ImageSize(reading.width, reading.height), policy)
@@ -148,7 +150,7 @@ def snap_reading(
     if (
         error > rounds.unit * WORST_PX
         or moved > rounds.unit * (windows[0] if start_covariance is None else np.inf)
-        or rounds.problem.surprise(parameters) > MOST_SURPRISING
+        or rounds.problem.surprise(parameters) > most_surprising
         or evidence.share < KEPT_SHARE * before.share
     ):
         return _kept(rounds, evidence, PAINT_DISAGREES, error, moved)

@@ -362,9 +362,9 @@ class Gate:
     ``margin`` is how far the value is from the threshold, as ``margin_of`` counts it.
 
     Attributes:
-        margin: How far the value is from the threshold, as a share of the threshold: 0.25 is better
-            than asked by a quarter of it, -0.25 worse by as much. None where there is no share:
-            nothing is asked, not judged, or the threshold is 0.
+        margin: Distance of the value from the threshold, as a share of the threshold: 0.25 is
+            better than required by a quarter of the threshold, -0.25 worse by a quarter. None if
+            the gate is off or not judged, or if the threshold is 0.
     """
 
     name: str

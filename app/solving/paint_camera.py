@@ -95,14 +95,15 @@ class PaintProblem:
         base = marking_weights(seen.marking, seen.sigmas) / seen.sigmas**2
         moved: FloatArray = np.zeros(PARAMETERS)
         for _ in range(INNER_STEPS):
-            weight = base * self._robust(seen.offsets - seen.jacobian @ moved, seen.sigmas, strict)
+            weight = base * self.robust(seen.offsets - seen.jacobian @ moved, seen.sigmas, strict)
             normal = (seen.jacobian * weight[:, None]).T @ seen.jacobian + information
             normal[np.diag_indices(PARAMETERS)] *= 1 + DAMPING
             right = seen.jacobian.T @ (weight * seen.offsets) + pull
             moved = np.asarray(np.linalg.solve(normal, right))
         return moved
 
-    def _robust(self, rest: FloatArray, sigmas: FloatArray, strict: bool) -> FloatArray:
+    def robust(self, rest: FloatArray, sigmas: FloatArray, strict: bool) -> FloatArray:
+        """Weight of each place by how far off it lies, pixels, both shape (N,)."""
         if not strict:
             weights: FloatArray = 1 / np.sqrt(1 + (rest / (ROBUST_PX * self.unit)) ** 2)
             return weights
@@ -127,7 +128,7 @@ class PaintProblem:
             places: Where on the pitch each of it lies, metres, shape (N, 2).
             pitch: The pitch.
         """
-        robust = self._robust(seen.offsets, seen.sigmas, strict=True)
+        robust = self.robust(seen.offsets, seen.sigmas, strict=True)
         prior = self.prior(parameters).sigma ** -2.0
         terms = pitch_terms(places, seen.marking, seen.jacobian, pitch)
         return paint_noise(seen, robust, prior, self.information, terms)

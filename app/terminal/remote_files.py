@@ -13,7 +13,8 @@ from app.progress import TellProgress
 from app.terminal.remote import IMPORT, follow, part, some, time_text
 
 if TYPE_CHECKING:
-    from app.features.predictions.sources import PredictionSource, SourcesRequest
+    from app.features.predictions.reader import PredictionFiles
+    from app.features.predictions.sources import SourcesRequest
     from touchline.client import Client
 
 
@@ -150,10 +151,10 @@ def write_evaluation(client: Client, values: Mapping[str, Any], out: Path) -> No
     write_parts(out, values, client.pages(f"{place}/frames"), fetch)
 
 
-def _set(client: Client, dataset: str, source: PredictionSource) -> dict[str, Any]:
+def _set(client: Client, dataset: str, source: PredictionFiles) -> dict[str, Any]:
     """The set of a source: of its files, which are read once, or of its name."""
     place = f"datasets/{part(dataset)}/predictions"
-    path = None if source.boxes is None else Path(source.boxes)
+    path = source.path
     if path is not None and not path.exists():
         known = {item["name"]: item for item in client.get(place)["items"]}
         if source.cameras is not None or str(path) not in known:

@@ -95,7 +95,7 @@ def get_case(store: Store, group_id: int, *, actor: str) -> Case:
     own = person_of(actor) in {take.person for take in takes}
     refused = None
     if own and (others := _others(store, original.dataset_id, takes)):
-        refused = f"you annotated this group yourself; {_named(others)} can decide, who did not"
+        refused = f"you annotated this group yourself; {_named(others)} can decide"
     return Case(
         original,
         row.batch_id or None,

@@ -128,7 +128,7 @@ class AgreementDocument(Document):
     """How far the people of a dataset agree."""
 
     agreed: int = Field(
-        description="Groups whose annotations agree, so that the first one was taken over."
+        description="Groups whose annotations agree; the first annotation was adopted."
     )
     open: int = Field(description="Groups that wait for a decision.")
     decided: int
@@ -159,8 +159,12 @@ class CaseDocument(Document):
     batch: int | None
     takes: list[CaseTake]
     comparison: GroupComparisonDocument
-    refused: str | None = Field(description="Why whoever asks may not decide; null: they may.")
-    own: bool = Field(description="They annotated it themselves, and nobody else is there.")
+    refused: str | None = Field(
+        description="Why the logged-in person may not decide; null: they may."
+    )
+    own: bool = Field(
+        description="They annotated the group themselves, and no other reviewer exists."
+    )
 
     @staticmethod
     def of(case: Case) -> CaseDocument:

@@ -61,13 +61,13 @@ class AuditEntry:
     """One thing that somebody said or did.
 
     Attributes:
-        actor: The person, with the name of the token where a script asked.
+        actor: Name of the person, with the name of the token for a script's request.
         kind: Of the entry in the log.
         sentence: What, in words.
         dataset: None: of none, or it is gone.
         network: From which address, where that is known.
-        address: Of the page that it is about; None where there is none.
-        hash: Of the entry in the chain.
+        address: Of the page that it is about.
+        hash: Of the entry, in the chain of the log.
     """
 
     id: int

@@ -77,7 +77,7 @@ class Lease:
         group: Its id; None: there is none left for them now.
         part: What they do with it.
         until: When it ends unless it is kept.
-        here: Everybody who has the group open.
+        here: People who have the group open.
         handed_in_by: Who has handed it in; None: nobody.
         handed_back: Why it was handed back to its annotator; None: it was not, or is handed in again.
         place: Of the groups that they annotate on their own: which this is, from 1; None otherwise.

@@ -42,7 +42,7 @@ class NewBatchDocument(BaseModel):
     )
     annotators: People = []
     reviewers: People = Field(
-        default=[], description="Nobody: whoever may review in the dataset may take part."
+        default=[], description="Empty: every reviewer of the dataset may review the batch."
     )
     due: date | None = None
     skip_given: bool = Field(
@@ -52,7 +52,8 @@ class NewBatchDocument(BaseModel):
         default=1, description="How many people judge each group independently."
     )
     blind: bool = Field(
-        default=True, description="Where several judge, nobody sees what the others say."
+        default=True,
+        description="When several people judge, they do not see each other's verdicts.",
     )
     gold_every: Annotated[int, Field(ge=1, le=RAREST_GOLD)] | None = Field(
         default=None, description="One of so many groups is a gold one; null: none is."
@@ -75,7 +76,7 @@ class BatchEdit(BaseModel):
     )
     gold_every: Annotated[int, Field(ge=1, le=RAREST_GOLD)] | None = Field(
         default=None,
-        description="From the next group on that somebody begins; null: no more gold groups.",
+        description="Counts from the next group that an annotator opens; null: no more gold groups.",
     )
 
 
@@ -96,10 +97,10 @@ class WorkBatchDocument(Document):
     annotators: list[str]
     reviewers: list[str]
     groups: int
-    waiting: int = Field(description="Groups that nobody has handed in or judged.")
+    waiting: int = Field(description="Groups that are neither submitted nor judged.")
     handed_in: int = Field(description="Groups that wait for a verdict.")
-    settled: int = Field(description="Groups whose work is over.")
-    last: datetime | None = Field(description="When one of them was handed in or settled last.")
+    settled: int = Field(description="Groups that are complete.")
+    last: datetime | None = Field(description="When a group was last submitted or completed.")
 
 
 class WorkBatchList(ListDocument[WorkBatchDocument]):
@@ -129,7 +130,7 @@ class LeaseRequest(BaseModel):
         extra="forbid", json_schema_extra={"examples": [{"take_over": False}]}
     )
 
-    take_over: bool = Field(default=False, description="Also where somebody else has it open.")
+    take_over: bool = Field(default=False, description="Also when another person has it open.")
 
 
 class LeaseDocument(Document):
@@ -139,8 +140,8 @@ class LeaseDocument(Document):
     group: int | None = Field(description="null: no group waits for them now.")
     part: Part | None = Field(description="What they do with it.")
     until: datetime | None = Field(description="When the lease ends unless it is taken again.")
-    here: list[PresenceDocument] = Field(description="Everybody who has the group open.")
-    handed_in_by: str | None = Field(description="Who has handed it in; null: nobody.")
+    here: list[PresenceDocument] = Field(description="People who have the group open.")
+    handed_in_by: str | None = Field(description="Person who submitted it; null: not submitted.")
     handed_back: HandedBack | None = Field(
         description="Why its annotator has it back; null: they have not."
     )
@@ -161,7 +162,7 @@ class MyBatchDocument(Document):
     parts: list[Part]
     left: int = Field(description="Groups that one may still get.")
     handed_back: list[HandedBack] = Field(
-        description="What one had handed in and has back, in the order of the batch."
+        description="Submitted groups that were returned to the person, in the order of the batch."
     )
 
 
@@ -188,8 +189,10 @@ class TeamBatchDocument(Document):
     gold_every: int | None = Field(description="One gold group in N.")
     here: list[PresenceDocument]
     stalled: datetime | None = Field(
-        description="Since when nobody does anything, where that is as long as the operator's setting "
-        "`stalled_hours`, a day by default; else null."
+        description=(
+            "Time of the last activity, if it is longer ago than the operator's setting "
+            "`stalled_hours` (default: one day); else null."
+        )
     )
     people: list[PaceDocument]
 

@@ -137,7 +137,7 @@ class Batch:
 
     @property
     def waiting(self) -> int:
-        """Groups that nobody has handed in or judged."""
+        """Groups that are neither submitted nor judged."""
         return self.groups - self.handed_in - self.settled
 
 
@@ -148,7 +148,7 @@ class BatchGroup:
     Attributes:
         number: Its place in the dataset.
         place: Its place in the batch, from 1.
-        handed_in_by: Also after it was handed back to them: then ``handed_in`` is None.
+        handed_in_by: Also after it was returned to them: then ``handed_in`` is None.
         here: Who has it open.
     """
 
@@ -382,7 +382,7 @@ def _check(new: NewBatch) -> None:
     checked_title(new.name, "a batch")
     if not 1 <= new.verdicts <= MOST_VERDICTS:
         raise InputError(
-            f"a batch asks for 1 to {MOST_VERDICTS} verdicts on each group", pointer="/verdicts"
+            f"a batch needs 1 to {MOST_VERDICTS} verdicts on each group", pointer="/verdicts"
         )
     _check_gold(new.gold_every)
 
@@ -407,7 +407,7 @@ def _nothing(found: Sequence[int]) -> InputError:
         return InputError("no group matches that query", pointer="/q")
     return InputError(
         "every group that matches is in an open batch already",
-        hint="Take them all the same, or ask for other groups.",
+        hint="Assign them anyway, or choose other groups.",
         pointer="/q",
     )
 

@@ -26,7 +26,7 @@ def list_findings(
     dataset: DatasetQuery,
     kind: Annotated[FindingKind | None, Query(description="Only these.")] = None,
     dismissed: Annotated[
-        bool | None, Query(description="Only those that somebody has checked, or nobody has.")
+        bool | None, Query(description="Only dismissed findings (true), or only open ones (false).")
     ] = None,
     limit: Annotated[int, Query(ge=1, le=MAX_GROUPS, description="Groups a page.")] = 50,
     cursor: Annotated[

@@ -92,13 +92,17 @@ class LinesEdit(BaseModel):
     lines: LineEdits
     proposed: Annotated[list[Marking], Field(max_length=len(MARKINGS))] = Field(
         default_factory=list,
-        description="Those of them whose points are as they were proposed from the paint: their "
-        "source is `proposed`, until somebody moves them.",
+        description=(
+            "Markings whose points are as proposed from the paint: their source is `proposed` "
+            "until a person moves them."
+        ),
     )
     not_visible: Annotated[list[Marking], Field(max_length=len(MARKINGS))] = Field(
         default_factory=list,
-        description="Those of them without points that the picture does not show, hidden or worn: "
-        "JaC does not count them as missing, until somebody draws them.",
+        description=(
+            "Markings without points that the picture does not show, hidden or worn: JaC does not "
+            "count them as missing until a person draws them."
+        ),
     )
 
     @model_validator(mode="after")
@@ -277,7 +281,7 @@ class StationDocument(Document):
     calibration: CalibrationChoice = Field(description="Which calibration counts when both exist.")
     has_given: bool
     picture: PictureGeometry | None = Field(
-        description="What was done to the picture, where somebody said that something was."
+        description="What was done to the picture since the camera took it; null: nothing is recorded."
     )
     etag: str = Field(description="For If-Match on `/stations/{id}/lines`.")
 
@@ -293,7 +297,7 @@ class ViewDocument(Document):
     height: int
     included: bool
     left_out: LeftOut | None = Field(
-        description="Why a person left the view out, where they said so."
+        description="Reason why a person left the view out, if they gave one."
     )
     station: StationDocument
     lines: LineDocuments

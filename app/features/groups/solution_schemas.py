@@ -78,7 +78,7 @@ class CameraDocument(Document):
     covariance: list[list[float]] | None = Field(
         default=None,
         description="How well it is known: 8 x 8, of x, y, z (metres), pan, tilt, roll (degrees), "
-        "focal length (pixels) and k1, as in camera files; null: nobody says.",
+        "focal length (pixels) and k1, as in camera files; null: unknown.",
     )
 
 
@@ -325,20 +325,20 @@ class FindingDocument(Document, shows=Finding):
 
     fix: FixDocument | None
     unusable_ball: bool = Field(
-        description="Whether nobody can use the ball: accepting the group needs a note then."
+        description="Whether the ball is unusable: accepting the group then needs a note."
     )
     offers: list[OfferDocument] = Field(
-        description="Edits that mend it, as its fix proposes or without one: none when only a person "
-        "can, several to choose from."
+        description=(
+            "Edits that correct it; empty when only a person can correct it, several to choose "
+            "from."
+        )
     )
     guide: GuideDocument | None = Field(
-        description="Where a person is led who has to look or draw; null where edits are offered, "
-        "or nothing."
+        description="Where a person has to look or draw; null if edits are offered, or nothing."
     )
     dismissed: DismissedDocument | None = Field(
         default=None,
-        description="Who has checked the finding and found it fine, as long as it says the same; "
-        "null: nobody.",
+        description="Person who dismissed the finding, while it has not changed; null: not dismissed.",
     )
 
     @staticmethod

@@ -46,9 +46,9 @@ class Guidelines:
     """What annotators are told.
 
     Attributes:
-        dataset: Id of the dataset whose guidelines they are.
-        number: Of this version; 0: nobody has written any.
-        text: In Markdown; ``![words](DIGEST)`` shows a picture.
+        dataset: Whose guidelines they are; copies have those of what they copy.
+        number: 0: there are no guidelines.
+        text: Markdown; ``![words](DIGEST)`` in a line of its own is a picture.
         versions: All of them, the newest first.
     """
 

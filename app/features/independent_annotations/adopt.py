@@ -151,7 +151,7 @@ def _line_changes(before: Station, after: Station) -> SetStationLines | None:
 
 def _require_ready(take: Take) -> None:
     if take.kind == GOLD:
-        raise ConflictError("this is an annotation of a gold group, whose truth is known")
+        raise ConflictError("this is an annotation of a gold group, whose true values are known")
     if take.handed_in is None:
         raise ConflictError(f"{take.person} has not submitted this yet")
     if take.settled is not None:

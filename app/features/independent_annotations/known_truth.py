@@ -75,7 +75,7 @@ class GoldChosen:
 
     Attributes:
         groups: Groups that are gold by now.
-        left_out: Groups of which nothing is known that could be the truth.
+        left_out: Groups without known true values.
     """
 
     groups: tuple[int, ...]
@@ -204,7 +204,8 @@ def _nothing(source: TruthSource) -> InputError:
             pointer="/source",
         )
     return InputError(
-        "this version holds none of these groups as several people agreed on it, or as somebody decided",
+        "none of these groups in this version was agreed on by several people or decided by a "
+        "reviewer",
         hint="Let several people annotate them in a batch first.",
         pointer="/version",
     )

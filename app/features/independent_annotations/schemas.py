@@ -28,7 +28,7 @@ class HandBack(BaseModel):
     )
 
     reason: Annotated[str, Field(max_length=MAX_REASON)] = Field(
-        default="", description="A sentence for whoever has it back."
+        default="", description="A sentence for the person who gets the group back."
     )
 
 

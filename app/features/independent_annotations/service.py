@@ -86,13 +86,13 @@ class TakeView:
 
     Attributes:
         batch: The batch that it is for; None: none.
-        group: The copy.
-        dataset: Of what it is a copy.
+        group: The copy: a group like any other.
+        dataset: Of the groups that this is a copy of one of.
         of, number: The original, and its number in its dataset; None where its person is not told.
-        title: What people call the group; where its person is not told, what they call the copy.
+        title: What people call the group; where it may not be known, the copy.
         place: Which one of this person in this batch, from 1.
-        settled: When something was decided about it; None: not yet, or its person is not told.
-        handed_back: Why its person has it back; None: they have not, or handed it in again.
+        settled: When it was decided; None: not yet, or not disclosed to its person.
+        handed_back: Why its person has it back; None: they have not.
     """
 
     id: int
@@ -225,7 +225,7 @@ def get_take_of(store: Store, copy_id: int) -> Take:
         there = bool(read_groups(session, [copy_id]))
     if not there:
         raise NotFoundError.group(copy_id)
-    raise NotFoundError(f"group {copy_id} is nobody's own annotation")
+    raise NotFoundError(f"group {copy_id} is not an independent annotation")
 
 
 def find_take_of(store: Store, copy_id: int) -> Take | None:

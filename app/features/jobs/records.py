@@ -109,7 +109,7 @@ class JobRecords:
             if run.progress.place != shown:
                 shown = run.progress.place
                 with suppress(StorageError):
-                    self._save(run.id, **run.columns)
+                    self._save(run.job.id, **run.columns)
 
     def _save(self, job_id: int, **values: Any) -> None:
         with self._store.write() as session:

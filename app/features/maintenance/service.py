@@ -86,8 +86,8 @@ def exposure_of(settings: Settings) -> str | None:
     secure = (settings.url or "").startswith("https://")
     if not is_local(settings.host) and not settings.team:
         return (
-            f"{settings.host} can be reached by other machines, and without accounts everybody who "
-            "reaches it could change everything. Use 127.0.0.1, or serve a team with --team."
+            f"{settings.host} can be reached from other machines, and without accounts anyone who "
+            f"reaches it could change everything. Use 127.0.0.1, or serve a team with --team."
         )
     if not is_local(settings.host) and not secure:
         return (

@@ -64,7 +64,7 @@ class MatchPositionDocument(Document):
         description="How far off it may be for one picture, each axis, the median of pictures."
     )
     current: bool | None = Field(
-        description="Whether it would be estimated from the same now; null: nothing is shared."
+        description="Whether a new estimate would use the same data; null: no shared position."
     )
     sentence: str = Field(description="All that in words.")
 
@@ -171,7 +171,9 @@ class NoiseDocument(Document):
     stations: list[SourceNoiseDocument] = Field(
         description="Static cameras of which enough is seen, the noisiest first."
     )
-    people: list[SourceNoiseDocument] = Field(description="The same of who placed balls last.")
+    people: list[SourceNoiseDocument] = Field(
+        description="The same for the people who placed the balls last."
+    )
     factors: list[FactorDocument] = Field(
         description="Of cameras and people together; empty where all may be like the dataset."
     )

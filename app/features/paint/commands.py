@@ -1,4 +1,4 @@
-"""Commands that read the paint of pictures: paint, snap, agree, propose."""
+"""Commands that read the paint of pictures: paint, snap, agree, propose, track."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def paint(
     Pictures that were read for the lines that they have now are left alone. The policy must say
     calibration.source paint, as touchline does; `touchline solve` computes what follows.
     """
-    from app.features.datasets.match_choice import of_match
+    from app.features.datasets.service import of_match
     from app.features.paint.service import get_paint, read_paint, take_back_paint
 
     if show and undo:
@@ -221,3 +221,35 @@ def _propose_for_files(
         if row["reason"]:
             say(f"{row['frame']}: {row['outcome']}; {row['reason']}")
     print_values(counts_of(rows), False)
+
+
+@commands.command()
+def track(
+    clip: Annotated[
+        Path,
+        typer.Argument(metavar="CLIP", exists=True, dir_okay=False, help="A video of one camera."),
+    ],
+    out: Annotated[Path, typer.Argument(metavar="OUT", help="Folder for camera files.")],
+    lines: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="FILE@FRAME",
+            help="Lines of a frame, which count from 0; may be given several times.",
+        ),
+    ] = None,
+    json_: Json = False,
+) -> None:
+    """Follow the camera of a clip: a camera for each frame.
+
+    It starts from the lines of annotated frames, or proposes a camera where nothing is annotated.
+    OUT gets camera_<frame>.json, and track.json with the outcome of each frame: tracked (on the
+    paint), bridged (carried by the background between tracked frames) or lost (no camera).
+    """
+    from app.features.file_tools.track import count_outcomes, track_files
+
+    with show_progress("Tracking") as progress:
+        result = track_files(clip, out, lines or (), progress=progress)
+    if json_:
+        print_json(result)
+        return
+    print_values(count_outcomes(result["frames"]), False)

@@ -36,7 +36,7 @@ class Proposal:
 
     Attributes:
         outcome: ``proposed``, ``unsure`` or ``nothing``.
-        sentence: Why nothing is proposed, or which drawn lines lie elsewhere; else empty.
+        sentence: Why no lines are proposed, or which drawn lines contradict the proposal; else empty.
         lines: Points on the paint of markings that nobody drew, pixels of the annotated size; none
             unless proposed.
         supported, explained, points, error_px, runner_up: As of ``paint.view_proposal``.

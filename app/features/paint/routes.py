@@ -195,4 +195,4 @@ def forget(dataset: DatasetPath, services: AppServices) -> int:
 def group_proposals(group: Id, store: AppStore) -> GroupProposals:
     """What was proposed for the views of a group, with its lines and scores."""
     found = get_group_proposals(store, group)
-    return GroupProposals(items=[GroupProposal.of(*item) for item in found])
+    return GroupProposals(items=[GroupProposal.of_view(*item) for item in found])

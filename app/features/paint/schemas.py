@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, StrictBool
 
-from app.features.groups.schemas import LineDocuments, LineEdits, Point, lines_document
+from app.features.groups.schemas import LineDocuments, LineEdits, lines_document
 from app.features.match_estimates.schemas import MatchRequest
 from app.features.paint.proposal_queries import Proposal
 from app.http.documents import Document, ListDocument
@@ -108,9 +108,9 @@ class ProposalDocument(Document):
 
     outcome: ProposalOutcome
     sentence: str = Field(
-        description="Why nothing is proposed, or which drawn lines lie elsewhere; else empty."
+        description="Why no lines are proposed, or which drawn lines contradict the proposal; else empty."
     )
-    lines: dict[str, list[Point]] = Field(
+    lines: LineDocuments = Field(
         description="Points on the paint, pixels of the annotated size; none unless proposed, and "
         "none of markings that are drawn."
     )
@@ -125,11 +125,7 @@ class ProposalDocument(Document):
     @classmethod
     def of(cls, found: ViewProposal) -> ProposalDocument:
         """The document of a proposal."""
-        lines = {
-            name: [Point(x=point.x, y=point.y) for point in points]
-            for name, points in found.lines.items()
-        }
-        return cls.model_validate({**vars(found), "lines": lines})
+        return cls.model_validate({**vars(found), "lines": lines_document(found.lines)})
 
 
 class MatchProposalsDocument(Document):
@@ -172,7 +168,7 @@ class ForgottenProposalsDocument(Document):
     forgotten: int = Field(description="How many proposals there were; accepted lines stay.")
 
 
-class GroupProposal(BaseModel):
+class GroupProposal(ProposalDocument):
     """What was proposed for one view: a prediction until its lines are saved."""
 
     view: int
@@ -181,35 +177,16 @@ class GroupProposal(BaseModel):
         description="Whether the view still has no given camera, and no lines or those beside "
         "which this was proposed because they determined no camera."
     )
-    outcome: ProposalOutcome
-    sentence: str = Field(
-        description="Why nothing is proposed, or which drawn lines lie elsewhere; else empty."
-    )
-    lines: LineDocuments = Field(
-        description="Points on the paint of markings that nobody drew, pixels of the annotated "
-        "size; none unless proposed."
-    )
-    supported: float | None = Field(description="Share of the visible markings that has paint.")
-    explained: float | None = Field(description="Share of line-like paint that has a marking.")
-    points: int = Field(description="How many places of paint the best camera lies on.")
-    error_px: float | None = Field(description="Median distance of the paint to its marking.")
-    runner_up: float | None = Field(
-        description="How much less the next best camera agrees; null where there is no other."
-    )
     frame: str = Field(description="Digest of the picture's bytes; empty where there were none.")
     version: str = Field(description="Of what read the picture.")
 
-    @staticmethod
-    def of(key: str, is_open: bool, found: Proposal) -> GroupProposal:
-        """The document of a proposal."""
-        names = GroupProposal.model_fields.keys() - {"view", "key", "open", "lines"}
-        return GroupProposal.model_construct(
-            view=found.view_id,
-            key=key,
-            open=is_open,
-            lines=lines_document(found.lines),
-            **{name: getattr(found, name) for name in names},
-        )
+    @classmethod
+    def of_view(cls, key: str, is_open: bool, found: Proposal) -> GroupProposal:
+        """The document of what was proposed for a view."""
+        shown = cls.model_fields.keys() - {"view", "key", "open"}
+        values: dict[str, Any] = {name: getattr(found, name) for name in shown}
+        values |= {"view": found.view_id, "key": key, "open": is_open}
+        return cls.model_construct(**{**values, "lines": lines_document(found.lines)})
 
 
 class GroupProposals(ListDocument[GroupProposal]):

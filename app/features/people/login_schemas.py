@@ -178,8 +178,10 @@ class SignOnAnswer(BaseModel):
     iss: Told | None = Field(default=None, description="Who answers (RFC 9207).")
     factor: Code | None = Field(
         default=None,
-        description="Of the second factor, or a recovery code; asked for by 401 with the pointer "
-        "`/factor`: send the same once more, with it.",
+        description=(
+            "Of the second factor, or a recovery code; requested by 401 with the pointer "
+            "`/factor`: repeat the request with it."
+        ),
     )
 
 

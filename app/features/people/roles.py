@@ -110,9 +110,7 @@ def require_scope(scopes: Collection[Scope], action: Action) -> None:
         return
     lacks = next((scope for scope, allowed in SCOPES.items() if action in allowed), None)
     if lacks is None:
-        raise ForbiddenError(
-            "no token may do this", hint="It is done in the browser, by somebody who has logged in."
-        )
+        raise ForbiddenError("no token may do this", hint="Log in and do it in the browser.")
     raise ForbiddenError(
         f"this token lacks the scope {lacks}; it has {' and '.join(scopes)}",
         hint="Make another one under Account, with that scope.",

@@ -38,8 +38,10 @@ class NewSession(BaseModel):
     password: Password
     code: Code | None = Field(
         default=None,
-        description="Of the second factor, or a recovery code; asked for by 401 with the pointer "
-        "`/code` where somebody has one.",
+        description=(
+            "Of the second factor, or a recovery code; requested by 401 with the pointer `/code` "
+            "if the person has one."
+        ),
     )
 
 
@@ -123,7 +125,7 @@ class SessionDocument(Document):
     """Who asks."""
 
     team: bool = Field(description="People log in; else one person runs the server alone.")
-    name: str | None = Field(description="Null: nobody is logged in.")
+    name: str | None = Field(description="Null: not logged in.")
     role: Role | None = Field(description="In every dataset that `datasets` does not name.")
     enrol: bool = Field(
         default=False, description="They must make a second factor before anything else."
@@ -132,28 +134,28 @@ class SessionDocument(Document):
         default=None, description="How this session began; null: there is none."
     )
     ways: WaysIn | None = Field(
-        default=None, description="How people log in; told to whoever asks who they are."
+        default=None, description="How people log in; only for requests without a login."
     )
     moment: str | None = Field(
         default=None,
-        description="How things stand, for `since` of the events: what comes after this answer is "
-        "told then. Null: nobody is logged in, or they have just come.",
+        description=(
+            "Moment of this response, for `since` of the events: they begin after it. Null: not "
+            "logged in, or logged in just now."
+        ),
     )
     maintenance: Banner | None = Field(
         default=None, description="The notice that everybody is shown; null: there is none."
     )
     may: list[Action] = Field(description="What the role lets them do.")
     datasets: list[SingleRole] = Field(default=[], description="Where they are something else.")
-    allows: dict[Role, list[Action]] = Field(
-        default={}, description="What each role lets somebody do."
-    )
+    allows: dict[Role, list[Action]] = Field(default={}, description="What each role allows.")
 
 
 class OpenSessionDocument(Document):
     """A session of one's own."""
 
     id: int
-    this: bool = Field(description="It is the one that asks.")
+    this: bool = Field(description="Whether it is the session of this request.")
     browser: str = Field(description="What the browser called itself.")
     address: str
     created: datetime
@@ -250,7 +252,7 @@ class UserList(ListDocument[Person]):
 
     adopted_by: str | None = Field(
         default=None,
-        description="As whose that is shown which was done before there were accounts.",
+        description="Person to whom work from before there were accounts is attributed.",
     )
     mail: bool = Field(default=False, description="Invitations can go by mail here.")
 
@@ -287,8 +289,8 @@ class MemberDocument(Document):
     id: int
     name: str
     role: Role = Field(description="What they are here.")
-    everywhere: Role = Field(description="What they are where nothing else is said.")
-    single: Role | None = Field(description="What is said of this dataset; null: nothing.")
+    everywhere: Role = Field(description="Their role in datasets without a role of their own.")
+    single: Role | None = Field(description="Their role in this dataset; null: none of its own.")
 
 
 class MemberList(ListDocument[MemberDocument]):

@@ -62,7 +62,7 @@ class FactorState:
         on: There is an authenticator, or a passkey.
         required: Everybody needs a second factor here.
         codes_left: Recovery codes that were not used yet.
-        authenticator: It is (also) an authenticator, which shows codes.
+        authenticator: There is an authenticator, which shows codes.
     """
 
     on: bool
@@ -166,7 +166,7 @@ class SecondFactors:
                 raise NotFoundError.person(person_id)
             if person.name == actor:
                 raise ForbiddenError(
-                    "nobody takes away their own second factor so", hint="Do it under Account."
+                    "you cannot remove your own second factor here", hint="Do it under Account."
                 )
             had = delete_second_factor(session, person_id)
             if delete_passkeys(session, person_id) or had:

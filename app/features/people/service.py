@@ -40,10 +40,10 @@ class Person:
     """Somebody with an account.
 
     Attributes:
-        joined: They have chosen a password, or come by single sign-on.
+        joined: Whether they have chosen a password or use single sign-on.
         invited: A link waits for them with which they can.
-        seen: When a session of theirs was used last, in UTC; None: none is open.
-        second_factor: More is asked for than their password.
+        seen: When a session was used last; None: none is open.
+        second_factor: Whether they log in with a second factor.
         tokens: How many tokens of scripts they have.
         sign_on: What their account of the provider is known by; None: none is linked.
         datasets: In which datasets they are something else than ``role``.
@@ -99,7 +99,7 @@ def require_no_people(store: Store) -> None:
     """
     if has_people(store):
         raise InputError(
-            "people have accounts here: without --team nobody would be asked who they are",
+            "this home has accounts: without --team the server would not ask for a login",
             hint="Serve with --team; or with --alone, if only you can reach this machine.",
         )
 
@@ -146,7 +146,7 @@ def renew_link(store: Store, person_id: int, *, actor: str) -> tuple[Person, Lin
             )
         if person.name == actor:
             raise ForbiddenError(
-                "nobody makes a link for themselves", hint="Change the password under Account."
+                "you cannot create a link for yourself", hint="Change the password under Account."
             )
         if person.disabled:
             raise ConflictError(f"{person.name} is disabled", hint="Enable them first.")

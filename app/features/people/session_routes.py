@@ -45,7 +45,7 @@ async def get_login(request: Request) -> Login:
     """
     login = login_of(request.scope)
     if login is None:
-        raise NotLoggedInError("nobody is logged in here", hint="Log in first.")
+        raise NotLoggedInError("you are not logged in", hint="Log in first.")
     return login
 
 

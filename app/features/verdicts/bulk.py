@@ -377,7 +377,7 @@ class BatchRun:
         given = find_batch(session, self.batch)
         if given is None or given.is_taken_back:
             raise ConflictError(
-                "the verdicts that were given so far have been taken back",
+                "the verdicts given so far have been undone",
                 hint="Give the verdict again, under another Idempotency-Key.",
             )
         return given

@@ -100,8 +100,7 @@ class BulkResult(Document):
     would_change: int | None = Field(description="Dry run only, like `sample`.")
     sample: list[SampleGroup] | None
     batch: int | None = Field(
-        description="What `POST /verdict-batches/{batch}/undo` takes back; null when nothing "
-        "changed."
+        description="Batch that `POST /verdict-batches/{batch}/undo` undoes; null when nothing changed."
     )
     changed: int
     refused: list[Refusal]

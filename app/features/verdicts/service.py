@@ -132,8 +132,8 @@ def _require_seen(group: Group, verdict: Verdict) -> None:
     seen = any(view.media is not None for view in group.views)
     if verdict.state == "accepted" and verdict.note is None and not seen:
         raise InputError(
-            "this group has no picture in any view, so nobody can have looked at it; accepting "
-            "it needs a note that says what it was judged by",
+            "this group has no picture in any view; accepting it needs a note that says what it "
+            "was judged by",
             hint="Import it again with its frames, or say in the note why it is right.",
             pointer="/note",
         )
@@ -160,10 +160,9 @@ class Reviewer:
     """One person's verdicts.
 
     Attributes:
-        accepted: Groups whose verdict counts and is this person's, like ``rejected`` and
-            ``deferred``.
-        today: Groups that this person has judged since midnight UTC.
-        last: Time of this person's last verdict.
+        accepted: Groups whose current verdict is this person's.
+        today: Groups judged since midnight UTC.
+        last: Time of the last verdict.
     """
 
     name: str

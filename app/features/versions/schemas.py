@@ -79,7 +79,7 @@ class VersionRequest(BaseModel):
     split: SplitChoice = SplitChoice()
     groups: VersionRule = Field(
         default="accepted",
-        description="What people accepted; or whatever the policy passes and nobody refused.",
+        description="Groups that people accepted, or all groups that pass the policy and are not rejected.",
     )
     dry_run: StrictBool = Field(default=False, description="Count, and freeze nothing.")
 
@@ -147,7 +147,7 @@ class VersionDocument(Document):
     software_version: str
     previous: int | None = Field(description="Id of the version frozen before.")
     verified: VerificationDocument | None = Field(
-        description="What came of verifying it the last time; null: nobody has."
+        description="Result of the last verification; null: never verified."
     )
 
 

@@ -39,7 +39,7 @@ class WebhookEdit(BaseModel):
     kinds: Kinds | None = None
     on: bool | None = Field(
         default=None,
-        description="Off: it is told nothing, and what happens meanwhile is not told later either.",
+        description="Off: it gets no messages, and events of that time are not sent later.",
     )
 
 
@@ -47,7 +47,7 @@ class WebhookList(ListDocument[Webhook]):
     """Webhooks of a dataset, and what they may be."""
 
     allowed: list[str] = Field(description="How the operator lets addresses begin.")
-    kinds: list[Kind] = Field(description="What a webhook may be told.")
+    kinds: list[Kind] = Field(description="Kinds of messages a webhook can get.")
 
 
 class WebhookWithSecret(Document):

@@ -45,8 +45,10 @@ class Webhook:
     """An address that is told.
 
     Attributes:
-        off: Why nothing is sent to it any more; None: it is.
-        waiting, delivered, failed: Messages that wait, have arrived, and were given up.
+        off: Why sending was stopped; None: it is on.
+        waiting: Messages that wait to be sent, or sent again.
+        delivered: Messages of the last 30 days that arrived.
+        failed: Messages of the last 30 days that were given up.
     """
 
     id: int
@@ -65,9 +67,9 @@ class Delivery:
     """A message to a webhook, and how its sending goes.
 
     Attributes:
-        message: Its id, the same however often it is sent.
+        message: ``webhook-id``: the same however often it is sent.
         body: The JSON that is sent, to the letter.
-        next_at: When it is tried (again); None: never.
+        next_at: When it is tried next.
         status: What the receiver answered last.
         problem: Why the last try failed.
     """
@@ -202,7 +204,9 @@ def send_ping(store: Store, dataset: str, webhook_id: int, *, actor: str) -> Del
 
 def _require_on(webhook: Webhook) -> None:
     if webhook.off is not None:
-        raise ConflictError(f"nothing is sent there: {webhook.off}", hint="Turn it on first.")
+        raise ConflictError(
+            f"the server does not send to this address: {webhook.off}", hint="Turn it on first."
+        )
 
 
 def _turned_on(session: Session) -> Mapping[str, Any]:

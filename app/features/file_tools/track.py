@@ -1,0 +1,197 @@
+"""Track: a clip to a camera file for each of its frames, without a database."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import closing
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from app.durable import replace_file
+from app.errors import InputError, UnsafePathError
+from app.finite import json_text
+from app.formats.cameras_writer import camera_name, camera_text
+from app.formats.line_documents import read_line_documents
+from app.formats.report import Report
+from app.formats.sn_calibration_reader import lines_from_json
+from app.geometry.resection import LOG_FOCAL, PAN, PARAMETERS, ROLL, TILT, X, Z
+from app.progress import TellProgress
+from app.soccer.annotation import Lines
+from app.soccer.frames import ImageSize
+from app.tracking.clip import Clip
+from app.tracking.follow import OUTCOMES
+from app.tracking.track import FrameCamera, track_clip
+from app.worker_process import WorkerEnded, WorkerLimits, WorkerProcess
+
+RESULT = "track.json"
+LIMITS = WorkerLimits(memory=3 * 2**30, processor=math.inf, silence=600.0)
+LARGEST_LINES = 16 * 2**20
+"""Bytes of a file of lines of one frame."""
+
+
+def track_files(
+    clip: Path,
+    out: Path,
+    lines: Sequence[str] = (),
+    *,
+    progress: TellProgress | None = None,
+) -> dict[str, Any]:
+    """Write a camera file for each frame of a clip that has a camera, and what became of each.
+
+    The clip is decoded and followed in a worker process with limits.
+
+    Args:
+        clip: A video of one camera.
+        out: Folder that gets ``camera_<frame>.json`` and ``track.json``. Camera files that an
+            earlier run left there for the same frames are replaced or removed.
+        lines: ``FILE@FRAME``: a line file of SoccerNet's form, and the number of its frame.
+        progress: Called with frames done.
+
+    Returns:
+        What ``track.json`` holds.
+
+    Raises:
+        InputError: A line file cannot be read or determines no camera, or ``out`` cannot hold the
+            result.
+        ImageError: The clip cannot be read.
+    """
+    named = _parse_names(lines)
+    contents = {number: _read(path) for number, path in named.items()}
+    shown = {number: str(path) for number, path in named.items()}
+
+    def tell(done: Any) -> None:
+        if progress is not None:
+            progress(done)
+
+    with closing(WorkerProcess(LIMITS)) as worker:
+        try:
+            found: list[FrameCamera] = worker.run(
+                track_video, clip, contents, shown, on_message=tell
+            )
+        except WorkerEnded as error:
+            raise InputError(f"{clip.name} {error}") from error
+    rows = [frame_row(frame) for frame in found]
+    _write(out, found, rows)
+    return {"frames": rows}
+
+
+def track_video(
+    clip: Path,
+    contents: Mapping[int, bytes],
+    shown: Mapping[int, str],
+    send: Callable[[int], Any],
+) -> list[FrameCamera]:
+    """The work of the process: decode, calibrate and follow.
+
+    Args:
+        clip: A video of one camera.
+        contents: Line files by number of their frame.
+        shown: Their names.
+        send: Called with frames done.
+    """
+    size, report = Clip.open(clip).size, Report()
+    lines = {
+        number: _lines(content, shown[number], size, report) for number, content in contents.items()
+    }
+    return track_clip(clip, lines, tell=send)
+
+
+def _lines(content: bytes, shown: str, size: ImageSize, report: Report) -> Lines:
+    documents = read_line_documents(content, shown, report)
+    if len(documents) != 1:
+        raise InputError(f"{shown} has the lines of {len(documents)} frames; give a file of one")
+    lines, _ = lines_from_json(documents[0].lines, size, shown, report)
+    if not lines:
+        raise report.refusal(f"{shown} has no line of a known marking")
+    return lines
+
+
+def _parse_names(lines: Sequence[str]) -> dict[int, Path]:
+    named: dict[int, Path] = {}
+    for text in lines:
+        path, separator, number = text.rpartition("@")
+        if not separator or not path or not number.isascii() or not number.isdigit():
+            raise InputError(
+                f'"{text}" does not name a line file and its frame',
+                hint="Write FILE@FRAME, such as lines.json@0; frames count from 0.",
+            )
+        if int(number) in named:
+            raise InputError(f"frame {int(number)} has two line files")
+        named[int(number)] = Path(path)
+    return named
+
+
+def _read(path: Path) -> bytes:
+    try:
+        with path.open("rb") as file:
+            content = file.read(LARGEST_LINES + 1)
+    except OSError as error:
+        raise InputError(f"{path} cannot be read ({error.strerror})") from error
+    if len(content) > LARGEST_LINES:
+        raise InputError(f"{path} is larger than the lines of a frame are ({LARGEST_LINES} bytes)")
+    return content
+
+
+def frame_row(frame: FrameCamera) -> dict[str, Any]:
+    """The row of a frame in ``track.json``: pixels of the video, degrees, metres, seconds."""
+    row: dict[str, Any] = {
+        "frame": frame.number,
+        "time": frame.time,
+        "outcome": frame.outcome,
+        "supported": frame.supported,
+        "explained": frame.explained,
+        "error_px": frame.error_px,
+        "keyframe": frame.is_keyframe,
+        "reason": frame.reason,
+        **dict.fromkeys(("pan", "tilt", "roll", "focal_px", "position", "sigma")),
+    }
+    camera = frame.camera
+    if camera is not None:
+        row["pan"], row["tilt"], row["roll"] = camera.pan_tilt_roll_degrees
+        row["focal_px"] = camera.focal_length[0]
+        row["position"] = [float(item) for item in camera.position]
+        if frame.covariance is not None:
+            row["sigma"] = _sigma(frame.covariance, camera.focal_length[0])
+    return row
+
+
+def _sigma(covariance: Sequence[float], focal: float) -> dict[str, float]:
+    """Standard deviations: angles in degrees, focal length in pixels, position in metres."""
+    matrix = np.reshape(covariance, (PARAMETERS, PARAMETERS))
+    each = np.sqrt(np.diag(matrix))
+    pan, tilt, roll = np.degrees(each[[PAN, TILT, ROLL]]).tolist()
+    largest = float(np.sqrt(np.linalg.eigvalsh(matrix[X : Z + 1, X : Z + 1])[-1]))
+    return {
+        "pan": pan,
+        "tilt": tilt,
+        "roll": roll,
+        "focal_px": float(each[LOG_FOCAL] * focal),
+        "position": largest,
+    }
+
+
+def count_outcomes(rows: Sequence[Mapping[str, Any]]) -> dict[str, int]:
+    """How many frames had which outcome."""
+    counts = Counter(row["outcome"] for row in rows)
+    return {"frames": len(rows), **{name: counts[name] for name in OUTCOMES}}
+
+
+def _write(out: Path, found: Sequence[FrameCamera], rows: list[dict[str, Any]]) -> None:
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        for frame in found:
+            file = out / camera_name(str(frame.number))
+            if frame.camera is None:
+                file.unlink(missing_ok=True)
+                continue
+            text = camera_text(frame.camera, frame.covariance, frame.size)
+            replace_file(file, text.encode(), durable=False, private=False)
+        text = json_text({"frames": rows}, indent=1) + "\n"
+        replace_file(out / RESULT, text.encode(), durable=False, private=False)
+    except (OSError, UnsafePathError) as error:
+        why = error.strerror if isinstance(error, OSError) else str(error)
+        raise InputError(f"{out} cannot hold the cameras ({why})") from error

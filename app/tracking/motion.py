@@ -1,0 +1,148 @@
+"""Motion: how a camera turned and zoomed between two frames, from the static background.
+
+Corners of stands, boards and grass are followed by optical flow (Lucas and Kanade, pyramids); what most
+of them do together is the camera's turn, whatever their distance, as it stands on a tripod.
+Players, and graphics that stay where they are, do something else and are left out.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from app.geometry.arrays import FloatArray
+from app.geometry.camera import Camera
+from app.geometry.resection import (
+    LOG_FOCAL,
+    PAN,
+    ROLL,
+    TILT,
+    camera_from_parameters,
+    parameters_from_camera,
+    projection_jacobians,
+)
+
+Grey = npt.NDArray[np.uint8]
+
+AIM = [PAN, TILT, ROLL, LOG_FOCAL]
+CORNERS, QUALITY, APART_PX = 300, 0.01, 12.0
+WINDOW_PX, LEVELS = 21, 3
+TOGETHER_PX = 2.0
+"""What lies farther off than this from the common motion is no background."""
+LEAST_CORNERS, LEAST_SHARE = 24, 0.3
+"""Fewer corners that move together, or a smaller share, say nothing."""
+BLURRED = 4
+"""Pictures are made so many times smaller where their motion is sought from nothing."""
+LEAST_ALIKE = 0.05
+ROUNDS, ROBUST_PX = 8, 0.5
+FAR_M = 60.0
+STILL_PX, MOVING_PX = 0.25, 1.5
+
+
+@dataclass(frozen=True)
+class BackgroundMatches:
+    """The background of two frames: the same corners in both, pixels, shapes (N, 2)."""
+
+    here: FloatArray
+    there: FloatArray
+
+    def reversed(self) -> BackgroundMatches:
+        """The same from the later frame to the earlier one."""
+        return BackgroundMatches(self.there, self.here)
+
+
+def match_background(here: Grey, there: Grey) -> BackgroundMatches | None:
+    """The background of two pictures of one camera; None where nothing moves together.
+
+    Args:
+        here: The earlier picture, grey, shape (H, W).
+        there: The later one.
+    """
+    corners = np.asarray(cv2.goodFeaturesToTrack(here, CORNERS, QUALITY, APART_PX), np.float32)
+    if corners.ndim != 3 or len(corners) < LEAST_CORNERS:
+        return None
+    found = _followed(here, there, corners, np.zeros(2))
+    if found is None:
+        shift = _shift(here, there)
+        if shift is not None:
+            found = _followed(here, there, corners, shift)
+    return found
+
+
+def _followed(
+    here: Grey, there: Grey, corners: npt.NDArray[np.float32], shift: FloatArray
+) -> BackgroundMatches | None:
+    """Corners that move together, sought from where a shift of the picture puts them."""
+    guess = np.asarray(corners + shift, np.float32)
+    flags = cv2.OPTFLOW_USE_INITIAL_FLOW
+    found, status, _ = cv2.calcOpticalFlowPyrLK(
+        here, there, corners, guess, winSize=(WINDOW_PX, WINDOW_PX), maxLevel=LEVELS, flags=flags
+    )
+    kept = status[:, 0] > 0
+    one, other = corners[kept, 0].astype(np.float64), found[kept, 0].astype(np.float64)
+    moved = np.hypot(*(other - one).T)
+    # Graphics stay where they are while the picture moves.
+    if len(moved) and np.median(moved) > MOVING_PX:
+        one, other = one[moved > STILL_PX], other[moved > STILL_PX]
+    if len(one) < LEAST_CORNERS:
+        return None
+    _, inside = cv2.findHomography(one, other, cv2.USAC_MAGSAC, TOGETHER_PX, maxIters=500)
+    if inside is None:
+        return None
+    chosen = inside[:, 0] > 0
+    if chosen.sum() < max(LEAST_CORNERS, LEAST_SHARE * len(corners)):
+        return None
+    return BackgroundMatches(one[chosen], other[chosen])
+
+
+def _shift(here: Grey, there: Grey) -> FloatArray | None:
+    """By how much all of a picture moved, pixels, shape (2,); None where both are not alike."""
+    small = [
+        cv2.resize(each, None, fx=1 / BLURRED, fy=1 / BLURRED, interpolation=cv2.INTER_AREA)
+        for each in (here, there)
+    ]
+    one, other = (each.astype(np.float32) for each in small)
+    window = cv2.createHanningWindow((one.shape[1], one.shape[0]), cv2.CV_32F)
+    shift, alike = cv2.phaseCorrelate(one, other, window)
+    return np.array(shift) * BLURRED if alike >= LEAST_ALIKE else None
+
+
+def rotate_camera(
+    camera: Camera, match: BackgroundMatches, half_diagonal: float
+) -> tuple[Camera, float]:
+    """A camera after the motion of a match, at the same place, and how well that explains it.
+
+    Args:
+        camera: Of the earlier frame.
+        match: To the later frame.
+        half_diagonal: Half the image diagonal, pixels.
+
+    Returns:
+        The camera of the later frame, and the median distance of its corners, pixels.
+    """
+    start = parameters_from_camera(camera, half_diagonal)
+    points = camera.position + FAR_M * camera.rays(match.here)
+    seen = np.isfinite(points).all(axis=1)
+    points, there = points[seen], match.there[seen]
+    parameters = start.copy()
+    apart = np.full(len(points), np.inf)
+    halves = np.full(len(points), half_diagonal)
+    for _ in range(ROUNDS):
+        now = camera_from_parameters(parameters, camera.principal_point, half_diagonal)
+        rest = there - now.project(points)
+        rest[~np.isfinite(rest)] = 1e3
+        apart = np.hypot(*rest.T)
+        weight = 1 / (1 + (apart / max(ROBUST_PX, float(np.median(apart)))) ** 2)
+        rows = projection_jacobians(np.tile(parameters, (len(points), 1)), points, halves)
+        rows = rows[:, :, AIM]
+        normal = np.einsum("n,nij,nik->jk", weight, rows, rows)
+        right = np.einsum("n,nij,ni->j", weight, rows, rest)
+        step = np.linalg.solve(normal, right)
+        parameters[AIM] += step
+        if np.abs(step).max() < 1e-6:
+            break
+    moved = camera_from_parameters(parameters, camera.principal_point, half_diagonal)
+    return moved, float(np.median(apart))

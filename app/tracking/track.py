@@ -1,0 +1,115 @@
+"""Track: from a clip, and lines of some of its frames, to a camera for each frame."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from app.errors import InputError
+from app.geometry.arrays import row_by_row
+from app.geometry.camera import Camera
+from app.soccer.annotation import Lines
+from app.soccer.frames import ImageSize
+from app.soccer.pitch import Pitch
+from app.soccer.policy import CLICKED, CalibrationPolicy
+from app.solving.calibrate import calibrate
+from app.tracking.clip import Clip
+from app.tracking.follow import Outcome
+from app.tracking.shot import Given, Tell, follow_shot
+
+
+@dataclass(frozen=True)
+class FrameCamera:
+    """The camera of one frame.
+
+    Attributes:
+        number: From 0, as the decoder returns frames.
+        time: When the frame is shown, seconds.
+        outcome: ``tracked``: the camera lies on the paint; ``bridged``: the background carries it
+            between frames where it does; ``lost``: there is none.
+        size: Of the video, pixels.
+        camera: Pixels of the video; None where it is lost.
+        covariance: Of its parameters (``geometry.resection``), row by row, shape (64,).
+        supported: Share of the visible markings that has paint.
+        explained: Share of the line-like paint that has a marking.
+        error_px: Median distance of the paint to its marking, pixels of the video.
+        is_keyframe: Whether its camera was annotated, or proposed from nothing.
+        reason: Why it is not tracked.
+    """
+
+    number: int
+    time: float
+    outcome: Outcome
+    size: ImageSize
+    camera: Camera | None
+    covariance: tuple[float, ...] | None
+    supported: float | None
+    explained: float | None
+    error_px: float | None
+    is_keyframe: bool
+    reason: str | None
+
+
+def track_clip(
+    path: Path,
+    lines: Mapping[int, Lines],
+    pitch: Pitch | None = None,
+    policy: CalibrationPolicy | None = None,
+    tell: Tell | None = None,
+) -> list[FrameCamera]:
+    """The camera of every frame of a clip.
+
+    Args:
+        path: The video.
+        lines: Annotated lines by number of their frame, pixels of the video.
+        pitch: The pitch.
+        policy: Prior of the distortion.
+        tell: Called with frames done.
+
+    Raises:
+        InputError: The lines of a frame make no camera, or there is no such frame.
+        ImageError: The clip cannot be read.
+    """
+    pitch, policy = pitch or Pitch(), policy or CalibrationPolicy()
+    clip = Clip.open(path)
+    given: dict[int, Given] = {}
+    for number, drawn in lines.items():
+        found = calibrate(drawn, pitch, clip.size, CLICKED)
+        if found.camera is None:
+            raise InputError(
+                f"the lines of frame {number} make no camera: {found.reason}",
+                hint="Draw more of the markings that this frame shows, or annotate another frame.",
+            )
+        spread = None if found.covariance is None else np.reshape(found.covariance, (8, 8))
+        given[number] = Given(clip.as_read(found.camera), spread)
+    shot = follow_shot(clip, given, pitch, policy, tell)
+    beyond = [number for number in given if number >= len(shot.frames)]
+    if beyond:
+        raise InputError(
+            f"{path.name} has {len(shot.frames)} frames, and none of the number {beyond[0]}",
+            hint="Frames count from 0.",
+        )
+    scale = clip.size.width / clip.work.width
+    return [
+        FrameCamera(
+            number=frame.number,
+            time=frame.time,
+            outcome=frame.outcome,
+            size=clip.size,
+            camera=None if frame.camera is None else clip.as_shown(frame.camera),
+            covariance=None
+            if frame.snapped is None or frame.snapped.covariance is None
+            else tuple(row_by_row(frame.snapped.covariance)),
+            supported=None if frame.seen is None else frame.seen.supported,
+            explained=None if frame.seen is None else frame.seen.explained,
+            error_px=None
+            if frame.snapped is None or frame.snapped.error_px is None
+            else frame.snapped.error_px * scale,
+            is_keyframe=frame.is_key,
+            reason=frame.reason,
+        )
+        for frame in shot.frames
+    ]

@@ -1,0 +1,147 @@
+"""Cameras over time: how many frames of real clips are tracked, and how well they lie (docs/track.md).
+
+Distances are pixels at 960 wide. Paint is read anew beside each camera; clicked markings are those of the
+annotated frames, met where every click lies within 0.5 % of the diagonal. Without real clips a
+rendered film is followed. ``python -m tests.bench.track [CLIP ...]``.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+import time
+from collections.abc import Mapping
+from itertools import combinations
+from pathlib import Path
+
+import numpy as np
+from scipy.stats import chi2
+
+from app.formats.report import Report
+from app.formats.sn_calibration_reader import lines_from_json
+from app.geometry.arrays import FloatArray
+from app.geometry.polyline import distance_to_polyline
+from app.geometry.resection import X, Z
+from app.paint.evidence import seek, trace
+from app.soccer.annotation import Lines
+from app.soccer.pitch import MARKINGS, Pitch
+from app.solving.jaccard import project_markings
+from app.tracking.clip import Clip
+from app.tracking.picture import read_frames
+from app.tracking.track import FrameCamera, track_clip
+from tests.bench.table import print_table
+
+DATA = Path(os.environ.get("TOUCHLINE_REAL_DATA", Path(__file__).parents[3] / "shared" / "data"))
+MEETS = float(chi2.ppf(0.95, 3))
+NEAR = 0.005
+PAIRS_EVERY = 5
+HEADER = (
+    "clip", "annotated", "frames", "tracked %", "bridged", "lost", "paint px", "p95", "clicked met",
+    "sigma m", "pairs meet %", "frames/s", "cpu ms", "x decoding",
+)  # fmt: skip
+
+
+def bench_track(clips: list[Path], lines: Path) -> None:
+    """Print the table: each clip with no annotated frame, and with one of each."""
+    rows = []
+    for file in clips:
+        known = clicked(Clip.open(file), file.stem, lines)
+        middle = sorted(known)[len(known) // 2 : len(known) // 2 + 1]
+        for chosen in ([], middle) if middle else ([],):
+            rows.append(measure(file, known, chosen))
+    print_table("Cameras over time on real clips", HEADER, rows)
+
+
+def measure(file: Path, known: Mapping[int, Lines], chosen: list[int]) -> list[object]:
+    """Numbers of one clip."""
+    began, spent = time.perf_counter(), time.process_time()
+    found = track_clip(file, {number: known[number] for number in chosen})
+    wall, cpu = time.perf_counter() - began, time.process_time() - spent
+    clip = Clip.open(file)
+    decoding = -time.process_time()
+    count = sum(1 for _ in clip.frames())
+    decoding += time.process_time()
+    paint = paint_distances(clip, found)
+    met = [hits for number in known for hits in clicked_hits(found[number], known[number])]
+    outcomes = [frame.outcome for frame in found]
+    tracked = [frame for frame in found if frame.outcome == "tracked"]
+    pairs = [meet(*pair) for pair in combinations(tracked[::PAIRS_EVERY], 2)]
+    return [
+        file.stem, ",".join(map(str, chosen)) or "none", count,
+        f"{100 * outcomes.count('tracked') / count:.1f}", outcomes.count("bridged"),
+        outcomes.count("lost"), float(np.median(paint)), float(np.percentile(paint, 95)),
+        f"{np.mean(met):.2f} of {len(met)}" if met else None,
+        float(np.median([sigma_m(frame) for frame in tracked])), 100 * float(np.mean(pairs)),
+        f"{count / wall:.0f}", f"{1000 * cpu / count:.0f}", f"{cpu / decoding:.1f}",
+    ]  # fmt: skip
+
+
+def clicked(clip: Clip, name: str, lines: Path) -> dict[int, Lines]:
+    """Clicked lines of a clip by number of their frame, pixels of the video."""
+    return {
+        int(file.stem.rpartition("_f")[2]): lines_from_json(
+            json.loads(file.read_text(encoding="utf-8")), clip.size, file.stem, Report()
+        )[0]
+        for file in sorted(lines.glob(f"{name}_f*.json"))
+    }
+
+
+def clicked_hits(frame: FrameCamera, lines: Lines) -> list[bool]:
+    """Of each clicked marking of the grass, whether the camera lays it there."""
+    names = [name for name in lines if name in MARKINGS and not name.startswith("Goal")]
+    if frame.camera is None:
+        return [False] * len(names)
+    shown = project_markings(frame.camera, Pitch(), frame.size)
+    hits = []
+    for name in names:
+        points = np.array([[point.x, point.y] for point in lines[name]])
+        polyline = shown.get(name)
+        if polyline is None or len(polyline) < 2:
+            hits.append(False)
+            continue
+        far = distance_to_polyline(points, polyline)[0].max()
+        hits.append(bool(far < NEAR * frame.size.diagonal))
+    return hits
+
+
+def paint_distances(clip: Clip, found: list[FrameCamera]) -> list[float]:
+    """Median distance of the paint of each tracked frame, pixels at 960 wide."""
+    distances = []
+    for picture in read_frames(clip.frames()):
+        frame = found[picture.number]
+        if frame.outcome != "tracked" or frame.camera is None:
+            continue
+        camera = clip.as_read(frame.camera)
+        unit = picture.reading.width / 960
+        evidence = seek(picture.reading, trace(picture.reading, camera, Pitch()), 3.0 * unit)
+        distances.append(float(np.median(np.abs(evidence.offsets))) / unit)
+    return distances
+
+
+def position_covariance(frame: FrameCamera) -> FloatArray:
+    """Metres squared, shape (3, 3)."""
+    matrix = np.reshape(frame.covariance or np.full(64, np.nan), (8, 8))
+    return matrix[X : Z + 1, X : Z + 1]
+
+
+def sigma_m(frame: FrameCamera) -> float:
+    """Largest standard deviation of the position, metres."""
+    return float(np.sqrt(np.linalg.eigvalsh(position_covariance(frame))[-1]))
+
+
+def meet(one: FrameCamera, other: FrameCamera) -> bool:
+    """Whether the 95 % regions of two positions meet."""
+    assert one.camera is not None and other.camera is not None
+    apart = one.camera.position - other.camera.position
+    both = position_covariance(one) + position_covariance(other)
+    return bool(apart @ np.linalg.solve(both, apart) < MEETS)
+
+
+if __name__ == "__main__":
+    folder = DATA / "broadcast" / "clips"
+    files = [*sorted(folder.glob("*.mp4")), *sorted((DATA / "replays").glob("*_clip_0.mp4"))]
+    names = sys.argv[1:]
+    bench_track(
+        [file for file in files if not names or file.stem in names], DATA / "broadcast" / "lines"
+    )

@@ -1,0 +1,126 @@
+"""``touchline track``: a clip to camera files."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from app.errors import InputError
+from app.features.file_tools import track
+from app.features.file_tools.track import count_outcomes, frame_row, track_files
+from app.formats.cameras_reader import read_cameras
+from app.formats.report import Report
+from app.soccer.frames import ImageSize
+from app.tracking.track import FrameCamera
+from tests.cameras import looking
+from tests.unit.tracking.test_clip import write
+
+Run = Callable[..., tuple[int, str, str]]
+CAMERA = looking((0, 60, -15), (10, 0, 0), 900)
+
+
+def frame(number: int, outcome: str) -> FrameCamera:
+    sigma = np.array([0.01, 0.01, 0.01, 0.3, 0.4, 0.2, 0.01, 0.001])
+    is_lost = outcome == "lost"
+    return FrameCamera(
+        number=number,
+        time=number / 25,
+        outcome=outcome,
+        size=ImageSize(1280, 720),
+        camera=None if is_lost else CAMERA,
+        covariance=None if is_lost else tuple(np.diag(sigma**2).ravel().tolist()),
+        supported=None if is_lost else 0.9,
+        explained=None if is_lost else 0.7,
+        error_px=0.2 if outcome == "tracked" else None,
+        is_keyframe=number == 0,
+        reason=None if outcome == "tracked" else "no_paint",
+    )
+
+
+@pytest.fixture
+def found(monkeypatch: pytest.MonkeyPatch) -> list[FrameCamera]:
+    """What the worker process returns, in place of a process that follows a film."""
+    frames = [frame(0, "tracked"), frame(1, "bridged"), frame(2, "lost")]
+
+    class Worker:
+        def __init__(self, limits: object) -> None:
+            pass
+
+        def run(self, *arguments: object, on_message: Callable[[int], None]) -> list[FrameCamera]:
+            on_message(3)
+            return frames
+
+        def close(self) -> None:
+            pass
+
+    monkeypatch.setattr(track, "WorkerProcess", Worker)
+    return frames
+
+
+def test_files_of_cameras_and_the_outcome_of_each_frame_are_written(
+    found: list[FrameCamera], tmp_path: Path, touchline: Run
+):
+    clip, out = tmp_path / "clip.mp4", tmp_path / "out"
+    clip.touch()
+    out.mkdir()
+    (out / "camera_2.json").write_text("of an earlier run")
+    code, told, _ = touchline("track", clip, out, "--json")
+    result = json.loads(told)
+    assert code == 0
+    assert result == json.loads((out / "track.json").read_text())
+    rows = result["frames"]
+    assert [row["outcome"] for row in rows] == ["tracked", "bridged", "lost"]
+    assert [row["keyframe"] for row in rows] == [True, False, False]
+    assert rows[1]["time"] == pytest.approx(0.04)
+    assert rows[0]["sigma"]["position"] == pytest.approx(0.4)
+    assert rows[0]["sigma"]["focal_px"] == pytest.approx(9.0)
+    assert rows[0]["pan"] == pytest.approx(CAMERA.pan_tilt_roll_degrees[0])
+    assert rows[2]["pan"] is None and rows[2]["reason"] == "no_paint"
+    names = sorted(file.name for file in out.iterdir())
+    assert names == ["camera_0.json", "camera_1.json", "track.json"]
+    cameras = read_cameras(out, Report())
+    assert cameras["0"].position == pytest.approx(CAMERA.position)
+    code, told, _ = touchline("track", clip, out)
+    assert (code, told.split()) == (
+        0, ["frames", "3", "tracked", "1", "bridged", "1", "lost", "1"],
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("lines", "message"),
+    [
+        (["lines.json"], "does not name a line file and its frame"),
+        (["lines.json@-1"], "does not name a line file and its frame"),
+        (["@3"], "does not name a line file and its frame"),
+        (["missing.json@3"], "missing.json cannot be read"),
+        (["a.json@3", "b.json@03"], "frame 3 has two line files"),
+    ],
+)
+def test_lines_that_name_no_file_or_frame_are_refused(
+    lines: list[str], message: str, tmp_path: Path
+):
+    with pytest.raises(InputError, match=message):
+        track_files(tmp_path / "clip.mp4", tmp_path / "out", lines)
+
+
+def test_the_worker_process_reads_clip_and_lines_and_says_what_is_wrong(
+    tmp_path: Path, touchline: Run
+):
+    clip = write(tmp_path / "clip.avi", 480, 270)
+    lines = tmp_path / "lines.json"
+    lines.write_text(json.dumps({"Side line left": [{"x": 0.1, "y": 0.2}, {"x": 0.1, "y": 0.8}]}))
+    code, _, err = touchline("track", clip, tmp_path / "out", "--lines", f"{lines}@0")
+    assert code == 1 and "the lines of frame 0 make no camera" in err
+    clip.write_bytes(b"RIFF")
+    code, _, err = touchline("track", clip, tmp_path / "out")
+    assert code == 1 and "clip.avi is no video that can be read" in err
+    assert not (tmp_path / "out").exists()
+
+
+def test_numbers_of_rows_are_counted():
+    rows = [frame_row(frame(number, "tracked")) for number in range(2)]
+    assert count_outcomes(rows) == {"frames": 2, "tracked": 2, "bridged": 0, "lost": 0}
