@@ -14,15 +14,17 @@ from app.features.people.visibility_queries import reads_blind
 from app.http.deps import AppServices, SeesWhole
 from app.http.event_schemas import EVENTS
 from app.http.events import Feed, hello
+from app.http.permissions import Action, OwnedKind, Where, may
 from app.http.problem import Responses, responses
 from app.http.requests import is_head
+from app.http.route import Route
 from app.http.services import Services
 
 _UNBUFFERED = {"Cache-Control": "no-cache", "X-Accel-Buffering": "no"}
 """What a proxy between asks for, which would hold events back otherwise."""
 _MOMENT = re.compile(r"(\d{1,18})-(\d{1,18})", re.ASCII)
 
-router = APIRouter(prefix="/events", tags=["events"])
+router = APIRouter(prefix="/events", tags=["events"], route_class=Route)
 
 STREAM: Responses = {
     200: {
@@ -129,6 +131,7 @@ def under_way(
     response_class=Response,
     responses={**responses(404), **STREAM},
 )
+@may(Action.READ, dataset=OwnedKind.DATASET, where=Where.SOMEWHERE)
 async def listen(
     request: Request,
     start: Annotated[Start, Depends()],

@@ -8,16 +8,16 @@ from collections.abc import Iterator, Mapping
 from dataclasses import is_dataclass
 from typing import Any, get_args, get_type_hints
 
-from fastapi import FastAPI
+from fastapi import APIRouter, FastAPI, Request
 from fastapi.openapi.utils import get_fields_from_routes, get_openapi
 from pydantic import BaseModel
+from starlette.responses import JSONResponse
 
-from app.features.people.roles import Action
 from app.http.event_schemas import EVENTS
-from app.http.idempotency import UNKEPT
+from app.http.permissions import Action, Where, may
 from app.http.problem import Problem
 from app.http.property_descriptions import PARAMETERS, PROPERTIES
-from app.http.rules import OPEN, RULES
+from app.http.route import Route, routes_of
 from app.http.team import NAME
 
 Schema = Mapping[str, Any]
@@ -186,6 +186,16 @@ _ATTRIBUTE = re.compile(r"^ {4}(\w[\w, ]*): (.*(?:\n {8}.*)*)", re.MULTILINE)
 REFERENCE = "#/components/schemas/{model}"
 
 
+router = APIRouter(include_in_schema=False, route_class=Route)
+
+
+@router.get("/openapi.json")
+@may(Action.DESCRIBE, where=Where.SOMEWHERE)
+async def get_document(request: Request) -> JSONResponse:
+    """What the server says of its addresses."""
+    return JSONResponse(request.app.openapi())
+
+
 def describe(app: FastAPI) -> None:
     """Replace the framework's own description of errors by ours."""
 
@@ -206,7 +216,8 @@ def _document(app: FastAPI) -> dict[str, Any]:
         routes=app.routes,
         tags=[{"name": name, "description": text} for name, text in TAGS.items()],
     )
-    _mend_operations(document)
+    routes = dict(routes_of(app))
+    _mend_operations(document, routes)
     schemas = document["components"]["schemas"]
     for name in ("HTTPValidationError", "ValidationError"):
         schemas.pop(name, None)
@@ -219,7 +230,7 @@ def _document(app: FastAPI) -> dict[str, Any]:
     for kind in {value for model in (*shown, *models) for value in _values(model)}:
         _describe_value(kind, schemas)
     _describe_schemas(schemas)
-    _secure(document)
+    _secure(document, routes)
     _give_examples(document)
     return document
 
@@ -266,13 +277,13 @@ def _describe_schemas(schemas: dict[str, Any]) -> None:
             )
 
 
-def _secure(document: dict[str, Any]) -> None:
+def _secure(document: dict[str, Any], routes: Mapping[str, Route]) -> None:
     """Say with what one may ask: on a server that one person runs alone, with nothing."""
     document["components"]["securitySchemes"] = SCHEMES
     document["security"] = [*({name: []} for name in SCHEMES), {}]
     for path, operations in document["paths"].items():
         for method, operation in operations.items():
-            if RULES.get(f"{method.upper()} {path}", Action.READ) is OPEN:
+            if routes[f"{method.upper()} {path}"].permission.action is None:
                 operation["security"] = []
 
 
@@ -288,7 +299,7 @@ def _give_examples(document: dict[str, Any]) -> None:
                         content["example"] = example_of(content.get("schema", {}), schemas)
 
 
-def _mend_operations(document: dict[str, Any]) -> None:
+def _mend_operations(document: dict[str, Any], routes: Mapping[str, Route]) -> None:
     """Say what the framework cannot know, and not what belongs to a newer OpenAPI."""
     for path, operations in document["paths"].items():
         for method, operation in operations.items():
@@ -303,7 +314,7 @@ def _mend_operations(document: dict[str, Any]) -> None:
                 if parameter["name"] == "If-Match":
                     parameter |= {"required": True, "schema": {"type": "string"}}
             named = {parameter["name"] for parameter in parameters}
-            kept = method != "get" and not UNKEPT.match(path)
+            kept = method != "get" and routes[f"{method.upper()} {path}"].stores_response
             if kept and KEY_PARAMETER["name"] not in named:
                 parameters.append(KEY_PARAMETER)
             for answer in operation["responses"].values():

@@ -13,13 +13,14 @@ from __future__ import annotations
 import asyncio
 import os
 import re
-from contextlib import suppress
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager, suppress
 from dataclasses import dataclass
 
 import anyio
 from starlette.datastructures import Headers
 from starlette.responses import HTMLResponse, Response
-from starlette.types import ASGIApp, Message, Receive, Scope, Send
+from starlette.types import Scope
 
 from app.admission import hold_admission
 from app.http.access import login_of
@@ -234,37 +235,27 @@ class Doors:
         return None if lane is None else self._of[lane]
 
 
-class Lanes:
-    """Lets each request wait for its turn; 503 where too many of its kind wait already.
+@asynccontextmanager
+async def turn(door: Door | None, scope: Scope) -> AsyncIterator[Response | None]:
+    """A request's turn, once it comes; what its sender is told instead where too many wait already.
 
-    The turn ends when the answer begins, for sending it to a slow client takes nobody's place; and
+    The turn ends when the answer is there, for sending it to a slow client takes nobody's place; and
     before, where the work says that it waits for something else (``release_admission``).
     """
-
-    def __init__(self, app: ASGIApp, doors: Doors):
-        self.app, self._doors = app, doors
-
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        door = self._doors.of(scope)
-        if door is None:
-            await self.app(scope, receive, send)
-            return
-        login = login_of(scope)
-        who = "" if login is None else login.name
-        if not await door.enter(who):
-            await _refusal(scope, door.lane)(scope, receive, send)
-            return
-        place = _Place(door, who)
-        hold_admission(place.leave_from_anywhere)
-
-        async def watch(message: Message) -> None:
-            place.end()
-            await send(message)
-
-        try:
-            await self.app(scope, receive, watch)
-        finally:
-            place.end()
+    if door is None:
+        yield None
+        return
+    login = login_of(scope)
+    who = "" if login is None else login.name
+    if not await door.enter(who):
+        yield _refusal(scope, door.lane)
+        return
+    place = _Place(door, who)
+    hold_admission(place.leave_from_anywhere)
+    try:
+        yield None
+    finally:
+        place.end()
 
 
 def _refusal(scope: Scope, lane: Lane) -> Response:

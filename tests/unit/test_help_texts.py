@@ -32,16 +32,16 @@ PLAIN_WORDS = """
     command comment comments compare comparison completion config confirm connections contact copy copying corner
     counts cross css csv cursor curve damped database datasets day delete deps descriptions details detect devices
     diagram dialect dialog diff differences dismissals distance documents drags drawing drawn durable editor
-    empty engine enrol ephemeral errors estimator evaluate event events executors existence export exports facets
+    empty engine enrol ephemeral errors estimator evaluate event events executors export exports facets
     facts fair faults fields figure figures files finder finite first fit fixture folder folders form format formats
-    frozen gestures give glossary gold grass grid guess guide guideline guidelines hand header headers heat help hide
+    frozen gestures give glossary gold grass grid guess guide guideline guidelines hand header headers heat help
     histograms history hit home hooks hosts idempotency identity if image images import imports index indexing info init insert
     insight invitation invitations invite items jaccard join json kept kernels key keys known konva last latest
     lazy lease leases least leftovers legend lens lesson lessons letter limits links list listing live local
     locks login logins lone look loupe mail main maintenance many map markdown marks match matches matrix me measures
     membership mentions menu merge messages metrics migrate mini model name names navigation needs neighbours notice
     nudge numbers object on open openapi opened options order origin other output own ownership
-    packing page pages paint palette panel parameters parquet parse parts past patch path pen people pins pitch
+    packing page pages paint palette panel parameters parquet parse parts past patch path pen people permissions pins pitch
     pitches pixel place places plain plural png pointer policies pool popover pose position postgresql preopen preview
     problem process processes profile progress projection proof property proposal propose props
     provider queries query quota rail rater reader reasons record reimport remote render report requests resect

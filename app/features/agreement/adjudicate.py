@@ -19,7 +19,7 @@ from app.features.independent_annotations.queries import Take
 from app.features.independent_annotations.return_work import hand_back_take
 from app.features.independent_annotations.service import TakeView
 from app.features.people.members import list_members
-from app.features.people.roles import Action, may
+from app.features.people.roles import Action, lets
 from app.finite import Moment
 from app.soccer.actors import LOCAL_USER, person_of
 
@@ -191,7 +191,7 @@ def _others(store: Store, dataset: int, takes: Sequence[Take]) -> list[str]:
     return [
         one.name
         for one in list_members(store, dataset)
-        if may(one.role, Action.REVIEW) and one.name not in takers
+        if lets(one.role, Action.REVIEW) and one.name not in takers
     ]
 
 

@@ -27,10 +27,12 @@ from app.features.independent_annotations.service import TakeView
 from app.finite import MAX_ID
 from app.http.cursor import paged
 from app.http.deps import Actor, AppServices, AppStore, DatasetPath, Id
+from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import responses
 from app.http.respond import document, no_content, responds
+from app.http.route import Route
 
-router = APIRouter(tags=["agreement"])
+router = APIRouter(tags=["agreement"], route_class=Route)
 CSV_FILE = "text/csv"
 OfBatch = Annotated[
     int | None, Query(ge=0, le=MAX_ID, description="One batch alone; 0: what belongs to none.")
@@ -43,6 +45,7 @@ OfBatch = Annotated[
     response_model=GroupComparisonDocument,
     responses=responses(404),
 )
+@may(Action.READ, group=OwnedKind.GROUP, with_=OwnedKind.GROUP)
 def compare(
     group: Id,
     store: AppStore,
@@ -57,6 +60,7 @@ def compare(
 
 
 @router.get("/datasets/{dataset}/agreement", operation_id="getAgreement", responses=responses(404))
+@may(Action.LEAD, dataset=OwnedKind.DATASET)
 def get_agreement(
     dataset: DatasetPath, store: AppStore, of_batch: OfBatch = None
 ) -> AgreementDocument:
@@ -73,6 +77,7 @@ def get_agreement(
         200: {"content": {CSV_FILE: {}}, "description": "A row for each group."},
     },
 )
+@may(Action.LEAD, dataset=OwnedKind.DATASET)
 def get_agreement_file(dataset: DatasetPath, store: AppStore, of_batch: OfBatch = None) -> Response:
     """The same as CSV, a row for each group."""
     headers = {"Content-Disposition": 'attachment; filename="touchline-agreement.csv"'}
@@ -86,6 +91,7 @@ def get_agreement_file(dataset: DatasetPath, store: AppStore, of_batch: OfBatch 
     response_model=AgreementLimits,
     responses=responses(404, 413, 415),
 )
+@may(Action.LEAD, dataset=OwnedKind.DATASET)
 @responds(document)
 def put_limits(
     dataset: DatasetPath, edit: LimitsEdit, store: AppStore, actor: Actor
@@ -98,6 +104,7 @@ def put_limits(
 @router.get(
     "/datasets/{dataset}/adjudications", operation_id="listWaitingGroups", responses=responses(404)
 )
+@may(Action.REVIEW, dataset=OwnedKind.DATASET, whole=True)
 @paged()
 def list_waiting(dataset: DatasetPath, store: AppStore) -> WaitingList:
     """Groups whose annotations disagree and wait for a decision, the worst first."""
@@ -110,6 +117,7 @@ def list_waiting(dataset: DatasetPath, store: AppStore) -> WaitingList:
     response_model=CaseDocument,
     responses=responses(404),
 )
+@may(Action.REVIEW, group=OwnedKind.GROUP)
 def get_case(group: Id, store: AppStore, actor: Actor) -> Response:
     """The annotations of a group that disagree, beside each other."""
     return document(CaseDocument.of(adjudicate.get_case(store, group, actor=actor)))
@@ -121,6 +129,7 @@ def get_case(group: Id, store: AppStore, actor: Actor) -> Response:
     response_model=GroupDocument,
     responses={**responses(403, 404, 409, 413, 415), 200: {"headers": ETAG}},
 )
+@may(Action.REVIEW, group=OwnedKind.GROUP)
 @responds(group_answer)
 def decide(group: Id, decision: Decision, services: AppServices, actor: Actor) -> GroupState:
     """Take one annotation over into the group, or let a third one begin from it."""
@@ -140,6 +149,7 @@ def decide(group: Id, decision: Decision, services: AppServices, actor: Actor) -
     status_code=204,
     responses=responses(403, 404, 409, 413, 415),
 )
+@may(Action.REVIEW, group=OwnedKind.GROUP)
 @responds(no_content)
 def hand_back(group: Id, back: TakeHandBack, store: AppStore, actor: Actor) -> TakeView:
     """Hand one of the annotations back to its person; it is compared again when it is handed in."""

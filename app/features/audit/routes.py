@@ -23,9 +23,11 @@ from app.http.access import login_of
 from app.http.cursor import Before, Cursor, first_below
 from app.http.deps import AppStore
 from app.http.documents import json_of
+from app.http.permissions import Action, OwnedKind, Where, may
 from app.http.problem import responses
+from app.http.route import Route
 
-router = APIRouter(prefix="/audit", tags=["users"])
+router = APIRouter(prefix="/audit", tags=["users"], route_class=Route)
 COLUMNS = tuple(field.name for field in fields(AuditEntry))
 
 
@@ -86,6 +88,7 @@ Search = Annotated[
 
 
 @router.get("", operation_id="getAudit", response_model=AuditDocument, responses=responses(404))
+@may(Action.LEAD, dataset=OwnedKind.DATASET, group=OwnedKind.GROUP, where=Where.SOMEWHERE)
 def get_audit(
     store: AppStore,
     led: Led,
@@ -114,6 +117,7 @@ def get_audit(
         200: {"content": {"text/csv": {}, "application/x-ndjson": {}}, "description": "The file."},
     },
 )
+@may(Action.LEAD, dataset=OwnedKind.DATASET, group=OwnedKind.GROUP, where=Where.SOMEWHERE)
 def export_audit(
     ending: Literal["csv", "jsonl"], store: AppStore, led: Led, asked: Asked, search: Search = ""
 ) -> StreamingResponse:

@@ -34,7 +34,7 @@ from app.features.independent_annotations.gold_queries import gold_heads
 from app.features.notifications.queries import RingKind
 from app.features.notifications.service import tell
 from app.features.people.members import list_members
-from app.features.people.roles import Action, may
+from app.features.people.roles import Action, lets
 from app.features.queue.listing_queries import Listing
 from app.features.queue.query import MAX_LISTED_LENGTH, parse_query
 from app.features.webhooks.queries import GIVEN_OUT, HANDED_ON, announce_batch
@@ -367,7 +367,9 @@ def _ids(store: Store, dataset: int, part: Part, names: Iterable[str]) -> list[i
     wanted = {name.strip().lower() for name in names}
     if not wanted:
         return []
-    able = {one.name: one.id for one in list_members(store, dataset) if may(one.role, _NEEDS[part])}
+    able = {
+        one.name: one.id for one in list_members(store, dataset) if lets(one.role, _NEEDS[part])
+    }
     missing = sorted(wanted - set(able))
     if missing:
         raise InputError(

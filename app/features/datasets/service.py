@@ -217,6 +217,12 @@ def dataset_id(store: Store, dataset: str | int) -> int:
         return need_dataset(session, dataset)
 
 
+def no_dataset(store: Store, dataset: str | int) -> NotFoundError:
+    """That there is no such dataset, or not for whoever asks."""
+    with store.read() as session:
+        return NotFoundError.dataset(dataset, dataset_names(session))
+
+
 def need_dataset(session: Session, dataset: str | int) -> int:
     """``dataset_id`` within a session."""
     return int(_need(session, dataset).id)

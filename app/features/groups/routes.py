@@ -16,7 +16,7 @@ from app.features.groups.history_schemas import PreviewDocument, PreviewRequest,
 from app.features.groups.schemas import GroupDocument
 from app.features.groups.solution_schemas import SolutionDocument
 from app.features.groups.state import GroupState
-from app.features.people.roles import Action, may
+from app.features.people.roles import lets
 from app.features.queue import service as queue
 from app.features.queue.schemas import GroupPage, GroupRow, History, LogEntryDocument, Neighbours
 from app.features.queue.service import Ids
@@ -34,10 +34,12 @@ from app.http.deps import (
     QueryText,
     etag_matches,
 )
+from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import Responses, responses
 from app.http.respond import document, responds
+from app.http.route import Route
 
-router = APIRouter(prefix="/groups", tags=["groups"])
+router = APIRouter(prefix="/groups", tags=["groups"], route_class=Route)
 
 MAX_LIMIT = 500
 ETAG = {"ETag": {"description": "The group's state.", "schema": {"type": "string"}}}
@@ -62,6 +64,7 @@ def load_document_of_view(store: Store, view_id: int) -> GroupDocument:
 
 
 @router.get("", operation_id="listGroups", responses=responses(404))
+@may(Action.READ, dataset=OwnedKind.DATASET)
 def list_groups(
     store: AppStore,
     request: Request,
@@ -95,12 +98,13 @@ def list_groups(
         # A forged cursor can hold what the database cannot.
         raise foreign_cursor() from error
     login = login_of(request.scope)
-    judges = login is None or may(login.roles.role_in(found), Action.REVIEW)
+    judges = login is None or lets(login.roles.role_in(found), Action.REVIEW)
     items = [GroupRow.of(row, judges) for row in page.items]
     return GroupPage(items=items, next=page.next, total=page.total)
 
 
 @router.get("/ids", operation_id="listGroupIds", responses=responses(404))
+@may(Action.READ, dataset=OwnedKind.DATASET)
 def list_group_ids(
     store: AppStore,
     dataset: DatasetQuery,
@@ -123,6 +127,7 @@ def list_group_ids(
     response_model=GroupDocument,
     responses={**responses(404), 200: {"headers": ETAG}, 304: {"description": "Not changed."}},
 )
+@may(Action.READ, group=OwnedKind.GROUP)
 def get_group(group: Id, store: AppStore, request: Request) -> Response:
     """One group, complete: annotations, solution, verdict."""
     if "if-none-match" in request.headers:
@@ -133,6 +138,7 @@ def get_group(group: Id, store: AppStore, request: Request) -> Response:
 
 
 @router.get("/{group}/solution", operation_id="getSolution", responses=responses(404))
+@may(Action.READ, group=OwnedKind.GROUP)
 def get_solution(group: Id, store: AppStore) -> SolutionDocument:
     """The solution of a group."""
     state = submit.load_solved(store, group)
@@ -147,12 +153,14 @@ def get_solution(group: Id, store: AppStore) -> SolutionDocument:
     response_model=Neighbours,
     responses=responses(404),
 )
+@may(Action.READ, group=OwnedKind.GROUP)
 def get_neighbours(group: Id, store: AppStore, query: QueryText = "") -> queue.Neighbours:
     """Where the group stands among those that match, and up to five before and after."""
     return queue.neighbours(store, group, query)
 
 
 @router.get("/{group}/history", operation_id="getHistory", responses=responses(404))
+@may(Action.READ, group=OwnedKind.GROUP)
 @paged()
 def get_history(group: Id, store: AppStore) -> History:
     """Everything that was said about the group and changed of its static cameras, oldest first."""
@@ -160,6 +168,7 @@ def get_history(group: Id, store: AppStore) -> History:
 
 
 @router.get("/{group}/history/{entry}", operation_id="getHistoryStep", responses=responses(404))
+@may(Action.READ, group=OwnedKind.GROUP)
 def get_step(group: Id, entry: Id, store: AppStore) -> StepDocument:
     """What one entry of the history has changed: the views that differ, before and after."""
     return StepDocument.of(read_step(store, group, entry))
@@ -171,6 +180,7 @@ def get_step(group: Id, entry: Id, store: AppStore) -> StepDocument:
     response_model=PreviewDocument,
     responses=responses(404, 409, 413, 415),
 )
+@may(Action.READ, group=OwnedKind.GROUP)
 async def preview_group(
     group: Id, changes: PreviewRequest, services: AppServices, request: Request
 ) -> Response:
@@ -185,6 +195,7 @@ async def preview_group(
     response_model=GroupDocument,
     responses={**responses(*CONFLICTS), **CHANGED},
 )
+@may(Action.ANNOTATE, group=OwnedKind.GROUP)
 @responds(group_answer)
 def undo(group: Id, services: AppServices, actor: Actor, if_match: IfMatch) -> GroupState:
     """Take the last edit back; 409 when there is none."""
@@ -199,6 +210,7 @@ def undo(group: Id, services: AppServices, actor: Actor, if_match: IfMatch) -> G
     response_model=GroupDocument,
     responses={**responses(*CONFLICTS), **CHANGED},
 )
+@may(Action.ANNOTATE, group=OwnedKind.GROUP)
 @responds(group_answer)
 def redo(group: Id, services: AppServices, actor: Actor, if_match: IfMatch) -> GroupState:
     """Do again what was undone last; 409 when there is nothing."""

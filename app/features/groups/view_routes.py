@@ -36,15 +36,17 @@ from app.features.solutions.service import Solve, solve_encoded
 from app.http.conflicts import current_state
 from app.http.cursor import paged
 from app.http.deps import Actor, AppServices, Id, IfMatch, etag_matches
+from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import Responses, responses
 from app.http.request_limits import is_large
 from app.http.respond import responds
+from app.http.route import Route
 from app.http.services import Services
 from app.media.frames import Frames, SentPicture
 from app.soccer.media import FARTHEST, Media
 from app.worker_process import WorkerEnded
 
-router = APIRouter(prefix="/views", tags=["views"])
+router = APIRouter(prefix="/views", tags=["views"], route_class=Route)
 
 WIDTH_STEP = 16
 """Asked widths are rounded up to a multiple, so that few sizes fill the cache."""
@@ -72,6 +74,7 @@ IMAGES: Responses = {
     response_model=GroupDocument,
     responses={**responses(*CONFLICTS), **CHANGED},
 )
+@may(Action.ANNOTATE, view=OwnedKind.VIEW)
 @responds(group_answer)
 def patch_lines(
     view: Id,
@@ -98,6 +101,7 @@ def patch_lines(
     response_model=GroupDocument,
     responses={**responses(*CONFLICTS), **CHANGED},
 )
+@may(Action.ANNOTATE, view=OwnedKind.VIEW)
 @responds(group_answer)
 def patch_ball(
     view: Id,
@@ -117,6 +121,7 @@ def patch_ball(
     response_model=GroupDocument,
     responses={**responses(*CONFLICTS), **CHANGED},
 )
+@may(Action.ANNOTATE, view=OwnedKind.VIEW)
 @responds(group_answer)
 def patch_view(
     view: Id, change: ViewEdit, services: AppServices, actor: Actor, if_match: IfMatch
@@ -155,6 +160,7 @@ def _submit(
     response_class=Response,
     responses={**responses(404, 413, 503), **IMAGES},
 )
+@may(Action.READ, view=OwnedKind.VIEW)
 async def get_image(
     view: Id,
     services: AppServices,
@@ -195,6 +201,7 @@ async def get_image(
     response_model=NeighbourList,
     responses=responses(404, 503),
 )
+@may(Action.READ, view=OwnedKind.VIEW)
 @paged()
 async def get_neighbours(
     view: Id, services: AppServices, request: Request

@@ -14,10 +14,12 @@ from app.features.independent_annotations.schemas import (
     NewGuidelinePicture,
 )
 from app.http.deps import Actor, AppServices, AppStore, DatasetPath, etag_matches
+from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import responses
 from app.http.respond import as_document, document, responds
+from app.http.route import Route
 
-router = APIRouter(prefix="/datasets/{dataset}/guidelines", tags=["takes"])
+router = APIRouter(prefix="/datasets/{dataset}/guidelines", tags=["takes"], route_class=Route)
 
 Digest = Annotated[str, Path(pattern=r"^[0-9a-f]{64}$", description="SHA-256 of its bytes.")]
 
@@ -28,6 +30,7 @@ Digest = Annotated[str, Path(pattern=r"^[0-9a-f]{64}$", description="SHA-256 of 
     response_model=Guidelines,
     responses=responses(404),
 )
+@may(Action.READ, dataset=OwnedKind.DATASET)
 def get_guidelines(
     dataset: DatasetPath,
     store: AppStore,
@@ -45,6 +48,7 @@ def get_guidelines(
     response_model=Guidelines,
     responses=responses(404, 409, 413, 415),
 )
+@may(Action.LEAD, dataset=OwnedKind.DATASET)
 @responds(document)
 def write_guidelines(
     dataset: DatasetPath, edit: GuidelinesEdit, store: AppStore, actor: Actor
@@ -62,6 +66,7 @@ def write_guidelines(
     status_code=201,
     responses=responses(404, 409, 413, 415, 503),
 )
+@may(Action.LEAD, dataset=OwnedKind.DATASET, body={"upload": OwnedKind.UPLOAD})
 @responds(as_document(GuidelinePictureDocument.model_validate, 201))
 def add_picture(
     dataset: DatasetPath, new: NewGuidelinePicture, services: AppServices
@@ -86,6 +91,7 @@ def add_picture(
         304: {"description": "Not changed."},
     },
 )
+@may(Action.READ, dataset=OwnedKind.DATASET)
 def get_picture(
     dataset: DatasetPath, digest: Digest, store: AppStore, request: Request
 ) -> Response:

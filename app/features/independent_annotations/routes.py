@@ -22,17 +22,20 @@ from app.features.independent_annotations.schemas import (
     TakeList,
 )
 from app.features.independent_annotations.service import TakeView
-from app.features.people.roles import Action, may
+from app.features.people.roles import lets
 from app.http.access import login_of
 from app.http.cursor import paged
 from app.http.deps import Actor, AppServices, AppStore, DatasetPath, Id
+from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import responses
 from app.http.respond import document, responds
+from app.http.route import Route
 
-takes_router = APIRouter(tags=["takes"])
+takes_router = APIRouter(tags=["takes"], route_class=Route)
 
 
 @takes_router.get("/datasets/{dataset}/takes", operation_id="listTakes", responses=responses(404))
+@may(Action.READ, dataset=OwnedKind.DATASET)
 @paged()
 def list_takes(dataset: DatasetPath, store: AppStore, request: Request, actor: Actor) -> TakeList:
     """Own annotations of a dataset's groups: for a lead everybody's, else those of whoever asks."""
@@ -40,7 +43,7 @@ def list_takes(dataset: DatasetPath, store: AppStore, request: Request, actor: A
     found = takes.list_takes(
         store,
         dataset,
-        lambda dataset_id: login is None or may(login.roles.role_in(dataset_id), Action.LEAD),
+        lambda dataset_id: login is None or lets(login.roles.role_in(dataset_id), Action.LEAD),
         person=actor,
     )
     return TakeList(items=found)
@@ -57,6 +60,7 @@ def _begun(take: TakeView) -> Response:
     status_code=201,
     responses=responses(404, 409),
 )
+@may(Action.ANNOTATE, group=OwnedKind.GROUP)
 @responds(_begun)
 def begin(group: Id, store: AppStore, actor: Actor) -> takes.TakeView:
     """Begin an own annotation of a group, on a copy that nobody else sees; the one begun, if so."""
@@ -69,6 +73,7 @@ def begin(group: Id, store: AppStore, actor: Actor) -> takes.TakeView:
     response_model=TakeView,
     responses=responses(404),
 )
+@may(Action.READ, group=OwnedKind.GROUP)
 def get_take(group: Id, store: AppStore) -> takes.TakeView:
     """Whose own annotation a group is; 404 for an ordinary group."""
     return takes.shown(store, takes.get_take_of(store, group))
@@ -80,6 +85,7 @@ def get_take(group: Id, store: AppStore) -> takes.TakeView:
     response_model=TakeView,
     responses=responses(403, 404, 409),
 )
+@may(Action.ANNOTATE, group=OwnedKind.GROUP)
 @responds(document)
 def hand_in(
     group: Id, services: AppServices, actor: Actor, background: BackgroundTasks
@@ -97,6 +103,7 @@ def hand_in(
     response_model=TakeView,
     responses=responses(404, 409, 413, 415),
 )
+@may(Action.LEAD, group=OwnedKind.GROUP)
 @responds(document)
 def hand_back(
     group: Id, store: AppStore, actor: Actor, why: HandBack | None = None
@@ -112,6 +119,7 @@ def hand_back(
     response_model=GroupDocument,
     responses={**responses(404, 409, 412), 200: {"headers": ETAG}},
 )
+@may(Action.LEAD, group=OwnedKind.GROUP)
 @responds(group_answer)
 def adopt(group: Id, services: AppServices, actor: Actor) -> GroupState:
     """Take an annotation and its verdict over into the group that it is of; the answer is that group.
@@ -122,7 +130,7 @@ def adopt(group: Id, services: AppServices, actor: Actor) -> GroupState:
     return take_over(services.store, take, actor=actor, paint=services.paint)
 
 
-gold_router = APIRouter(tags=["takes"])
+gold_router = APIRouter(tags=["takes"], route_class=Route)
 
 
 @gold_router.get(
@@ -131,6 +139,7 @@ gold_router = APIRouter(tags=["takes"])
     response_model=GoldReportDocument,
     responses=responses(404),
 )
+@may(Action.LEAD, dataset=OwnedKind.DATASET)
 def get_report(dataset: DatasetPath, store: AppStore) -> gold.GoldReport:
     """The gold groups of a dataset, and what each person made of those that they were given."""
     return gold.read_report(store, dataset)
@@ -142,6 +151,7 @@ def get_report(dataset: DatasetPath, store: AppStore) -> gold.GoldReport:
     response_model=GoldChosen,
     responses=responses(404, 409, 413, 415),
 )
+@may(Action.LEAD, dataset=OwnedKind.DATASET)
 @responds(document)
 def choose(
     dataset: DatasetPath, choice: GoldChoiceDocument, store: AppStore, actor: Actor
@@ -158,6 +168,7 @@ def choose(
     response_model=GoldGroup,
     responses=responses(404, 409, 413, 415),
 )
+@may(Action.LEAD, group=OwnedKind.GROUP)
 @responds(document)
 def mark(group: Id, edit: GoldEdit, store: AppStore, actor: Actor) -> gold.GoldGroup:
     """Say that what a group holds now, with its verdict, is true."""
@@ -170,6 +181,7 @@ def mark(group: Id, edit: GoldEdit, store: AppStore, actor: Actor) -> gold.GoldG
     response_model=GoldGroup,
     responses=responses(404, 413, 415),
 )
+@may(Action.LEAD, group=OwnedKind.GROUP)
 @responds(document)
 def change(group: Id, edit: GoldEdit, store: AppStore, actor: Actor) -> gold.GoldGroup:
     """Let annotators of a gold group begin with something else; what is true of it stays."""
@@ -182,6 +194,7 @@ def change(group: Id, edit: GoldEdit, store: AppStore, actor: Actor) -> gold.Gol
     response_model=GoldGroup,
     responses=responses(404),
 )
+@may(Action.LEAD, group=OwnedKind.GROUP)
 @responds(document)
 def unmark(group: Id, store: AppStore, actor: Actor) -> gold.GoldGroup:
     """Let a gold group be an ordinary one again; what people made of it is no longer shown."""

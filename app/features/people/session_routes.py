@@ -14,7 +14,7 @@ from app.features.people import links
 from app.features.people.links import Meant
 from app.features.people.logins import Login
 from app.features.people.members import read_single_roles
-from app.features.people.roles import SCOPES, Action, Role, may
+from app.features.people.roles import SCOPES, Role, lets
 from app.features.people.schemas import (
     LinkLook,
     LinkUse,
@@ -29,11 +29,13 @@ from app.http.access import login_of
 from app.http.cursor import paged
 from app.http.deps import AppServices, AppStore, Id
 from app.http.headers import bearer_of
+from app.http.permissions import Action, may, open_to_all
 from app.http.problem import responses
+from app.http.route import SecretRoute
 from app.http.team import AppTeam, Team
 from app.soccer.actors import LOCAL_USER
 
-router = APIRouter(tags=["sessions"])
+router = APIRouter(tags=["sessions"], route_class=SecretRoute)
 log = structlog.get_logger("touchline.access")
 
 
@@ -52,7 +54,7 @@ async def get_login(request: Request) -> Login:
 Me = Annotated[Login, Depends(get_login)]
 
 
-ALLOWS = {role: [action for action in Action if may(role, action)] for role in Role}
+ALLOWS = {role: [action for action in Action if lets(role, action)] for role in Role}
 
 
 def session_of(login: Login | None, store: Store) -> SessionDocument:
@@ -76,6 +78,7 @@ def session_of(login: Login | None, store: Store) -> SessionDocument:
 
 
 @router.get("/session", operation_id="getSession", responses=responses(401, 429))
+@open_to_all
 def get_session(request: Request, services: AppServices) -> SessionDocument:
     """Who asks; nobody, before they have logged in. With a token: whose it is, and what it may."""
     team: Team | None = request.app.state.team
@@ -101,6 +104,7 @@ def get_session(request: Request, services: AppServices) -> SessionDocument:
 
 
 @router.post("/session", operation_id="createSession", responses=responses(401, 409, 413, 415, 429))
+@open_to_all
 def log_in(
     who: NewSession, request: Request, response: Response, store: AppStore, team: AppTeam
 ) -> SessionDocument:
@@ -148,6 +152,7 @@ def _begin(
 
 
 @router.delete("/session", operation_id="deleteSession", responses=responses(409))
+@open_to_all
 def log_out(
     request: Request, response: Response, store: AppStore, team: AppTeam
 ) -> SessionDocument:
@@ -164,6 +169,7 @@ def log_out(
     operation_id="changePassword",
     responses=responses(401, 409, 413, 415, 429),
 )
+@may(Action.ACCOUNT, to_enrol=True)
 def change_password(
     change: PasswordEdit,
     request: Request,
@@ -181,6 +187,7 @@ def change_password(
 
 
 @router.get("/sessions", operation_id="listSessions", responses=responses(401, 409))
+@may(Action.ACCOUNT)
 @paged()
 def list_sessions(team: AppTeam, me: Me) -> OpenSessionList:
     """One's own sessions, in this browser and others."""
@@ -194,6 +201,7 @@ def list_sessions(team: AppTeam, me: Me) -> OpenSessionList:
 @router.delete(
     "/sessions", operation_id="deleteOtherSessions", status_code=204, responses=responses(401, 409)
 )
+@may(Action.ACCOUNT)
 def end_others(team: AppTeam, me: Me) -> None:
     """End every session of one's own but this one."""
     team.logins.end_others(me)
@@ -205,12 +213,14 @@ def end_others(team: AppTeam, me: Me) -> None:
     status_code=204,
     responses=responses(401, 404, 409),
 )
+@may(Action.ACCOUNT)
 def end_session(session: Id, team: AppTeam, me: Me) -> None:
     """End a session of one's own."""
     team.logins.end(me, session)
 
 
 @router.post("/links/look", operation_id="lookAtLink", responses=responses(404, 409, 413, 415, 429))
+@open_to_all
 def look_at_link(asked: LinkLook, request: Request, store: AppStore, team: AppTeam) -> Meant:
     """Whom a link is for; 404 when it is not good any more."""
     team.count_try(request)
@@ -220,6 +230,7 @@ def look_at_link(asked: LinkLook, request: Request, store: AppStore, team: AppTe
 @router.post(
     "/links/use", operation_id="useLink", responses=responses(401, 404, 409, 413, 415, 429)
 )
+@open_to_all
 def use_link(
     chosen: LinkUse, request: Request, response: Response, store: AppStore, team: AppTeam
 ) -> SessionDocument:

@@ -20,10 +20,12 @@ from app.features.people.schemas import PasswordOnly
 from app.features.people.session_routes import Me, session_of
 from app.features.people.sign_on_rules import unlink, unlink_person, ways_of
 from app.http.deps import AppStore, Id
+from app.http.permissions import Action, may, open_to_all
 from app.http.problem import responses
+from app.http.route import SecretRoute
 from app.http.team import AppTeam
 
-router = APIRouter(tags=["sessions"])
+router = APIRouter(tags=["sessions"], route_class=SecretRoute)
 log = structlog.get_logger("touchline.access")
 
 
@@ -32,6 +34,7 @@ log = structlog.get_logger("touchline.access")
     operation_id="beginSignOn",
     responses=responses(404, 409, 413, 415, 429),
 )
+@open_to_all
 def begin(said: SignOnBegin, request: Request, response: Response, team: AppTeam) -> SignOnBegun:
     """Where to go to log in by single sign-on; it is for this browser, which gets a cookie."""
     sign_on = team.require_sign_on()
@@ -49,6 +52,7 @@ def begin(said: SignOnBegin, request: Request, response: Response, team: AppTeam
     operation_id="createSessionBySignOn",
     responses=responses(401, 404, 409, 413, 415, 429),
 )
+@open_to_all
 def finish(
     said: SignOnAnswer, request: Request, response: Response, store: AppStore, team: AppTeam
 ) -> SignOnEnd:
@@ -83,6 +87,7 @@ def finish(
 
 
 @router.get("/session/identity", operation_id="getIdentity", responses=responses(401, 409))
+@may(Action.ACCOUNT)
 def get_identity(store: AppStore, team: AppTeam, me: Me) -> OwnWaysDocument:
     """How one can come in: whether there is a password, and which account of the provider is one's own."""
     ways, rules = ways_of(store, me.person_id), team.sign_on and team.sign_on.rules
@@ -99,6 +104,7 @@ def get_identity(store: AppStore, team: AppTeam, me: Me) -> OwnWaysDocument:
     operation_id="beginIdentity",
     responses=responses(401, 409, 413, 415, 429),
 )
+@may(Action.ACCOUNT)
 def begin_link(
     said: PasswordOnly, request: Request, response: Response, team: AppTeam, me: Me
 ) -> SignOnBegun:
@@ -117,6 +123,7 @@ def begin_link(
     status_code=204,
     responses=responses(401, 404, 409, 413, 415, 429),
 )
+@may(Action.ACCOUNT)
 def remove(said: PasswordOnly, request: Request, store: AppStore, team: AppTeam, me: Me) -> None:
     """Unlink one's account of the provider; 409 for whoever has no password. Takes the password."""
     team.count_try(request, me.name)
@@ -130,6 +137,7 @@ def remove(said: PasswordOnly, request: Request, store: AppStore, team: AppTeam,
     tags=["users"],
     responses=responses(401, 404, 409),
 )
+@may(Action.ADMINISTER)
 def remove_from(user: Id, store: AppStore, _team: AppTeam, me: Me) -> None:
     """Unlink somebody's account of the provider; their sessions that began with it end."""
     unlink_person(store, user, actor=me.actor)

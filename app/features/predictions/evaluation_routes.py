@@ -28,10 +28,12 @@ from app.finite import MAX_ID
 from app.http.cursor import paged, parse_cursor
 from app.http.deps import Actor, AppServices, AppStore, DatasetPath, Id
 from app.http.job_responses import by_job, job_answer
+from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import Responses, responses
 from app.http.respond import document, no_content, responds
+from app.http.route import Route
 
-router = APIRouter(tags=["evaluations"])
+router = APIRouter(tags=["evaluations"], route_class=Route)
 
 FigureName = StrEnum("FigureName", list(FIGURES))  # type: ignore[misc]
 TableName = StrEnum("TableName", list(TABLES))  # type: ignore[misc]
@@ -65,6 +67,7 @@ TABLE_FILES = _files(
 @router.get(
     "/datasets/{dataset}/evaluations", operation_id="listEvaluations", responses=responses(404)
 )
+@may(Action.READ, dataset=OwnedKind.DATASET, whole=True)
 @paged()
 def list_evaluations(dataset: DatasetPath, store: AppStore) -> EvaluationList:
     """The evaluations of a dataset, the newest first."""
@@ -76,6 +79,11 @@ def list_evaluations(dataset: DatasetPath, store: AppStore) -> EvaluationList:
     "/datasets/{dataset}/evaluations",
     operation_id="startEvaluation",
     **by_job(404, 409, 413, 415),
+)
+@may(
+    Action.LEAD,
+    dataset=OwnedKind.DATASET,
+    body={"predictions": OwnedKind.PREDICTIONS, "careful": OwnedKind.PREDICTIONS},
 )
 @responds(job_answer)
 def start_evaluation(
@@ -97,6 +105,7 @@ def start_evaluation(
     response_model=EvaluationDocument,
     responses=responses(404),
 )
+@may(Action.READ, evaluation=OwnedKind.EVALUATION)
 def get_evaluation(evaluation: Id, store: AppStore) -> review.StoredEvaluation:
     """One evaluation: what it pins, its tables, and the names of its figures."""
     return review.get_evaluation(store, evaluation)
@@ -108,6 +117,7 @@ def get_evaluation(evaluation: Id, store: AppStore) -> review.StoredEvaluation:
     status_code=204,
     responses=responses(404),
 )
+@may(Action.LEAD, evaluation=OwnedKind.EVALUATION)
 @responds(no_content)
 def delete_evaluation(evaluation: Id, store: AppStore, actor: Actor) -> None:
     """Delete an evaluation; its predictions stay."""
@@ -120,6 +130,7 @@ def delete_evaluation(evaluation: Id, store: AppStore, actor: Actor) -> None:
     response_class=Response,
     responses={**responses(404), **FIGURE_FILES},
 )
+@may(Action.READ, evaluation=OwnedKind.EVALUATION)
 def get_figure(
     evaluation: Id,
     figure: FigureName,
@@ -143,6 +154,7 @@ def get_figure(
     response_class=Response,
     responses={**responses(404), **TABLE_FILES},
 )
+@may(Action.READ, evaluation=OwnedKind.EVALUATION)
 def get_table(
     evaluation: Id, table: TableName, ending: Literal["json", "csv"], store: AppStore
 ) -> Response:
@@ -166,6 +178,7 @@ def get_table(
     response_model=FrameList,
     responses=responses(404),
 )
+@may(Action.READ, evaluation=OwnedKind.EVALUATION)
 def list_frames(
     evaluation: Id,
     store: AppStore,
@@ -194,6 +207,7 @@ def list_frames(
     operation_id="compareEvaluations",
     responses=responses(404),
 )
+@may(Action.READ, evaluation=OwnedKind.EVALUATION, with_=OwnedKind.EVALUATION)
 def compare_evaluations(
     evaluation: Id,
     store: AppStore,

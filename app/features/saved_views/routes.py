@@ -15,15 +15,18 @@ from app.features.saved_views.service import SavedView
 from app.features.verdicts import service as reviewers
 from app.http.cursor import paged
 from app.http.deps import Actor, AppStore, DatasetPath, Id
+from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import responses
 from app.http.respond import document, responds
+from app.http.route import Route
 
-router = APIRouter(tags=["queue"])
+router = APIRouter(tags=["queue"], route_class=Route)
 
 
 @router.get(
     "/datasets/{dataset}/saved-views", operation_id="listSavedViews", responses=responses(404)
 )
+@may(Action.READ, dataset=OwnedKind.DATASET)
 @paged()
 def list_saved_views(dataset: DatasetPath, store: AppStore) -> SavedViewList:
     """Queries under names, each with the number of groups that match it now."""
@@ -49,6 +52,7 @@ def _saved(view: SavedView) -> Response:
         },
     },
 )
+@may(Action.ANNOTATE, dataset=OwnedKind.DATASET)
 @responds(_saved)
 def save_view(dataset: DatasetPath, view: NewSavedView, store: AppStore, actor: Actor) -> SavedView:
     """Keep a query under a name; 409 when the name is taken."""
@@ -60,6 +64,7 @@ def save_view(dataset: DatasetPath, view: NewSavedView, store: AppStore, actor: 
     operation_id="getSavedView",
     responses=responses(404),
 )
+@may(Action.READ, view=OwnedKind.SAVED_VIEW)
 def get_saved_view(view: Id, store: AppStore) -> SavedView:
     """One saved view."""
     return saved_views.get_view(store, view)
@@ -71,6 +76,7 @@ def get_saved_view(view: Id, store: AppStore) -> SavedView:
     response_model=SavedView,
     responses=responses(404),
 )
+@may(Action.ANNOTATE, view=OwnedKind.SAVED_VIEW)
 @responds(document)
 def delete_saved_view(view: Id, store: AppStore) -> SavedView:
     """Forget a saved view; the answer is what it was, so that it can be saved again."""
@@ -78,6 +84,7 @@ def delete_saved_view(view: Id, store: AppStore) -> SavedView:
 
 
 @router.get("/datasets/{dataset}/reviewers", operation_id="listReviewers", responses=responses(404))
+@may(Action.READ, dataset=OwnedKind.DATASET)
 @paged()
 def list_reviewers(dataset: DatasetPath, store: AppStore) -> ReviewerList:
     """Who has judged how many groups."""

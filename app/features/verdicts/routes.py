@@ -26,10 +26,12 @@ from app.features.verdicts.service import set_verdict
 from app.http.conflicts import current_state
 from app.http.cursor import MAX_ITEMS, Cursor, parse_cursor
 from app.http.deps import Actor, AppServices, AppStore, DatasetPath, DryRun, Id, IfMatch
+from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import responses
 from app.http.respond import as_document, document, responds
+from app.http.route import Route
 
-router = APIRouter()
+router = APIRouter(route_class=Route)
 
 
 @router.put(
@@ -39,6 +41,7 @@ router = APIRouter()
     response_model=GroupDocument,
     responses={**responses(*CONFLICTS), **CHANGED},
 )
+@may(Action.REVIEW, group=OwnedKind.GROUP)
 @responds(group_answer)
 def put_verdict(
     group: Id,
@@ -65,6 +68,7 @@ def put_verdict(
     response_model=GroupDocument,
     responses={**responses(*CONFLICTS), **CHANGED},
 )
+@may(Action.REVIEW, group=OwnedKind.GROUP)
 @responds(group_answer)
 def put_dismissal(
     group: Id, said: DismissalEdit, services: AppServices, actor: Actor, if_match: IfMatch
@@ -95,6 +99,7 @@ def put_dismissal(
     response_model=BulkResult,
     responses=responses(404, 409, 413, 415),
 )
+@may(Action.REVIEW, dataset=OwnedKind.DATASET)
 @responds(as_document(BulkResult.done))
 def post_verdicts(
     dataset: DatasetPath,
@@ -122,6 +127,7 @@ def post_verdicts(
     operation_id="listVerdictBatches",
     responses=responses(404),
 )
+@may(Action.READ, dataset=OwnedKind.DATASET, whole=True)
 def list_batches(
     dataset: DatasetPath,
     store: AppStore,
@@ -142,6 +148,7 @@ def list_batches(
     response_model=RedoReport,
     responses=responses(404, 409),
 )
+@may(Action.REVIEW, batch=OwnedKind.BATCH)
 @responds(document)
 def redo_batch(batch: Id, store: AppStore, actor: Actor) -> bulk_redo.RedoReport:
     """Give the verdicts of a batch again that was taken back, as a new batch.
@@ -159,6 +166,7 @@ def redo_batch(batch: Id, store: AppStore, actor: Actor) -> bulk_redo.RedoReport
     response_model=UndoReport,
     responses=responses(404, 409),
 )
+@may(Action.REVIEW, batch=OwnedKind.BATCH)
 @responds(document)
 def undo_batch(batch: Id, store: AppStore, actor: Actor) -> bulk_undo.UndoReport:
     """Give each group of a batch the verdict back that it had before; 409 the second time.

@@ -18,9 +18,13 @@ from app.features.webhooks.schemas import (
 from app.features.webhooks.service import Delivery, Webhook
 from app.http.cursor import Before, Cursor, first_below, paged
 from app.http.deps import Actor, AppStore, DatasetPath, Id
+from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import responses
+from app.http.route import SecretRoute
 
-router = APIRouter(prefix="/datasets/{dataset}/webhooks", tags=["webhooks"])
+router = APIRouter(
+    prefix="/datasets/{dataset}/webhooks", tags=["webhooks"], route_class=SecretRoute
+)
 
 
 def _with_secret(made: tuple[Webhook, str]) -> WebhookWithSecret:
@@ -29,6 +33,7 @@ def _with_secret(made: tuple[Webhook, str]) -> WebhookWithSecret:
 
 
 @router.get("", operation_id="listWebhooks", responses=responses(404))
+@may(Action.LEAD, dataset=OwnedKind.DATASET)
 @paged()
 def list_webhooks(dataset: DatasetPath, store: AppStore) -> WebhookList:
     """Who is told what happens in a dataset."""
@@ -42,6 +47,7 @@ def list_webhooks(dataset: DatasetPath, store: AppStore) -> WebhookList:
     status_code=201,
     responses=responses(404, 409, 413, 415),
 )
+@may(Action.LEAD, dataset=OwnedKind.DATASET)
 def make_webhook(
     dataset: DatasetPath, new: NewWebhook, store: AppStore, actor: Actor
 ) -> WebhookWithSecret:
@@ -55,6 +61,7 @@ def make_webhook(
     response_model=Webhook,
     responses=responses(404, 409, 413, 415),
 )
+@may(Action.LEAD, dataset=OwnedKind.DATASET)
 def change_webhook(
     dataset: DatasetPath, webhook: Id, change: WebhookEdit, store: AppStore, actor: Actor
 ) -> Webhook:
@@ -67,12 +74,14 @@ def change_webhook(
 @router.delete(
     "/{webhook}", operation_id="deleteWebhook", status_code=204, responses=responses(404)
 )
+@may(Action.LEAD, dataset=OwnedKind.DATASET)
 def delete_webhook(dataset: DatasetPath, webhook: Id, store: AppStore, actor: Actor) -> None:
     """Tell an address nothing more, and forget what it was told."""
     webhooks.remove_webhook(store, dataset, webhook, actor=actor)
 
 
 @router.post("/{webhook}/secret", operation_id="renewWebhookSecret", responses=responses(404))
+@may(Action.LEAD, dataset=OwnedKind.DATASET)
 def renew_secret(
     dataset: DatasetPath, webhook: Id, store: AppStore, actor: Actor
 ) -> WebhookWithSecret:
@@ -87,12 +96,14 @@ def renew_secret(
     response_model=Delivery,
     responses=responses(404, 409),
 )
+@may(Action.LEAD, dataset=OwnedKind.DATASET)
 def ping_webhook(dataset: DatasetPath, webhook: Id, store: AppStore, actor: Actor) -> Delivery:
     """Send a message of the kind `ping`, to see whether messages arrive."""
     return webhooks.send_ping(store, dataset, webhook, actor=actor)
 
 
 @router.get("/{webhook}/deliveries", operation_id="listWebhookDeliveries", responses=responses(404))
+@may(Action.LEAD, dataset=OwnedKind.DATASET)
 def list_deliveries(
     dataset: DatasetPath,
     webhook: Id,
@@ -114,6 +125,7 @@ def list_deliveries(
     response_model=Delivery,
     responses=responses(404, 409),
 )
+@may(Action.LEAD, dataset=OwnedKind.DATASET)
 def send_again(dataset: DatasetPath, webhook: Id, delivery: Id, store: AppStore) -> Delivery:
     """Send a message once more, at once."""
     return webhooks.send_again(store, dataset, webhook, delivery)

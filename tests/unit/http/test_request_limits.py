@@ -10,8 +10,9 @@ from typing import Any
 
 import anyio
 import pytest
+from starlette.responses import Response
 from starlette.testclient import TestClient
-from starlette.types import Receive, Scope, Send
+from starlette.types import Scope
 
 from app.admission import release_admission
 from app.http import request_limits as lanes
@@ -34,8 +35,8 @@ from app.http.request_limits import (
     Door,
     Doors,
     Lane,
-    Lanes,
     lane_of,
+    turn,
 )
 from app.main import PREFIX
 
@@ -144,13 +145,12 @@ class Work:
         self.away = False
         """Whether they say that they wait for something else."""
 
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+    async def __call__(self, scope: Scope) -> Response:
         self.begun.append(scope["path"])
         if self.away:
             await asyncio.to_thread(release_admission)
         await self.may_answer.wait()
-        await send({"type": "http.response.start", "status": 200, "headers": []})
-        await self.may_end.wait()
+        return Response()
 
 
 @dataclass
@@ -161,11 +161,11 @@ class Named:
 
 
 class Service:
-    """Requests against ``Lanes`` without a socket."""
+    """Requests that take turns, without a socket."""
 
     def __init__(self) -> None:
         self.work, self.doors = Work(), Doors()
-        self.lanes = Lanes(self.work, self.doors)
+        self.app: Callable[[Scope], Awaitable[Response]] = self.work
         self.statuses: list[int] = []
         self.bodies: list[bytes] = []
         self.tasks: list[asyncio.Task[None]] = []
@@ -178,14 +178,13 @@ class Service:
         if who:
             scope[LOGIN] = Named(who)
 
-        async def send(message: Any) -> None:
-            if message["type"] == "http.response.start":
-                self.statuses.append(message["status"])
-            else:
-                self.bodies.append(message["body"])
-
         async def run() -> None:
-            await self.lanes(scope, receive_nothing, send)
+            async with turn(self.doors.of(scope), scope) as refusal:
+                response = refusal or await self.app(scope)
+            self.statuses.append(response.status_code)
+            self.bodies.append(bytes(response.body))
+            if refusal is None:
+                await self.work.may_end.wait()
 
         self.tasks.append(asyncio.create_task(run()))
 
@@ -198,10 +197,6 @@ class Service:
         self.work.may_answer.set()
         self.work.may_end.set()
         await asyncio.gather(*self.tasks)
-
-
-async def receive_nothing() -> Any:
-    return {"type": "http.disconnect"}
 
 
 def run(test: Callable[[Service], Awaitable[None]]) -> None:
@@ -385,11 +380,11 @@ class TestLanes:
         run(test)
 
     def test_an_application_that_breaks_gives_its_turn_back(self) -> None:
-        async def broken(scope: Scope, receive: Receive, send: Send) -> None:
+        async def broken(_: Scope) -> Response:
             raise KeyError
 
         async def test(service: Service) -> None:
-            service.lanes.app = broken
+            service.app = broken
             service.ask("GET", "/groups/1")
             with pytest.raises(KeyError):
                 await service.end()
