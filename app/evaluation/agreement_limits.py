@@ -20,7 +20,7 @@ class AgreementLimits:
         ball_px: Centres of the ball, pixels.
         diameter_px: Its diameters, pixels.
         ball_m: 3D balls, metres.
-        jac: The least JaC of one's camera with the other's lines.
+        jac: The least JaC of one's camera with the other's lines, 0 to 1.
     """
 
     line_px: float = 5.0
@@ -38,7 +38,7 @@ class Disagreement:
     Attributes:
         kind: ``verdict``, ``ball``, ``ball_px``, ``diameter_px``, ``ball_3d``, ``ball_m``,
             ``view``, ``markings``, ``line_px`` or ``jac``.
-        sentence: For people; a and b stand for the two.
+        sentence: For people, ``a`` and ``b`` standing for the two.
         view: Its key; None where it is about the whole group.
         marking: Its name, or None.
         value: What was measured, and ``limit`` what is allowed; None where it is no number.
@@ -66,7 +66,7 @@ class Spread:
 
     Attributes:
         count: Of how many numbers; the other two are None of none.
-        tail: 95th percentile; of JaC the 5th.
+        tail: 95th percentile; of JaC, of which more is better, the 5th.
     """
 
     count: int

@@ -34,8 +34,9 @@ class LineDistance:
     """One marking of one view as two people drew it.
 
     Attributes:
-        only: Who alone drew it; None: both did.
-        mean_px: Mean distance of each one's points from the other's line.
+        only: ``a`` or ``b`` where only that one drew it, else None.
+        mean_px: Mean distance of the points of each from the line of the other, both ways;
+            None where only one drew it.
         largest_px: The largest of them.
     """
 
@@ -52,7 +53,7 @@ class BallDistance:
     Attributes:
         a: ``seen``, ``occluded``, ``out_of_view``, ``none`` or ``several``; ``b`` likewise.
         center_px: Distance of both centres; None unless both have one ball with a place.
-        diameter_px: Of b less that of a.
+        diameter_px: Difference of both diameters, b less a; None unless both drew boxes.
     """
 
     a: BallState
@@ -74,8 +75,9 @@ class ViewDistance:
         view: Its key.
         included: Whether each of a and b left it in the group.
         lines: Markings that either drew, by name.
-        jac: Of a's camera with b's lines, and of b's with a's, at 0.5 % of the diagonal.
-        position_m: Between both cameras.
+        jac: JaC of a's camera with b's lines, and of b's camera with a's, at 0.5 % of
+            the diagonal; None where there is no camera or no line.
+        position_m: Between both cameras; None where either is missing.
     """
 
     view: str

@@ -25,11 +25,12 @@ class Coefficient:
 
     Attributes:
         name: ``cohen``, ``fleiss`` or ``krippendorff``.
-        value: None where too few people annotated to disagree.
-        low: Lower end of the 95 % interval.
+        value: 1 is complete agreement, 0 what chance gives; None where nobody could disagree:
+            no item was judged twice, or all judgements are the same.
+        low: Lower end of the 95 % interval; None where there is none.
         high: Upper end.
-        observed: Share of pairs of verdicts that agree.
-        items: Groups that it is computed from.
+        observed: Share of pairs of judgements that agree; None without any pair.
+        items: How many items it was computed from.
     """
 
     name: Literal["cohen", "fleiss", "krippendorff"]

@@ -25,9 +25,11 @@ class PictureGeometry:
     """Aspect and principal point of a picture, with how well they are known.
 
     Attributes:
-        aspect: Width of a pixel by its height: 1.05 is stretched by 5 %.
-        shift: Of the optical axis from the middle, right and down, in half diagonals.
-        sigma: Standard deviations of the aspect and of both shifts.
+        aspect: Width of a pixel by its height: 1.05 is a picture stretched by 5 % in width.
+        shift: Of the optical axis from the middle of the picture, right and down, in half
+            diagonals.
+        sigma: Standard deviations of the aspect (as a share) and of both shifts; where they are
+            wide, the lines of the view itself say what the numbers are.
     """
 
     aspect: float = 1.0

@@ -66,7 +66,7 @@ class AuditEntry:
         sentence: What, in words.
         dataset: None: of none, or it is gone.
         network: From which address, where that is known.
-        address: Of the page that it is about.
+        address: Of the page that it is about; None where there is none.
         hash: Of the entry, in the chain of the log.
     """
 

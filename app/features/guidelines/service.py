@@ -47,7 +47,7 @@ class Guidelines:
 
     Attributes:
         dataset: Whose guidelines they are; copies have those of what they copy.
-        number: 0: there are no guidelines.
+        number: Of this version; 0: there are no guidelines.
         text: Markdown; ``![words](DIGEST)`` in a line of its own is a picture.
         versions: All of them, the newest first.
     """

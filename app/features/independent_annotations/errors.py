@@ -21,11 +21,13 @@ class DistanceFromTruth:
     """How far an annotation is from the truth.
 
     Attributes:
-        line_px: Median over the markings that both have of their mean distance, pixels.
-        lines_missing: Markings of the truth that were not drawn.
-        ball_px: Largest distance of the balls in a view, pixels.
-        balls_missing: Views in which one has a ball and the other none.
-        ball_m: Distance of the 3D balls, metres.
+        line_px: Median over the markings that both have of their mean distance, pixels of the
+            annotated size; None: they have none in common.
+        lines_missing: Markings that the truth has and the annotation has not.
+        ball_px: The largest distance of the two balls' centres over the views; None: there is no
+            view in which both have one.
+        balls_missing: Views in which one of the two has a ball and the other has none.
+        ball_m: Distance of the 3D balls, metres; None: one of them has none.
     """
 
     line_px: float | None

@@ -89,10 +89,10 @@ class TakeView:
         group: The copy: a group like any other.
         dataset: Of the groups that this is a copy of one of.
         of, number: The original, and its number in its dataset; None where its person is not told.
-        title: What people call the group; where it may not be known, the copy.
+        title: What people call the group; where its person is not told, what they call the copy.
         place: Which one of this person in this batch, from 1.
-        settled: When it was decided; None: not yet, or not disclosed to its person.
-        handed_back: Why its person has it back; None: they have not.
+        settled: When something was decided about it; None: not yet, or its person is not told.
+        handed_back: Why its person has it back; None: they have not, or handed it in again.
     """
 
     id: int

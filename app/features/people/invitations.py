@@ -46,8 +46,10 @@ class Invitation:
 
     Attributes:
         row: Which of the list, from 1.
-        state: ``possible``: they would be invited, says a dry run.
-        link: Link to pass on to the person, shown only this once; None: sent by mail, or none.
+        state: ``invited``; ``reset``, who has a way in already; ``possible``, on a dry run; or
+            ``refused``.
+        link: Address of the link, for whoever invites to hand over; None: there is none, or it went
+            by mail.
         expires: Until when the link is good.
         mailed: The mail server has taken the letter with the link.
         problem: Why the row was refused, or its letter not sent; the link is then shown.

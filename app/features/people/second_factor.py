@@ -62,7 +62,7 @@ class FactorState:
         on: There is an authenticator, or a passkey.
         required: Everybody needs a second factor here.
         codes_left: Recovery codes that were not used yet.
-        authenticator: There is an authenticator, which shows codes.
+        authenticator: It is (also) an authenticator, which shows codes.
     """
 
     on: bool

@@ -155,9 +155,9 @@ class RedoReport:
     """What giving a batch again did.
 
     Attributes:
-        batch: The new batch, which can be undone; None when nothing changed.
+        batch: The new batch, which can be undone like any other; None when nothing changed.
         changed: Groups that have the verdict again.
-        kept: Groups that a person has judged or edited since.
+        kept: Groups that a person has judged or edited since; they stay as they are.
         refused: Groups that the verdict cannot be given to any more, and why.
     """
 

@@ -160,9 +160,10 @@ class Reviewer:
     """One person's verdicts.
 
     Attributes:
-        accepted: Groups whose current verdict is this person's.
-        today: Groups judged since midnight UTC.
-        last: Time of the last verdict.
+        accepted: Groups whose verdict counts and is this person's, like ``rejected`` and
+            ``deferred``.
+        today: Groups that this person has judged since midnight UTC.
+        last: Time of this person's last verdict.
     """
 
     name: str

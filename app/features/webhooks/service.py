@@ -37,7 +37,7 @@ from app.finite import Moment
 
 MOST = 20
 """Webhooks of one dataset."""
-OFF = "somebody turned it off"
+OFF = "a person turned it off"
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ class Webhook:
     """An address that is told.
 
     Attributes:
-        off: Why sending was stopped; None: it is on.
+        off: Why nothing is sent to it any more; None: it is.
         waiting: Messages that wait to be sent, or sent again.
         delivered: Messages of the last 30 days that arrived.
         failed: Messages of the last 30 days that were given up.
@@ -69,7 +69,7 @@ class Delivery:
     Attributes:
         message: ``webhook-id``: the same however often it is sent.
         body: The JSON that is sent, to the letter.
-        next_at: When it is tried next.
+        next_at: When it is tried (again); None: never.
         status: What the receiver answered last.
         problem: Why the last try failed.
     """
