@@ -29,6 +29,7 @@ from app.http.cursor import paged
 from app.http.deps import Actor, AppServices, AppStore, DatasetPath, Id
 from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import responses
+from app.http.request_limits import LOOKS, QUESTIONS, limit
 from app.http.respond import document, no_content, responds
 from app.http.route import Route
 
@@ -46,6 +47,7 @@ OfBatch = Annotated[
     responses=responses(404),
 )
 @may(Action.READ, group=OwnedKind.GROUP, with_=OwnedKind.GROUP)
+@limit(QUESTIONS)
 def compare(
     group: Id,
     store: AppStore,
@@ -118,6 +120,7 @@ def list_waiting(dataset: DatasetPath, store: AppStore) -> WaitingList:
     responses=responses(404),
 )
 @may(Action.REVIEW, group=OwnedKind.GROUP)
+@limit(LOOKS)
 def get_case(group: Id, store: AppStore, actor: Actor) -> Response:
     """The annotations of a group that disagree, beside each other."""
     return document(CaseDocument.of(adjudicate.get_case(store, group, actor=actor)))

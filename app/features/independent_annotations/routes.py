@@ -28,6 +28,7 @@ from app.http.cursor import paged
 from app.http.deps import Actor, AppServices, AppStore, DatasetPath, Id
 from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import responses
+from app.http.request_limits import LOOKS, limit
 from app.http.respond import document, responds
 from app.http.route import Route
 
@@ -74,6 +75,7 @@ def begin(group: Id, store: AppStore, actor: Actor) -> takes.TakeView:
     responses=responses(404),
 )
 @may(Action.READ, group=OwnedKind.GROUP)
+@limit(LOOKS)
 def get_take(group: Id, store: AppStore) -> takes.TakeView:
     """Whose own annotation a group is; 404 for an ordinary group."""
     return takes.shown(store, takes.get_take_of(store, group))

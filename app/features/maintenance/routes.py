@@ -13,6 +13,7 @@ from app.http.deps import Actor, AppStore
 from app.http.metrics import SharedNumbers
 from app.http.permissions import Action, may, open_to_all
 from app.http.problem import responses
+from app.http.request_limits import limit
 from app.http.route import Route
 
 maintenance_router = APIRouter(prefix="/maintenance", tags=["sessions"], route_class=Route)
@@ -48,6 +49,7 @@ health_router = APIRouter(tags=["health"], route_class=Route)
 
 @health_router.get("/healthz", operation_id="getHealth", responses=responses())
 @open_to_all
+@limit(None)
 async def get_health(request: Request) -> Health:
     """Whether the process answers; it needs no thread and no database."""
     return Health(status="ok", version=request.app.version)
@@ -55,6 +57,7 @@ async def get_health(request: Request) -> Health:
 
 @health_router.get("/readyz", operation_id="getReadiness", responses=responses())
 @open_to_all
+@limit(None)
 def get_readiness(store: AppStore) -> Readiness:
     """Whether the database answers, keeps changes, and was not seen to be damaged; else 503."""
     store.require_undamaged()
@@ -76,6 +79,7 @@ def get_readiness(store: AppStore) -> Readiness:
     responses={**responses(), 200: {"content": {CONTENT_TYPE_LATEST: {}}}},
 )
 @may(Action.ADMINISTER)
+@limit(None)
 def get_metrics(request: Request) -> Response:
     """Requests, lanes, event streams, processes, jobs, files and room, in Prometheus' text format."""
     shared: SharedNumbers | None = getattr(request.app.state, "shared_metrics", None)

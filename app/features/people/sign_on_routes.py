@@ -22,6 +22,7 @@ from app.features.people.sign_on_rules import unlink, unlink_person, ways_of
 from app.http.deps import AppStore, Id
 from app.http.permissions import Action, may, open_to_all
 from app.http.problem import responses
+from app.http.request_limits import SIGN_ONS, limit
 from app.http.route import SecretRoute
 from app.http.team import AppTeam
 
@@ -35,6 +36,7 @@ log = structlog.get_logger("touchline.access")
     responses=responses(404, 409, 413, 415, 429),
 )
 @open_to_all
+@limit(SIGN_ONS)
 def begin(said: SignOnBegin, request: Request, response: Response, team: AppTeam) -> SignOnBegun:
     """Where to go to log in by single sign-on; it is for this browser, which gets a cookie."""
     sign_on = team.require_sign_on()
@@ -53,6 +55,7 @@ def begin(said: SignOnBegin, request: Request, response: Response, team: AppTeam
     responses=responses(401, 404, 409, 413, 415, 429),
 )
 @open_to_all
+@limit(SIGN_ONS)
 def finish(
     said: SignOnAnswer, request: Request, response: Response, store: AppStore, team: AppTeam
 ) -> SignOnEnd:
@@ -105,6 +108,7 @@ def get_identity(store: AppStore, team: AppTeam, me: Me) -> OwnWaysDocument:
     responses=responses(401, 409, 413, 415, 429),
 )
 @may(Action.ACCOUNT)
+@limit(SIGN_ONS)
 def begin_link(
     said: PasswordOnly, request: Request, response: Response, team: AppTeam, me: Me
 ) -> SignOnBegun:

@@ -30,6 +30,7 @@ from app.http.deps import Actor, AppServices, AppStore, DatasetPath, Id
 from app.http.job_responses import by_job, job_answer
 from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import Responses, responses
+from app.http.request_limits import IMAGES, limit
 from app.http.respond import document, no_content, responds
 from app.http.route import Route
 
@@ -131,6 +132,7 @@ def delete_evaluation(evaluation: Id, store: AppStore, actor: Actor) -> None:
     responses={**responses(404), **FIGURE_FILES},
 )
 @may(Action.READ, evaluation=OwnedKind.EVALUATION)
+@limit(IMAGES)
 def get_figure(
     evaluation: Id,
     figure: FigureName,

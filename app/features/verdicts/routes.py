@@ -28,6 +28,7 @@ from app.http.cursor import MAX_ITEMS, Cursor, parse_cursor
 from app.http.deps import Actor, AppServices, AppStore, DatasetPath, DryRun, Id, IfMatch
 from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import responses
+from app.http.request_limits import EDITS, limit
 from app.http.respond import as_document, document, responds
 from app.http.route import Route
 
@@ -42,6 +43,7 @@ router = APIRouter(route_class=Route)
     responses={**responses(*CONFLICTS), **CHANGED},
 )
 @may(Action.REVIEW, group=OwnedKind.GROUP)
+@limit(EDITS)
 @responds(group_answer)
 def put_verdict(
     group: Id,
