@@ -12,10 +12,10 @@ from __future__ import annotations
 
 import asyncio
 import os
-import re
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable, Collection
 from contextlib import asynccontextmanager, suppress
 from dataclasses import dataclass
+from typing import Any, TypeVar
 
 import anyio
 from starlette.datastructures import Headers
@@ -28,6 +28,7 @@ from app.http.fair_turns import Turns
 from app.http.origin import SAFE_METHODS
 from app.http.problem import make_problem, problem_response
 
+E = TypeVar("E", bound=Callable[..., Any])
 PATIENCE = 10.0
 """Seconds that a request waits for its turn."""
 RETRY_SECONDS = "2"
@@ -121,47 +122,27 @@ THREADS = sum(max(lane.width, lane.served or 0, lane.apart or 0) for lane in LAN
 """A thread for each request at work, for as many edits and changes as may have left, and some for files
 of the browser application."""
 
-_API = re.compile(r"/api/v\d+/")
-_NO_PAGE = re.compile(r"/(?:healthz|readyz|metrics)$|/(?:assets|static)/")
-_STREAM = re.compile(r"/events$")
-_IMAGE = re.compile(r"/(?:image|figures/[^/]+|views/[^/]+/(?:neighbours|paint|propose))$")
-_ZIP = re.compile(r"/exports/[^/]+/content$")
-_PREVIEW = re.compile(r"/preview$")
-_EDIT = re.compile(
-    r"/(?:views/[^/]+(?:/ball|/lines)?|groups/[^/]+/(?:verdict|undo|redo)"
-    r"|batches/[^/]+/(?:next|groups/[^/]+/lease))$"
-)
-_BULK_EDIT = re.compile(r"/datasets/[^/]+/edits$")
-_QUESTION = re.compile(r"/(?:comparison|influence|remedies|yield|noise)$")
-_LOOK = re.compile(r"/(?:groups/(?!ids$)|views/|stations/|session$|bell$|work$)")
-_LOGIN = re.compile(r"/(?:session|session/password|links/use)$")
-_SIGN_ON = re.compile(r"/session/(?:sign-on|sign-on/begin|identity/begin)$")
-_UPLOAD = re.compile(r"/uploads$")
+_LANE = "lane"
 
 
-def lane_of(method: str, path: str) -> Lane | None:
-    """The lane of a request; None where it needs no thread for long."""
-    if not _API.match(path):
-        return None if _NO_PAGE.match(path) else PAGES
-    if _STREAM.search(path):
-        return STREAMS
-    if _PREVIEW.search(path):
-        return PREVIEWS
-    if _QUESTION.search(path):
-        return QUESTIONS
-    if _IMAGE.search(path):
-        return IMAGES
-    if method in SAFE_METHODS:
-        return ZIPS if _ZIP.search(path) else LOOKS if _LOOK.search(path) else READS
-    if _LOGIN.search(path):
-        return LOGINS
-    if _SIGN_ON.search(path):
-        return SIGN_ONS
-    if method == "POST" and _UPLOAD.search(path):
-        return UPLOADS
-    if _BULK_EDIT.search(path):
-        return LARGE
-    return EDITS if _EDIT.search(path) else CHANGES
+def limit(lane: Lane | None) -> Callable[[E], E]:
+    """Say of which kind the requests of a route are; None: they need no thread for long.
+
+    A route that does not say it is of ``READS``, or of ``CHANGES``.
+    """
+
+    def decorate(endpoint: E) -> E:
+        setattr(endpoint, _LANE, lane)
+        return endpoint
+
+    return decorate
+
+
+def lane_of(endpoint: Callable[..., Any], methods: Collection[str]) -> Lane | None:
+    """The lane of a route, by the function that answers and its methods."""
+    otherwise = READS if set(methods) <= SAFE_METHODS else CHANGES
+    found: Lane | None = getattr(endpoint, _LANE, otherwise)
+    return found
 
 
 def is_large(scope: Scope) -> bool:
@@ -225,11 +206,8 @@ class Doors:
         self.all = tuple(Door(lane, served, apart) for lane in LANES)
         self._of = {door.lane: door for door in self.all}
 
-    def of(self, scope: Scope) -> Door | None:
-        """The door that a request goes through, if any."""
-        if scope["type"] != "http":
-            return None
-        lane = lane_of(scope["method"], scope["path"])
+    def of(self, lane: Lane | None, scope: Scope) -> Door | None:
+        """The door that a request of a lane goes through, if any."""
         if lane in (EDITS, PREVIEWS) and is_large(scope):
             lane = LARGE
         return None if lane is None else self._of[lane]
