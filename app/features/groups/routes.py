@@ -18,14 +18,8 @@ from app.features.groups.solution_schemas import SolutionDocument
 from app.features.groups.state import GroupState
 from app.features.people.roles import lets
 from app.features.queue import service as queue
-from app.features.queue.schemas import (
-    GroupIds,
-    GroupPage,
-    GroupRow,
-    History,
-    LogEntryDocument,
-    Neighbours,
-)
+from app.features.queue.schemas import GroupPage, GroupRow, History, LogEntryDocument, Neighbours
+from app.features.queue.service import Ids
 from app.finite import MAX_ID
 from app.http.access import login_of
 from app.http.conflicts import current_state
@@ -120,13 +114,12 @@ def list_group_ids(
     start: Annotated[
         int, Query(alias="from", ge=0, le=MAX_ID, description="Position of the first, from 0.")
     ] = 0,
-) -> GroupIds:
+) -> Ids:
     """The ids alone of the groups that match, in the order of the list.
 
     What `id:12,15,19` in a query takes, and what a loop over a whole dataset needs.
     """
-    found = queue.list_ids(store, dataset_id(store, dataset), query, limit, start)
-    return GroupIds(ids=list(found.ids), total=found.total)
+    return queue.list_ids(store, dataset_id(store, dataset), query, limit, start)
 
 
 @router.get(

@@ -6,8 +6,8 @@ from fastapi import APIRouter, Request, Response
 from prometheus_client import CONTENT_TYPE_LATEST, CollectorRegistry, generate_latest
 
 from app.errors import BusyError, NotFoundError, OverloadedError, StorageError
-from app.features.maintenance.schemas import BannerDocument, Health, NewBanner, Readiness
-from app.features.maintenance.service import clear_banner, set_banner
+from app.features.maintenance.schemas import Health, NewBanner, Readiness
+from app.features.maintenance.service import Banner, clear_banner, set_banner
 from app.features.queue.changes import read_position
 from app.http.deps import Actor, AppStore
 from app.http.metrics import SharedNumbers
@@ -21,13 +21,12 @@ maintenance_router = APIRouter(prefix="/maintenance", tags=["sessions"], route_c
 
 @maintenance_router.put("", operation_id="setMaintenance", responses=responses(413, 415))
 @may(Action.ADMINISTER)
-def put_maintenance(new: NewBanner, store: AppStore, actor: Actor) -> BannerDocument:
+def put_maintenance(new: NewBanner, store: AppStore, actor: Actor) -> Banner:
     """Show a notice on every page, in place of the one before.
 
     Windows that are open show it within some seconds; the login page has it, too.
     """
-    banner = set_banner(store, new.text, starts=new.starts, until=new.until, actor=actor)
-    return BannerDocument.model_validate(banner)
+    return set_banner(store, new.text, starts=new.starts, until=new.until, actor=actor)
 
 
 @maintenance_router.delete(

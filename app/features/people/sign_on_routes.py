@@ -10,7 +10,6 @@ from fastapi import APIRouter, Request, Response
 
 from app.errors import AccessError
 from app.features.people.login_schemas import (
-    IdentityDocument,
     OwnWaysDocument,
     SignOnAnswer,
     SignOnBegin,
@@ -95,12 +94,11 @@ def finish(
 def get_identity(store: AppStore, team: AppTeam, me: Me) -> OwnWaysDocument:
     """How one can come in: whether there is a password, and which account of the provider is one's own."""
     ways, rules = ways_of(store, me.person_id), team.sign_on and team.sign_on.rules
-    found = None if ways.identity is None else IdentityDocument.model_validate(ways.identity)
     return OwnWaysDocument(
         password=ways.password,
         provider=rules.label if rules else None,
         only=bool(rules and rules.only),
-        identity=found,
+        identity=ways.identity,
     )
 
 
