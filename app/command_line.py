@@ -176,7 +176,7 @@ def run() -> None:
         if isinstance(error, PermissionError):
             complain(
                 f"this user may not look at {name}",
-                "Open it to them (chmod, chown), or give the command as somebody else.",
+                "Give this user access (chmod, chown), or run the command as another user.",
             )
         else:
             complain(f"{name} cannot be used: {error.strerror}")

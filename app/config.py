@@ -20,9 +20,9 @@ from pydantic import (
 )
 from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
 
+from app.durable import read_private
 from app.errors import InputError
 from app.log import LogFormat
-from app.private_file import read_private
 
 
 def _user_data_folder() -> Path:
@@ -147,7 +147,7 @@ class Settings(BaseSettings):
     """Addresses such as https://hooks.example.org/touchline: webhooks may be sent to them and to what
     lies below them, and nowhere else."""
     stalled_hours: float = Field(default=24.0, gt=0, le=8760)
-    """A batch that is not done and in which nobody did anything for so long has stalled; one whose due
+    """An unfinished batch without activity for so long is stalled; one whose due
     day is over, in any case."""
     sso_issuer: str | None = None
     """Address of the OpenID Connect provider by which people log in (single sign-on), as it calls itself:
@@ -166,17 +166,17 @@ class Settings(BaseSettings):
     sso_scope: str = "openid email profile"
     """What the provider is asked to tell of people."""
     sso_name_claim: str = "preferred_username"
-    """Which claim is the name of somebody new."""
+    """Claim with the name of a new person."""
     sso_domains: list[str] = []
     """Who may come in: whose verified e-mail address is of one of these domains; empty: of any, or none."""
     sso_group_claim: str | None = None
-    """Which claim lists somebody's groups."""
+    """Claim that lists the person's groups."""
     sso_groups: list[str] = []
     """Who may come in: whoever is in one of these groups; empty: everybody."""
     sso_new_role: str | None = None
-    """Which role somebody gets whom nobody here knows, such as ``viewer``; empty: they do not come in."""
+    """Role of unknown people at their first login, such as ``viewer``; empty: they do not come in."""
     sso_only: bool = False
-    """Nobody logs in by password or passkey."""
+    """Login by password or passkey is off."""
     sso_second_factor: list[str] = []
     """Values of the claims ``amr`` and ``acr`` by which the provider says that it has asked for a second
     factor: with one of them ours is not asked for; empty: it always is."""

@@ -141,7 +141,7 @@ class NotFoundError(ReviewError):
     @classmethod
     def person(cls, person_id: int) -> Self:
         """That there is nobody of that id."""
-        return cls(f"there is nobody with id {person_id}")
+        return cls(f"there is no account with id {person_id}")
 
     @classmethod
     def dataset(cls, name: str | int, known: Mapping[int, str] | None = None) -> Self:
@@ -228,7 +228,7 @@ class BusyError(StorageError):
     """Another process writes for longer than one waits."""
 
 
-EXAMINE = "Run touchline doctor: it says what is damaged, and how to restore a backup."
+EXAMINE = "Run touchline doctor: it reports what is damaged and how to restore a backup."
 """What to do about a damaged database."""
 
 

@@ -19,10 +19,10 @@ from urllib.parse import urlsplit
 import structlog
 
 from app.config import Settings
+from app.durable import read_private
 from app.errors import InputError
 from app.finite import quoted
 from app.hosts import is_local
-from app.private_file import read_private
 
 log = structlog.get_logger("touchline.mail")
 

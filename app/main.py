@@ -48,8 +48,9 @@ from app.features.webhooks import routes as webhooks
 from app.features.what_if import routes as what_if
 from app.formats.manifest import software_version
 from app.http import event_routes as http_event
-from app.http.access import Access, require_decided
-from app.http.bodies import MAX_JSON_BYTES, JsonBodies
+from app.http import openapi
+from app.http.access import Access
+from app.http.bodies import MAX_JSON_BYTES
 from app.http.errors import install_handlers
 from app.http.headers import SecurityHeaders
 from app.http.idempotency import Idempotency
@@ -57,14 +58,14 @@ from app.http.metrics import SharedNumbers, install_metrics
 from app.http.openapi import describe
 from app.http.origin import KnownHosts, SameOrigin
 from app.http.pages import install_pages
-from app.http.request_limits import THREADS, Doors, Lanes
+from app.http.request_limits import THREADS, Doors
 from app.http.request_log import RequestLog
 from app.http.requests import HeadAsGet, OneLength, OneRange
+from app.http.route import Gate, Route, nothing_here, require_permissions
 from app.http.services import Services
 from app.http.site import STATIC, Site
 from app.http.strict_parameters import refuse_unknown_parameters
 from app.http.team import Team, allowed_hosts
-from app.soccer.actors import LOCAL_USER
 
 PREFIX = "/api/v1"
 ROUTERS = (
@@ -111,6 +112,7 @@ ROUTERS = (
     people_sign_on.router,
     people_login.passkeys_router,
     people_login.second_factors_router,
+    people_login.team_router,
     maintenance.maintenance_router,
     people_login.tokens_router,
     people.users_router,
@@ -118,6 +120,7 @@ ROUTERS = (
     audit.router,
     webhooks.router,
     agreement.router,
+    openapi.router,
 )
 
 
@@ -141,7 +144,7 @@ def create_app(settings: Settings, *, static: Path = STATIC, pool: Pool = nullco
         title="Touchline",
         version=software_version(),
         summary="Multi-view soccer frames into a trusted 3D ball dataset.",
-        openapi_url=f"{PREFIX}/openapi.json",
+        openapi_url=None,
         # Both pages load scripts from elsewhere, which the content policy refuses.
         docs_url=None,
         redoc_url=None,
@@ -150,8 +153,16 @@ def create_app(settings: Settings, *, static: Path = STATIC, pool: Pool = nullco
     )
     app.state.services = services
     team = app.state.team = Team.of(settings, services.store)
+    shared = services.store.sharing.is_shared
+    app.state.gate = Gate(
+        None if team is None else Access(team, services.store),
+        Idempotency(),
+        Doors(shared, settings.solves_apart),
+        min(MAX_JSON_BYTES, settings.max_upload_bytes),
+    )
     install_handlers(app)
-    app.include_router(maintenance.health_router, dependencies=[Depends(require_decided)])
+    app.router.route_class, app.router.default = Route, nothing_here
+    app.include_router(maintenance.health_router)
     # Before the API: nobody asks for as much at once as somebody who opens the first page.
     events = services.events
     install_pages(app, site, None if settings.team else events.moment, events.banner)
@@ -159,33 +170,22 @@ def create_app(settings: Settings, *, static: Path = STATIC, pool: Pool = nullco
         app.include_router(
             router,
             prefix=PREFIX,
-            dependencies=[Depends(require_decided), Depends(refuse_unknown_parameters)],
+            dependencies=[Depends(refuse_unknown_parameters)],
         )
     describe(app)
-    _add_middleware(app, settings, site, team)
+    require_permissions(app)
+    _add_middleware(app, settings, site)
     return app
 
 
-def _add_middleware(app: FastAPI, settings: Settings, site: Site, team: Team | None) -> None:
+def _add_middleware(app: FastAPI, settings: Settings, site: Site) -> None:
     """The first one added is the innermost."""
-    doors = Doors(app.state.services.store.sharing.is_shared, settings.solves_apart)
-    app.add_middleware(Lanes, doors=doors)
-    # Outside of the lanes: a repetition that waits for the first response takes nobody's place.
-    app.add_middleware(Idempotency, actor=LOCAL_USER)
-    if team is not None:
-        # Inside of what makes HEAD a GET, outside of whatever could answer.
-        app.add_middleware(Access, team=team, store=app.state.services.store)
     app.add_middleware(OneRange)
     app.add_middleware(HeadAsGet)
-    app.add_middleware(
-        JsonBodies,
-        max_bytes=min(MAX_JSON_BYTES, settings.max_upload_bytes),
-        streamed=frozenset({f"{PREFIX}/uploads"}),
-    )
     app.add_middleware(OneLength)
-    app.add_middleware(SameOrigin, url=settings.url, required=team is not None)
+    app.add_middleware(SameOrigin, url=settings.url, required=settings.team)
     app.add_middleware(KnownHosts, allowed=allowed_hosts(settings))
-    install_metrics(app, doors)
+    install_metrics(app, app.state.gate.doors)
     app.add_middleware(RequestLog)
     app.add_middleware(SecurityHeaders, policy=site.policy)
 

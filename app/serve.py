@@ -32,7 +32,7 @@ def serve(
         bool | None,
         typer.Option(
             "--team/--alone",
-            help="Ask everybody who they are, or nobody. Default: alone, unless TOUCHLINE_TEAM is set.",
+            help="Require a login, or do not. Default: no login, unless TOUCHLINE_TEAM is set.",
         ),
     ] = None,
     url: Annotated[

@@ -86,7 +86,7 @@ class WorkerEnded(Exception):  # noqa: N818
                 "processor": f"takes more than {limits.processor:,.0f} seconds to work out",
                 "silence": f"was at work for {limits.silence:,.0f} seconds without a result",
                 "killed": "was not finished: its process was killed, most likely for want of memory",
-                "terminated": "was not finished: its process was told to end",
+                "terminated": "was not finished: its process was stopped",
                 "crash": "made its process crash",
             }[reason]
         )

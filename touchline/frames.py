@@ -31,7 +31,7 @@ class NoFrames:
     def read(self, view: View) -> bytes:
         """Raises DataError."""
         raise DataError(
-            f"nobody said where the frame of {view.key} is",
+            f"no place is configured for the frame of {view.key} is",
             "Give the folder, zip or server that has the frames: touchline.open(..., frames=...).",
         )
 

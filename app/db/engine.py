@@ -67,7 +67,7 @@ def _storage_error(error: DBAPIError, kind: Failure, name: str, settings: Settin
     if kind is Failure.DISK:
         return StorageError(
             f"the disk does not read or write {file} ({name})",
-            hint="Look after the disk; touchline doctor says what is left.",
+            hint="Free space on the disk; touchline doctor reports how much is left.",
         )
     if kind is Failure.AWAY:
         return StorageError(

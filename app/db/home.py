@@ -16,9 +16,8 @@ from pathlib import Path
 from app.config import Settings
 from app.db.dialects.dialect import dialect_of
 from app.db.recovery.anchor import read_anchor
-from app.durable import PARTIAL, sync
+from app.durable import PARTIAL, keep_private, sync
 from app.errors import DamagedError, StorageError
-from app.private_file import keep_private
 
 NETWORK_FILE_SYSTEMS = frozenset(
     {"nfs", "nfs4", "cifs", "smb3", "smbfs", "afs", "fuse.sshfs", "fuse.s3fs", "9p", "glusterfs"}

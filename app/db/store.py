@@ -34,8 +34,7 @@ from app.db.recovery.anchor import (
     require_own_database,
     sync_anchor,
 )
-from app.db.recovery.opened_file import OpenedFile
-from app.db.recovery.preopen_check import require_sound
+from app.db.recovery.preopen_check import OpenedFile, require_sound
 from app.db.session import Session
 from app.errors import EXAMINE, BusyError, DamagedError, StorageError
 
@@ -225,7 +224,7 @@ class Store:
             try:
                 listener()
             except Exception:
-                log.exception("a change was saved, and somebody could not be told")
+                log.exception("a change was saved, but a listener could not be notified")
 
     @property
     def is_damaged(self) -> bool:

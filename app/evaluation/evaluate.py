@@ -6,16 +6,14 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from app.evaluation import sensitivity
+from app.evaluation.average_precision import detection_summary, precision_recall
 from app.evaluation.binned import DISTANCE, PARALLAX, SIZE, detection_table, error_figure
 from app.evaluation.bootstrap import RESAMPLES, SEED, Resamples
 from app.evaluation.cameras import Scores, cameras_table, jac_figure, score_cameras
 from app.evaluation.careful import boxes_figure, boxes_table, comparable
-from app.evaluation.detection import detection_summary, precision_recall
 from app.evaluation.figure import Figure
-from app.evaluation.frame import Detection, Frame, JudgedFrame, judge
-from app.evaluation.localization import localization_table, precision_distance
-from app.evaluation.monocular import measure_frame
-from app.evaluation.overlap import iou
+from app.evaluation.frame import Detection, Frame, JudgedFrame, iou, judge
+from app.evaluation.localization import localization_table, measure_frame, precision_distance
 from app.evaluation.result import Evaluation, FrameResult
 from app.evaluation.table import Table
 from app.geometry.camera import Camera

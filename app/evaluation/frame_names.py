@@ -7,9 +7,9 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 
 from app.formats.export_names import key_in_group, named
+from app.formats.fields import id_text
 from app.formats.frame_names import flat_frame, match_frame
 from app.formats.gamestate import sequence_frame
-from app.formats.record_ids import id_text
 from app.formats.sn_calibration import line_frame
 from app.soccer.frames import ImageSize
 from app.soccer.group import Group, Station, View

@@ -41,10 +41,9 @@ from app.finite import quoted
 from app.formats import fields
 from app.formats.ball_names import is_ball
 from app.formats.cameras_reader import read_cameras
+from app.formats.fields import IdIndex, id_text
 from app.formats.file_tree import DEFAULT_LIMITS, FileTree, Limits
-from app.formats.json_document import json_kind
-from app.formats.json_text import read_json, read_json_lines
-from app.formats.record_ids import IdIndex, id_text
+from app.formats.json_text import json_kind, read_json, read_json_lines
 from app.formats.report import Report
 from app.formats.trees import opened_tree
 from app.geometry.camera import Camera

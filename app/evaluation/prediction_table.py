@@ -15,8 +15,8 @@ from app.evaluation.frame_names import NamedFrame
 from app.evaluation.prediction_run import FieldError, PredictionRun, in_field, noted, read_field
 from app.formats import fields
 from app.formats.csv_text import is_missing, numbers_in, read_rows
+from app.formats.fields import id_text
 from app.formats.file_tree import FileTree, Limits
-from app.formats.record_ids import id_text
 from app.soccer.frames import Box, ImageSize
 
 SCORES = ("score", "confidence", "conf", "probability", "prob")

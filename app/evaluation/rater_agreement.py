@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -32,7 +33,7 @@ class Coefficient:
         items: How many items it was computed from.
     """
 
-    name: str
+    name: Literal["cohen", "fleiss", "krippendorff"]
     value: float | None
     low: float | None
     high: float | None
@@ -72,7 +73,9 @@ def fleiss_kappa(rated: Rated) -> Coefficient:
     Source: Fleiss, "Measuring nominal scale agreement among many raters", 1971, eq. 2-7.
     """
     if len({len(row) for row in rated}) > 1 or (rated and len(rated[0]) < 2):
-        raise ValueError("Fleiss' kappa asks for equally many judgements of each item, two or more")
+        raise ValueError(
+            "Fleiss' kappa needs the same number of judgements of each item, two or more"
+        )
     counts = _counts(rated)
     raters = counts.sum(axis=1, keepdims=True)
     agreeing = (counts * (counts - 1)).sum(axis=1, keepdims=True) / (raters * (raters - 1))
@@ -99,7 +102,9 @@ def krippendorff_alpha(rated: Rated) -> Coefficient:
 
 
 def _coefficient(
-    name: str, parts: FloatArray, compute: Callable[[FloatArray], tuple[FloatArray, FloatArray]]
+    name: Literal["cohen", "fleiss", "krippendorff"],
+    parts: FloatArray,
+    compute: Callable[[FloatArray], tuple[FloatArray, FloatArray]],
 ) -> Coefficient:
     """A coefficient from each item's part, shape (N, ...), and its interval by resampling."""
     items = len(parts)

@@ -16,8 +16,7 @@ from app.formats.camera_matrix import camera_from_matrices, holds_matrices
 from app.formats.corner_origin import HALF
 from app.formats.fields import stated_size
 from app.formats.file_tree import DEFAULT_LIMITS, FileTree, Limits, Root
-from app.formats.json_document import is_camera, json_kind
-from app.formats.json_text import read_json, read_json_lines
+from app.formats.json_text import is_camera, json_kind, read_json, read_json_lines
 from app.formats.match_info import place_of, read_match_info
 from app.formats.report import Report
 from app.formats.sn_calibration import CAMERAS, LINES

@@ -1,4 +1,4 @@
-"""Categories of a foreign COCO file: what each is called, and which of them are the ball."""
+"""COCO: names that its reader and its writer share, categories of a foreign file, and which are the ball."""
 
 from __future__ import annotations
 
@@ -8,9 +8,20 @@ from dataclasses import dataclass
 from typing import Any
 
 from app.formats.ball_names import is_ball, same_name
-from app.formats.record_ids import IdIndex, id_text
+from app.formats.fields import IdIndex, id_text
 from app.formats.report import Report
 from app.plural import plural
+
+STATE = "touchline"
+"""The extra field of an image that holds everything that was said of its view."""
+CAMERA = "camera"
+"""The field of an image that holds its camera as SoccerNet spells it."""
+ORIGIN, CORNER = "bbox_origin", "corner"
+"""Says in that block, and in the file's ``info``, that boxes are measured from the corner of the
+first pixel; files of before, whose boxes are in our own pixel frame, do not say it."""
+PREFIX, OUTSIDE = "instances_", "outside_"
+"""Of the files with the images from which a detector learns, and of those with all others."""
+
 
 _SHOWN = 12
 """Categories that a sentence names."""

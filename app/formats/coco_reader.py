@@ -10,18 +10,32 @@ from typing import Any
 
 from app.errors import DatasetFormatError, UnsafePathError
 from app.formats.camera_json import camera_from_json
-from app.formats.coco import CAMERA, CORNER, ORIGIN, OUTSIDE, PREFIX, STATE
-from app.formats.coco_annotation import NoPlaceError, ball_of, box_of, is_occluded
-from app.formats.coco_categories import Categories, Category
+from app.formats.coco_annotation import (
+    Annotation,
+    Joined,
+    NoPlaceError,
+    ball_of,
+    box_of,
+    is_occluded,
+    spelt,
+)
+from app.formats.coco_categories import (
+    CAMERA,
+    CORNER,
+    ORIGIN,
+    OUTSIDE,
+    PREFIX,
+    STATE,
+    Categories,
+    Category,
+)
 from app.formats.coco_frames import Frame, FrameFile, groups_of, split_of_folders
-from app.formats.coco_joins import Annotation, Joined, spelt
 from app.formats.corner_origin import box_from_corner
+from app.formats.fields import id_text
 from app.formats.file_tree import DEFAULT_LIMITS, FileTree, Limits, Root
 from app.formats.frame_names import UNASSIGNED
-from app.formats.json_document import is_gamestate, json_kind
-from app.formats.json_text import read_json
+from app.formats.json_text import is_gamestate, json_kind, read_json
 from app.formats.picture_finder import Home, PictureFinder, picture_parts, split_in
-from app.formats.record_ids import id_text
 from app.formats.report import Report
 from app.formats.safe_path import check_name
 from app.formats.synloc import camera_from_synloc, is_synloc

@@ -14,7 +14,7 @@ from typing import IO, Any
 
 from app.finite import json_text
 from app.formats.camera_json import camera_to_json
-from app.formats.coco import CAMERA, CORNER, ORIGIN, OUTSIDE, PREFIX, STATE
+from app.formats.coco_categories import CAMERA, CORNER, ORIGIN, OUTSIDE, PREFIX, STATE
 from app.formats.corner_origin import box_to_corner
 from app.formats.export_record import ExportRecord, chosen_box, frame_name
 from app.formats.frame_names import UNASSIGNED

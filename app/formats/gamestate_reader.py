@@ -10,10 +10,10 @@ from typing import Any
 from app.errors import DatasetFormatError, UnsafePathError
 from app.formats import fields
 from app.formats.ball_names import is_ball
+from app.formats.fields import IdIndex
 from app.formats.file_tree import DEFAULT_LIMITS, FileTree, Limits, Root, files_inside
 from app.formats.gamestate import BALL, LABELS, METADATA, PITCH
 from app.formats.json_text import read_json
-from app.formats.record_ids import IdIndex
 from app.formats.report import Report
 from app.formats.safe_path import check_name
 from app.formats.sn_calibration_reader import lines_from_json

@@ -1,15 +1,22 @@
-"""Which format a folder, a zip or a file most likely holds, from names alone."""
+"""Which format a folder, a zip or a file most likely holds, from names alone or by its first bytes."""
 
 from __future__ import annotations
 
 import os
 import re
+from collections import Counter
 from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path, PurePosixPath
 
+from app.errors import ReviewError
+from app.formats.file_tree import BROKEN, FileTree, Root
 from app.formats.frame_names import IMAGE_SUFFIXES, VIDEO_SUFFIXES, is_system_file
+from app.formats.json_text import EVALUATE, EXPORT
+from app.formats.report import Report
 from app.formats.safe_path import MAX_PART
+from app.formats.trees import opened_tree
 from app.object_store.path import StoredPath
 from app.zip_file import first_names
 
@@ -99,3 +106,152 @@ def _below(root: Path, inside: str, depth: int) -> Iterator[str]:
         return
     for folder in sorted(folders)[:20] if depth > 1 else ():
         yield from _below(root, folder, depth - 1)
+
+
+MAX_FILES = 40
+"""Files of which the beginning is read."""
+HEAD_BYTES = 64 * 1024
+CONVERT = f"Touchline does not import that; {EXPORT}"
+YOLO = f"they hold no cameras and no groups; {EXPORT}, or give predictions to {EVALUATE}"
+NO_PLACES = "it holds no places in pictures"
+PREDICTED = f"it holds predictions, not annotations; give it to {EVALUATE}"
+
+
+@dataclass(frozen=True)
+class Look:
+    """What files look like.
+
+    Attributes:
+        name: The format, as people call it.
+        format: Name of the import format, or None where there is none.
+        advice: What to do about it, after the name.
+    """
+
+    name: str
+    format: str | None = None
+    advice: str = CONVERT
+
+    @property
+    def sentence(self) -> str:
+        """What to tell whoever gave the files for something else."""
+        if self.format is None:
+            return f"It looks like {self.name}: {self.advice}."
+        return f"It looks like {self.format}: choose that format and import it again."
+
+    def is_said(self, problem: str) -> bool:
+        """Whether a problem says already what to do about such files, as ``json_kind`` does."""
+        if self.format is not None:
+            return f"import it as {self.format}" in problem
+        return any(advice in self.advice and advice in problem for advice in (EVALUATE, EXPORT))
+
+
+def _keys(*names: str) -> tuple[re.Pattern[bytes], ...]:
+    """That all of some keys stand in a JSON text."""
+    return tuple(re.compile(rb'"%s"\s*:' % name.encode()) for name in names)
+
+
+_MARKING = (
+    rb'"(?:Side line|Middle line|Circle|Big rect\.|Small rect\.|Goal) ?[a-z ]{0,30}"\s*:\s*\['
+)
+_NUMBER = rb"-?\d{1,9}(?:\.\d{1,20})?(?:e-?\d{1,3})?"
+_YOLO = re.compile(rb"\A\s*\d{1,4}(?:[ \t]+%s){4,60}[ \t]*(?:\r?\n|\Z)" % _NUMBER)
+_MOT = re.compile(rb"\A\s*\d{1,9}, ?-?\d{1,9}(?:, ?%s){4,8}\s*(?:\r?\n|\Z)" % _NUMBER)
+
+_Kinds = tuple[tuple[tuple[re.Pattern[bytes], ...], Look], ...]
+"""What is found where all of some patterns are; the first one that fits."""
+_JSON: _Kinds = (
+    (_keys("imageMetadata", "calibration"), Look("soccernet-v3d", "soccernet-v3d")),
+    (_keys("imageMetadata"), Look("soccernet-v3", "soccernet-v3")),
+    (_keys("bbox_image"), Look("gamestate", "gamestate")),
+    (_keys("shapes", "imagePath"), Look("LabelMe, a JSON file for each picture")),
+    (_keys("file_attributes", "regions"), Look("a project of the VGG Image Annotator (VIA)")),
+    (_keys("from_name", "to_name"), Look("Label Studio's own JSON")),
+    (_keys("classTitle"), Look("Supervisely")),
+    (_keys("dm_format_version"), Look("Datumaro")),
+    (_keys("image", "annotations", "coordinates"), Look("Create ML")),
+    (_keys("images", "annotations"), Look("coco", "coco")),
+    (_keys("images", "categories"), Look("coco", "coco")),
+    (_keys("images", "file_name"), Look("coco", "coco")),
+    (_keys("image_id", "score"), Look("COCO results of a detector", None, PREDICTED)),
+    (_keys("gameTime", "label"), Look("SoccerNet's action spotting", None, NO_PLACES)),
+    (_keys("pan_degrees"), Look("cameras", "cameras")),
+    ((re.compile(_MARKING),), Look("sn-calibration", "sn-calibration")),
+)
+_XML: _Kinds = (
+    ((re.compile(rb"<(?:\w{1,40}:)?viper\b"),), Look("issia", "issia")),
+    (
+        (re.compile(rb"<annotations\b"), re.compile(rb"<(?:meta|track|image)\b")),
+        Look("CVAT's own XML"),
+    ),
+    (
+        (re.compile(rb"<annotation\b"), re.compile(rb"<(?:object|filename)\b")),
+        Look("Pascal VOC, an XML file for each picture"),
+    ),
+)
+_TEXT: _Kinds = (
+    ((_YOLO,), Look("YOLO labels", None, YOLO)),
+    ((_MOT,), Look("tracks of the MOT challenge")),
+)
+_CSV: _Kinds = (
+    (
+        (re.compile(rb"\A[^\n]*main_action"), re.compile(rb"\A[^\n]*ball_bbox")),
+        Look("soccernet-v3d", "soccernet-v3d"),
+    ),
+    ((re.compile(rb"\A[^\n]*x_cam\d"),), Look("issia-3d", "issia-3d")),
+    (
+        (re.compile(rb"\A[^\n]*(?:xmin|x_min|bbox)", re.IGNORECASE),),
+        Look("a table of boxes (CSV)"),
+    ),
+)
+_HEADS = {
+    ".json": _JSON, ".jsonl": _JSON, ".xml": _XML, ".xgtf": _XML, ".txt": _TEXT, ".csv": _CSV,
+}  # fmt: skip
+
+
+def looks_like(path: Root, format_: str) -> Look | None:
+    """What the files at a path look like, other than the format for which they were given.
+
+    Args:
+        path: Folder, zip or file.
+        format_: The format that they were given for.
+    """
+    try:
+        with opened_tree(path, Report()) as tree:
+            found = None if tree is None else _of_tree(tree)
+    except (*BROKEN, ReviewError, ValueError):
+        found = None
+    if found is not None:
+        return None if found.format == format_ else found
+    guess = guess_format(path)
+    return None if guess is None or guess == format_ else Look(guess, guess)
+
+
+def _of_tree(tree: FileTree) -> Look | None:
+    """What most of the first files are."""
+    names = tree.names()
+    suffixes = Counter(PurePosixPath(name).suffix.lower() for name in names)
+    if suffixes[".parquet"]:
+        return Look("parquet", "parquet")
+    heads = [name for name in names if PurePosixPath(name).suffix.lower() in _HEADS]
+    seen = Counter(
+        look for name in islice(heads, MAX_FILES) if (look := _of_head(tree, name)) is not None
+    )
+    if seen:
+        return seen.most_common(1)[0][0]
+    if not heads and any(suffixes[suffix] for suffix in VIDEO_SUFFIXES):
+        return Look("a video", None, "it has no annotations")
+    if not heads and any(suffixes[suffix] for suffix in IMAGE_SUFFIXES):
+        return Look("pictures alone", None, "there are no annotations beside them")
+    return None
+
+
+def _of_head(tree: FileTree, name: str) -> Look | None:
+    try:
+        with tree.open(name) as file:
+            head = file.read(HEAD_BYTES)
+    except (*BROKEN, ReviewError, ValueError):
+        return None
+    patterns = _HEADS[PurePosixPath(name).suffix.lower()]
+    return next(
+        (look for some, look in patterns if all(pattern.search(head) for pattern in some)), None
+    )

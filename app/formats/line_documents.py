@@ -10,8 +10,7 @@ from typing import Any
 from app.errors import DatasetFormatError
 from app.formats.fields import stated_size
 from app.formats.frame_names import IMAGE_SUFFIXES
-from app.formats.json_document import json_kind
-from app.formats.json_text import read_json, read_json_lines
+from app.formats.json_text import json_kind, read_json, read_json_lines
 from app.formats.report import Report
 from app.soccer.frames import ImageSize
 from app.soccer.pitch import WITHOUT_GEOMETRY, marking_like

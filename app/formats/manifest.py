@@ -27,7 +27,7 @@ LICENCES: Mapping[str, str] = {
     ),
     "sample": "Synthetic scenes made by Touchline itself; no rights are reserved.",
 }
-UNKNOWN_LICENCE = "The terms of the source were not recorded; ask whoever supplied the data."
+UNKNOWN_LICENCE = "The terms of the source were not recorded; ask the supplier of the data."
 
 
 @dataclass(frozen=True)

@@ -1,17 +1,13 @@
-"""Access: on a server of a team, nobody comes further than their role. The one place that decides.
+"""Access: on a server of a team, who asks, and whether they may ask what a route gives.
 
-Every request is looked up in one table; what does not stand there is refused. Routes decide
-nothing of this kind, and see to it that the table has decided about them (``require_decided``).
+Routes say who may ask them (``http/permissions.py``); here it is found out who that is.
 """
 
 from __future__ import annotations
 
 import asyncio
-import re
 from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 import structlog
@@ -19,60 +15,35 @@ from anyio import CapacityLimiter
 from anyio.to_thread import run_sync
 from fastapi import Request
 from starlette.responses import Response
-from starlette.routing import compile_path
-from starlette.types import ASGIApp, Message, Receive, Scope, Send
+from starlette.types import Message, Receive, Scope, Send
 
 from app.db.store import Store
-from app.errors import (
-    AccessError,
-    ForbiddenError,
-    NotLoggedInError,
-    StorageError,
-    TooManyTriesError,
-)
+from app.errors import AccessError, ForbiddenError, NotLoggedInError, StorageError
 from app.features.people.access_tokens import AccessTokens
 from app.features.people.logins import Login, Logins
-from app.features.people.roles import Action, DatasetRoles, require_scope
+from app.features.people.roles import DatasetRoles, require_scope
 from app.features.people.visibility_queries import EVERYTHING, READER, Sight
-from app.http.datasets_of_request import (
+from app.http.headers import bearer_of, cookie_of
+from app.http.permissions import (
     AskedAbout,
     OwnedMention,
-    datasets_of,
     is_hidden,
-    is_known,
+    missing,
     require_allowed,
     takes_looking,
 )
-from app.http.headers import SCHEME as BEARER
-from app.http.headers import bearer_of, cookie_of
-from app.http.hide_existence import HIDDEN, Concealment
-from app.http.problem import SCHEME, make_problem, problem_response
-from app.http.rules import OPEN, RULES
 from app.http.team import Team
 
 log = structlog.get_logger("touchline.access")
 
-API = "/api/v1"
 ASKS = "touchline.asks"
 """Where a request's scope says whose it is, also where it is refused."""
 LOGIN = "touchline.login"
 """Where a request's scope says who is logged in."""
-RULE = "touchline.rule"
-"""Where it says which row of the table has let it through."""
-UNDECIDED = "Nobody is let through. It is a fault of Touchline: report it."
 LOOK_SECONDS = 1.0
 """Between two looks whether whoever reads an endless answer still may."""
 THREADS = 8
 """So many sessions are looked up at a time."""
-ENROLLING = (
-    "/session/second-factor",
-    "/session/second-factor/confirm",
-    "/session/passkeys",
-    "/session/passkeys/begin",
-    "/session/password",
-)
-"""What somebody may ask who needs a second factor and has none."""
-STREAMS = frozenset({"GET /api/v1/events"})
 
 
 def login_of(scope: Mapping[str, Any]) -> Login | None:
@@ -99,147 +70,86 @@ def sight_of_whole(scope: Mapping[str, Any]) -> Sight:
     return EVERYTHING if login is None else login.sight_of_whole
 
 
-async def require_decided(request: Request) -> None:
-    """Refuse a request that reached a route which the table did not decide about.
-
-    Raises:
-        ForbiddenError: The table has taken it for another one, or was never asked.
-    """
-    if request.app.state.team is None:
-        return
-    # A route knows its address without the prefix of its router.
-    own = request.scope["route"].path_format
-    decided = {f"{request.scope['method']} {prefix}{own}" for prefix in ("", API)}
-    if request.scope.get(RULE) not in decided:
-        raise ForbiddenError("no rule says who may ask for this address", hint=UNDECIDED)
-
-
-@dataclass(frozen=True)
-class RuleRow:
-    """A row of the table that a request fits, with the parameters of its address."""
-
-    name: str
-    action: Action | None
-    path: Mapping[str, str]
-
-
-class _Rules:
-    """The table, ready to be asked: rows by method, length, third word and last word."""
-
-    def __init__(self) -> None:
-        self._fixed: dict[str, Action | None] = {}
-        self._rows: dict[_Key, list[tuple[re.Pattern[str], str, Action | None]]] = {}
-        for name in sorted(RULES, key=lambda name: ("elsewhere" in name, name.count("{"))):
-            method, template = name.split(" ", 1)
-            if "{" not in template:
-                self._fixed[name] = RULES[name]
-                continue
-            parts = template.split("/")
-            words = (_word(part) for part in (*parts[3:4], parts[-1]))
-            key: _Key = (method,) if ":" in template else (method, len(parts), *words)
-            found = compile_path(template)[0], name, RULES[name]
-            self._rows.setdefault(key, []).append(found)
-
-    def find(self, method: str, path: str) -> RuleRow | None:
-        """Row of a request; None where there is none. Fixed addresses come first."""
-        name = f"{method} {path}"
-        if name in self._fixed:
-            return RuleRow(name, self._fixed[name], {})
-        parts = path.split("/")
-        size: _Key = (method, len(parts), *parts[3:4])
-        keys: tuple[_Key, ...] = ((*size, parts[-1]), (*size, ""), (method,))
-        for key in keys:
-            for pattern, name, action in self._rows.get(key, ()):
-                if fits := pattern.match(path):
-                    return RuleRow(name, action, fits.groupdict())
-        return None
-
-
-_Key = tuple[str | int, ...]
-
-
-def _word(part: str) -> str:
-    return "" if "{" in part else part
-
-
-@dataclass(frozen=True)
-class _Let:
-    """Who asks, and where everything is that the request mentions, as far as they may know."""
-
-    login: Login
-    owned: list[OwnedMention]
-
-
 class Access:
-    """Lets a request through whose session or token, and role, allow it.
-
-    Others get 401, 403, and 404 for what no row has. A token counts before a cookie.
+    """Finds out who asks, by session or token, and whether they may. A token counts before a cookie.
 
     Args:
-        app: Answers those that may.
         team: Knows sessions and tokens.
         store: Says which dataset something belongs to.
     """
 
-    def __init__(self, app: ASGIApp, team: Team, store: Store):
-        self.app, self._team, self._store = app, team, store
-        self._rules = _Rules()
+    def __init__(self, team: Team, store: Store):
+        self._team, self._store = team, store
         self._threads = CapacityLimiter(THREADS)
         self._touching: dict[tuple[bool, int], asyncio.Task[None]] = {}
 
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        if scope["type"] != "http":
-            await self.app(scope, receive, send)
-            return
-        row = self._rules.find(scope["method"], scope["path"])
-        if row is not None and row.action is OPEN:
-            scope[RULE] = row.name
-            await self.app(scope, receive, send)
-            return
-        asked = None if row is None else AskedAbout.of(row.name, scope, row.path)
-        action = None if row is None else row.action
-        try:
-            let = await self._ask(scope, asked, action)
-        except (StorageError, AccessError) as error:
-            await _refuse(error, scope)(scope, receive, send)
-            return
-        if asked is None or action is None:
-            problem = make_problem(404, "there is nothing at this address")
-            await problem_response(problem)(scope, receive, send)
-            return
-        self._note_use(let.login)
-        concealment = Concealment(asked, let.owned)
-        if concealment:
-            told = concealment.scope(scope)
-            told[HIDDEN] = partial(is_hidden, self._store, let.owned)
-            receive, send, scope = concealment.receive(receive, told), concealment.send(send), told
-        scope[RULE], scope[LOGIN] = asked.route, let.login
-        READER.set(let.login.reader)
-        if asked.route in STREAMS:
-            await self._stream(asked, action, scope, receive, send)
-        else:
-            await self.app(scope, receive, send)
-
-    async def _ask(self, scope: Scope, asked: AskedAbout | None, action: Action | None) -> _Let:
-        """Who that is, and what they may know of what they ask.
+    async def log_in(self, scope: Scope) -> Login:
+        """Whose request it is.
 
         Raises:
-            NotLoggedInError: Nobody.
-            TooManyTriesError: Nobody, with one of many tokens that are none.
-            ForbiddenError: They see it, and may not do that.
+            NotLoggedInError: Nobody's.
+            TooManyTriesError: Nobody's, with one of many tokens that are none.
         """
         if bearer_of(scope) is None and not cookie_of(scope, self._team.cookie):
             raise _nobody()
         login = self._login_at_once(scope)
-        if login is None or (asked is not None and takes_looking(asked, login)):
-            return await run_sync(self._look, scope, asked, action, limiter=self._threads)
+        if login is None:
+            login = await run_sync(self._look_up, scope, limiter=self._threads)
         scope[ASKS] = login.actor
-        return self._let(login, asked, action)
+        return login
 
-    def _look(self, scope: Scope, asked: AskedAbout | None, action: Action | None) -> _Let:
-        login = self._login(scope)
-        scope[ASKS] = login.actor
-        return self._let(login, asked, action)
+    async def allow(self, asked: AskedAbout, login: Login) -> list[OwnedMention]:
+        """Where everything is that a request names, as far as its reader may know.
+
+        Raises:
+            ForbiddenError: They see it, and may not do that.
+        """
+        action = asked.permission.action
+        if login.token is not None and action is not None:
+            require_scope(login.token.scopes, action)
+        if login.must_enrol and not asked.permission.to_enrol:
+            raise ForbiddenError(
+                "everybody needs a second factor here, and you have none yet",
+                hint="Make one under Account, before anything else.",
+            )
+        if not takes_looking(asked, login):
+            return require_allowed(self._store, asked, login)
+        return await run_sync(require_allowed, self._store, asked, login, limiter=self._threads)
+
+    async def require_there(self, owned: list[OwnedMention]) -> None:
+        """Raise NotFoundError where something is not there, or not for whoever asks."""
+        if any(item.ownership is None for item in owned):
+            error = await run_sync(missing, self._store, owned, limiter=self._threads)
+            if error is not None:
+                raise error
+
+    async def is_hidden(self, owned: list[OwnedMention]) -> bool:
+        """Whether anything is there that is not for whoever asks."""
+        if all(item.ownership is not None for item in owned):
+            return False
+        return await run_sync(is_hidden, self._store, owned, limiter=self._threads)
+
+    def admit(self, scope: Scope, login: Login) -> None:
+        """Let a request be its sender's from here on."""
+        scope[LOGIN] = login
+        READER.set(login.reader)
+        self._note_use(login)
+
+    def while_allowed(self, response: Response, asked: AskedAbout, login: Login) -> Response:
+        """An answer without an end, which ends when its reader is logged out, or has other rights."""
+        return _WhileAllowed(response, self, asked, login.roles)
+
+    async def still_may(self, scope: Scope, asked: AskedAbout, roles: DatasetRoles) -> bool:
+        """Whether somebody may go on reading, with the rights that they had when they began."""
+        try:
+            login = await self.log_in(scope)
+            await self.allow(asked, login)
+        except AccessError:
+            return False
+        except StorageError:
+            # Nobody knows; what is told is read from the same database.
+            return True
+        return login.roles == roles
 
     def _login_at_once(self, scope: Scope) -> Login | None:
         """Whose session it is, where that can be said without waiting; else a thread says it.
@@ -252,25 +162,7 @@ class Access:
             return self._team.logins.find(cookie_of(scope, self._team.cookie) or "", at_once=True)
         return None
 
-    def _let(self, login: Login, asked: AskedAbout | None, action: Action | None) -> _Let:
-        if asked is None or action is None:
-            return _Let(login, [])
-        if login.token is not None:
-            require_scope(login.token.scopes, action)
-        if login.must_enrol and not asked.route.endswith(ENROLLING):
-            raise ForbiddenError(
-                "everybody needs a second factor here, and you have none yet",
-                hint="Make one under Account, before anything else.",
-            )
-        if action is not Action.ACCOUNT and not _is_decided(asked.route, action):
-            raise ForbiddenError(
-                "no rule says which datasets this address is about", hint=UNDECIDED
-            )
-        owned = datasets_of(self._store, asked, login)
-        require_allowed(asked, owned, login, action)
-        return _Let(login, owned)
-
-    def _login(self, scope: Scope) -> Login:
+    def _look_up(self, scope: Scope) -> Login:
         bearer = bearer_of(scope)
         if bearer is not None:
             return self._team.login_with(bearer, Request(scope))
@@ -297,27 +189,24 @@ class Access:
     def _kind(self, login: Login) -> Logins | AccessTokens:
         return self._team.logins if login.token is None else self._team.tokens
 
-    async def _stream(
-        self,
-        asked: AskedAbout,
-        action: Action,
-        scope: Scope,
-        receive: Receive,
-        send: Send,
-    ) -> None:
-        """An answer without an end; it ends when its reader is logged out, or has other rights.
 
-        Whoever may read on comes back, and is told what they see from then on.
-        """
+class _WhileAllowed(Response):
+    """A stream for as long as its reader may; whoever may read on comes back, and is told what they
+    see from then on."""
+
+    def __init__(self, inner: Response, access: Access, asked: AskedAbout, roles: DatasetRoles):
+        self._inner, self._access, self._asked, self._roles = inner, access, asked, roles
+        self.status_code, self.background = inner.status_code, inner.background
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         ended = asyncio.Event()
-        roles = scope[LOGIN].roles
 
         async def look() -> None:
             # However the looking ends: nobody reads on whom nobody looks at.
             try:
                 while not ended.is_set():
                     await asyncio.sleep(LOOK_SECONDS)
-                    if not await self._still_may(scope, asked, action, roles):
+                    if not await self._access.still_may(scope, self._asked, self._roles):
                         return
             finally:
                 ended.set()
@@ -345,42 +234,12 @@ class Access:
 
         looking = asyncio.ensure_future(look())
         try:
-            await self.app(scope, heard, told)
+            await self._inner(scope, heard, told)
         finally:
             looking.cancel()
         if begun and not over:
             await send({"type": "http.response.body", "body": b"", "more_body": False})
 
-    async def _still_may(
-        self, scope: Scope, asked: AskedAbout, action: Action, roles: DatasetRoles
-    ) -> bool:
-        """Whether somebody may go on reading, with the rights that they had when they began."""
-        try:
-            let = await self._ask(scope, asked, action)
-        except AccessError:
-            return False
-        except StorageError:
-            # Nobody knows; what is told is read from the same database.
-            return True
-        return let.login.roles == roles
-
-
-def _is_decided(route: str, action: Action) -> bool:
-    """Whether somebody has decided which datasets a route is about; admins' routes are about none."""
-    return action is Action.ADMINISTER or is_known(route)
-
 
 def _nobody() -> NotLoggedInError:
-    return NotLoggedInError("nobody is logged in here", hint="Log in first.")
-
-
-def _refuse(error: StorageError | AccessError, scope: Scope) -> Response:
-    status, headers = 503, {"Retry-After": "5"}
-    if isinstance(error, TooManyTriesError):
-        status, headers = 429, {"Retry-After": str(error.seconds)}
-    elif isinstance(error, NotLoggedInError):
-        status = 401
-        headers = {"WWW-Authenticate": SCHEME if bearer_of(scope) is None else BEARER}
-    elif isinstance(error, AccessError):
-        status, headers = 403, {}
-    return problem_response(make_problem(status, error.message, hint=error.hint), headers)
+    return NotLoggedInError("you are not logged in", hint="Log in first.")

@@ -10,10 +10,10 @@ from typing import Any, NoReturn
 
 import numpy as np
 from starlette.datastructures import Headers
-from starlette.types import ASGIApp, Message, Receive, Scope, Send
+from starlette.responses import Response
+from starlette.types import Receive
 
 from app.finite import quoted
-from app.http.origin import SAFE_METHODS
 from app.http.problem import make_problem, problem_response
 
 MAX_JSON_BYTES = 512 * 1024
@@ -33,9 +33,6 @@ MAX_NAME = 1_000
 """Characters of a name; that of a view is a file's."""
 MAX_STRANGERS_BYTES = 64 * 1024
 """Of what is asked before anybody is known: a passkey's answer has three texts of 16 kB at most."""
-VALUE = "touchline.json"
-"""Where a request's scope says what its JSON body is."""
-_STRANGERS = re.compile(r"/api/v\d+/(?:session|links)(?:/|$)")
 # Possessive, and the closing quote may be missing: linear on whatever comes.
 _STRINGS = re.compile(rb'"(?:[^"\\]|\\.)*+"?', re.DOTALL)
 _NO_BRACKETS = bytes(sorted(set(range(256)) - set(b"[]{}")))
@@ -51,6 +48,13 @@ class BodyError(Exception):
     def __init__(self, status: int, detail: str, hint: str | None = None):
         super().__init__(detail)
         self.status, self.detail, self.hint = status, detail, hint
+
+    def response(self) -> Response:
+        """What its sender is told."""
+        problem = make_problem(self.status, self.detail, hint=self.hint)
+        # The rest of the body is unread: the connection cannot carry another request.
+        headers = {"Connection": "close"} if self.status == 413 else None
+        return problem_response(problem, headers)
 
 
 def read_json(body: bytes) -> Any:
@@ -146,62 +150,15 @@ def _refuse_what_cannot_be_written(value: object) -> None:
         raise BodyError(400, "a number in the body is too large") from None
 
 
-class JsonBodies:
-    """Reads the body of a request that changes something, up to a cap, and checks it.
+async def read_body(headers: Headers, receive: Receive, most: int) -> bytes:
+    """The body of a request, of so many bytes at most.
 
-    An honest Content-Length is refused before a byte is read; a dishonest or chunked one is cut
-    off as soon as the cap is passed. Paths in ``streamed`` take bytes instead, which pass
-    through unread.
+    An honest Content-Length is refused before a byte is read; a dishonest or chunked one is cut off as
+    soon as the cap is passed.
+
+    Raises:
+        BodyError: It is longer, or whoever sent it has left.
     """
-
-    def __init__(
-        self,
-        app: ASGIApp,
-        max_bytes: int = MAX_JSON_BYTES,
-        streamed: frozenset[str] = frozenset(),
-    ):
-        self.app = app
-        self.max_bytes = max_bytes
-        self.streamed = streamed
-
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        if scope["type"] != "http" or scope["method"] in SAFE_METHODS:
-            await self.app(scope, receive, send)
-            return
-        if scope["method"] == "POST" and scope["path"] in self.streamed:
-            await self._pass_on(scope, receive, send)
-            return
-        try:
-            strangers = _STRANGERS.match(scope["path"])
-            most = min(self.max_bytes, MAX_STRANGERS_BYTES) if strangers else self.max_bytes
-            body = await _read(Headers(scope=scope), receive, most)
-            if body is None:
-                return
-            if body:
-                require_json_type(Headers(scope=scope).getlist("content-type"))
-                scope[VALUE] = read_json(body)
-        except BodyError as error:
-            problem = make_problem(error.status, error.detail, hint=error.hint)
-            # The rest of the body is unread: the connection cannot carry another request.
-            headers = {"Connection": "close"} if error.status == 413 else None
-            await problem_response(problem, headers)(scope, receive, send)
-            return
-        await self.app(scope, _replay(body, receive), send)
-
-    async def _pass_on(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Let a body of bytes through as it comes; its route counts it."""
-        kinds = Headers(scope=scope).getlist("content-type")
-        if [kind.strip().lower() for kind in kinds] == [BYTES]:
-            await self.app(scope, receive, send)
-            return
-        problem = make_problem(
-            415, "an upload must be plain bytes", hint=f"Send Content-Type: {BYTES}."
-        )
-        await problem_response(problem)(scope, receive, send)
-
-
-async def _read(headers: Headers, receive: Receive, most: int) -> bytes | None:
-    """The body, of so many bytes at most; None where whoever sent it has left."""
     declared = headers.get("content-length", "0")
     if not declared.isascii() or not declared.isdigit():
         raise BodyError(400, "Content-Length is not a number")
@@ -212,7 +169,7 @@ async def _read(headers: Headers, receive: Receive, most: int) -> bytes | None:
     while more:
         message = await receive()
         if message["type"] == "http.disconnect":
-            return None
+            raise BodyError(400, "the body was cut off")
         body += message.get("body", b"")
         more = message.get("more_body", False)
         if len(body) > most:
@@ -224,6 +181,12 @@ def _too_large(most: int) -> BodyError:
     return BodyError(413, f"a request body may have at most {most} bytes")
 
 
+def require_bytes(types: list[str]) -> None:
+    """Raise ``BodyError`` (415) unless the Content-Type is plain bytes."""
+    if [kind.strip().lower() for kind in types] != [BYTES]:
+        raise BodyError(415, "an upload must be plain bytes", hint=f"Send Content-Type: {BYTES}.")
+
+
 def require_json_type(types: list[str]) -> None:
     """Raise ``BodyError`` (415) unless the Content-Type is JSON in UTF-8."""
     kind, *parameters = [part.strip().lower() for part in "".join(types).split(";")]
@@ -232,16 +195,3 @@ def require_json_type(types: list[str]) -> None:
         raise BodyError(
             415, "a request body must be JSON", hint="Send Content-Type: application/json."
         )
-
-
-def _replay(body: bytes, receive: Receive) -> Receive:
-    sent = False
-
-    async def replay() -> Message:
-        nonlocal sent
-        if sent:
-            return await receive()
-        sent = True
-        return {"type": "http.request", "body": body, "more_body": False}
-
-    return replay

@@ -41,8 +41,10 @@ async def get_actor(
         str | None,
         Header(
             alias=ACTOR_HEADER,
-            description="What a script calls itself: up to 60 letters, digits, spaces and . _ @ + -. "
-            "History, verdicts and jobs name it as `script:NAME`. Nobody checks who it is.",
+            description=(
+                "Name of the script: up to 60 letters, digits, spaces and . _ @ + -. History, "
+                "verdicts and jobs show it as `script:NAME`. It is not verified."
+            ),
             examples=["nightly import"],
         ),
     ] = None,
@@ -59,7 +61,7 @@ async def get_actor(
         if said is not None:
             raise InputError(
                 f"{ACTOR_HEADER} is not accepted where people log in",
-                hint="Leave it out: the log names the person who is logged in.",
+                hint="Leave it out: the log names the logged-in person.",
                 pointer=f"/{ACTOR_HEADER}",
             )
         return login.actor
@@ -82,7 +84,7 @@ async def require_if_match(
         Header(
             alias="If-Match",
             description="The ETag of the state that the change builds on. Required: 428 without "
-            "it, 412 with the present state when somebody else was faster. `*` is refused.",
+            "it, 412 with the present state when another person changed it first. `*` is refused.",
             examples=['"9f2c61d0a4"'],
         ),
     ] = None,

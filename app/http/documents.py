@@ -1,15 +1,16 @@
-"""The base of documents, and a cache of identical ones."""
+"""The base of documents, values that are their own documents, and a cache of identical ones."""
 
 from __future__ import annotations
 
 from collections import OrderedDict
 from collections.abc import Callable
 from dataclasses import fields
+from functools import cache
 from inspect import get_annotations
 from threading import Lock
 from typing import Any, Generic, TypeVar, get_type_hints
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, TypeAdapter
 
 Item = TypeVar("Item")
 
@@ -31,10 +32,21 @@ class Document(BaseModel):
             cls.__annotations__ = shown | get_annotations(cls)
 
 
+def json_of(value: Any) -> bytes:
+    """The JSON of a document, or of a frozen dataclass, which is its own; no number is infinite or NaN."""
+    kind: Any = type(value)
+    return _writer(kind).dump_json(value)
+
+
+@cache
+def _writer(kind: Any) -> TypeAdapter[Any]:
+    return TypeAdapter(kind)
+
+
 class ListDocument(Document, Generic[Item]):
     """An answer of several things, in an order that its own words tell."""
 
-    items: list[Item] = Field(description="The things, of one page where a limit was asked for.")
+    items: list[Item] = Field(description="The items; one page of them if `limit` is given.")
     next: str | None = Field(
         default=None, description="`cursor` of the next page; null on the last one."
     )

@@ -33,6 +33,8 @@ from app.errors import (
 )
 from app.http.access import sight_of
 from app.http.event_schemas import PresenceDocument
+from app.http.headers import SCHEME as BEARER
+from app.http.headers import bearer_of
 from app.http.problem import SCHEME, TITLES, FieldProblem, make_problem, problem_response
 from app.http.strict_parameters import UNKNOWN, sentence_about
 
@@ -119,7 +121,7 @@ async def _review_error(request: Request, error: Exception) -> Response:
     if isinstance(error, TooManyTriesError):
         headers["Retry-After"] = str(error.seconds)
     if status == 401:
-        headers["WWW-Authenticate"] = SCHEME
+        headers["WWW-Authenticate"] = SCHEME if bearer_of(request.scope) is None else BEARER
     current = None
     if isinstance(error, StaleStateError):
         headers["ETag"], current = error.etag, error.current

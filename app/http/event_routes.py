@@ -14,15 +14,18 @@ from app.features.people.visibility_queries import reads_blind
 from app.http.deps import AppServices, SeesWhole
 from app.http.event_schemas import EVENTS
 from app.http.events import Feed, hello
+from app.http.permissions import Action, OwnedKind, Where, may
 from app.http.problem import Responses, responses
+from app.http.request_limits import STREAMS, limit
 from app.http.requests import is_head
+from app.http.route import Route
 from app.http.services import Services
 
 _UNBUFFERED = {"Cache-Control": "no-cache", "X-Accel-Buffering": "no"}
 """What a proxy between asks for, which would hold events back otherwise."""
 _MOMENT = re.compile(r"(\d{1,18})-(\d{1,18})", re.ASCII)
 
-router = APIRouter(prefix="/events", tags=["events"])
+router = APIRouter(prefix="/events", tags=["events"], route_class=Route)
 
 STREAM: Responses = {
     200: {
@@ -59,16 +62,20 @@ class Start:
             str | None,
             Header(
                 alias="Last-Event-ID",
-                description="`id` of the last event that was seen: what came after it is told "
-                "first. Anything that is no such id counts as none.",
+                description=(
+                    "`id` of the last event received: later events are sent first. Anything else "
+                    "is ignored."
+                ),
             ),
         ] = None,
         since: Annotated[
             str | None,
             Query(
                 max_length=40,
-                description="`moment` of the session, or of the page: what came after it is told "
-                "first, where no `Last-Event-ID` says more. Anything else counts as none.",
+                description=(
+                    "`moment` of the session or of the page: later events are sent first, unless "
+                    "there is a `Last-Event-ID`. Anything else is ignored."
+                ),
             ),
         ] = None,
     ):
@@ -125,6 +132,8 @@ def under_way(
     response_class=Response,
     responses={**responses(404), **STREAM},
 )
+@may(Action.READ, dataset=OwnedKind.DATASET, where=Where.SOMEWHERE)
+@limit(STREAMS)
 async def listen(
     request: Request,
     start: Annotated[Start, Depends()],

@@ -7,7 +7,7 @@ from datetime import datetime
 from pydantic import BaseModel, Field
 
 from app.features.jobs.schemas import JobDocument
-from app.features.maintenance.schemas import BannerDocument
+from app.features.maintenance.service import Banner
 from app.http.documents import Document
 
 
@@ -44,13 +44,13 @@ class WorkEvent(BaseModel):
     batch: int
     group: int
     dataset: str | None
-    here: list[PresenceDocument] = Field(description="Everybody who has the group open now.")
+    here: list[PresenceDocument] = Field(description="People who have the group open now.")
 
 
 class MaintenanceEvent(BaseModel):
     """The notice of maintenance is another one."""
 
-    banner: BannerDocument | None = Field(description="Null: it was taken away.")
+    banner: Banner | None = Field(description="Null: it was taken away.")
 
 
 EVENTS: dict[str, type[BaseModel]] = {

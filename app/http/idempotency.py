@@ -2,7 +2,7 @@
 
 A route stores its response in the transaction of its work (``http.respond``), so that wherever the
 server is stopped a repetition finds either both or neither. The responses of other routes are
-stored here, once they are sent.
+stored here, before they are sent.
 """
 
 from __future__ import annotations
@@ -11,26 +11,24 @@ import asyncio
 import hashlib
 import re
 import time
+from collections.abc import AsyncIterator, Awaitable, Callable
+from contextlib import asynccontextmanager
 
 import structlog
 from anyio import CancelScope, CapacityLimiter
 from anyio.to_thread import run_sync
-from starlette.datastructures import Headers
-from starlette.types import ASGIApp, Message, Receive, Scope, Send
+from fastapi import Request
+from starlette.responses import Response
+from starlette.types import Message
 
 from app.canonical import canonical
 from app.db.idempotency import KeyedRequest, claim, end_claim, find_stored, store_sent
 from app.db.store import Store
 from app.db.stored_responses import IdempotencyKey, StoredResponse
-from app.errors import BusyError, OverloadedError, ReviewError, StorageError
-from app.http.access import actor_of
-from app.http.bodies import BYTES, VALUE
+from app.errors import BusyError, OverloadedError, StorageError
 from app.http.deps import ACTOR_HEADER
-from app.http.errors import RETRY_SECONDS, status_of
-from app.http.hide_existence import HIDDEN, SENT
-from app.http.origin import SAFE_METHODS
 from app.http.problem import make_problem, problem_response
-from app.http.respond import KEYED_REQUEST, STORED_HEADERS
+from app.http.respond import KEYED_REQUEST, stored_form
 
 log = structlog.get_logger("touchline.api")
 
@@ -44,252 +42,179 @@ PATIENCE = 60.0
 """Seconds that a repetition waits for the first one to be answered."""
 AGAIN_SECONDS = 0.02
 """Between two looks whether another process has answered."""
-UNKEPT = re.compile(
-    r"/api/v\d+/(?:session|sessions|links|tokens|users|datasets/[^/]+/webhooks)(?:/|$)"
-)
-"""Responses that hold a secret are shown once, and stored nowhere."""
 THREADS = 4
 """So many responses are looked up at a time, and as many are stored."""
+Hidden = Callable[[], Awaitable[bool]]
+Work = Callable[[], Awaitable[Response]]
+
+
+class RequestDigest:
+    """What a request asks for: its method, address, body, actor and If-Match.
+
+    Args:
+        request: The request.
+        value: Its JSON body, read already; JSON in another order is the same.
+        has_value: Whether it has one.
+        is_streamed: Whether its body is of bytes instead, which are digested as they pass.
+    """
+
+    def __init__(
+        self,
+        request: Request,
+        value: object = None,
+        *,
+        has_value: bool = False,
+        is_streamed: bool = False,
+    ):
+        self.is_streamed = is_streamed
+        self._request, self._value, self._has_value = request, value, has_value
+        self._sum, self._ended = hashlib.sha256(), not is_streamed
+
+    async def receive(self) -> Message:
+        """The next message of a body of bytes."""
+        message = await self._request.receive()
+        if message["type"] == "http.request":
+            self._sum.update(message.get("body", b""))
+            self._ended = self._ended or not message.get("more_body", False)
+        else:
+            self._ended = True
+        return message
+
+    async def whole(self) -> str:
+        """The digest, once all of the body has passed."""
+        while not self._ended:
+            await self.receive()
+        scope, headers = self._request.scope, self._request.headers
+        place = [scope["method"], scope["path"], scope["query_string"].decode()]
+        place += headers.getlist(ACTOR_HEADER)
+        # The same change of another state is another request.
+        place += [f"If-Match: {tag}" for tag in headers.getlist("if-match")]
+        if self.is_streamed:
+            body = self._sum.hexdigest()
+        else:
+            body = canonical(self._value) if self._has_value else ""
+        return hashlib.sha256(canonical([*place, body]).encode()).hexdigest()
 
 
 class Idempotency:
-    """Answers a repetition with the first response, and the same key with another request with 422.
+    """Answers a repetition with the first response, and the same key with another request with 422."""
 
-    Args:
-        app: What answers for the first time.
-        actor: Whose keys they are, where nobody is logged in.
-    """
-
-    def __init__(self, app: ASGIApp, actor: str):
-        self.app, self._actor = app, actor
+    def __init__(self) -> None:
         self._under_way: dict[tuple[str, str], asyncio.Event] = {}
         self._finding, self._storing = CapacityLimiter(THREADS), CapacityLimiter(THREADS)
 
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """One request."""
-        if scope["type"] != "http" or scope["method"] in SAFE_METHODS:
-            await self.app(scope, receive, send)
-            return
-        if UNKEPT.match(scope["path"]):
-            await self.app(scope, receive, send)
-            return
-        keys = Headers(scope=scope).getlist(HEADER)
-        if not keys:
-            await self.app(scope, receive, send)
-        elif len(keys) > 1 or not KEY.fullmatch(keys[0]):
-            problem = make_problem(400, f"{HEADER} must be 1 to 200 visible ASCII characters")
-            await problem_response(problem)(scope, receive, send)
-        else:
-            await self._once(keys[0], scope, receive, send)
+    async def answer(
+        self, request: Request, digest: RequestDigest, actor: str, hidden: Hidden, work: Work
+    ) -> Response:
+        """The response to a request that changes something.
 
-    async def _once(self, key: str, scope: Scope, receive: Receive, send: Send) -> None:
-        whose = (actor_of(scope, self._actor), key)
+        Args:
+            request: The request.
+            digest: Its digest.
+            actor: Whose key it is.
+            hidden: Says whether its sender has lost sight, meanwhile, of what it is about.
+            work: Carries it out.
+
+        Raises:
+            OverloadedError: The first of its key is still being answered.
+            StorageError: Nobody knows whether it was answered before.
+        """
+        keys = request.headers.getlist(HEADER)
+        if not keys:
+            return await work()
+        if len(keys) > 1 or not KEY.fullmatch(keys[0]):
+            problem = make_problem(400, f"{HEADER} must be 1 to 200 visible ASCII characters")
+            return problem_response(problem)
+        store: Store = request.app.state.services.store
+        async with self._alone(store, keys[0], actor):
+            known = await self._find(store, keys[0], actor)
+            if known is None or await hidden():
+                return await self._carry_out(request, digest, keys[0], actor, work)
+            is_same = await digest.whole() == known.request_digest
+            if is_same and known.under_way:
+                return await self._carry_out(request, digest, keys[0], actor, work)
+            return _replay(known, is_same=is_same)
+
+    @asynccontextmanager
+    async def _alone(self, store: Store, key: str, actor: str) -> AsyncIterator[None]:
+        """Answer while nobody else answers a request of that key, in this process or another."""
+        whose = (actor, key)
         try:
             while (first := self._under_way.get(whose)) is not None:
                 await asyncio.wait_for(first.wait(), PATIENCE)
         except TimeoutError:
-            await _refuse(_still(), scope, receive, send)
-            return
+            raise _still() from None
         done = self._under_way[whose] = asyncio.Event()
         try:
-            await self._alone(*whose, _Request(scope, receive), send)
+            if not store.sharing.is_shared:
+                yield
+                return
+            await self._claim(store, key, actor)
+            try:
+                yield
+            finally:
+                with CancelScope(shield=True):
+                    await run_sync(end_claim, store, key, actor, limiter=self._storing)
         finally:
             del self._under_way[whose]
             done.set()
 
-    async def _alone(self, actor: str, key: str, request: _Request, send: Send) -> None:
-        """Answer while no other process does, where there may be some."""
-        if not request.store.sharing.is_shared:
-            await self._answer(actor, key, request, send)
-            return
-        try:
-            claimed = await self._claim(request.store, key, actor)
-        except StorageError as error:
-            await _refuse(error, request.scope, request.receive, send)
-            return
-        if not claimed:
-            await _refuse(_still(), request.scope, request.receive, send)
-            return
-        try:
-            await self._answer(actor, key, request, send)
-        finally:
-            with CancelScope(shield=True):
-                await run_sync(end_claim, request.store, key, actor, limiter=self._storing)
-
-    async def _claim(self, store: Store, key: str, actor: str) -> bool:
-        """Whether it could be had before patience was at its end."""
+    async def _claim(self, store: Store, key: str, actor: str) -> None:
+        """Let no other process answer; raises OverloadedError where patience comes to its end."""
         until = time.monotonic() + PATIENCE
         while not await run_sync(claim, store, key, actor, limiter=self._finding):
             if time.monotonic() > until:
-                return False
+                raise _still()
             await asyncio.sleep(AGAIN_SECONDS)
-        return True
 
-    async def _answer(self, actor: str, key: str, request: _Request, send: Send) -> None:
+    async def _find(self, store: Store, key: str, actor: str) -> StoredResponse | None:
+        """What is stored under a key; in a thread only where there is something to wait for."""
         try:
-            known = await self._find(request, key, actor)
-        except StorageError as error:
-            await _refuse(error, request.scope, request.receive, send)
-            return
-        if known is not None and not (known.under_way and await request.asks_for(known)):
-            await _again(known, request, send)
-        else:
-            await self._carry_out(actor, key, request, send)
-
-    async def _find(self, request: _Request, key: str, actor: str) -> StoredResponse | None:
-        """What is stored under a key; in a thread only where there is something to wait for.
-
-        Nothing for who has lost sight, meanwhile, of what it is about.
-        """
-        try:
-            found = find_stored(request.store, key, actor, at_once=True)
+            return find_stored(store, key, actor, at_once=True)
         except BusyError:
-            found = await run_sync(find_stored, request.store, key, actor, limiter=self._finding)
-        hidden = None if found is None else request.scope.get(HIDDEN)
-        if hidden is not None and await run_sync(hidden, limiter=self._finding):
-            return None
-        return found
+            return await run_sync(find_stored, store, key, actor, limiter=self._finding)
 
-    async def _carry_out(self, actor: str, key: str, request: _Request, send: Send) -> None:
-        if request.streamed:
-            # What is asked for is known once its bytes have passed.
-            keyed = None
-        else:
-            await request.read()
-            keyed = KeyedRequest(IdempotencyKey(key, actor, request.digest()))
+    async def _carry_out(
+        self, request: Request, digest: RequestDigest, key: str, actor: str, work: Work
+    ) -> Response:
+        keyed = None
+        store: Store = request.app.state.services.store
+        # What is asked for by bytes is known once they have passed.
+        if not digest.is_streamed:
+            keyed = KeyedRequest(IdempotencyKey(key, actor, await digest.whole()))
             request.scope[KEYED_REQUEST] = keyed
-        recorded = _Recorded(send)
-        await self.app(request.scope, request.receive, recorded.send)
-        if recorded.is_whole and not (keyed and keyed.stored):
+        response = await work()
+        if not (keyed and keyed.stored) and _is_stored(response):
             try:
-                sent = recorded.stored_form(request.digest())
-                await run_sync(store_sent, request.store, key, actor, sent, limiter=self._storing)
+                sent = stored_form(response, await digest.whole())
+                await run_sync(store_sent, store, key, actor, sent, limiter=self._storing)
             except StorageError as error:
-                # It is sent already; a repetition is answered with the state as it is then.
+                # The work is done; a repetition is answered with the state as it is then.
                 log.warning("a response could not be stored", error=str(error))
+        return response
+
+
+def _is_stored(response: Response) -> bool:
+    """Whether it is a success of a size that is stored; what was refused may be tried again."""
+    body = getattr(response, "body", None)
+    return 200 <= response.status_code < 300 and body is not None and len(body) <= MAX_ANSWER_BYTES
 
 
 def _still() -> OverloadedError:
     return OverloadedError("the first request of this key is still being answered")
 
 
-async def _refuse(error: ReviewError, scope: Scope, receive: Receive, send: Send) -> None:
-    problem = make_problem(status_of(error), error.message, hint=error.hint)
-    await problem_response(problem, {"Retry-After": RETRY_SECONDS})(scope, receive, send)
-
-
-async def _again(known: StoredResponse, request: _Request, send: Send) -> None:
-    if not await request.asks_for(known):
+def _replay(known: StoredResponse, *, is_same: bool) -> Response:
+    if not is_same:
         problem = make_problem(
             422, f"this {HEADER} was used for another request", hint="Send a new key with it."
         )
-        await problem_response(problem)(request.scope, request.receive, send)
-        return
+        return problem_response(problem)
     if known.body is None:
         problem = make_problem(
             409,
             "this request was answered before, and its answer is no longer kept",
             hint="It was carried out, once. Load the present state.",
         )
-        await problem_response(problem, {REPLAYED: "true"})(request.scope, request.receive, send)
-        return
-    headers = [(name.encode(), text.encode("latin-1")) for name, text in known.headers.items()]
-    headers.append((REPLAYED.lower().encode(), b"true"))
-    headers.append((b"content-length", str(len(known.body)).encode()))
-    await send({"type": "http.response.start", "status": known.status, "headers": headers})
-    await send({"type": "http.response.body", "body": known.body})
-
-
-class _Request:
-    """A request and the digest of what it asks for; an upload's body is digested as it passes."""
-
-    def __init__(self, scope: Scope, receive: Receive):
-        self.scope, self._receive = scope, receive
-        kind = Headers(scope=scope).get("content-type", "")
-        self.streamed = kind.strip().lower() == BYTES
-        self._sum = hashlib.sha256()
-        self._body: list[bytes] = []
-        self._ended = self._replayed = False
-
-    @property
-    def store(self) -> Store:
-        """Where the application stores its responses."""
-        store: Store = self.scope["app"].state.services.store
-        return store
-
-    async def read(self) -> None:
-        """Read the rest of the body; one that is not streamed can be received once more."""
-        while not self._ended:
-            await self._next()
-
-    async def asks_for(self, known: StoredResponse) -> bool:
-        """Whether it is the request that a response was given to."""
-        await self.read()
-        return self.digest() == known.request_digest
-
-    async def receive(self) -> Message:
-        """The next message for whoever answers."""
-        if self.streamed or self._replayed:
-            return await self._next()
-        self._replayed = True
-        return {"type": "http.request", "body": b"".join(self._body), "more_body": False}
-
-    def digest(self) -> str:
-        """Digest of method, address, body, actor and If-Match; JSON in another order gives the same one.
-
-        It is that of what was sent: what is deleted is asked for under another name afterwards.
-        """
-        sent = self.scope.get(SENT, self.scope)
-        place = [sent["method"], sent["path"], sent["query_string"].decode()]
-        headers = Headers(scope=sent)
-        place += headers.getlist(ACTOR_HEADER)
-        # The same change of another state is another request.
-        place += [f"If-Match: {tag}" for tag in headers.getlist("if-match")]
-        if self.streamed:
-            body = self._sum.hexdigest()
-        else:
-            body = canonical(sent[VALUE]) if VALUE in sent else ""
-        return hashlib.sha256(canonical([*place, body]).encode()).hexdigest()
-
-    async def _next(self) -> Message:
-        message = await self._receive()
-        if message["type"] == "http.request":
-            part = message.get("body", b"")
-            if self.streamed:
-                self._sum.update(part)
-            else:
-                self._body.append(part)
-            self._ended = self._ended or not message.get("more_body", False)
-        else:
-            self._ended = True
-        return message
-
-
-class _Recorded:
-    """Passes a response on and remembers it."""
-
-    def __init__(self, send: Send):
-        self._send = send
-        self._status, self._headers = 0, Headers()
-        self._body = bytearray()
-        self._ended = False
-
-    @property
-    def is_whole(self) -> bool:
-        """Whether it is a whole success; what was refused may be tried again."""
-        return self._ended and 200 <= self._status < 300 and len(self._body) <= MAX_ANSWER_BYTES
-
-    async def send(self, message: Message) -> None:
-        """The next message of the response."""
-        if message["type"] == "http.response.start":
-            self._status, self._headers = message["status"], Headers(raw=message["headers"])
-        elif message["type"] == "http.response.body":
-            if len(self._body) <= MAX_ANSWER_BYTES:
-                self._body += message.get("body", b"")
-            self._ended = not message.get("more_body", False)
-        await self._send(message)
-
-    def stored_form(self, digest: str) -> StoredResponse:
-        """What is stored."""
-        headers = {name: self._headers[name] for name in STORED_HEADERS if name in self._headers}
-        return StoredResponse(digest, self._status, headers, bytes(self._body))
+        return problem_response(problem, {REPLAYED: "true"})
+    return Response(known.body, known.status, {**known.headers, REPLAYED: "true"})

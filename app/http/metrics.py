@@ -129,7 +129,7 @@ class ProcessCollector(Collector):
         waiting = {door.lane.name: door.waiting for door in doors}
         yield _gauges("lane_waiting", "Requests that wait for their turn.", "lane", waiting)
         refused = {door.lane.name: door.refused for door in doors}
-        yield _counter("lane_refused", "Requests that were told to come back.", "lane", refused)
+        yield _counter("lane_refused", "Requests refused with Retry-After.", "lane", refused)
 
 
 class SharedNumbers:

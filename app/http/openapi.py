@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
+import inspect
 import re
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Iterator, Mapping
+from dataclasses import is_dataclass
+from typing import Any, get_args, get_type_hints
 
-from fastapi import FastAPI
-from fastapi.openapi.utils import get_openapi
+from fastapi import APIRouter, FastAPI, Request
+from fastapi.openapi.utils import get_fields_from_routes, get_openapi
 from pydantic import BaseModel
+from starlette.responses import JSONResponse
 
-from app.features.people.roles import Action
 from app.http.event_schemas import EVENTS
-from app.http.idempotency import UNKEPT
+from app.http.permissions import Action, Where, may
 from app.http.problem import Problem
 from app.http.property_descriptions import PARAMETERS, PROPERTIES
-from app.http.rules import OPEN, RULES
+from app.http.route import Route, routes_of
 from app.http.team import NAME
 
 Schema = Mapping[str, Any]
@@ -154,17 +156,17 @@ TAGS = {
     "views": "One image of an instant: its lines, its ball, its frame.",
     "stations": "Static cameras, whose lines many views share.",
     "findings": "What a person should look at.",
-    "insight": "What would mend a group, and which points move its ball most.",
+    "insight": "Suggestions for a group, and which points move its ball most.",
     "verdicts": "Many groups judged at once.",
-    "queue": "Saved queries, and who has reviewed how much.",
-    "work": "Batches of groups that leads give out, and who has which group open.",
-    "takes": "Own annotations that nobody else sees, groups whose truth is known, guidelines.",
+    "queue": "Saved queries, and how much each person has reviewed.",
+    "work": "Batches of groups that leads assign, and which person has which group open.",
+    "takes": "Independent annotations, gold groups whose true values are known, guidelines.",
     "yield": "What a policy lets through, and what another one would.",
-    "agreement": "How far people agree who annotated the same frames.",
-    "comments": "What people say to each other about groups, and what they are told.",
-    "webhooks": "Addresses that are told what happens in a dataset, each message signed.",
+    "agreement": "Agreement of people who annotated the same frames.",
+    "comments": "Comments on groups, and notifications.",
+    "webhooks": "Addresses that get signed messages about what happens in a dataset.",
     "imports": "Files and folders that become datasets.",
-    "predictions": "What detectors say, beside what people said.",
+    "predictions": "Predictions of detectors, beside the annotations of people.",
     "evaluations": "Detectors measured on what was accepted.",
     "versions": "Datasets as they were frozen.",
     "exports": "Datasets as files.",
@@ -173,14 +175,25 @@ TAGS = {
     "jobs": "Work that outlasts a request: how far it is and what came of it.",
     "events": "What changes, as it changes.",
     "pitch": "Names and shapes of the 26 markings.",
-    "sessions": "On a server of a team: who is logged in, and where.",
-    "tokens": "On a server of a team: with what scripts ask, in the name of a person.",
-    "users": "On a server of a team: who has an account, and which role.",
-    "health": "For whoever runs the service.",
+    "sessions": "On a team's server: login and open sessions.",
+    "tokens": "On a team's server: tokens for scripts that act in the name of a person.",
+    "users": "On a team's server: accounts and roles.",
+    "health": "For the operator of the service.",
 }
 
 
+_ATTRIBUTE = re.compile(r"^ {4}(\w[\w, ]*): (.*(?:\n {8}.*)*)", re.MULTILINE)
 REFERENCE = "#/components/schemas/{model}"
+
+
+router = APIRouter(include_in_schema=False, route_class=Route)
+
+
+@router.get("/openapi.json")
+@may(Action.DESCRIBE, where=Where.SOMEWHERE)
+async def get_document(request: Request) -> JSONResponse:
+    """What the server says of its addresses."""
+    return JSONResponse(request.app.openapi())
 
 
 def describe(app: FastAPI) -> None:
@@ -203,7 +216,8 @@ def _document(app: FastAPI) -> dict[str, Any]:
         routes=app.routes,
         tags=[{"name": name, "description": text} for name, text in TAGS.items()],
     )
-    _mend_operations(document)
+    routes = dict(routes_of(app))
+    _mend_operations(document, routes)
     schemas = document["components"]["schemas"]
     for name in ("HTTPValidationError", "ValidationError"):
         schemas.pop(name, None)
@@ -212,10 +226,41 @@ def _document(app: FastAPI) -> dict[str, Any]:
         described = model.model_json_schema(ref_template=REFERENCE)
         schemas.update(described.pop("$defs", {}))
         schemas[model.__name__] = described
+    shown = [field.field_info.annotation for field in get_fields_from_routes(app.routes)]
+    for kind in {value for model in (*shown, *models) for value in _values(model)}:
+        _describe_value(kind, schemas)
     _describe_schemas(schemas)
-    _secure(document)
+    _secure(document, routes)
     _give_examples(document)
     return document
+
+
+def _values(kind: Any, above: frozenset[Any] = frozenset()) -> Iterator[type[Any]]:
+    """Frozen values that a response holds, which are their own models."""
+    if kind in above:
+        return
+    hints: Any = get_args(kind)
+    if isinstance(kind, type) and is_dataclass(kind):
+        yield kind
+        hints = get_type_hints(kind).values()
+    elif isinstance(kind, type) and issubclass(kind, BaseModel):
+        hints = [field.annotation for field in kind.model_fields.values()]
+    for hint in hints:
+        yield from _values(hint, above | {kind})
+
+
+def _describe_value(kind: type[Any], schemas: Mapping[str, dict[str, Any]]) -> None:
+    """Say of a value that all its fields are there, and what each is as its docstring does."""
+    schema, text = schemas[kind.__name__], inspect.cleandoc(kind.__doc__ or "")
+    text = text.replace("``", "`").replace("None", "null")
+    schema["description"], _, attributes = text.partition("\n\nAttributes:\n")
+    schema["required"] = list(schema["properties"])
+    for names, words in _ATTRIBUTE.findall(attributes):
+        for name in names.split(", "):
+            if name in schema["properties"]:
+                schema["properties"][name]["description"] = " ".join(words.split())
+    for one in schema["properties"].values():
+        one.pop("default", None)
 
 
 def _describe_schemas(schemas: dict[str, Any]) -> None:
@@ -232,13 +277,13 @@ def _describe_schemas(schemas: dict[str, Any]) -> None:
             )
 
 
-def _secure(document: dict[str, Any]) -> None:
+def _secure(document: dict[str, Any], routes: Mapping[str, Route]) -> None:
     """Say with what one may ask: on a server that one person runs alone, with nothing."""
     document["components"]["securitySchemes"] = SCHEMES
     document["security"] = [*({name: []} for name in SCHEMES), {}]
     for path, operations in document["paths"].items():
         for method, operation in operations.items():
-            if RULES.get(f"{method.upper()} {path}", Action.READ) is OPEN:
+            if routes[f"{method.upper()} {path}"].permission.action is None:
                 operation["security"] = []
 
 
@@ -254,7 +299,7 @@ def _give_examples(document: dict[str, Any]) -> None:
                         content["example"] = example_of(content.get("schema", {}), schemas)
 
 
-def _mend_operations(document: dict[str, Any]) -> None:
+def _mend_operations(document: dict[str, Any], routes: Mapping[str, Route]) -> None:
     """Say what the framework cannot know, and not what belongs to a newer OpenAPI."""
     for path, operations in document["paths"].items():
         for method, operation in operations.items():
@@ -269,7 +314,7 @@ def _mend_operations(document: dict[str, Any]) -> None:
                 if parameter["name"] == "If-Match":
                     parameter |= {"required": True, "schema": {"type": "string"}}
             named = {parameter["name"] for parameter in parameters}
-            kept = method != "get" and not UNKEPT.match(path)
+            kept = method != "get" and routes[f"{method.upper()} {path}"].stores_response
             if kept and KEY_PARAMETER["name"] not in named:
                 parameters.append(KEY_PARAMETER)
             for answer in operation["responses"].values():
@@ -288,15 +333,18 @@ SCHEMES: dict[str, Any] = {
         "in": "cookie",
         "name": NAME,
         "description": "The session of a person who has logged in on a server of a team, set by"
-        " `POST /api/v1/session`; `__Host-` stands before its name where people come by TLS. A"
+        " `POST /api/v1/session`; `__Host-` stands before its name if the server is reached by "
+        "TLS. A"
         " change carries an `Origin` of the server, too.",
     },
     "token": {
         "type": "http",
         "scheme": "bearer",
         "bearerFormat": "tl_...",
-        "description": "A token of `POST /api/v1/tokens`, with which scripts ask in the name of a"
-        " person, within its scopes.",
+        "description": (
+            "A token of `POST /api/v1/tokens`, with which scripts act in the name of a person, "
+            "within its scopes."
+        ),
     },
 }
 KEY_PARAMETER: dict[str, Any] = {

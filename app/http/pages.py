@@ -15,6 +15,10 @@ from starlette.staticfiles import StaticFiles
 from starlette.types import Receive, Scope, Send
 
 from app.errors import StorageError
+from app.http import request_limits
+from app.http.permissions import open_to_all
+from app.http.request_limits import limit
+from app.http.route import Route
 from app.http.site import IndexPage, Site
 
 MEDIA_TYPES = {
@@ -169,7 +173,7 @@ def install_pages(
     ``moment`` says how things stand, so that a page hears of all that happens after it was asked
     for; None: the page asks who is there before it reads anything, and is told with the answer.
     """
-    router = APIRouter(include_in_schema=False)
+    router = APIRouter(include_in_schema=False, route_class=Route)
 
     def found() -> IndexPage:
         index = site.index()
@@ -177,6 +181,8 @@ def install_pages(
             raise HTTPException(status_code=404)
         return index
 
+    @open_to_all
+    @limit(request_limits.PAGES)
     def page(request: Request) -> Response:
         index = found()
         if moment is not None:
@@ -188,11 +194,15 @@ def install_pages(
             return Response(status_code=304, headers=headers)
         return Response(index.html, media_type="text/html", headers=headers)
 
+    @open_to_all
+    @limit(None)
     def styles(version: str) -> Response:
         content = found().styles
         headers = {"Cache-Control": FOR_GOOD if version == site.version else REVALIDATED}
         return Response(content, media_type="text/css", headers=headers)
 
+    @open_to_all
+    @limit(request_limits.PAGES)
     def elsewhere(request: Request) -> Response:
         """People who mistyped an address are told so by the page, programs by a problem."""
         if "text/html" not in request.headers.get("accept", ""):

@@ -242,7 +242,7 @@ async def get_team(request: Request) -> Team:
     if team is None:
         raise ConflictError(
             "this server is run by one person alone: it has no accounts",
-            hint="touchline serve --team asks everybody who they are.",
+            hint="touchline serve --team requires a login.",
         )
     return team
 

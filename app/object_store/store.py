@@ -15,9 +15,9 @@ from datetime import timedelta
 from functools import lru_cache
 from typing import IO, TYPE_CHECKING, Any, cast
 
+from app.durable import is_open_to_others
 from app.errors import InputError, NotFoundError, StorageError, TooLargeError
 from app.object_store.address import SCHEME
-from app.private_file import is_open_to_others
 
 if TYPE_CHECKING:
     from app.config import Settings, StoreSettings
@@ -29,7 +29,7 @@ PART_SECONDS = 120.0
 """Longest time that a part may take to be written."""
 LISTED = 1000
 """Objects that one request lists."""
-OPERATOR = "Ask the operator: touchline doctor says what is wrong with a store."
+OPERATOR = "Ask the operator: touchline doctor reports what is wrong with a store."
 _CODE = re.compile(r"<Code>(\w{1,60})</Code>")
 _KEYS_REFUSED = frozenset(
     {"AccessDenied", "ExpiredToken", "InvalidAccessKeyId", "InvalidToken", "SignatureDoesNotMatch", "TokenRefreshRequired"}

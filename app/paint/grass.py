@@ -72,7 +72,7 @@ def why_no_field(image: Image, field: BoolArray) -> str | None:
     if float(np.ptp(small, axis=2).mean()) < GREY_SPREAD:
         if levels.mean() > PALE_LEVEL:
             return "the picture is nearly white: no grass is seen"
-        return "the picture has no colours: grass cannot be told from anything else"
+        return "the picture has no colours: grass cannot be recognised"
     if float(levels.mean()) < DARK_LEVEL:
         return "the picture is too dark: no grass is seen"
     return "no field of play is seen: too little of the picture is grass"

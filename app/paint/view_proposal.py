@@ -29,7 +29,7 @@ class ViewProposal:
 
     Attributes:
         outcome: ``proposed``, ``unsure`` or ``nothing``.
-        sentence: Why nothing is proposed, or which drawn lines lie elsewhere; else empty.
+        sentence: Why no lines are proposed, or which drawn lines contradict the proposal; else empty.
         lines: Points on the paint of each marking that is seen, and on posts and crossbars, which
             JaC counts like them; none unless proposed.
         supported, explained: As of ``ViewPaint``.

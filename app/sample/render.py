@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import lru_cache
+from typing import Any
 
 import cv2
 import numpy as np
@@ -13,16 +14,188 @@ from app.formats.soccernet_record import IMAGE
 from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
 from app.sample.figures import DrawnPerson, draw_person, people_in_view
-from app.sample.instant import HALF_LENGTH, HALF_WIDTH, Instant
-from app.sample.look import Colour, Look
-from app.sample.pose import pose_people
+from app.sample.instant import BALL_DIAMETER, HALF_LENGTH, HALF_WIDTH, Instant
+from app.sample.look import Colour, Lamp, Light, Look
+from app.sample.pose import INDEX, LIMBS, Pose, pose_people
 from app.sample.props import draw_ball, draw_frame, draw_net
 from app.sample.scene import Scene
 from app.sample.scoreboard import draw_scoreboard
-from app.sample.shadows import shadow_mask
-from app.sample.surface import Bowl, Eye, Turf, shade
-from app.sample.textures import board_atlas, noise_tiles
+from app.sample.surface import BOARD_HEIGHT, TILE, Bowl, Eye, Turf, shade
 from app.sample.views import HEIGHT, WIDTH
+
+Tile = npt.NDArray[np.float32]
+
+BOARD_PIXELS = 76
+PANEL_METRES = 7.6
+PANELS = 10
+SIZES = 5
+# Brands that nobody owns, and their colours (blue, green, red): ground, letters.
+BRANDS = (
+    ("VELOMAR", (120, 28, 20), (245, 245, 245)),
+    ("Nordkap Tea", (238, 238, 236), (40, 90, 20)),
+    ("KILNWORKS", (24, 24, 26), (60, 200, 245)),
+    ("Otterby Bank", (92, 60, 8), (250, 250, 250)),
+    ("SOLENNE", (40, 40, 205), (250, 250, 250)),
+    ("glimmr", (225, 120, 30), (255, 255, 255)),
+    ("PELICORE", (245, 245, 245), (190, 60, 20)),
+    ("Marrow & Finch", (50, 92, 20), (215, 240, 250)),
+    ("TRANZEO AIR", (150, 40, 90), (255, 255, 255)),
+    ("Hoppkorn", (30, 190, 245), (30, 30, 30)),
+    ("ALPENSTROM", (235, 240, 240), (30, 30, 200)),
+    ("quibit", (60, 20, 60), (235, 200, 90)),
+)
+
+
+@lru_cache(maxsize=1)
+def noise_tiles() -> tuple[Tile, Tile]:
+    """Wrapping noise with unit spread: broad patches, and blades of grass."""
+    rng = np.random.default_rng(20_260_101)
+    coarse = sum(
+        weight * _smooth(rng, sigma) for sigma, weight in ((24.0, 0.6), (9.0, 0.5), (3.0, 0.6))
+    )
+    fine = 0.8 * _smooth(rng, 0.8) + 0.5 * _smooth(rng, 2.2)
+    return _unit(np.asarray(coarse)), _unit(np.asarray(fine))
+
+
+def _smooth(rng: np.random.Generator, sigma: float) -> Tile:
+    noise = rng.standard_normal((TILE, TILE)).astype(np.float32)
+    margin = int(4 * sigma) + 1
+    wrapped = np.pad(noise, margin, mode="wrap")
+    blurred = cv2.GaussianBlur(wrapped, (0, 0), sigma)[margin:-margin, margin:-margin]
+    return _unit(blurred)
+
+
+def _unit(tile: npt.NDArray[Any]) -> Tile:
+    unit: Tile = ((tile - tile.mean()) / tile.std()).astype(np.float32)
+    return unit
+
+
+@lru_cache(maxsize=8)
+def board_atlas(seed: int) -> tuple[Image, npt.NDArray[np.float64]]:
+    """The boards of a match at five sizes, one below the other.
+
+    Returns:
+        The image, and a row (first row, height, width, length in metres) for each size.
+    """
+    rng = np.random.default_rng([seed, 0xB0])
+    order = rng.permutation(len(BRANDS))[:PANELS]
+    width = int(PANEL_METRES / BOARD_HEIGHT * BOARD_PIXELS)
+    strip = np.hstack([_panel(*BRANDS[index], width) for index in order])
+    sizes, rows, top = [], [], 0
+    for level in range(SIZES):
+        height, length = BOARD_PIXELS >> level, strip.shape[1] >> level
+        small = cv2.resize(strip, (length, height), interpolation=cv2.INTER_AREA)
+        padded = np.zeros((height, strip.shape[1], 3), np.uint8)
+        padded[:, :length] = small
+        sizes.append(padded)
+        rows.append((top, height, length, PANEL_METRES * PANELS))
+        top += height
+    return np.vstack(sizes), np.array(rows, dtype=np.float64)
+
+
+def _panel(
+    text: str, ground: tuple[int, int, int], letters: tuple[int, int, int], width: int
+) -> Image:
+    panel = np.full((BOARD_PIXELS, width, 3), ground, np.uint8)
+    font = cv2.FONT_HERSHEY_DUPLEX if text.isupper() else cv2.FONT_HERSHEY_TRIPLEX
+    scale, thickness = 1.75, 5
+    (length, height), _ = cv2.getTextSize(text, font, scale, thickness)
+    if length > width - 50:
+        scale *= (width - 50) / length
+        (length, height), _ = cv2.getTextSize(text, font, scale, thickness)
+    origin = ((width - length) // 2 + 18, (BOARD_PIXELS + height) // 2)
+    cv2.putText(panel, text, origin, font, scale, letters, thickness, cv2.LINE_AA)
+    cv2.circle(panel, (origin[0] - 34, BOARD_PIXELS // 2), 17, letters, 6, cv2.LINE_AA)
+    cv2.line(panel, (0, 0), (0, BOARD_PIXELS), (20, 20, 20), 3)
+    return panel
+
+
+HALVED = 2
+"""Shadows are drawn at half size: they are soft, and there are many."""
+_TURN = np.linspace(0, 2 * np.pi, 8, endpoint=False)
+_CIRCLE = np.column_stack([np.cos(_TURN), np.sin(_TURN)])
+_SHIFT = 4
+
+
+def shadow_mask(
+    camera: Camera, instant: Instant, pose: Pose, light: Light, height: int, width: int
+) -> Image:
+    """Light left on the grass, 255 is all, shape (height, width)."""
+    scale = camera.focal_length[0] / float(camera.pitch_to_camera(instant.ball[None])[0, 2])
+    left: Image = np.full((height // HALVED, width // HALVED), 255, np.uint8)
+    ball_radius = BALL_DIAMETER / 2
+    for lamp in light.lamps:
+        layer = np.full_like(left, 255)
+        _draw_people(layer, camera, pose, lamp)
+        _draw_ball(layer, camera, instant.ball, lamp, ball_radius)
+        sigma = float(np.clip(light.softness * scale / HALVED, 0.5, 7.0))
+        left = _darken(left, cv2.GaussianBlur(layer, (0, 0), sigma))
+    left = _darken(left, _contact(left, camera, instant, scale))
+    return np.asarray(cv2.resize(left, (width, height), interpolation=cv2.INTER_LINEAR), np.uint8)
+
+
+def _darken(light: Image, layer: npt.NDArray[Any]) -> Image:
+    return np.asarray(cv2.multiply(light, layer, scale=1 / 255), np.uint8)
+
+
+def _draw_people(layer: Image, camera: Camera, pose: Pose, lamp: Lamp) -> None:
+    shade = int(255 * (1 - lamp.darkness))
+    ends = np.array([[INDEX[a], INDEX[b]] for a, b, _, _ in LIMBS])
+    radii = np.array([(ra, rb) for _, _, ra, rb in LIMBS]) * 1.8
+    joints = pose.joints[:, ends]  # people, limbs, 2, 3
+    ground = joints[..., :2] - joints[..., 2:] * np.array(lamp.shift)
+    rims = ground[..., None, :] + radii[None, :, :, None, None] * _CIRCLE
+    people, limbs = joints.shape[:2]
+    hulls = _project_ground(camera, rims.reshape(-1, 2)).reshape(
+        people * limbs, 2 * len(_CIRCLE), 2
+    )
+    rows, columns = layer.shape
+    with np.errstate(invalid="ignore"):
+        low, high = hulls.min(axis=1), hulls.max(axis=1)
+        shown = (high > 0).all(axis=1) & (low[:, 0] < columns) & (low[:, 1] < rows)
+    for hull in hulls[shown]:
+        _fill(layer, hull, shade)
+
+
+def _draw_ball(layer: Image, camera: Camera, ball: FloatArray, lamp: Lamp, radius: float) -> None:
+    shift = np.array(lamp.shift)
+    length = float(np.hypot(*shift))
+    along = shift / max(length, 1e-9)
+    across = np.array([-along[1], along[0]])
+    # The shadow of a sphere is longer along the light.
+    rim = np.outer(_CIRCLE[:, 0] * np.hypot(1.0, length), along) + np.outer(_CIRCLE[:, 1], across)
+    center = ball[:2] - ball[2] * shift
+    pixels = _project_ground(camera, center + radius * rim)
+    if np.isfinite(pixels).all():
+        _fill(layer, pixels, int(255 * (1 - lamp.darkness)))
+
+
+def _contact(like: Image, camera: Camera, instant: Instant, scale: float) -> Image:
+    """The dark patch right below feet and ball, whatever the light."""
+    layer = np.full_like(like, 255)
+    for place in instant.feet:
+        pixels = _project_ground(camera, place + 0.30 * _CIRCLE)
+        if np.isfinite(pixels).all():
+            _fill(layer, pixels, 168)
+    height = -float(instant.ball[2]) - BALL_DIAMETER / 2
+    if height < 0.3:
+        pixels = _project_ground(camera, instant.ball[:2] + 0.11 * _CIRCLE)
+        if np.isfinite(pixels).all():
+            _fill(layer, pixels, int(120 + 300 * height))
+    sigma = float(np.clip(0.06 * scale / HALVED, 0.5, 6.0))
+    return np.asarray(cv2.GaussianBlur(layer, (0, 0), sigma), np.uint8)
+
+
+def _project_ground(camera: Camera, places: FloatArray) -> FloatArray:
+    """Pixels of the halved picture for places on the grass, both shape (N, 2)."""
+    pixels = camera.project(np.column_stack([places, np.zeros(len(places))]))
+    return (pixels + 0.5) / HALVED - 0.5
+
+
+def _fill(layer: Image, points: FloatArray, shade: int) -> None:
+    fixed = np.clip(np.round(points * (1 << _SHIFT)), -(1 << 20), 1 << 20).astype(np.int32)
+    cv2.fillConvexPoly(layer, cv2.convexHull(fixed), shade, 8, _SHIFT)
+
 
 Image = npt.NDArray[np.uint8]
 GRAIN = 2.2

@@ -106,7 +106,7 @@ class CalibrationPolicy:
     shortest_marking_px: float = _threshold(
         0.0,
         CALIBRATION,
-        "Shortest marking that JaC misses when nobody drew it",
+        "Shortest undrawn marking that JaC counts as missing",
         "px at 960x540",
         0.0,
         50.0,

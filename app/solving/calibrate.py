@@ -406,7 +406,7 @@ def _shared(group: Group, view: View, policy: CalibrationPolicy) -> SharedPositi
 
 
 def shortest_px(policy: CalibrationPolicy, size: ImageSize) -> float:
-    """Length below which a marking that nobody drew is not missing, pixels; 0: none is."""
+    """Length below which an undrawn marking does not count as missing, pixels; 0: none is."""
     return policy.shortest_marking_px * size.diagonal / REFERENCE_DIAGONAL
 
 

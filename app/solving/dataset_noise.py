@@ -15,14 +15,69 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from app.errors import DegenerateGeometryError
+from app.geometry.arrays import FloatArray, row_by_row
 from app.soccer.annotation import Lines, make_lines
+from app.soccer.frames import ImageSize
 from app.soccer.group import Group, View
-from app.soccer.policy import Policy
+from app.soccer.pitch import Pitch
+from app.soccer.policy import CalibrationPolicy, Policy
 from app.soccer.solution import Ball3D, Calibration, Solution
 from app.solving.ball_noise import BallNoise, Miss, estimate_ball_noise, misses_of
-from app.solving.line_noise import LineEstimate, LineEvidence, estimate_line_noise
+from app.solving.line_noise import (
+    LineEstimate,
+    LineEvidence,
+    LineNoise,
+    estimate_line_noise,
+    line_evidence,
+)
+from app.solving.observations import observe
+from app.solving.resect import ResectionProblem
 from app.solving.triangulate import Sighting, sights_of
-from app.solving.view_noise import view_line_covariance, view_line_evidence
+
+
+def view_line_noise(
+    calibration: Calibration, lines: Lines, pitch: Pitch, size: ImageSize, policy: CalibrationPolicy
+) -> LineNoise:
+    """Noise of the clicks of a view that is calibrated from them.
+
+    Raises:
+        DegenerateGeometryError: It has no camera, or its lines leave that open.
+    """
+    problem, parameters = _at(calibration, size, policy)
+    return problem.line_noise(parameters, observe(lines, policy.fitted(pitch), size))
+
+
+def view_line_evidence(
+    calibration: Calibration, lines: Lines, pitch: Pitch, size: ImageSize, policy: CalibrationPolicy
+) -> LineEvidence:
+    """What the clicks of a view say of the noise of its dataset, pixels at 960 x 540.
+
+    Raises:
+        DegenerateGeometryError: It has no camera, or its lines leave that open.
+    """
+    problem, parameters = _at(calibration, size, policy)
+    rows = problem.noise_rows(parameters, observe(lines, policy.fitted(pitch), size))
+    return line_evidence(*rows).in_units(problem.unit)
+
+
+def view_line_covariance(
+    calibration: Calibration, lines: Lines, pitch: Pitch, size: ImageSize, policy: CalibrationPolicy
+) -> tuple[float, ...]:
+    """Covariance of the parameters of a view's camera under a policy's noise of lines, row by row, (64,).
+
+    Noise moves no camera: the calibration may be that of a policy with another one.
+    """
+    noise = view_line_noise(calibration, lines, pitch, size, policy)
+    return row_by_row(noise.parameters)
+
+
+def _at(
+    calibration: Calibration, size: ImageSize, policy: CalibrationPolicy
+) -> tuple[ResectionProblem, FloatArray]:
+    if calibration.camera is None:
+        raise DegenerateGeometryError("without a camera there are no residuals")
+    problem = ResectionProblem.of(size, policy)
+    return problem, problem.parameters(calibration.camera)
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,7 @@
 No pitch is quite the plan: it is longer or wider, raised in the middle, its lines are measured
 to their outer edges, and each is painted by hand. A camera takes such a pitch for another place
 of its own, by a metre and more, and no residual shows it. Each such number has a prior
-(``stadium_priors``), and what it does to the paint is carried into the camera's covariance.
+(priors of ``lone_frame``), and what it does to the paint is carried into the camera's covariance.
 
 Source: Hartley & Zisserman, section 5.2 (propagation of covariance); JCGM 100:2008, annex F.2.4
 (errors that measurements have in common).
@@ -18,13 +18,13 @@ import numpy as np
 from app.geometry.arrays import FloatArray, IntArray
 from app.geometry.resection import ARC, X, Z
 from app.soccer.pitch import MARKINGS, Pitch
-from app.solving.observations import pitch_curves
-from app.solving.stadium_priors import (
+from app.solving.lone_frame import (
     CROWN_SIGMA_M,
     INWARD_SIGMA_M,
     LINE_SIGMA_M,
     PAINT_SIZE_SIGMA_M,
 )
+from app.solving.observations import pitch_curves
 
 
 def pitch_terms(

@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
+import shutil
 import tempfile
-from collections.abc import Mapping
+import zipfile
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from app.errors import InputError, NotFoundError
+from app.formats.output import zip_files
+from app.formats.safe_path import resolve_inside
 from app.object_store.address import is_address
 from app.progress import TellProgress
 from app.terminal.remote import IMPORT, follow, part, some, time_text
 
 if TYPE_CHECKING:
-    from app.features.predictions.sources import PredictionSource, SourcesRequest
+    from app.features.predictions.reader import PredictionFiles
+    from app.features.predictions.sources import SourcesRequest
     from touchline.client import Client
 
 
@@ -87,7 +93,6 @@ def export_values(
         report = _export_report(client.get(f"exports/{job['id']}"))
         return {"out": out, "format": request["format"], **report}
     from app.formats.output import output_tree
-    from app.formats.packing import unpack
 
     with output_tree(out) as folder, tempfile.TemporaryDirectory() as held:
         job = client.post("exports", request)
@@ -150,10 +155,10 @@ def write_evaluation(client: Client, values: Mapping[str, Any], out: Path) -> No
     write_parts(out, values, client.pages(f"{place}/frames"), fetch)
 
 
-def _set(client: Client, dataset: str, source: PredictionSource) -> dict[str, Any]:
+def _set(client: Client, dataset: str, source: PredictionFiles) -> dict[str, Any]:
     """The set of a source: of its files, which are read once, or of its name."""
     place = f"datasets/{part(dataset)}/predictions"
-    path = None if source.boxes is None else Path(source.boxes)
+    path = source.path
     if path is not None and not path.exists():
         known = {item["name"]: item for item in client.get(place)["items"]}
         if source.cameras is not None or str(path) not in known:
@@ -175,7 +180,6 @@ def _set(client: Client, dataset: str, source: PredictionSource) -> dict[str, An
 def _send(client: Client, path: Path) -> str:
     """Id of an upload of a file, or of a folder as a zip; what is there already is not sent again."""
     from app.features.imports.upload_queries import upload_id
-    from app.formats.packing import as_one_file
     from touchline.errors import NotFoundError as NotThere
 
     with as_one_file(path) as file:
@@ -183,3 +187,39 @@ def _send(client: Client, path: Path) -> str:
             return str(client.get(f"uploads/{upload_id(file)}")["id"])
         except NotThere:
             return client.upload(file)
+
+
+COMPRESSED = frozenset({".jpg", ".jpeg", ".png", ".webp", ".mp4", ".zip", ".parquet"})
+"""Endings of files that are compressed already."""
+_CHUNK = 1 << 20
+
+
+@contextmanager
+def as_one_file(path: Path) -> Iterator[Path]:
+    """A file itself, or all files of a folder as a zip of its name, there until the block ends.
+
+    The same files make the same zip, so that it is known again.
+    """
+    if not path.is_dir():
+        yield path
+        return
+    with tempfile.TemporaryDirectory() as held:
+        packed = Path(held) / f"{path.resolve().name}.zip"
+        files = (file for file in sorted(path.rglob("*")) if file.is_file())
+        named = ((file.relative_to(path).as_posix(), file) for file in files)
+        zip_files(named, packed, COMPRESSED)
+        yield packed
+
+
+def unpack(packed: Path, folder: Path) -> None:
+    """All files of a zip into a folder.
+
+    Raises:
+        UnsafePathError: A name leads out of it.
+    """
+    with zipfile.ZipFile(packed) as archive:
+        for name in archive.namelist():
+            target = resolve_inside(folder, name)
+            target.parent.mkdir(parents=True, exist_ok=True)
+            with archive.open(name) as source, target.open("wb") as file:
+                shutil.copyfileobj(source, file, _CHUNK)

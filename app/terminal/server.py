@@ -15,9 +15,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 from urllib.parse import urlsplit
 
+from app.durable import is_open_to_others
 from app.errors import InputError, ReviewError
 from app.formats.plain_file import open_plain
-from app.private_file import is_open_to_others
 
 if TYPE_CHECKING:
     from touchline.client import Client
@@ -162,7 +162,7 @@ def _require_team(server: ServerPlace, client: Client) -> None:
     session = client.get("session")
     if session["team"] and session["name"] is None:
         raise InputError(
-            f"{server.url} asks who you are",
+            f"{server.url} requires a login",
             hint="Name a file with a token: --token-file (TOUCHLINE_TOKEN_FILE).",
         )
     if not session["team"] and server.token_file is not None:
@@ -178,7 +178,7 @@ def _explained(server: ServerPlace, error: Exception) -> ReviewError:
     said_nothing = getattr(error, "status", None) == 0
     if said_nothing and ("certificate" in message.lower() or "ssl" in message.lower()):
         return InputError(
-            f"{server.url} cannot prove who it is: {message}",
+            f"{server.url} cannot prove its identity: {message}",
             hint="Is the address right? A certificate of your own goes into SSL_CERT_FILE.",
         )
     if said_nothing:

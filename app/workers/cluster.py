@@ -23,10 +23,10 @@ from pathlib import Path
 from typing import Any, TypeVar
 from urllib.parse import urlsplit
 
+from app.durable import is_open_to_others
 from app.errors import ClusterError, InputError
 from app.formats.manifest import software_version
 from app.hosts import is_local
-from app.private_file import is_open_to_others
 from app.soccer.solution import SOLVER_VERSION
 
 R = TypeVar("R")
@@ -118,7 +118,8 @@ def read_place(address: str, keys: Path | None) -> SchedulerPlace:
     if parts.scheme == "tcp":
         if not is_local(parts.hostname or ""):
             raise InputError(
-                f"{address} is not encrypted: whoever reaches it could run programs on every worker",
+                f"{address} is not encrypted: anyone who reaches it could run programs on every "
+                f"worker",
                 hint="Write tls://HOST:PORT, and name a folder with certificates (TOUCHLINE_CLUSTER_KEYS).",
             )
         return SchedulerPlace(f"tcp://{parts.netloc}")

@@ -3,13 +3,13 @@
 
 import { html } from 'htm/preact';
 
-import { getNoise } from '../api/noise.js';
+import { getNoise } from '../api/match_estimates.js';
 import { count } from '../lib/format.js';
 import { useResource } from '../lib/resource.js';
 import { Loading, Trouble } from './page_frame.js';
 
 /** @import {ComponentChildren} from 'preact' */
-/** @import {AdviceJson, FactorJson, NoiseJson, SourceNoiseJson} from '../api/noise.js' */
+/** @import {AdviceJson, FactorJson, NoiseJson, SourceNoiseJson} from '../api/match_estimates.js' */
 
 /**
  * What the estimates change in the policy, for people.

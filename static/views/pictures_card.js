@@ -4,14 +4,14 @@
 import { html } from 'htm/preact';
 import { useState } from 'preact/hooks';
 
-import { estimateMatchPictures, getMatchPictures, setMatchPicture } from '../api/pictures.js';
+import { estimateMatchPictures, getMatchPictures, setMatchPicture } from '../api/match_estimates.js';
 import { fixed, plural } from '../lib/format.js';
 import { matchName } from '../lib/match_name.js';
 import { JobButton } from './job_button.js';
 import { MatchButton, MatchCard, MatchHead, useMatchCard } from './match_card.js';
 import { Trouble } from './page_frame.js';
 
-/** @import {MatchPictureJson, PictureEstimateJson} from '../api/pictures.js' */
+/** @import {MatchPictureJson, PictureEstimateJson} from '../api/match_estimates.js' */
 /** @import {PictureJson} from '../api/types.js' */
 
 /** Changes of groups after which other pictures may be in use. */

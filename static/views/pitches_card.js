@@ -3,7 +3,7 @@
 
 import { html } from 'htm/preact';
 
-import { estimatePitches, getPitches, setPitch } from '../api/pitches.js';
+import { estimatePitches, getPitches, setPitch } from '../api/match_estimates.js';
 import { count } from '../lib/format.js';
 import { matchName } from '../lib/match_name.js';
 import { pitchSize, shownSize } from '../lib/pitch_size.js';
@@ -11,7 +11,7 @@ import { JobButton } from './job_button.js';
 import { MatchButton, MatchCard, MatchHead, useMatchCard } from './match_card.js';
 import { Trouble } from './page_frame.js';
 
-/** @import {MatchPitchJson, PitchSizeJson} from '../api/pitches.js' */
+/** @import {MatchPitchJson, PitchSizeJson} from '../api/match_estimates.js' */
 
 /** Changes of groups after which other sizes may be in use or shown by the lines. */
 const CONCERNED = ['pitch', 'import', 'solved'];

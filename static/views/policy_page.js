@@ -4,7 +4,7 @@
 import { html } from 'htm/preact';
 import { useRef, useState } from 'preact/hooks';
 
-import { acceptNoise, takeNoiseBack } from '../api/noise.js';
+import { acceptNoise, takeNoiseBack } from '../api/match_estimates.js';
 import { getPolicies, getPolicy, putPolicy, putPolicyText } from '../api/policies.js';
 import { withValue } from '../lib/field.js';
 import { saveText } from '../lib/save_text.js';
@@ -20,7 +20,7 @@ import { useSavePolicy } from './save_policy.js';
 import { When } from './when.js';
 
 /** @import {JobJson} from '../api/jobs.js' */
-/** @import {NoiseJson} from '../api/noise.js' */
+/** @import {NoiseJson} from '../api/match_estimates.js' */
 /** @import {PolicyField, PolicyState, ShippedPolicy} from '../api/policies.js' */
 /** @import {DatasetJson} from '../api/types.js' */
 

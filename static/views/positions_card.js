@@ -3,12 +3,12 @@
 
 import { html } from 'htm/preact';
 
-import { getPositions, sharePositions, takePositionsBack } from '../api/positions.js';
+import { getPositions, sharePositions, takePositionsBack } from '../api/match_estimates.js';
 import { matchName } from '../lib/match_name.js';
 import { MatchButton, MatchCard, MatchHead, useMatchCard } from './match_card.js';
 import { Trouble } from './page_frame.js';
 
-/** @import {MatchPositionJson} from '../api/positions.js' */
+/** @import {MatchPositionJson} from '../api/match_estimates.js' */
 
 /** Changes of groups after which positions may be others, or old. */
 const CONCERNED = ['position', 'pitch', 'import', 'edit', 'undo', 'redo'];

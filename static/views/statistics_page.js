@@ -28,7 +28,7 @@ import { QueryBox } from './query_box.js';
 import { seriesColour, Spread } from './spread.js';
 import { WebhooksCard } from './webhooks_card.js';
 
-/** @import {NoiseJson} from '../api/noise.js' */
+/** @import {NoiseJson} from '../api/match_estimates.js' */
 /** @import {MatchCounts, StatisticsJson} from '../api/statistics.js' */
 /** @import {DatasetJson} from '../api/types.js' */
 

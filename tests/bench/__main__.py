@@ -19,6 +19,7 @@ from tests.bench.drawn import bench_drawn
 from tests.bench.geometry import bench_geometry
 from tests.bench.goals import bench_goals
 from tests.bench.line_coverage import bench_line_coverage
+from tests.bench.link import bench_link
 from tests.bench.listeners import bench_listeners
 from tests.bench.lone_frames import bench_lone_frames
 from tests.bench.page_loads import bench_page_loads
@@ -64,6 +65,7 @@ def main() -> None:
     bench_drawn()
     bench_clips(REAL_DATA)
     bench_propose(REAL_DATA)
+    bench_link(REAL_DATA)
     bench_requests()
     bench_listeners()
     bench_browser()

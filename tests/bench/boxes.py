@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from app.evaluation.overlap import iou, size_error_percent
+from app.evaluation.frame import iou, size_error_percent
 from app.sample.scene import SceneTruth
 from app.soccer.ball_boxes import ball_boxes
 from app.soccer.frames import Box

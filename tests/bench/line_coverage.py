@@ -28,10 +28,10 @@ from app.soccer.pitch import CIRCLES, Pitch
 from app.soccer.policy import CalibrationPolicy
 from app.soccer.solution import Calibration
 from app.solving.calibrate import calibrate
+from app.solving.dataset_noise import view_line_evidence, view_line_noise
 from app.solving.line_noise import LineEvidence, estimate_line_noise
 from app.solving.observations import observe
 from app.solving.resect import ResectionProblem
-from app.solving.view_noise import view_line_evidence, view_line_noise
 from tests.bench.cases import SIZE as MADE_SIZE
 from tests.bench.cases import Case, make_case
 from tests.bench.table import print_table

@@ -10,7 +10,7 @@ PAGE = Path(__file__).resolve().parents[2] / "docs" / "fixes.md"
 TEXT = """
 What the browser's buttons do, as requests. Findings (`views[].findings`, `GET /findings`) and remedies (`GET /groups/{id}/remedies`) say in
 `fix.action`, or `edit.action`, what they propose, and in `offers` hold the edit that does it, or in `guide` say where a person has to look or draw.
-Buttons and pictures are made of `offers`, `guide` and their captions alone: nobody needs to know the actions. Every request below takes `If-Match` with the
+Buttons and pictures are made of `offers`, `guide` and their captions alone: callers do not need to know the actions. Every request below takes `If-Match` with the
 **group's** ETag and answers the whole group, solved; `POST /groups/{id}/undo` takes it back. A static camera's lines belong to its station:
 `PATCH /stations/{id}/lines?group={id}` with the station's ETag.
 """.strip()
@@ -35,7 +35,7 @@ ACTIONS: dict[str, tuple[str, str | None]] = {
     "include_view": ("a view that a person left out is used again", "include_view"),
     "exclude_view": ("a view is left out", "include_view"),
     "look_ball": ("no edit: look whether the ball is at `point`, then send its box", None),
-    "draw_marking": ("no edit: the marking can be seen and nobody drew it; draw it", None),
+    "draw_marking": ("no edit: the marking is visible and not drawn; draw it", None),
     "read_paint": ("no edit: the picture is read again, with those of its match", None),
 }
 """By the action of a fix: what it does, and its edit."""

@@ -14,8 +14,7 @@ from app.command_line import app as cli
 from app.config import Settings
 from app.db.store import Store
 from app.errors import InputError
-from app.evaluation.frame import Detection
-from app.evaluation.overlap import iou
+from app.evaluation.frame import Detection, iou
 from app.features.datasets.tables import ViewModel
 from app.features.groups.edit import SetBall
 from app.features.groups.submit import load, submit

@@ -1,7 +1,7 @@
 import assert from 'node:assert/strict';
 import { afterEach, describe, it } from 'node:test';
 
-import { takePositionsBack } from '../../static/api/positions.js';
+import { takePositionsBack } from '../../static/api/match_estimates.js';
 
 const { fetch } = globalThis;
 

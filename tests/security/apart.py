@@ -27,10 +27,9 @@ from app.features.people.ownership import OwnedKind
 from app.features.people.roles import Role
 from app.features.people.service import invite
 from app.features.solutions.service import solve_dataset
-from app.http.datasets_of_request import BODY, QUERY, kind_of_path
 from app.main import create_app
 from tests.scenes import make_scenes
-from tests.security.table import Row
+from tests.security.table import Row, permissions
 
 with warnings.catch_warnings():
     # It would rather use another HTTP client than the one that is installed.
@@ -70,14 +69,21 @@ class Mentioned:
     kind: OwnedKind
 
 
+PERMISSIONS = permissions()
+
+
 def mentioned(row: Row) -> list[Mentioned]:
     """Every place where a request of a route names something that is in a dataset."""
-    found = []
-    if first := kind_of_path(str(row)):
-        found.append(Mentioned("path", *first))
-    found += [Mentioned("query", *item) for item in QUERY.get(str(row), {}).items()]
-    found += [Mentioned("body", *item) for item in BODY.get(str(row), {}).items() if _one(item[0])]
-    return found
+    permission = PERMISSIONS[str(row)]
+    found = [
+        Mentioned("path" if name in row.parameters else "query", name, kind)
+        for name, kind in permission.names.items()
+    ]
+    return found + [
+        Mentioned("body", name, kind)
+        for name, kind in permission.body.items()
+        if _one(name) and kind is not OwnedKind.FOLDER
+    ]
 
 
 def _one(field: str) -> bool:
@@ -173,6 +179,7 @@ class Apart:
         for number, name in enumerate((MINE, THEIRS), start=1):
             found = self.ids[name]
             found |= {OwnedKind.DATASET: name, OwnedKind.GROUP: number}
+            found[OwnedKind.FOLDER] = f"folder beside {name}"
             document = self.ask("admin", "GET", f"/groups/{number}").json()
             found[OwnedKind.VIEW] = document["views"][0]["id"]
             found[OwnedKind.STATION] = document["views"][0]["station"]["id"]

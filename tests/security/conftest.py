@@ -33,7 +33,7 @@ from tests.scenes import make_scenes
 from tests.security.asking import JSON, Asker
 from tests.security.door import Door
 from tests.security.table import CORPUS
-from tests.security.team import HIDDEN, Team
+from tests.security.team import Team
 from tests.waiting import SECONDS
 
 API = "/api/v1"
@@ -181,9 +181,6 @@ def team(tmp_path_factory: pytest.TempPathFactory, provider: Provider) -> Iterat
         patch.setattr(tries, "CHALLENGES_OF_AN_ADDRESS", parse("1000/minute"))
         passwords._nobodys.cache_clear()
         app = create_app(settings)
-        app.add_api_route(HIDDEN, lambda: {"secret": 1}, include_in_schema=False)
-        # Before the routes that take whatever is left.
-        app.router.routes.insert(0, app.router.routes.pop())
         with listen("127.0.0.1", 0) as (socket, address):
             server = make_server(app)
             thread = threading.Thread(target=lambda: server.run(sockets=[socket]))

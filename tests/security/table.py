@@ -11,6 +11,11 @@ from typing import Any
 import yaml
 from fastapi import FastAPI
 
+from app.features.maintenance import routes as maintenance
+from app.http.permissions import Permission
+from app.http.route import Route
+from app.main import PREFIX, ROUTERS
+
 CORPUS = Path(__file__).parent / "corpus"
 TABLE = yaml.safe_load((Path(__file__).parent / "routes.yaml").read_text())
 MISSING = "99999999"
@@ -64,6 +69,18 @@ def rows(of: str = "") -> list[Row]:
         classes = frozenset([*TABLE["kinds"][kind]["classes"], *more])
         found.append(Row(method, _MOUNTED.get(path, path), kind, role, classes))
     return [row for row in found if not of or of in row.classes]
+
+
+def permissions() -> dict[str, Permission]:
+    """Who may ask each route of the application but its pages, as the routes say."""
+    routers = [("", maintenance.health_router), *((PREFIX, router) for router in ROUTERS)]
+    return {
+        f"{method} {prefix}{route.path}": route.permission
+        for prefix, router in routers
+        for route in router.routes
+        if isinstance(route, Route)
+        for method in route.methods
+    }
 
 
 def served(app: FastAPI) -> set[str]:

@@ -13,10 +13,9 @@ from app.features.imports.ingest import ingest
 from app.features.people.roles import Action, Role
 from app.features.people.visibility_queries import COPIES
 from app.features.solutions.service import solve_dataset
-from app.http.datasets_of_request import QUERIES
-from app.http.rules import RULES
+from app.http.permissions import QUERIES
 from tests.scenes import make_scenes
-from tests.security.apart import API, Apart, opened
+from tests.security.apart import API, PERMISSIONS, Apart, opened
 from tests.security.table import rows
 
 BALL = [613.25, 301.75, 9.5, 9.5]
@@ -172,7 +171,7 @@ class TestQueries:
             for name in ("vera", "olaf"):
                 answer = team.ask(name, *with_query(team, asked, ASKS))
                 assert answer.status_code == 403, (asked, name, answer.text[:200])
-            if RULES[f"{asked[0]} {asked[1]}"] is Action.READ:
+            if PERMISSIONS[f"{asked[0]} {asked[1]}"].action is Action.READ:
                 method, target, _ = with_query(team, asked, "id:1")
                 assert team.ask("vera", method, target).status_code in (200, 422), asked
 

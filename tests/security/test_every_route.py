@@ -36,7 +36,7 @@ STALL_SECONDS = 45.0
 SOME = slice(None, None, 5)
 """Of a long list, on a route whose like was given all of it."""
 LARGE = 50_000
-"""A body of more bytes is sent to one route: it is read before any route is found."""
+"""A body of more bytes is sent to one route: the same lines read it for all."""
 ALL_RANGES = ("/static/{file}", f"{API}/exports/{{export}}/content", f"{API}/views/{{view}}/image")
 """Files that are read from the disk, and what is made when it is asked for."""
 NOT_THERE = ("/lesson", "/take", "/adjudication", "/guidelines/pictures/{digest}")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import http.client
 import json
-import re
 import time
 from contextlib import ExitStack, closing
 from datetime import UTC, datetime, timedelta
@@ -27,7 +26,7 @@ from app.features.people.roles import LEAST, Role, Scope
 from app.features.people.service import change_person, find_person, renew_link
 from app.http import access, tries
 from app.http.pages import PAGES
-from app.http.rules import OPEN, RULES
+from app.http.route import routes_of
 from tests.security.asking import Answer, assert_guarded
 from tests.security.table import MISSING, TABLE, Row, rows
 from tests.security.team import API, BYTES, DEVICE, GUARDED, HIDDEN, SECRET, Team, asked, cookie_in
@@ -52,18 +51,20 @@ the body of no shape."""
 
 
 class TestTable:
-    def test_the_reviewed_table_and_the_one_that_decides_are_the_same(self) -> None:
+    def test_the_reviewed_table_and_what_the_routes_say_are_the_same(self, team: Team) -> None:
         reviewed = {str(row): row.role for row in rows()}
+        said = {name: route.permission.action for name, route in routes_of(team.app)}
         decided = {
-            re.sub(r":path(?=})", "", route): "everybody" if action is OPEN else LEAST[action].value
-            for route, action in RULES.items()
+            name: "everybody" if action is None else LEAST[action].value
+            for name, action in said.items()
         }
-        # It is one of the files of a version.
-        assert reviewed.pop("GET /assets/{version}/all.css") == "everybody"
+        # Mounted folders, of the browser application alone (``require_permissions``).
+        for folder in ("GET /static/{file}", "GET /assets/{version}/{file}"):
+            assert reviewed.pop(folder) == "everybody"
         assert decided == reviewed
 
-    def test_nothing_is_open_but_the_application_and_the_way_in(self) -> None:
-        opened = {route for route, action in RULES.items() if action is OPEN}
+    def test_nothing_is_open_but_the_application_and_the_way_in(self, team: Team) -> None:
+        opened = {name for name, route in routes_of(team.app) if route.permission.action is None}
         data = {route for route in opened if API in route}
         assert data == {
             f"GET {API}/session",
@@ -139,21 +140,10 @@ class TestEveryRoute:
     def test_what_is_open_answers_strangers(self, team: Team, row: Row) -> None:
         assert asked(team, row, None).status in LET_IN[row.kind], row
 
-    def test_what_is_in_no_table_is_refused(self, team: Team) -> None:
+    def test_what_is_no_route_is_not_there(self, team: Team) -> None:
         assert team.ask("GET", HIDDEN).status == 401
         for role in RANKS:
-            answer = team.ask("GET", HIDDEN, role=role)
-            assert (answer.status, b"secret" in answer.body) == (404, False)
-
-    def test_a_route_taken_for_another_is_refused(
-        self, team: Team, monkeypatch: pytest.MonkeyPatch
-    ) -> None:
-        """Should the table's addresses ever be read otherwise than the router reads them."""
-        taken = access.RuleRow(f"GET {API}/session", OPEN, {})
-        monkeypatch.setattr(access._Rules, "find", lambda *_: taken)
-        assert team.ask("GET", f"{API}/datasets").status == 403
-        assert team.ask("GET", "/metrics").status == 403
-        assert team.ask("GET", f"{API}/session").status == 200
+            assert team.ask("GET", HIDDEN, role=role).status == 404
 
     @pytest.mark.parametrize(
         ("path", "status"),
@@ -240,23 +230,23 @@ class TestSessions:
         self, team: Team, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         by_threads: list[str] = []
-        look = access.Access._look
+        run_sync = access.run_sync
 
-        def noted(self, scope, *asked):
-            by_threads.append(scope["path"])
-            return look(self, scope, *asked)
+        async def noted(work, *given, **how):
+            by_threads.append(work.__name__)
+            return await run_sync(work, *given, **how)
 
-        monkeypatch.setattr(access.Access, "_look", noted)
+        monkeypatch.setattr(access, "run_sync", noted)
         address = f"{API}/datasets"
         assert team.ask("GET", address, role="reviewer").status == 200
         assert by_threads == []
         # Whoever has a role in one dataset alone: it takes a look where each thing is.
         team.add("here-only", Role.NONE)
         assert team.ask("GET", f"{API}/jobs/1", role="here-only").status == 404
-        assert by_threads == [f"{API}/jobs/1"]
+        assert by_threads == ["require_allowed", "missing"]
         with team.store.peek():
             assert team.ask("GET", address, role="reviewer").status == 200
-        assert by_threads == [f"{API}/jobs/1", address]
+        assert by_threads == ["require_allowed", "missing", "_look_up"]
         assert team.ask("GET", address, Cookie="touchline-session=nobody").status == 401
 
     def test_the_log_says_who_asked_and_from_where(self, team: Team) -> None:
@@ -433,7 +423,7 @@ class TestStreams:
         elif ends == "logged out":
             team.ask("DELETE", f"{API}/session", role=name)
         else:
-            monkeypatch.setattr(access.Access, "_still_may", None)
+            monkeypatch.setattr(access.Access, "still_may", None)
         # It says every now and then that it is still there.
         until = time.monotonic() + SECONDS
         while answer.read1(1000):

@@ -65,7 +65,7 @@ class TestComingIn:
         gone = door.team.ask("DELETE", own, {"password": SECRET}, Cookie=cookie)
         assert gone.status == 204, gone.body
         assert door.team.ask("GET", own, Cookie=entered).status == 401, "it began with the account"
-        assert_refused(door.enter(), word="nobody here is linked")
+        assert_refused(door.enter(), word="no person here is linked")
 
     def test_the_first_admin_may_come_by_it(self, door: Door, monkeypatch: Any) -> None:
         monkeypatch.setattr("app.features.people.links.count_able", lambda *_: 0)
@@ -85,7 +85,7 @@ class TestComingIn:
         asked = door.team.ask("DELETE", f"{API}/users/{person.id}/identity", role="admin")
         assert asked.status == 204
         assert door.team.ask("GET", f"{API}/sessions", Cookie=session).status == 401
-        assert_refused(door.enter(), word="nobody here is linked")
+        assert_refused(door.enter(), word="no person here is linked")
         assert_refused(
             door.team.ask("DELETE", f"{API}/users/{person.id}/identity", role="admin"), 404
         )
@@ -94,14 +94,14 @@ class TestComingIn:
 class TestStrangers:
     def test_nobody_is_let_in_whom_nobody_here_knows(self, door: Door) -> None:
         door.provider.who = {"sub": "s-stranger", "preferred_username": "stranger"}
-        assert_refused(door.enter(), word="nobody here is linked")
+        assert_refused(door.enter(), word="no person here is linked")
 
     def test_neither_name_nor_address_takes_over_an_account(self, door: Door, ruled: Any) -> None:
         door.team.add("victim", Role.LEAD)
         claims = {"preferred_username": "victim", "name": "victim", "email": "victim@club.example"}
         for verified in (False, True):
             door.provider.who = {"sub": "s-thief", **claims, "email_verified": verified}
-            assert_refused(door.enter(), word="nobody here is linked")
+            assert_refused(door.enter(), word="no person here is linked")
             ruled(new_role=Role.VIEWER)
             assert_refused(door.enter(), word="there is a victim here already")
             ruled(new_role=None)

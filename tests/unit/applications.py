@@ -20,9 +20,13 @@ from app.features.imports.ingest import ingest
 from app.features.jobs import run as job_run
 from app.features.solutions.service import solve_dataset
 from app.geometry.camera import Camera
+from app.http.bodies import MAX_JSON_BYTES
 from app.http.errors import install_handlers
 from app.http.headers import SecurityHeaders
+from app.http.idempotency import Idempotency
 from app.http.pages import install_pages
+from app.http.request_limits import Doors
+from app.http.route import Gate
 from app.http.services import Services
 from app.http.site import Site
 from app.main import create_app
@@ -97,8 +101,10 @@ def pages_client(plain_app: FastAPI, client_of, static_folder: Path) -> TestClie
 
 @pytest.fixture
 def plain_app() -> FastAPI:
-    """An application without routes of its own."""
-    return FastAPI(docs_url=None, redoc_url=None)
+    """An application without routes of its own, which anybody may ask."""
+    app = FastAPI(docs_url=None, redoc_url=None)
+    app.state.gate = Gate(None, Idempotency(), Doors(), MAX_JSON_BYTES)
+    return app
 
 
 CAMERAS = {

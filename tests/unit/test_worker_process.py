@@ -251,7 +251,7 @@ class TestRun:
             tracker._stop()
 
     def test_one_that_is_told_to_end_did_not_crash(self, worker: WorkerProcess) -> None:
-        with pytest.raises(WorkerEnded, match="its process was told to end") as ended:
+        with pytest.raises(WorkerEnded, match="its process was stopped") as ended:
             worker.run(be_told_to_end)
         assert ended.value.reason == "terminated"
 

@@ -136,7 +136,10 @@ class ServerSharing:
                 with self._engine.connect() as connection:
                     self._follow(connection)
             except Exception as error:
-                log.warning("nothing is heard of other processes", error=type(error).__name__)
+                log.warning(
+                    "notifications of other processes cannot be received",
+                    error=type(error).__name__,
+                )
                 self._closing.wait(AGAIN_SECONDS)
 
     def _follow(self, connection: Connection) -> None:
@@ -160,7 +163,7 @@ class ServerSharing:
             try:
                 hearer(word)
             except Exception:
-                log.exception("what another process said could not be followed", word=word)
+                log.exception("a notification of another process could not be handled", word=word)
 
 
 _NOTIFY = text("SELECT pg_notify(:channel, :said)")

@@ -15,10 +15,12 @@ from app.features.groups.state import GroupState
 from app.features.groups.submit import load_solved
 from app.features.groups.view_paint import PaintFollower
 from app.features.independent_annotations.adopt import adopt_take
+from app.features.independent_annotations.queries import Take
 from app.features.independent_annotations.return_work import hand_back_take
-from app.features.independent_annotations.service import Take, TakeView
+from app.features.independent_annotations.service import TakeView
 from app.features.people.members import list_members
-from app.features.people.roles import Action, may
+from app.features.people.roles import Action, lets
+from app.finite import Moment
 from app.soccer.actors import LOCAL_USER, person_of
 
 
@@ -36,7 +38,7 @@ class OpenCase:
     people: tuple[str, ...]
     worst: float
     disagreements: int
-    since: str
+    since: Moment
 
 
 @dataclass(frozen=True)
@@ -93,7 +95,7 @@ def get_case(store: Store, group_id: int, *, actor: str) -> Case:
     own = person_of(actor) in {take.person for take in takes}
     refused = None
     if own and (others := _others(store, original.dataset_id, takes)):
-        refused = f"you annotated this group yourself; {_named(others)} can decide, who did not"
+        refused = f"you annotated this group yourself; {_named(others)} can decide"
     return Case(
         original,
         row.batch_id or None,
@@ -189,7 +191,7 @@ def _others(store: Store, dataset: int, takes: Sequence[Take]) -> list[str]:
     return [
         one.name
         for one in list_members(store, dataset)
-        if may(one.role, Action.REVIEW) and one.name not in takers
+        if lets(one.role, Action.REVIEW) and one.name not in takers
     ]
 
 

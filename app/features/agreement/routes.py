@@ -15,7 +15,6 @@ from app.features.agreement.schemas import (
     CaseDocument,
     Decision,
     GroupComparisonDocument,
-    LimitsDocument,
     LimitsEdit,
     WaitingList,
 )
@@ -28,10 +27,13 @@ from app.features.independent_annotations.service import TakeView
 from app.finite import MAX_ID
 from app.http.cursor import paged
 from app.http.deps import Actor, AppServices, AppStore, DatasetPath, Id
+from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import responses
-from app.http.respond import as_document, document, no_content, responds
+from app.http.request_limits import LOOKS, QUESTIONS, limit
+from app.http.respond import document, no_content, responds
+from app.http.route import Route
 
-router = APIRouter(tags=["agreement"])
+router = APIRouter(tags=["agreement"], route_class=Route)
 CSV_FILE = "text/csv"
 OfBatch = Annotated[
     int | None, Query(ge=0, le=MAX_ID, description="One batch alone; 0: what belongs to none.")
@@ -44,6 +46,8 @@ OfBatch = Annotated[
     response_model=GroupComparisonDocument,
     responses=responses(404),
 )
+@may(Action.READ, group=OwnedKind.GROUP, with_=OwnedKind.GROUP)
+@limit(QUESTIONS)
 def compare(
     group: Id,
     store: AppStore,
@@ -58,6 +62,7 @@ def compare(
 
 
 @router.get("/datasets/{dataset}/agreement", operation_id="getAgreement", responses=responses(404))
+@may(Action.LEAD, dataset=OwnedKind.DATASET)
 def get_agreement(
     dataset: DatasetPath, store: AppStore, of_batch: OfBatch = None
 ) -> AgreementDocument:
@@ -74,6 +79,7 @@ def get_agreement(
         200: {"content": {CSV_FILE: {}}, "description": "A row for each group."},
     },
 )
+@may(Action.LEAD, dataset=OwnedKind.DATASET)
 def get_agreement_file(dataset: DatasetPath, store: AppStore, of_batch: OfBatch = None) -> Response:
     """The same as CSV, a row for each group."""
     headers = {"Content-Disposition": 'attachment; filename="touchline-agreement.csv"'}
@@ -84,10 +90,11 @@ def get_agreement_file(dataset: DatasetPath, store: AppStore, of_batch: OfBatch 
 @router.put(
     "/datasets/{dataset}/agreement/limits",
     operation_id="setAgreementLimits",
-    response_model=LimitsDocument,
+    response_model=AgreementLimits,
     responses=responses(404, 413, 415),
 )
-@responds(as_document(LimitsDocument.model_validate))
+@may(Action.LEAD, dataset=OwnedKind.DATASET)
+@responds(document)
 def put_limits(
     dataset: DatasetPath, edit: LimitsEdit, store: AppStore, actor: Actor
 ) -> AgreementLimits:
@@ -99,6 +106,7 @@ def put_limits(
 @router.get(
     "/datasets/{dataset}/adjudications", operation_id="listWaitingGroups", responses=responses(404)
 )
+@may(Action.REVIEW, dataset=OwnedKind.DATASET, whole=True)
 @paged()
 def list_waiting(dataset: DatasetPath, store: AppStore) -> WaitingList:
     """Groups whose annotations disagree and wait for a decision, the worst first."""
@@ -111,6 +119,8 @@ def list_waiting(dataset: DatasetPath, store: AppStore) -> WaitingList:
     response_model=CaseDocument,
     responses=responses(404),
 )
+@may(Action.REVIEW, group=OwnedKind.GROUP)
+@limit(LOOKS)
 def get_case(group: Id, store: AppStore, actor: Actor) -> Response:
     """The annotations of a group that disagree, beside each other."""
     return document(CaseDocument.of(adjudicate.get_case(store, group, actor=actor)))
@@ -122,6 +132,7 @@ def get_case(group: Id, store: AppStore, actor: Actor) -> Response:
     response_model=GroupDocument,
     responses={**responses(403, 404, 409, 413, 415), 200: {"headers": ETAG}},
 )
+@may(Action.REVIEW, group=OwnedKind.GROUP)
 @responds(group_answer)
 def decide(group: Id, decision: Decision, services: AppServices, actor: Actor) -> GroupState:
     """Take one annotation over into the group, or let a third one begin from it."""
@@ -141,6 +152,7 @@ def decide(group: Id, decision: Decision, services: AppServices, actor: Actor) -
     status_code=204,
     responses=responses(403, 404, 409, 413, 415),
 )
+@may(Action.REVIEW, group=OwnedKind.GROUP)
 @responds(no_content)
 def hand_back(group: Id, back: TakeHandBack, store: AppStore, actor: Actor) -> TakeView:
     """Hand one of the annotations back to its person; it is compared again when it is handed in."""

@@ -34,8 +34,9 @@ from app.features.batches.queries import (
     waiting_group,
 )
 from app.features.batches.service import WORK, Batch, Here, Part, read_batch
+from app.features.independent_annotations.queries import Take
 from app.features.independent_annotations.return_work import checked_reason, note_hand_back
-from app.features.independent_annotations.service import HandedBack, Take, read_handed_back
+from app.features.independent_annotations.service import HandedBack, read_handed_back
 from app.features.people.visibility_queries import is_blind
 
 LASTS = timedelta(minutes=3)
@@ -76,7 +77,7 @@ class Lease:
         group: Its id; None: there is none left for them now.
         part: What they do with it.
         until: When it ends unless it is kept.
-        here: Everybody who has the group open.
+        here: People who have the group open.
         handed_in_by: Who has handed it in; None: nobody.
         handed_back: Why it was handed back to its annotator; None: it was not, or is handed in again.
         place: Of the groups that they annotate on their own: which this is, from 1; None otherwise.

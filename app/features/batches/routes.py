@@ -27,16 +27,19 @@ from app.features.batches.schemas import (
 from app.features.batches.service import Batch, NewBatch
 from app.features.independent_annotations.schemas import HandBack
 from app.features.people.logins import Login
-from app.features.people.roles import Action, may
+from app.features.people.roles import lets
 from app.http.access import login_of
 from app.http.cursor import paged
 from app.http.deps import Actor, AppServices, AppStore, DatasetPath, Id, Sees
+from app.http.permissions import Action, OwnedKind, Where, may
 from app.http.problem import responses
+from app.http.request_limits import EDITS, LOOKS, limit
 from app.http.respond import as_document, document, no_content, responds
+from app.http.route import Route
 from app.http.services import Services
 from app.soccer.actors import LOCAL_USER
 
-router = APIRouter(tags=["work"])
+router = APIRouter(tags=["work"], route_class=Route)
 
 
 @dataclass(frozen=True)
@@ -50,7 +53,7 @@ class Workers:
         if self.login is None:
             return Worker(LOCAL_USER, alone=True)
         role = self.login.roles.role_in(dataset_id)
-        annotates, reviews = (may(role, one) for one in (Action.ANNOTATE, Action.REVIEW))
+        annotates, reviews = (lets(role, one) for one in (Action.ANNOTATE, Action.REVIEW))
         return Worker(self.login.name, annotates, reviews)
 
     def of_batch(self, store: Store, batch: int) -> Worker:
@@ -72,6 +75,8 @@ def _told(services: Services, lease: Lease) -> Lease:
 
 
 @router.get("/work", operation_id="getMyWork", responses=responses())
+@may(Action.READ, where=Where.SOMEWHERE)
+@limit(LOOKS)
 @paged()
 def my_work(store: AppStore, sight: Sees, asks: Asks) -> MyWork:
     """Open batches of whoever asks; on a server without accounts all of them."""
@@ -79,6 +84,7 @@ def my_work(store: AppStore, sight: Sees, asks: Asks) -> MyWork:
 
 
 @router.get("/datasets/{dataset}/batches", operation_id="listBatches", responses=responses(404))
+@may(Action.READ, dataset=OwnedKind.DATASET)
 @paged()
 def list_batches(dataset: DatasetPath, store: AppStore) -> WorkBatchList:
     """The batches of a dataset."""
@@ -103,6 +109,7 @@ def _made(batch: Batch) -> Response:
         },
     },
 )
+@may(Action.LEAD, dataset=OwnedKind.DATASET)
 @responds(_made)
 def make_batch(dataset: DatasetPath, new: NewBatchDocument, store: AppStore, actor: Actor) -> Batch:
     """Give out the groups that a query finds now, in its order."""
@@ -111,6 +118,7 @@ def make_batch(dataset: DatasetPath, new: NewBatchDocument, store: AppStore, act
 
 
 @router.get("/datasets/{dataset}/team-work", operation_id="getTeamWork", responses=responses(404))
+@may(Action.LEAD, dataset=OwnedKind.DATASET)
 @paged()
 def team_work(dataset: DatasetPath, store: AppStore) -> TeamWork:
     """Every batch of a dataset: who has done what, how fast, and which batch has stalled."""
@@ -127,6 +135,7 @@ def team_work(dataset: DatasetPath, store: AppStore) -> TeamWork:
     response_model=WorkBatchDocument,
     responses=responses(404),
 )
+@may(Action.READ, batch=OwnedKind.WORK)
 def get_batch(batch: Id, store: AppStore) -> Batch:
     """One batch."""
     return own.seen_batch(store, batch)
@@ -138,6 +147,7 @@ def get_batch(batch: Id, store: AppStore) -> Batch:
     response_model=WorkBatchDocument,
     responses=responses(404, 409, 413, 415),
 )
+@may(Action.LEAD, batch=OwnedKind.WORK)
 @responds(as_document(WorkBatchDocument.model_validate))
 def change_batch(batch: Id, change: BatchEdit, store: AppStore, actor: Actor) -> Batch:
     """Give a batch on to others, close it, or name it otherwise."""
@@ -149,6 +159,7 @@ def change_batch(batch: Id, change: BatchEdit, store: AppStore, actor: Actor) ->
 @router.delete(
     "/batches/{batch}", operation_id="deleteBatch", status_code=204, responses=responses(404)
 )
+@may(Action.LEAD, batch=OwnedKind.WORK)
 @responds(no_content)
 def delete_batch(batch: Id, store: AppStore, actor: Actor) -> Batch:
     """Delete a batch; what was said of its groups stays."""
@@ -156,6 +167,7 @@ def delete_batch(batch: Id, store: AppStore, actor: Actor) -> Batch:
 
 
 @router.get("/batches/{batch}/groups", operation_id="listBatchGroups", responses=responses(404))
+@may(Action.READ, batch=OwnedKind.WORK, whole=True)
 @paged()
 def list_batch_groups(batch: Id, store: AppStore) -> BatchGroupList:
     """The groups of a batch in order, with who has them open."""
@@ -168,6 +180,8 @@ def list_batch_groups(batch: Id, store: AppStore) -> BatchGroupList:
     response_model=LeaseDocument,
     responses=responses(404, 409, 413, 415),
 )
+@may(Action.ANNOTATE, batch=OwnedKind.WORK)
+@limit(EDITS)
 def take_next(batch: Id, come: NextGroup, services: AppServices, asks: Asks) -> Lease:
     """Take the next group that waits for whoever asks, and that nobody else has open.
 
@@ -183,6 +197,8 @@ def take_next(batch: Id, come: NextGroup, services: AppServices, asks: Asks) -> 
     response_model=LeaseDocument,
     responses=responses(404, 409, 413, 415),
 )
+@may(Action.ANNOTATE, batch=OwnedKind.WORK)
+@limit(EDITS)
 def take_group(batch: Id, group: Id, how: LeaseRequest, services: AppServices, asks: Asks) -> Lease:
     """Take a group, or keep it for another three minutes; 409 where somebody has it open."""
     worker = asks.of_batch(services.store, batch)
@@ -196,6 +212,8 @@ def take_group(batch: Id, group: Id, how: LeaseRequest, services: AppServices, a
     status_code=204,
     responses=responses(404),
 )
+@may(Action.ANNOTATE, batch=OwnedKind.WORK)
+@limit(EDITS)
 def give_back(batch: Id, group: Id, services: AppServices, asks: Asks) -> None:
     """Leave a group to others."""
     worker = asks.of_batch(services.store, batch)
@@ -208,6 +226,7 @@ def give_back(batch: Id, group: Id, services: AppServices, asks: Asks) -> None:
     response_model=LeaseDocument,
     responses=responses(404, 409, 413, 415),
 )
+@may(Action.ANNOTATE, batch=OwnedKind.WORK)
 @responds(as_document(LeaseDocument.model_validate))
 def hand_in(
     batch: Id,
@@ -229,6 +248,7 @@ def hand_in(
     response_model=LeaseDocument,
     responses=responses(404, 409),
 )
+@may(Action.ANNOTATE, batch=OwnedKind.WORK)
 @responds(as_document(LeaseDocument.model_validate))
 def take_back(batch: Id, group: Id, services: AppServices, actor: Actor, asks: Asks) -> Lease:
     """Say that a group is not annotated yet, after all; 409 for one's own copy that is submitted."""
@@ -243,6 +263,7 @@ def take_back(batch: Id, group: Id, services: AppServices, actor: Actor, asks: A
     response_model=LeaseDocument,
     responses=responses(404, 409, 413, 415),
 )
+@may(Action.REVIEW, batch=OwnedKind.WORK)
 @responds(as_document(LeaseDocument.model_validate))
 def hand_back(
     batch: Id, group: Id, why: HandBack, services: AppServices, actor: Actor, asks: Asks

@@ -8,9 +8,9 @@ from typing import Annotated
 from pydantic import BaseModel, ConfigDict, Field
 
 from app.features.batches.progress import Pace
-from app.features.batches.service import MOST_GROUPS, MOST_VERDICTS, RAREST_GOLD, Part
+from app.features.batches.service import MOST_GROUPS, MOST_VERDICTS, RAREST_GOLD, BatchGroup, Part
 from app.features.datasets.service import MAX_TITLE
-from app.features.independent_annotations.schemas import HandedBackDocument
+from app.features.independent_annotations.service import HandedBack
 from app.features.queue.query import MAX_LISTED_LENGTH
 from app.finite import MAX_ID
 from app.http.documents import Document, ListDocument
@@ -42,7 +42,7 @@ class NewBatchDocument(BaseModel):
     )
     annotators: People = []
     reviewers: People = Field(
-        default=[], description="Nobody: whoever may review in the dataset may take part."
+        default=[], description="Empty: every reviewer of the dataset may review the batch."
     )
     due: date | None = None
     skip_given: bool = Field(
@@ -52,7 +52,8 @@ class NewBatchDocument(BaseModel):
         default=1, description="How many people judge each group independently."
     )
     blind: bool = Field(
-        default=True, description="Where several judge, nobody sees what the others say."
+        default=True,
+        description="When several people judge, they do not see each other's verdicts.",
     )
     gold_every: Annotated[int, Field(ge=1, le=RAREST_GOLD)] | None = Field(
         default=None, description="One of so many groups is a gold one; null: none is."
@@ -75,7 +76,7 @@ class BatchEdit(BaseModel):
     )
     gold_every: Annotated[int, Field(ge=1, le=RAREST_GOLD)] | None = Field(
         default=None,
-        description="From the next group on that somebody begins; null: no more gold groups.",
+        description="Counts from the next group that an annotator opens; null: no more gold groups.",
     )
 
 
@@ -96,31 +97,17 @@ class WorkBatchDocument(Document):
     annotators: list[str]
     reviewers: list[str]
     groups: int
-    waiting: int = Field(description="Groups that nobody has handed in or judged.")
+    waiting: int = Field(description="Groups that are neither submitted nor judged.")
     handed_in: int = Field(description="Groups that wait for a verdict.")
-    settled: int = Field(description="Groups whose work is over.")
-    last: datetime | None = Field(description="When one of them was handed in or settled last.")
+    settled: int = Field(description="Groups that are complete.")
+    last: datetime | None = Field(description="When a group was last submitted or completed.")
 
 
 class WorkBatchList(ListDocument[WorkBatchDocument]):
     """Batches; open ones and those that are due first come first."""
 
 
-class BatchGroupDocument(Document):
-    """A group of a batch."""
-
-    group: int
-    number: int = Field(description="Its place in the dataset.")
-    place: int = Field(description="Its place in the batch, from 1.")
-    handed_in: datetime | None
-    handed_in_by: str | None = Field(
-        description="Also after it was handed back to them: then `handed_in` is null."
-    )
-    settled: datetime | None
-    here: list[str] = Field(description="Who has it open.")
-
-
-class BatchGroupList(ListDocument[BatchGroupDocument]):
+class BatchGroupList(ListDocument[BatchGroup]):
     """The groups of a batch in the order in which they are given out."""
 
 
@@ -143,7 +130,7 @@ class LeaseRequest(BaseModel):
         extra="forbid", json_schema_extra={"examples": [{"take_over": False}]}
     )
 
-    take_over: bool = Field(default=False, description="Also where somebody else has it open.")
+    take_over: bool = Field(default=False, description="Also when another person has it open.")
 
 
 class LeaseDocument(Document):
@@ -153,9 +140,9 @@ class LeaseDocument(Document):
     group: int | None = Field(description="null: no group waits for them now.")
     part: Part | None = Field(description="What they do with it.")
     until: datetime | None = Field(description="When the lease ends unless it is taken again.")
-    here: list[PresenceDocument] = Field(description="Everybody who has the group open.")
-    handed_in_by: str | None = Field(description="Who has handed it in; null: nobody.")
-    handed_back: HandedBackDocument | None = Field(
+    here: list[PresenceDocument] = Field(description="People who have the group open.")
+    handed_in_by: str | None = Field(description="Person who submitted it; null: not submitted.")
+    handed_back: HandedBack | None = Field(
         description="Why its annotator has it back; null: they have not."
     )
     place: int | None = Field(
@@ -174,8 +161,8 @@ class MyBatchDocument(Document):
     batch: WorkBatchDocument
     parts: list[Part]
     left: int = Field(description="Groups that one may still get.")
-    handed_back: list[HandedBackDocument] = Field(
-        description="What one had handed in and has back, in the order of the batch."
+    handed_back: list[HandedBack] = Field(
+        description="Submitted groups that were returned to the person, in the order of the batch."
     )
 
 
@@ -202,8 +189,10 @@ class TeamBatchDocument(Document):
     gold_every: int | None = Field(description="One gold group in N.")
     here: list[PresenceDocument]
     stalled: datetime | None = Field(
-        description="Since when nobody does anything, where that is as long as the operator's setting "
-        "`stalled_hours`, a day by default; else null."
+        description=(
+            "Time of the last activity, if it is longer ago than the operator's setting "
+            "`stalled_hours` (default: one day); else null."
+        )
     )
     people: list[PaceDocument]
 

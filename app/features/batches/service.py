@@ -31,12 +31,14 @@ from app.features.batches.queries import (
 )
 from app.features.datasets.service import checked_title, dataset_id
 from app.features.independent_annotations.gold_queries import gold_heads
-from app.features.notifications.service import RingKind, tell
+from app.features.notifications.queries import RingKind
+from app.features.notifications.service import tell
 from app.features.people.members import list_members
-from app.features.people.roles import Action, may
+from app.features.people.roles import Action, lets
 from app.features.queue.listing_queries import Listing
 from app.features.queue.query import MAX_LISTED_LENGTH, parse_query
 from app.features.webhooks.queries import GIVEN_OUT, HANDED_ON, announce_batch
+from app.finite import Moment
 from app.plural import plural
 from app.soccer.actors import person_of
 
@@ -135,20 +137,27 @@ class Batch:
 
     @property
     def waiting(self) -> int:
-        """Groups that nobody has handed in or judged."""
+        """Groups that are neither submitted nor judged."""
         return self.groups - self.handed_in - self.settled
 
 
 @dataclass(frozen=True)
 class BatchGroup:
-    """A group of a batch; ``here`` are the names of those who have it open."""
+    """A group of a batch; ``here`` are the names of those who have it open.
+
+    Attributes:
+        number: Its place in the dataset.
+        place: Its place in the batch, from 1.
+        handed_in_by: Also after it was returned to them: then ``handed_in`` is None.
+        here: Who has it open.
+    """
 
     group: int
     number: int
     place: int
-    handed_in: str | None
+    handed_in: Moment | None
     handed_in_by: str | None
-    settled: str | None
+    settled: Moment | None
     here: list[str]
 
 
@@ -358,7 +367,9 @@ def _ids(store: Store, dataset: int, part: Part, names: Iterable[str]) -> list[i
     wanted = {name.strip().lower() for name in names}
     if not wanted:
         return []
-    able = {one.name: one.id for one in list_members(store, dataset) if may(one.role, _NEEDS[part])}
+    able = {
+        one.name: one.id for one in list_members(store, dataset) if lets(one.role, _NEEDS[part])
+    }
     missing = sorted(wanted - set(able))
     if missing:
         raise InputError(
@@ -373,7 +384,7 @@ def _check(new: NewBatch) -> None:
     checked_title(new.name, "a batch")
     if not 1 <= new.verdicts <= MOST_VERDICTS:
         raise InputError(
-            f"a batch asks for 1 to {MOST_VERDICTS} verdicts on each group", pointer="/verdicts"
+            f"a batch needs 1 to {MOST_VERDICTS} verdicts on each group", pointer="/verdicts"
         )
     _check_gold(new.gold_every)
 
@@ -398,7 +409,7 @@ def _nothing(found: Sequence[int]) -> InputError:
         return InputError("no group matches that query", pointer="/q")
     return InputError(
         "every group that matches is in an open batch already",
-        hint="Take them all the same, or ask for other groups.",
+        hint="Assign them anyway, or choose other groups.",
         pointer="/q",
     )
 

@@ -17,19 +17,26 @@ from app.features.comments.schemas import (
 )
 from app.http.cursor import paged
 from app.http.deps import Actor, AppStore, Id
+from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import responses
+from app.http.request_limits import LOOKS, limit
 from app.http.respond import document, no_content, responds
+from app.http.route import Route
 
-router = APIRouter(prefix="/groups/{group}", tags=["comments"])
+router = APIRouter(prefix="/groups/{group}", tags=["comments"], route_class=Route)
 
 
 @router.get("/people", operation_id="listPeopleOfGroup", responses=responses(404))
+@may(Action.ANNOTATE, group=OwnedKind.GROUP)
+@limit(LOOKS)
 def list_people(group: Id, store: AppStore) -> PeopleOfGroup:
     """Who can be mentioned in comments on the group: everybody who sees it."""
     return PeopleOfGroup(names=comments.people_of(store, group))
 
 
 @router.get("/threads", operation_id="listThreads", responses=responses(404))
+@may(Action.READ, group=OwnedKind.GROUP)
+@limit(LOOKS)
 @paged()
 def list_threads(group: Id, store: AppStore, actor: Actor) -> ThreadList:
     """What people say to each other about the group, the oldest thread first."""
@@ -48,6 +55,7 @@ def _told(thread: comments.StoredThread, actor: str, status: int = 200) -> Respo
     status_code=201,
     responses=responses(404, 409, 413, 415),
 )
+@may(Action.ANNOTATE, group=OwnedKind.GROUP)
 @responds(partial(_told, status=201), "actor")
 def begin_thread(group: Id, new: NewThread, store: AppStore, actor: Actor) -> comments.StoredThread:
     """Say something about the group, a view of it, or a place there.
@@ -64,6 +72,7 @@ def begin_thread(group: Id, new: NewThread, store: AppStore, actor: Actor) -> co
     response_model=ThreadDocument,
     responses=responses(404, 409, 413, 415),
 )
+@may(Action.ANNOTATE, group=OwnedKind.GROUP)
 @responds(_told, "actor")
 def change_thread(
     group: Id, thread: Id, change: ThreadEdit, store: AppStore, actor: Actor
@@ -79,6 +88,7 @@ def change_thread(
     status_code=201,
     responses=responses(404, 409, 413, 415),
 )
+@may(Action.ANNOTATE, group=OwnedKind.GROUP)
 @responds(partial(_told, status=201), "actor")
 def reply(
     group: Id, thread: Id, new: NewComment, store: AppStore, actor: Actor
@@ -93,6 +103,7 @@ def reply(
     response_model=ThreadDocument,
     responses=responses(403, 404, 409, 413, 415),
 )
+@may(Action.ANNOTATE, group=OwnedKind.GROUP)
 @responds(_told, "actor")
 def change_comment(
     group: Id, thread: Id, comment: Id, new: NewComment, store: AppStore, actor: Actor
@@ -107,6 +118,7 @@ def change_comment(
     status_code=204,
     responses=responses(403, 404),
 )
+@may(Action.ANNOTATE, group=OwnedKind.GROUP)
 @responds(no_content)
 def delete_comment(group: Id, thread: Id, comment: Id, store: AppStore, actor: Actor) -> None:
     """Delete a comment of one's own; a thread in which nothing else is said goes with it."""

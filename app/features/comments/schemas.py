@@ -68,8 +68,8 @@ class CommentDocument(Document):
     at: datetime
     edited: datetime | None = Field(description="When its writer changed or deleted it.")
     text: str | None = Field(description="null: its writer has deleted it.")
-    mentions: list[str] = Field(description="Names of people whom it mentions.")
-    mine: bool = Field(description="Whoever asks has written it, and can change it.")
+    mentions: list[str] = Field(description="Names of the mentioned people.")
+    mine: bool = Field(description="Whether the logged-in person wrote it and can change it.")
 
     @classmethod
     def of(cls, comment: StoredComment, actor: str) -> Self:

@@ -51,7 +51,7 @@ def _values_at(server: ServerPlace) -> list[dict[str, Any]]:
 @commands.command()
 def delete(
     name: Annotated[str, typer.Argument(help="Name of the dataset.")],
-    yes: Annotated[bool, typer.Option("--yes", help="Do not ask.")] = False,
+    yes: Annotated[bool, typer.Option("--yes", help="Do not ask for confirmation.")] = False,
     json_: Json = False,
 ) -> None:
     """Delete a dataset with everything that belongs to it; cannot be undone.

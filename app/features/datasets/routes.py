@@ -23,13 +23,16 @@ from app.http.access import login_of
 from app.http.cursor import paged
 from app.http.deps import Actor, AppServices, AppStore, DatasetPath, QueryText, Sees
 from app.http.job_responses import by_job, job_answer
+from app.http.permissions import Action, OwnedKind, Where, may
 from app.http.problem import responses
 from app.http.respond import document, responds
+from app.http.route import Route
 
-router = APIRouter(prefix="/datasets", tags=["datasets"])
+router = APIRouter(prefix="/datasets", tags=["datasets"], route_class=Route)
 
 
 @router.get("", operation_id="listDatasets", responses=responses())
+@may(Action.READ, where=Where.SOMEWHERE)
 @paged()
 def list_datasets(request: Request, store: AppStore, sight: Sees) -> DatasetList:
     """Every dataset that one sees, with its progress."""
@@ -44,12 +47,14 @@ def list_datasets(request: Request, store: AppStore, sight: Sees) -> DatasetList
     response_model=DatasetDocument,
     responses=responses(404),
 )
+@may(Action.READ, dataset=OwnedKind.DATASET)
 def get_dataset(dataset: DatasetPath, store: AppStore) -> review.Dataset:
     """One dataset by name or id."""
     return review.get_dataset(store, dataset)
 
 
 @router.get("/{dataset}/summary", operation_id="getSummary", responses=responses(404))
+@may(Action.READ, dataset=OwnedKind.DATASET)
 def get_summary(dataset: DatasetPath, store: AppStore, query: QueryText = "") -> SummaryDocument:
     """Progress and histograms over the groups that a query matches."""
     found = review.get_dataset_head(store, dataset)
@@ -58,6 +63,7 @@ def get_summary(dataset: DatasetPath, store: AppStore, query: QueryText = "") ->
 
 
 @router.post("/{dataset}/solve", operation_id="solveDataset", **by_job(404))
+@may(Action.LEAD, dataset=OwnedKind.DATASET)
 @responds(job_answer)
 def solve_dataset(dataset: DatasetPath, services: AppServices, actor: Actor) -> Job:
     """Solve what has no solution for its present state, policy and solver, as a job.
@@ -78,6 +84,7 @@ def _deleted(gone: DatasetContents, dry_run: bool) -> Response:
     response_model=DeletedDocument,
     responses=responses(404, 409, 413, 415),
 )
+@may(Action.ADMINISTER, dataset=OwnedKind.DATASET)
 @responds(_deleted, "dry_run")
 def delete_dataset(
     dataset: DatasetPath,

@@ -18,8 +18,10 @@ class DatasetDocument(Document, shows=Dataset):
     policy: PolicyDocument
     created: datetime
     hides_groups: bool = Field(
-        description="Whether groups are hidden from whoever asks until the batch in which they annotate "
-        "independently is closed; no count has them."
+        description=(
+            "Whether groups are hidden from the logged-in person until the batch that they "
+            "annotate independently is closed; counts leave them out."
+        )
     )
 
 

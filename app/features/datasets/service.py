@@ -6,7 +6,7 @@ import re
 from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol, TypeVar
 
 from app.db.idempotency import without_response
 from app.db.log import Entry, append
@@ -14,7 +14,6 @@ from app.db.session import Session, now
 from app.db.store import Store
 from app.errors import ConflictError, InputError, NotFoundError
 from app.features.datasets import queries as removal
-from app.features.datasets.match_choice import no_match
 from app.features.datasets.orphan_queries import delete_calibrations, spare_calibrations
 from app.features.datasets.queries import (
     dataset_names,
@@ -41,6 +40,40 @@ from app.formats.issia import MATCH as ISSIA
 from app.formats.manifest import LICENCES, UNKNOWN_LICENCE
 from app.sample.fixture import LEAGUES
 from app.soccer.policy import Policy
+
+
+class MatchState(Protocol):
+    """Something that is known of one match."""
+
+    @property
+    def match(self) -> str:
+        """Its name; empty: groups without a match."""
+
+
+State = TypeVar("State", bound=MatchState)
+
+
+def of_match(states: Iterable[State], match: str | None) -> list[State]:
+    """What is known of one match, or of all where ``match`` is None."""
+    return [state for state in states if match in (None, state.match)]
+
+
+def need_match(states: Iterable[State], match: str | None, dataset: str) -> list[State]:
+    """``of_match``.
+
+    Raises:
+        NotFoundError: The dataset has no match of that name.
+    """
+    chosen = of_match(states, match)
+    if match is not None and not chosen:
+        raise no_match(dataset, match)
+    return chosen
+
+
+def no_match(dataset: str, match: str) -> NotFoundError:
+    """The error where a dataset has no match of some name."""
+    return NotFoundError(f'"{dataset}" has no match {match}')
+
 
 MAX_TITLE = 80
 """Characters of what only people read."""
@@ -182,6 +215,12 @@ def dataset_id(store: Store, dataset: str | int) -> int:
     """The id of a dataset; raises NotFoundError when there is none."""
     with store.read() as session:
         return need_dataset(session, dataset)
+
+
+def no_dataset(store: Store, dataset: str | int) -> NotFoundError:
+    """That there is no such dataset, or not for whoever asks."""
+    with store.read() as session:
+        return NotFoundError.dataset(dataset, dataset_names(session))
 
 
 def need_dataset(session: Session, dataset: str | int) -> int:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,7 @@ from app.features.datasets.service import get_dataset_head
 from app.features.exports.folder import ExportFolder
 from app.features.exports.service import ExportReport, export, require_possible
 from app.features.jobs.queries import EXPORT, Job
-from app.features.jobs.run import JobProgress, Work, counting, run_job_in_worker
+from app.features.jobs.run import JobProgress, counting, run_job_in_worker
 from app.features.jobs.service import Jobs
 from app.formats.file_tree import Root
 from app.formats.safe_path import check_name
@@ -70,7 +71,7 @@ def request_export(
     return jobs.submit(
         KIND,
         f"Export {found.name} as {request['format']}",
-        export_work(store, folder, frames, found.id, asked),
+        partial(export_work, store, folder, frames),
         dataset_id=found.id,
         actor=actor,
         request=asked,
@@ -80,50 +81,42 @@ def request_export(
 def resume_exports(jobs: Jobs, store: Store, folder: ExportFolder, frames: Frames) -> None:
     """Let exports that an earlier server was at be written from their beginning."""
 
-    def work_of(job: Job) -> Work:
-        return export_work(store, folder, frames, job.dataset_id or 0, job.request)
-
-    jobs.resumes(KIND, work_of)
+    jobs.resumes(KIND, partial(export_work, store, folder, frames))
 
 
-def export_work(
-    store: Store, folder: ExportFolder, frames: Frames, dataset_id: int, request: Json
-) -> Work:
+def export_work(store: Store, folder: ExportFolder, frames: Frames, progress: JobProgress) -> Json:
     """The work itself; the zip appears whole or not at all, and its record after it."""
-
-    def work(progress: JobProgress) -> Json:
-        name, to = str(progress.job_id), request.get("to")
-        progress(0, None, f"Writing {request['format']}.")
-        content = folder.content(name)
-        with folder.writing(name) as beside:
-            report = run_job_in_worker(
-                store,
-                "exports",
-                "the export",
-                _export,
-                dataset_id,
-                content if to is None else _target(store, to),
-                beside,
-                request,
-                dataset_id=dataset_id,
-                progress=progress,
-                report=counting(progress, "groups written"),
-                answer=lambda frame: frames.read(*frame),
-            )
-        # It is done, also where somebody cancels it now.
-        progress.place = report.groups, report.groups, f"{plural(report.groups, 'group')} written"
-        entry = folder.keep(name, request, report)
-        return {
-            "export": entry.id,
-            "format": request["format"],
-            "content": f"/api/v1/exports/{entry.id}/content",
-            "bytes": entry.bytes,
-            "counts": entry.counts,
-            "left_out": entry.left_out,
-            "missing_images": len(entry.missing_images),
-        }
-
-    return work
+    request, name = progress.job.request, str(progress.job_id)
+    to = request.get("to")
+    progress(0, None, f"Writing {request['format']}.")
+    content = folder.content(name)
+    with folder.writing(name) as beside:
+        report = run_job_in_worker(
+            store,
+            "exports",
+            "the export",
+            _export,
+            progress.dataset_id,
+            content if to is None else _target(store, to),
+            beside,
+            request,
+            dataset_id=progress.dataset_id,
+            progress=progress,
+            report=counting(progress, "groups written"),
+            answer=lambda frame: frames.read(*frame),
+        )
+    # It is done, also where somebody cancels it now.
+    progress.place = report.groups, report.groups, f"{plural(report.groups, 'group')} written"
+    entry = folder.keep(name, request, report)
+    return {
+        "export": entry.id,
+        "format": request["format"],
+        "content": f"/api/v1/exports/{entry.id}/content",
+        "bytes": entry.bytes,
+        "counts": entry.counts,
+        "left_out": entry.left_out,
+        "missing_images": len(entry.missing_images),
+    }
 
 
 def _export(

@@ -29,12 +29,15 @@ from app.formats.export_formats import used_options
 from app.http.cursor import paged, parse_cursor
 from app.http.deps import Actor, AppServices, AppStore, DatasetPath, SeesWhole
 from app.http.job_responses import ACCEPTED, job_address
+from app.http.permissions import Action, OwnedKind, Where, may
 from app.http.problem import Responses, responses
+from app.http.request_limits import ZIPS, limit
 from app.http.respond import document, no_content, responds
+from app.http.route import Route
 from app.http.services import Services
 from app.http.stored_file import stored_file
 
-router = APIRouter(tags=["exports"])
+router = APIRouter(tags=["exports"], route_class=Route)
 
 PATIENCE = 20.0
 """Seconds that a request for the zip waits for it to be written."""
@@ -52,6 +55,7 @@ ZIP: Responses = {
     operation_id="listExportFormats",
     responses=responses(400, 404),
 )
+@may(Action.READ, dataset=OwnedKind.DATASET, whole=True)
 @paged()
 def list_formats(
     dataset: DatasetPath,
@@ -85,6 +89,7 @@ def _export_answer(job: Job) -> Response:
     response_model=ExportJobDocument,
     responses={**responses(404, 409, 413, 415, 507), **ACCEPTED},
 )
+@may(Action.EXPORT, body={"dataset": OwnedKind.DATASET}, whole=True)
 @responds(_export_answer)
 def make_export(request: ExportRequest, services: AppServices, actor: Actor) -> Job:
     """Write accepted groups, or all of them, to a zip; 400 when there is nothing to write."""
@@ -99,6 +104,7 @@ def make_export(request: ExportRequest, services: AppServices, actor: Actor) -> 
 
 
 @router.get("/exports", operation_id="listExports", responses=responses(404))
+@may(Action.READ, dataset=OwnedKind.DATASET, where=Where.SOMEWHERE, whole=True)
 def list_exports(
     services: AppServices,
     sight: SeesWhole,
@@ -122,6 +128,7 @@ def list_exports(
 
 
 @router.get("/exports/{export}", operation_id="getExport", responses=responses(404))
+@may(Action.READ, export=OwnedKind.EXPORT)
 def get_export(export: ExportId, services: AppServices) -> ExportDocument:
     """What was asked for, how far it is, and what came of it."""
     return _document(services, export)
@@ -134,6 +141,7 @@ def get_export(export: ExportId, services: AppServices) -> ExportDocument:
     response_class=Response,
     responses={**responses(404, 409), 204: {"description": "It is gone."}},
 )
+@may(Action.LEAD, export=OwnedKind.EXPORT)
 @responds(no_content)
 def delete_export(export: ExportId, services: AppServices, actor: Actor) -> None:
     """Delete the file of an export, or one that failed altogether; 409 while it is being written."""
@@ -163,6 +171,8 @@ async def written(export: ExportId, services: AppServices) -> str:
     response_class=FileResponse,
     responses={**responses(404, 409, 503), **ZIP},
 )
+@may(Action.READ, export=OwnedKind.EXPORT)
+@limit(ZIPS)
 def get_content(
     export: Annotated[str, Depends(written)], services: AppServices, request: Request
 ) -> Response:

@@ -71,7 +71,7 @@ class FormatList(ListDocument[FormatDocument]):
 class ExportJobDocument(JobDocument):
     """The job that writes an export; its `id` is that of the export, too."""
 
-    content: str = Field(description="Address of the zip; asked early, it waits for it.")
+    content: str = Field(description="Address of the zip; a request before it is ready waits.")
 
     @staticmethod
     def of_export(job: JobDocument) -> ExportJobDocument:
@@ -85,8 +85,10 @@ class ExportDocument(BaseModel):
 
     id: str
     state: Literal[JobState, "gone", "expired"] = Field(
-        description="As of its job; `gone`: it was written, and somebody deleted its file; "
-        "`expired`: the server deleted its file after some days."
+        description=(
+            "State of its job; `gone`: a person deleted the file; `expired`: the server deleted "
+            "the file after some days."
+        )
     )
     status: Literal["waiting", "running", "ready", "failed", "cancelled", "gone", "expired"] = (
         Field(

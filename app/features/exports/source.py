@@ -224,5 +224,5 @@ def _nothing(dataset: DatasetHead, left_out: Mapping[str, int], everything: bool
         reasons = ", ".join(f"{count} {reason}" for reason, count in left_out.items())
         return InputError(f'no accepted group of "{dataset.name}" can be exported ({reasons})')
     return InputError(
-        f'nobody has accepted a group of "{dataset.name}" yet, so there is nothing to export'
+        f'no group has been accepted in "{dataset.name}" yet, so there is nothing to export'
     )

@@ -1,4 +1,4 @@
-"""Commands on line files: calibrate, score; they need no dataset."""
+"""Commands on files of lines, cameras and balls: calibrate, score, link; they need no dataset."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import typer
 
 from app.plural import plural
 from app.terminal.options import Json, Size, Workers, read_settings
-from app.terminal.terminal import complain, print_values, show_progress
+from app.terminal.terminal import complain, print_json, print_values, say, show_progress
 
 commands = typer.Typer()
 
@@ -130,3 +130,47 @@ def score(
         result = score_files(lines, cameras, size=size, without=without, progress=progress)
     print_values(result, json_)
     _tell_problems(result["problems"])
+
+
+@commands.command()
+def link(
+    live: Annotated[
+        Path, typer.Argument(metavar="LIVE", exists=True, help="Folder of the live shot.")
+    ],
+    replay: Annotated[
+        Path, typer.Argument(metavar="REPLAY", exists=True, help="Folder of its replay.")
+    ],
+    out: Annotated[Path, typer.Argument(metavar="OUT", help="Folder for link.json.")],
+    at: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="LIVE_TIME=REPLAY_TIME",
+            help="One instant in both, seconds, as a person sees it; may be given several times.",
+        ),
+    ] = None,
+    json_: Json = False,
+) -> None:
+    """Find which time of a live shot each time of its replay shows.
+
+    Both folders hold camera_<frame>.json and ball.csv (frame,time_s,x,y in pixels). The rays of the
+    ball that belong together meet: t_live = offset + speed * t_replay. A ball that does not tell
+    the times is refused with a reason (outcome unobservable).
+    """
+    from app.features.file_tools.link import link_files, parse_hint
+
+    try:
+        hints = [parse_hint(text) for text in at or ()]
+    except ValueError as error:
+        raise typer.BadParameter(str(error), param_hint="--at") from error
+    result = link_files(live, replay, out, hints)
+    if json_:
+        print_json(result)
+    else:
+        shown = {name: value for name, value in result.items() if not isinstance(value, list)}
+        print_values({name: value for name, value in shown.items() if value is not None}, False)
+        for piece in result["pieces"]:
+            say(
+                f"from {piece['first_s']:.2f} to {piece['last_s']:.2f} s: offset "
+                f"{piece['offset_s']:.3f} s, speed {piece['speed']:.4f}"
+            )
+        _tell_problems(result["problems"])

@@ -11,22 +11,25 @@ from app.features.findings.service import count_groups, read_findings
 from app.features.queue.schemas import FindingList, FindingRow
 from app.http.cursor import parse_cursor
 from app.http.deps import AppStore, DatasetQuery
+from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import responses
+from app.http.route import Route
 from app.soccer.finding import FINDING_KINDS
 
-router = APIRouter(prefix="/findings", tags=["findings"])
+router = APIRouter(prefix="/findings", tags=["findings"], route_class=Route)
 
 FindingKind = Literal[FINDING_KINDS]  # type: ignore[valid-type]
 MAX_GROUPS = 200
 
 
 @router.get("", operation_id="listFindings", responses=responses(404))
+@may(Action.READ, dataset=OwnedKind.DATASET)
 def list_findings(
     store: AppStore,
     dataset: DatasetQuery,
     kind: Annotated[FindingKind | None, Query(description="Only these.")] = None,
     dismissed: Annotated[
-        bool | None, Query(description="Only those that somebody has checked, or nobody has.")
+        bool | None, Query(description="Only dismissed findings (true), or only open ones (false).")
     ] = None,
     limit: Annotated[int, Query(ge=1, le=MAX_GROUPS, description="Groups a page.")] = 50,
     cursor: Annotated[

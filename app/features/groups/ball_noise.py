@@ -17,7 +17,7 @@ from app.features.groups.edit import Edit, SetBall, SetBalls, SetNoise, Several,
 from app.features.groups.group_edits import give_edits
 from app.features.groups.queries import StoredGroup
 from app.features.groups.undo_stacks import GROUP_KINDS
-from app.features.match_estimates.noise_queries import (
+from app.features.match_estimates.queries import (
     NOISE,
     Factors,
     factor_of,

@@ -12,10 +12,13 @@ from app.features.groups.bulk_edits import BulkEditReport, edit_views, plan_edit
 from app.features.groups.bulk_schemas import BulkEdit, BulkEditDocument
 from app.features.solutions.service import solve_encoded
 from app.http.deps import STRONG_ETAG, Actor, AppServices, DatasetPath, DryRun
+from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import responses
+from app.http.request_limits import LARGE, limit
 from app.http.respond import as_document, document, responds
+from app.http.route import Route
 
-router = APIRouter(prefix="/datasets/{dataset}/edits", tags=["views"])
+router = APIRouter(prefix="/datasets/{dataset}/edits", tags=["views"], route_class=Route)
 
 
 @router.post(
@@ -24,6 +27,8 @@ router = APIRouter(prefix="/datasets/{dataset}/edits", tags=["views"])
     response_model=BulkEditDocument,
     responses=responses(404, 413, 415),
 )
+@may(Action.ANNOTATE, dataset=OwnedKind.DATASET)
+@limit(LARGE)
 @responds(as_document(BulkEditDocument.of))
 def edit_many(
     dataset: DatasetPath,

@@ -49,7 +49,7 @@ class ViewEditItem(BaseModel):
     )
     proposed: Annotated[list[Marking], Field(max_length=len(MARKINGS))] = Field(
         default_factory=list,
-        description="Those of `lines` whose points are as they were proposed from the paint.",
+        description="Markings of `lines` whose points are as proposed from the paint.",
     )
 
     @model_validator(mode="after")
@@ -129,8 +129,10 @@ class EditedItem(Document):
         "where the view is unknown, or the server had no time for it."
     )
     status: int | None = Field(
-        description="What the same change alone is answered with; null unless it is refused. 412: "
-        "somebody else was faster, `etag` is the present state."
+        description=(
+            "Status that the same change alone would get; null unless refused. 412: another person "
+            "changed the group first, `etag` is the present state."
+        )
     )
     problem: str | None = Field(description="Why it is refused, one sentence.")
     hint: str | None

@@ -102,7 +102,7 @@ class ViewPreview(BaseModel):
     included: StrictBool | None = None
     picture: PictureEdit | None = Field(
         default=None,
-        description="null: as it was taken; absent: the picture stays what it is said to be.",
+        description="null: as the camera took it; absent: unchanged.",
     )
 
 

@@ -25,7 +25,7 @@ from app.features.datasets.tables import (
 )
 from app.features.groups import codecs
 from app.features.groups.view_queries import StoredStation, stored_station
-from app.features.match_estimates.noise_queries import Factors, factors_of
+from app.features.match_estimates.queries import Factors, factors_of
 from app.features.paint.queries import paint_digests, read_readings
 from app.features.people.visibility_queries import seen_in
 from app.soccer.annotation import BallAnnotation, Extras

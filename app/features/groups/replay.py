@@ -32,8 +32,7 @@ from app.features.groups.state_snapshot import (
     ViewRecord,
     without_station,
 )
-from app.features.match_estimates.noise_queries import NOISE
-from app.features.match_estimates.picture_queries import POSITION
+from app.features.match_estimates.queries import NOISE, POSITION
 from app.features.paint.queries import PAINT
 from app.features.pitches.queries import PITCH
 from app.features.queue.queries import refresh_queue

@@ -21,7 +21,7 @@ from app.soccer.finding import Dismissal, Finding, Fix
 from app.soccer.frames import Box, ImageSize
 from app.soccer.group import Group
 from app.soccer.pitch import Pitch
-from app.soccer.solution import GAMMAS_PERCENT, BallFit, Calibration, Pair, Solution, Suspect
+from app.soccer.solution import GAMMAS_PERCENT, BallFit, Calibration, Gate, Pair, Solution, Suspect
 from app.solving.calibrate import DRAWN_DIGITS
 from app.solving.jaccard import project_markings
 
@@ -78,7 +78,7 @@ class CameraDocument(Document):
     covariance: list[list[float]] | None = Field(
         default=None,
         description="How well it is known: 8 x 8, of x, y, z (metres), pan, tilt, roll (degrees), "
-        "focal length (pixels) and k1, as in camera files; null: nobody says.",
+        "focal length (pixels) and k1, as in camera files; null: unknown.",
     )
 
 
@@ -100,10 +100,6 @@ class SuspectDocument(Document, shows=Suspect):
     """A marking whose label looks wrong, and what would fit."""
 
     error_px: Measured
-
-
-class CameraSigmaDocument(Document, shows=CameraSigma):
-    """One standard deviation of each number of a camera."""
 
 
 class PaintFitDocument(Document):
@@ -131,7 +127,7 @@ class CalibrationDocument(Document):
 
     source: str = Field(description="`given`, `lines` or `paint`.")
     camera: Annotated[CameraDocument, BeforeValidator(_camera)] | None
-    sigma: CameraSigmaDocument | None = Field(
+    sigma: CameraSigma | None = Field(
         description="How well the camera is known; null for a given one of which nothing more is known."
     )
     reason: str | None = Field(description="Why there is no camera.")
@@ -271,23 +267,6 @@ class BestBallDocument(Document):
     )
 
 
-class GateDocument(Document):
-    """One gate as judged for the group."""
-
-    name: str
-    passed: bool
-    active: bool
-    value: float | None
-    threshold: float | None
-    margin: float | None = Field(
-        description="How far the value is from the threshold, as a share of the threshold: 0.25 "
-        "is better than asked by a quarter of it, -0.25 worse by as much. null where there is no "
-        "share: nothing is asked, not judged, or the threshold is 0."
-    )
-    sentence: str
-    view: str | None
-
-
 class FailingGate(Document):
     """The gate to name to a person."""
 
@@ -346,20 +325,20 @@ class FindingDocument(Document, shows=Finding):
 
     fix: FixDocument | None
     unusable_ball: bool = Field(
-        description="Whether nobody can use the ball: accepting the group needs a note then."
+        description="Whether the ball is unusable: accepting the group then needs a note."
     )
     offers: list[OfferDocument] = Field(
-        description="Edits that mend it, as its fix proposes or without one: none when only a person "
-        "can, several to choose from."
+        description=(
+            "Edits that correct it; empty when only a person can correct it, several to choose "
+            "from."
+        )
     )
     guide: GuideDocument | None = Field(
-        description="Where a person is led who has to look or draw; null where edits are offered, "
-        "or nothing."
+        description="Where a person has to look or draw; null if edits are offered, or nothing."
     )
     dismissed: DismissedDocument | None = Field(
         default=None,
-        description="Who has checked the finding and found it fine, as long as it says the same; "
-        "null: nobody.",
+        description="Person who dismissed the finding, while it has not changed; null: not dismissed.",
     )
 
     @staticmethod
@@ -387,7 +366,7 @@ class SolutionDocument(Document):
     policy_hash: str
     passes: bool
     first_failing: FailingGate | None
-    gates: list[GateDocument]
+    gates: list[Gate]
     views: list[ViewSolutionDocument]
     pairs: list[PairDocument]
     point: str = Field(

@@ -36,15 +36,17 @@ from app.features.solutions.service import Solve, solve_encoded
 from app.http.conflicts import current_state
 from app.http.cursor import paged
 from app.http.deps import Actor, AppServices, Id, IfMatch, etag_matches
+from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import Responses, responses
-from app.http.request_limits import is_large
+from app.http.request_limits import EDITS, IMAGES, is_large, limit
 from app.http.respond import responds
+from app.http.route import Route
 from app.http.services import Services
 from app.media.frames import Frames, SentPicture
 from app.soccer.media import FARTHEST, Media
 from app.worker_process import WorkerEnded
 
-router = APIRouter(prefix="/views", tags=["views"])
+router = APIRouter(prefix="/views", tags=["views"], route_class=Route)
 
 WIDTH_STEP = 16
 """Asked widths are rounded up to a multiple, so that few sizes fill the cache."""
@@ -53,7 +55,7 @@ SECONDS = 3600
 CLIENT_GONE = 499
 """What the log calls the answer that nobody reads."""
 NO_NEIGHBOURS = "This dataset has no frames before or after this one."
-IMAGES: Responses = {
+FRAME: Responses = {
     200: {
         "description": "The frame as JPEG, PNG or WebP.",
         "content": {
@@ -72,6 +74,8 @@ IMAGES: Responses = {
     response_model=GroupDocument,
     responses={**responses(*CONFLICTS), **CHANGED},
 )
+@may(Action.ANNOTATE, view=OwnedKind.VIEW)
+@limit(EDITS)
 @responds(group_answer)
 def patch_lines(
     view: Id,
@@ -98,6 +102,8 @@ def patch_lines(
     response_model=GroupDocument,
     responses={**responses(*CONFLICTS), **CHANGED},
 )
+@may(Action.ANNOTATE, view=OwnedKind.VIEW)
+@limit(EDITS)
 @responds(group_answer)
 def patch_ball(
     view: Id,
@@ -117,6 +123,8 @@ def patch_ball(
     response_model=GroupDocument,
     responses={**responses(*CONFLICTS), **CHANGED},
 )
+@may(Action.ANNOTATE, view=OwnedKind.VIEW)
+@limit(EDITS)
 @responds(group_answer)
 def patch_view(
     view: Id, change: ViewEdit, services: AppServices, actor: Actor, if_match: IfMatch
@@ -153,8 +161,10 @@ def _submit(
     "/{view}/image",
     operation_id="getImage",
     response_class=Response,
-    responses={**responses(404, 413, 503), **IMAGES},
+    responses={**responses(404, 413, 503), **FRAME},
 )
+@may(Action.READ, view=OwnedKind.VIEW)
+@limit(IMAGES)
 async def get_image(
     view: Id,
     services: AppServices,
@@ -195,6 +205,8 @@ async def get_image(
     response_model=NeighbourList,
     responses=responses(404, 503),
 )
+@may(Action.READ, view=OwnedKind.VIEW)
+@limit(IMAGES)
 @paged()
 async def get_neighbours(
     view: Id, services: AppServices, request: Request

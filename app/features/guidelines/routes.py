@@ -7,17 +7,19 @@ from typing import Annotated
 from fastapi import APIRouter, Path, Query, Request, Response
 
 from app.features.guidelines import service as guidelines
+from app.features.guidelines.service import Guidelines
 from app.features.independent_annotations.schemas import (
     GuidelinePictureDocument,
-    GuidelinesDocument,
     GuidelinesEdit,
     NewGuidelinePicture,
 )
 from app.http.deps import Actor, AppServices, AppStore, DatasetPath, etag_matches
+from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import responses
-from app.http.respond import as_document, responds
+from app.http.respond import as_document, document, responds
+from app.http.route import Route
 
-router = APIRouter(prefix="/datasets/{dataset}/guidelines", tags=["takes"])
+router = APIRouter(prefix="/datasets/{dataset}/guidelines", tags=["takes"], route_class=Route)
 
 Digest = Annotated[str, Path(pattern=r"^[0-9a-f]{64}$", description="SHA-256 of its bytes.")]
 
@@ -25,9 +27,10 @@ Digest = Annotated[str, Path(pattern=r"^[0-9a-f]{64}$", description="SHA-256 of 
 @router.get(
     "",
     operation_id="getGuidelines",
-    response_model=GuidelinesDocument,
+    response_model=Guidelines,
     responses=responses(404),
 )
+@may(Action.READ, dataset=OwnedKind.DATASET)
 def get_guidelines(
     dataset: DatasetPath,
     store: AppStore,
@@ -42,10 +45,11 @@ def get_guidelines(
 @router.put(
     "",
     operation_id="writeGuidelines",
-    response_model=GuidelinesDocument,
+    response_model=Guidelines,
     responses=responses(404, 409, 413, 415),
 )
-@responds(as_document(GuidelinesDocument.model_validate))
+@may(Action.LEAD, dataset=OwnedKind.DATASET)
+@responds(document)
 def write_guidelines(
     dataset: DatasetPath, edit: GuidelinesEdit, store: AppStore, actor: Actor
 ) -> guidelines.Guidelines:
@@ -62,6 +66,7 @@ def write_guidelines(
     status_code=201,
     responses=responses(404, 409, 413, 415, 503),
 )
+@may(Action.LEAD, dataset=OwnedKind.DATASET, body={"upload": OwnedKind.UPLOAD})
 @responds(as_document(GuidelinePictureDocument.model_validate, 201))
 def add_picture(
     dataset: DatasetPath, new: NewGuidelinePicture, services: AppServices
@@ -86,6 +91,7 @@ def add_picture(
         304: {"description": "Not changed."},
     },
 )
+@may(Action.READ, dataset=OwnedKind.DATASET)
 def get_picture(
     dataset: DatasetPath, digest: Digest, store: AppStore, request: Request
 ) -> Response:

@@ -226,7 +226,8 @@ def ingest_batch(
     """
     if is_copy(session, origin.dataset_id):
         raise ConflictError(
-            "this dataset holds one person's own annotations; nothing is imported into it",
+            "this dataset holds independent annotations of one person; importing into it is not "
+            "possible",
             hint="Import into the dataset that they are of.",
         )
     shared = SharedStations(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any
 
 from app.config import Settings
@@ -17,7 +18,7 @@ from app.features.imports.folders import resolve_folder
 from app.features.imports.sources import FORMATS, Source, import_source
 from app.features.imports.upload_queries import get_upload, keep_upload, upload_path
 from app.features.jobs.queries import Job
-from app.features.jobs.run import FailedWithReportError, JobProgress, Work, left_to_next_server
+from app.features.jobs.run import FailedWithReportError, JobProgress, left_to_next_server
 from app.features.jobs.service import Jobs
 from app.features.paint.jobs import PAINT, PROPOSALS
 from app.features.paint.service import has_pictures
@@ -114,7 +115,7 @@ def request_import(
     return jobs.submit(
         KIND,
         f"{would} {source.name} ({request.format}) for {request.dataset}",
-        import_work(jobs, store, settings, request, actor),
+        partial(import_work, jobs, store, settings),
         dataset_id=None if row is None else int(row.id),
         actor=actor,
         request=request.values(),
@@ -124,46 +125,38 @@ def request_import(
 def resume_imports(jobs: Jobs, store: Store, settings: Settings) -> None:
     """Let imports that an earlier server was at go on; what is there already stays as it is."""
 
-    def work_of(job: Job) -> Work:
-        return import_work(jobs, store, settings, ImportRequest(**job.request), job.actor)
-
-    jobs.resumes(KIND, work_of)
+    jobs.resumes(KIND, partial(import_work, jobs, store, settings))
 
 
-def import_work(
-    jobs: Jobs, store: Store, settings: Settings, request: ImportRequest, actor: str
-) -> Work:
+def import_work(jobs: Jobs, store: Store, settings: Settings, progress: JobProgress) -> Json:
     """The work itself; its result is the report, also where it fails because it read nothing."""
-
-    def work(progress: JobProgress) -> Json:
-        source = source_of(settings, request)
-        sentence = f"{'Reading' if request.dry_run else 'Importing'} {source.name}."
-        progress(0, None, sentence)
-        if not request.dry_run and "upload" in request.source:
-            # Frames are read where they are, so the file must stay from the first group on.
-            keep_upload(settings, request.source["upload"])
-        with left_to_next_server(progress):
-            outcome = import_in_worker(
-                store,
-                request.dataset,
-                source,
-                actor=actor,
-                dry_run=request.dry_run,
-                progress=_step(progress, sentence),
-                stop=progress.check,
-                policy=None if request.policy is None else POLICIES[request.policy],
-            )
-        with store.read() as session:
-            found = find_dataset(session, request.dataset)
-        if found is not None:
-            jobs.belongs(progress.job_id, int(found.id))
-        if outcome.nothing is not None:
-            raise FailedWithReportError(*outcome.nothing, _result(outcome, request))
-        if request.dry_run or not outcome.fresh:
-            return _result(outcome, request)
-        return _result(outcome, request, **_following(jobs, store, request, actor))
-
-    return work
+    request, actor = ImportRequest(**progress.job.request), progress.job.actor
+    source = source_of(settings, request)
+    sentence = f"{'Reading' if request.dry_run else 'Importing'} {source.name}."
+    progress(0, None, sentence)
+    if not request.dry_run and "upload" in request.source:
+        # Frames are read where they are, so the file must stay from the first group on.
+        keep_upload(settings, request.source["upload"])
+    with left_to_next_server(progress):
+        outcome = import_in_worker(
+            store,
+            request.dataset,
+            source,
+            actor=actor,
+            dry_run=request.dry_run,
+            progress=_step(progress, sentence),
+            stop=progress.check,
+            policy=None if request.policy is None else POLICIES[request.policy],
+        )
+    with store.read() as session:
+        found = find_dataset(session, request.dataset)
+    if found is not None:
+        jobs.belongs(progress.job_id, int(found.id))
+    if outcome.nothing is not None:
+        raise FailedWithReportError(*outcome.nothing, _result(outcome, request))
+    if request.dry_run or not outcome.fresh:
+        return _result(outcome, request)
+    return _result(outcome, request, **_following(jobs, store, request, actor))
 
 
 def import_in_worker(

@@ -100,7 +100,8 @@ def _sentence(decision: str, stored: StoredStation) -> str | None:
     key = stored.station.key
     if decision == CONFLICT:
         return (
-            f"another installation edited the lines or the camera of {key} too; what is here stays"
+            f"another installation edited the lines or the camera of {key} too; the edit of this "
+            f"installation is kept"
         )
     if decision == UPSTREAM:
         return (

@@ -126,7 +126,9 @@ def _merged(
 
 def _kept(view: str | None, decision: str, what: str) -> list[KeptEdit]:
     if decision == CONFLICT:
-        sentence = f"another installation edited the {what} too; what is here stays"
+        sentence = (
+            f"another installation edited the {what} too; the edit of this installation is kept"
+        )
     elif decision == UPSTREAM:
         sentence = (
             f"another installation edited the {what} on another state of the "

@@ -267,7 +267,7 @@ def _dismissal(value: Json) -> Mapping[str, Any]:
             _text(values[name], most=MAX_NOTE)
     number = values["number"]
     if number is not None and (type(number) not in (int, float) or not math.isfinite(number)):
-        raise InputError("has a dismissed finding whose number is none")
+        raise InputError("has a dismissed finding whose `number` is not a number")
     if values["kind"] not in FINDING_KINDS or values["dismissed"] not in (True, False):
         raise InputError("has a dismissed finding that Touchline does not know")
     return values

@@ -30,11 +30,14 @@ from app.features.jobs.queries import Job
 from app.http.cursor import paged
 from app.http.deps import Actor, AppServices, DryRun, Sees
 from app.http.job_responses import by_job, job_answer
+from app.http.permissions import Action, OwnedKind, Where, may
 from app.http.problem import responses
+from app.http.request_limits import UPLOADS, limit
 from app.http.respond import no_content, responds
+from app.http.route import Route
 from app.http.services import Services
 
-imports_router = APIRouter(prefix="/imports", tags=["imports"])
+imports_router = APIRouter(prefix="/imports", tags=["imports"], route_class=Route)
 
 FolderPath = Annotated[
     str, Query(max_length=4000, description="`path` of an item; empty for the allowed folders.")
@@ -47,6 +50,7 @@ FolderPath = Annotated[
     response_model=FolderDocument,
     responses=responses(404),
 )
+@may(Action.LEAD, where=Where.EVERYWHERE)
 @paged()
 def get_folders(services: AppServices, path: FolderPath = "") -> FolderListing:
     """What may be imported from: the operator names folders in TOUCHLINE_IMPORT_FOLDERS."""
@@ -57,6 +61,16 @@ def get_folders(services: AppServices, path: FolderPath = "") -> FolderListing:
     "",
     operation_id="startImport",
     **by_job(404, 413, 415, 503),
+)
+@may(
+    Action.LEAD,
+    body={
+        "dataset": OwnedKind.NEW_DATASET,
+        "source/upload": OwnedKind.UPLOAD,
+        "options/lines/upload": OwnedKind.UPLOAD,
+        "source/folder": OwnedKind.FOLDER,
+        "options/lines/folder": OwnedKind.FOLDER,
+    },
 )
 @responds(job_answer)
 def start_import(
@@ -76,7 +90,7 @@ def start_import(
     )
 
 
-uploads_router = APIRouter(prefix="/uploads", tags=["imports"])
+uploads_router = APIRouter(prefix="/uploads", tags=["imports"], route_class=Route)
 T = TypeVar("T")
 
 CHUNK = 1024 * 1024
@@ -114,6 +128,8 @@ BODY: dict[str, Any] = {
         },
     },
 )
+@may(Action.LEAD, where=Where.SOMEWHERE)
+@limit(UPLOADS)
 async def upload_file(
     request: Request, services: AppServices, actor: Actor, name: FileName, response: Response
 ) -> UploadDocument:
@@ -174,6 +190,7 @@ async def _on_disk(work: Callable[..., T], *arguments: Any) -> T:
 
 
 @uploads_router.get("", operation_id="listUploads", responses=responses())
+@may(Action.LEAD, where=Where.SOMEWHERE)
 @paged()
 def get_uploads(services: AppServices, sight: Sees, actor: Actor) -> UploadList:
     """Every file of one's own that is still here; an admin is shown everybody's.
@@ -191,6 +208,7 @@ def get_uploads(services: AppServices, sight: Sees, actor: Actor) -> UploadList:
 
 
 @uploads_router.get("/{upload}", operation_id="getUpload", responses=responses(404))
+@may(Action.LEAD, upload=OwnedKind.UPLOAD)
 def get_one(upload: UploadId, services: AppServices) -> UploadDocument:
     """One uploaded file, without its content."""
     return UploadDocument.model_validate(find_upload(services.settings, upload))
@@ -203,6 +221,7 @@ def get_one(upload: UploadId, services: AppServices) -> UploadDocument:
     response_class=Response,
     responses={**responses(404), 204: {"description": "It is gone."}},
 )
+@may(Action.LEAD, upload=OwnedKind.UPLOAD)
 @responds(no_content)
 def delete_one(upload: UploadId, services: AppServices, sight: Sees) -> None:
     """Delete a file; 400 while a dataset reads its frames from it.

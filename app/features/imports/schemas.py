@@ -105,8 +105,10 @@ class ImportBody(BaseModel):
     options: ImportOptions = ImportOptions()
     policy: PolicyName | None = Field(
         default=None,
-        description="Of a dataset that is made; null: `touchline` where most of its views have a "
-        "picture whose paint can place their camera, else `paper`.",
+        description=(
+            "Policy of a new dataset; null: `touchline` if most views have a picture with enough "
+            "paint to place the camera, else `paper`."
+        ),
     )
     dry_run: StrictBool = Field(
         default=False, description="The same as the parameter: report, and save nothing."
@@ -130,11 +132,7 @@ class ImportBody(BaseModel):
         )
 
 
-class FolderEntry(Document, shows=FolderItem):
-    """A folder or a file that an import can name."""
-
-
-class FolderDocument(ListDocument[FolderEntry]):
+class FolderDocument(ListDocument[FolderItem]):
     """What is in a folder that the operator allows; without a path, the folders themselves."""
 
     path: str

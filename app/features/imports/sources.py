@@ -22,10 +22,9 @@ from app.formats.format_names import ImportFormat
 from app.formats.frame_list import read_frame_list
 from app.formats.frames_reader import check_grouping, read_frames
 from app.formats.gamestate_reader import read_gamestate
-from app.formats.guess_format import guess_format, holds_videos_alone
+from app.formats.guess_format import guess_format, holds_videos_alone, looks_like
 from app.formats.issia_3d_reader import open_issia_3d
 from app.formats.issia_reader import IssiaFolder, IssiaOptions, open_issia
-from app.formats.looks_like import looks_like
 from app.formats.parquet_reader import read_parquet
 from app.formats.report import Report
 from app.formats.sn_calibration import DEFAULT_SIZE
@@ -413,7 +412,7 @@ def _static(source: Source, report: Report, limits: Limits) -> IssiaFolder:
 
 def _tell_contradicted(folder: IssiaFolder, dataset: str, source: Source, report: Report) -> None:
     """Say of which static cameras the lines do not fit the given camera, and what to do."""
-    from app.features.solutions.given_cameras import contradicted, sentence_of
+    from app.features.solutions.service import contradicted, sentence_of
 
     stations = {station.key: number for number, station in folder.stations.items()}
     off = contradicted(((one, Pitch()) for one in folder.stations.values()), PAPER)

@@ -29,8 +29,8 @@ from app.features.groups.submit import current_etag, solved_in, submit
 from app.features.groups.view_paint import PaintFollower
 from app.features.groups.view_queries import groups_of_station, save_station
 from app.features.independent_annotations.copying import aligned
-from app.features.independent_annotations.queries import GOLD, update_take
-from app.features.independent_annotations.service import Take, get_take, read_take
+from app.features.independent_annotations.queries import GOLD, Take, update_take
+from app.features.independent_annotations.service import get_take, read_take
 from app.features.independent_annotations.submission_queries import KIND
 from app.features.queue.queries import refresh_queue
 from app.features.verdicts.queries import (
@@ -151,7 +151,7 @@ def _line_changes(before: Station, after: Station) -> SetStationLines | None:
 
 def _require_ready(take: Take) -> None:
     if take.kind == GOLD:
-        raise ConflictError("this is an annotation of a gold group, whose truth is known")
+        raise ConflictError("this is an annotation of a gold group, whose true values are known")
     if take.handed_in is None:
         raise ConflictError(f"{take.person} has not submitted this yet")
     if take.settled is not None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from fastapi import APIRouter, BackgroundTasks, Request
+from fastapi import APIRouter, BackgroundTasks, Request, Response
 
 from app.features.agreement.adjudicate import take_over
 from app.features.agreement.service import after_hand_in
@@ -11,29 +11,32 @@ from app.features.groups.schemas import GroupDocument
 from app.features.groups.state import GroupState
 from app.features.independent_annotations import gold
 from app.features.independent_annotations import service as takes
+from app.features.independent_annotations.gold import GoldGroup
 from app.features.independent_annotations.known_truth import GoldChoice, GoldChosen, mark_known
 from app.features.independent_annotations.return_work import hand_back_take
 from app.features.independent_annotations.schemas import (
     GoldChoiceDocument,
-    GoldChosenDocument,
     GoldEdit,
-    GoldGroupDocument,
     GoldReportDocument,
     HandBack,
-    TakeDocument,
     TakeList,
 )
-from app.features.people.roles import Action, may
+from app.features.independent_annotations.service import TakeView
+from app.features.people.roles import lets
 from app.http.access import login_of
 from app.http.cursor import paged
 from app.http.deps import Actor, AppServices, AppStore, DatasetPath, Id
+from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import responses
-from app.http.respond import as_document, responds
+from app.http.request_limits import LOOKS, limit
+from app.http.respond import document, responds
+from app.http.route import Route
 
-takes_router = APIRouter(tags=["takes"])
+takes_router = APIRouter(tags=["takes"], route_class=Route)
 
 
 @takes_router.get("/datasets/{dataset}/takes", operation_id="listTakes", responses=responses(404))
+@may(Action.READ, dataset=OwnedKind.DATASET)
 @paged()
 def list_takes(dataset: DatasetPath, store: AppStore, request: Request, actor: Actor) -> TakeList:
     """Own annotations of a dataset's groups: for a lead everybody's, else those of whoever asks."""
@@ -41,20 +44,25 @@ def list_takes(dataset: DatasetPath, store: AppStore, request: Request, actor: A
     found = takes.list_takes(
         store,
         dataset,
-        lambda dataset_id: login is None or may(login.roles.role_in(dataset_id), Action.LEAD),
+        lambda dataset_id: login is None or lets(login.roles.role_in(dataset_id), Action.LEAD),
         person=actor,
     )
-    return TakeList(items=[TakeDocument.model_validate(one) for one in found])
+    return TakeList(items=found)
+
+
+def _begun(take: TakeView) -> Response:
+    return document(take, 201)
 
 
 @takes_router.post(
     "/groups/{group}/takes",
     operation_id="beginTake",
-    response_model=TakeDocument,
+    response_model=TakeView,
     status_code=201,
     responses=responses(404, 409),
 )
-@responds(as_document(TakeDocument.model_validate, 201))
+@may(Action.ANNOTATE, group=OwnedKind.GROUP)
+@responds(_begun)
 def begin(group: Id, store: AppStore, actor: Actor) -> takes.TakeView:
     """Begin an own annotation of a group, on a copy that nobody else sees; the one begun, if so."""
     return takes.begin_take(store, group, person=actor)
@@ -63,9 +71,11 @@ def begin(group: Id, store: AppStore, actor: Actor) -> takes.TakeView:
 @takes_router.get(
     "/groups/{group}/take",
     operation_id="getTake",
-    response_model=TakeDocument,
+    response_model=TakeView,
     responses=responses(404),
 )
+@may(Action.READ, group=OwnedKind.GROUP)
+@limit(LOOKS)
 def get_take(group: Id, store: AppStore) -> takes.TakeView:
     """Whose own annotation a group is; 404 for an ordinary group."""
     return takes.shown(store, takes.get_take_of(store, group))
@@ -74,10 +84,11 @@ def get_take(group: Id, store: AppStore) -> takes.TakeView:
 @takes_router.post(
     "/groups/{group}/hand-in",
     operation_id="handInTake",
-    response_model=TakeDocument,
+    response_model=TakeView,
     responses=responses(403, 404, 409),
 )
-@responds(as_document(TakeDocument.model_validate))
+@may(Action.ANNOTATE, group=OwnedKind.GROUP)
+@responds(document)
 def hand_in(
     group: Id, services: AppServices, actor: Actor, background: BackgroundTasks
 ) -> takes.TakeView:
@@ -91,10 +102,11 @@ def hand_in(
 @takes_router.post(
     "/groups/{group}/hand-back",
     operation_id="handBackTake",
-    response_model=TakeDocument,
+    response_model=TakeView,
     responses=responses(404, 409, 413, 415),
 )
-@responds(as_document(TakeDocument.model_validate))
+@may(Action.LEAD, group=OwnedKind.GROUP)
+@responds(document)
 def hand_back(
     group: Id, store: AppStore, actor: Actor, why: HandBack | None = None
 ) -> takes.TakeView:
@@ -109,6 +121,7 @@ def hand_back(
     response_model=GroupDocument,
     responses={**responses(404, 409, 412), 200: {"headers": ETAG}},
 )
+@may(Action.LEAD, group=OwnedKind.GROUP)
 @responds(group_answer)
 def adopt(group: Id, services: AppServices, actor: Actor) -> GroupState:
     """Take an annotation and its verdict over into the group that it is of; the answer is that group.
@@ -119,7 +132,7 @@ def adopt(group: Id, services: AppServices, actor: Actor) -> GroupState:
     return take_over(services.store, take, actor=actor, paint=services.paint)
 
 
-gold_router = APIRouter(tags=["takes"])
+gold_router = APIRouter(tags=["takes"], route_class=Route)
 
 
 @gold_router.get(
@@ -128,6 +141,7 @@ gold_router = APIRouter(tags=["takes"])
     response_model=GoldReportDocument,
     responses=responses(404),
 )
+@may(Action.LEAD, dataset=OwnedKind.DATASET)
 def get_report(dataset: DatasetPath, store: AppStore) -> gold.GoldReport:
     """The gold groups of a dataset, and what each person made of those that they were given."""
     return gold.read_report(store, dataset)
@@ -136,10 +150,11 @@ def get_report(dataset: DatasetPath, store: AppStore) -> gold.GoldReport:
 @gold_router.post(
     "/datasets/{dataset}/gold",
     operation_id="chooseGoldGroups",
-    response_model=GoldChosenDocument,
+    response_model=GoldChosen,
     responses=responses(404, 409, 413, 415),
 )
-@responds(as_document(GoldChosenDocument.model_validate))
+@may(Action.LEAD, dataset=OwnedKind.DATASET)
+@responds(document)
 def choose(
     dataset: DatasetPath, choice: GoldChoiceDocument, store: AppStore, actor: Actor
 ) -> GoldChosen:
@@ -152,10 +167,11 @@ def choose(
 @gold_router.put(
     "/groups/{group}/gold",
     operation_id="markGold",
-    response_model=GoldGroupDocument,
+    response_model=GoldGroup,
     responses=responses(404, 409, 413, 415),
 )
-@responds(as_document(GoldGroupDocument.model_validate))
+@may(Action.LEAD, group=OwnedKind.GROUP)
+@responds(document)
 def mark(group: Id, edit: GoldEdit, store: AppStore, actor: Actor) -> gold.GoldGroup:
     """Say that what a group holds now, with its verdict, is true."""
     return gold.mark(store, group, edit.start, actor=actor)
@@ -164,10 +180,11 @@ def mark(group: Id, edit: GoldEdit, store: AppStore, actor: Actor) -> gold.GoldG
 @gold_router.patch(
     "/groups/{group}/gold",
     operation_id="changeGold",
-    response_model=GoldGroupDocument,
+    response_model=GoldGroup,
     responses=responses(404, 413, 415),
 )
-@responds(as_document(GoldGroupDocument.model_validate))
+@may(Action.LEAD, group=OwnedKind.GROUP)
+@responds(document)
 def change(group: Id, edit: GoldEdit, store: AppStore, actor: Actor) -> gold.GoldGroup:
     """Let annotators of a gold group begin with something else; what is true of it stays."""
     return gold.start_with(store, group, edit.start, actor=actor)
@@ -176,10 +193,11 @@ def change(group: Id, edit: GoldEdit, store: AppStore, actor: Actor) -> gold.Gol
 @gold_router.delete(
     "/groups/{group}/gold",
     operation_id="unmarkGold",
-    response_model=GoldGroupDocument,
+    response_model=GoldGroup,
     responses=responses(404),
 )
-@responds(as_document(GoldGroupDocument.model_validate))
+@may(Action.LEAD, group=OwnedKind.GROUP)
+@responds(document)
 def unmark(group: Id, store: AppStore, actor: Actor) -> gold.GoldGroup:
     """Let a gold group be an ordinary one again; what people made of it is no longer shown."""
     return gold.unmark(store, group, actor=actor)

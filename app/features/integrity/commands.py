@@ -27,7 +27,7 @@ def doctor(
     """Look whether home and database are whole: what the log tells of, and what was computed; 1 if not."""
     from app.db.locks import server_lock
     from app.features.groups.replay import rebuild as rebuild_tables
-    from app.features.integrity.jobs import examine_everything
+    from app.features.integrity.home import examine_everything
 
     settings = read_settings()
     if rebuild:

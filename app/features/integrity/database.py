@@ -58,7 +58,7 @@ REBUILD = "Run touchline doctor --rebuild: it writes these tables anew from the 
 REBUILT = {
     "groups": "groups",
     "stations": "cameras",
-    "spare": "spare frames",
+    "spare": "unassigned frames",
     "noticed": "findings of imports",
 }
 """Parts of the ledger that ``rebuild`` writes, with the words for them."""
@@ -147,7 +147,7 @@ def _digests(session: Session) -> Check:
         present = {key: digest for key, (digest, _) in group.view_digests.items()}
         if (present, group.inputs_hash) != (views, hashed):
             apart.append(f"group {group.id}")
-    whole = f"of {count:,} groups and cameras, each that of what was said"
+    whole = f"of {count:,} groups and cameras, each matching its annotations"
     return compared("digests", whole, apart, "not of what was said", REBUILD)
 
 

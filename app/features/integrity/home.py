@@ -1,10 +1,11 @@
-"""A home beside its tables: settings, permissions, room, clock, leftovers, object stores."""
+"""A home beside its tables: settings, permissions, room, clock, leftovers, object stores; and all together."""
 
 from __future__ import annotations
 
 import os
 import secrets
 import shutil
+from contextlib import closing
 from datetime import UTC, datetime, timedelta
 from itertools import islice
 
@@ -14,16 +15,20 @@ import pysqlite3.dbapi2
 from app.config import Settings
 from app.db.check import Check
 from app.db.dialects.sqlite import MIN_SQLITE
-from app.db.home import open_to_others
+from app.db.home import make_home, open_to_others
 from app.db.leftovers import leftovers
 from app.db.log import entries_after, last_time
 from app.db.recovery.anchor import read_anchor
 from app.db.session import Session, text_of
 from app.db.store import Store
 from app.errors import ConflictError, InputError, ReviewError, StorageError
+from app.features.comments.check import examine_threads
 from app.features.datasets.orphan_queries import spare_calibrations, unread_uploads
+from app.features.integrity.database import examine
 from app.features.people.provider import Provider
 from app.features.people.sign_on_rules import linked_admins, read_rules
+from app.features.versions.check import examine_versions
+from app.features.what_if.service import examine_yields
 from app.mail import read_mail_server
 from app.object_store.store import ChangedObjectError, ObjectStore, open_store
 from app.plural import plural
@@ -31,8 +36,8 @@ from app.plural import plural
 KEYS = "Correct TOUCHLINE_STORES or the file of keys: docs/operations.md says what a store needs."
 CONDITIONS = "Update the store, or use another one: docs/operations.md says which."
 _UNCONDITIONAL = (
-    "reads whatever is there, although another content was asked for (If-Match): a frame that was"
-    " changed would be shown as the imported one"
+    "ignores If-Match and returns changed content: a changed frame would be shown as the imported "
+    "one"
 )
 _PROBE = ".touchline-check"
 _NO_CONTENT = '"touchline-asks-for-no-content"'
@@ -236,7 +241,7 @@ def _leftovers(settings: Settings) -> Check:
 def _calibrations(session: Session) -> Check:
     count = len(spare_calibrations(session))
     mend = "The server deletes them when it has nothing to do." if count else None
-    return Check("spare calibrations", True, f"{count:,} that no solution rests on", mend)
+    return Check("unused calibrations", True, f"{count:,} that no solution rests on", mend)
 
 
 def _uploads(session: Session, settings: Settings) -> Check:
@@ -244,3 +249,15 @@ def _uploads(session: Session, settings: Settings) -> Check:
     sentence = f"{len(found):,} kept for frames that no dataset reads"
     mend = f"Delete the folder {settings.uploads / found[0]}, and the others." if found else None
     return Check("uploads", True, sentence, mend)
+
+
+def examine_everything(settings: Settings) -> list[Check]:
+    """Look at everything; where the database cannot be opened, say why, and what lies around it."""
+    make_home(settings)
+    checks = [*examine_home(settings), examine_yields(settings)]
+    try:
+        with closing(Store.open(settings)) as store:
+            checks += [*examine_surroundings(store), *examine(store)]
+            return [*checks, examine_threads(store), *examine_versions(store)]
+    except StorageError as error:
+        return [*checks, Check("database", False, error.message, error.hint)]

@@ -37,10 +37,10 @@ from app.db.migrate import UNFINISHED, make_schema, schema_revision
 from app.db.recovery.anchor import anchor_of
 from app.db.session import Session
 from app.db.store import Store
+from app.durable import read_private
 from app.errors import DamagedError, InputError
 from app.features.tables import Base
 from app.plural import plural
-from app.private_file import read_private
 
 _PASSWORD = re.compile(r"://[^:/@]*:[^@]*@|[?&]password=")
 """In the address of a database, as its driver reads it."""

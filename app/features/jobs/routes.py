@@ -11,11 +11,13 @@ from app.features.jobs.queries import Job
 from app.features.jobs.schemas import JobDocument, JobKind, JobPage
 from app.http.cursor import parse_cursor
 from app.http.deps import Actor, AppServices, Id, SeesWhole
+from app.http.permissions import Action, OwnedKind, Where, may
 from app.http.problem import responses
 from app.http.respond import as_document, responds
+from app.http.route import Route
 from app.soccer.choices import JobState
 
-router = APIRouter(prefix="/jobs", tags=["jobs"])
+router = APIRouter(prefix="/jobs", tags=["jobs"], route_class=Route)
 
 Limit = Annotated[int, Query(ge=1, le=500)]
 Cursor = Annotated[str | None, Query(max_length=30, description="`next` of the page before.")]
@@ -25,6 +27,7 @@ DatasetFilter = Annotated[
 
 
 @router.get("", operation_id="listJobs", responses=responses(404))
+@may(Action.READ, dataset=OwnedKind.DATASET, where=Where.SOMEWHERE, whole=True)
 def list_jobs(
     services: AppServices,
     sight: SeesWhole,
@@ -49,6 +52,7 @@ def list_jobs(
 
 
 @router.get("/{job}", operation_id="getJob", response_model=JobDocument, responses=responses(404))
+@may(Action.READ, job=OwnedKind.JOB)
 def get_job(job: Id, services: AppServices) -> Job:
     """A job as it stands."""
     return services.jobs.get(job)
@@ -57,6 +61,7 @@ def get_job(job: Id, services: AppServices) -> Job:
 @router.delete(
     "/{job}", operation_id="cancelJob", response_model=JobDocument, responses=responses(404, 409)
 )
+@may(Action.LEAD, job=OwnedKind.JOB)
 @responds(as_document(JobDocument.model_validate))
 def cancel_job(job: Id, services: AppServices, actor: Actor) -> Job:
     """End a job: one that waits at once, one that runs at its next step; 409 when it is over."""

@@ -18,7 +18,7 @@ from app.db.json_columns import Json
 from app.db.store import Store
 from app.errors import JobCancelled, OverloadedError, ReviewError, TooLargeError
 from app.features.datasets.queries import has_more_groups
-from app.features.jobs.queries import CANCELLED, DONE, FAILED
+from app.features.jobs.queries import CANCELLED, DONE, FAILED, Job
 from app.formats.export_formats import lacking
 from app.plural import counted, plural
 from app.progress import TellProgress
@@ -168,7 +168,7 @@ _MEMORY = f"{_AGAIN} Where it happens often, give more memory."
 _ENDS: dict[EndReason, tuple[str, str]] = {
     "memory": ("needs more memory than there is", _MEMORY),
     "killed": ("was killed, most likely for want of memory", _MEMORY),
-    "terminated": ("was told to end", _AGAIN),
+    "terminated": ("was stopped", _AGAIN),
     "crash": ("crashed", f"{_AGAIN} Where it crashes again, report it."),
     "processor": ("took too long to work out", _AGAIN),
     "silence": ("came to no next step", f"{_AGAIN} The disk or a store may not answer."),
@@ -206,11 +206,13 @@ def counting(progress: JobProgress, what: str) -> TellProgress:
 class JobProgress:
     """How far a job is; its work calls it often, and it costs next to nothing.
 
-    ``job_id`` is the job's, for what its work writes under that name.
+    Attributes:
+        job: The job as it was when it was asked for, or taken up: its ``request`` above all, which is
+            all that its work needs to know.
     """
 
-    def __init__(self, job_id: int, closing: threading.Event):
-        self.job_id = job_id
+    def __init__(self, job: Job, closing: threading.Event):
+        self.job = job
         self.place: tuple[int, int | None, str] = (0, None, "")
         self.cancelled = threading.Event()
         self._closing = closing
@@ -224,6 +226,16 @@ class JobProgress:
         _, last_total, last_sentence = self.place
         self.place = (done, last_total if total is None else total, sentence or last_sentence)
         self.check()
+
+    @property
+    def job_id(self) -> int:
+        """The job's id, for what its work writes under that name."""
+        return self.job.id
+
+    @property
+    def dataset_id(self) -> int:
+        """The job's dataset; 0, which none is, where it has none."""
+        return self.job.dataset_id or 0
 
     def require_wanted(self) -> None:
         """Raise ``JobCancelled`` where somebody cancelled it; a server that stops did not."""
@@ -245,15 +257,16 @@ class JobProgress:
 class JobRun:
     """A job of this process that waits or runs."""
 
-    id: int
-    kind: str
-    dataset_id: int | None
-    actor: str
     work: Work
     progress: JobProgress
     over: threading.Event = field(default_factory=threading.Event)
     counted: bool = False
     """Whether its record says that it was begun here."""
+
+    @property
+    def job(self) -> Job:
+        """The job."""
+        return self.progress.job
 
     @property
     def columns(self) -> dict[str, Any]:
@@ -265,9 +278,9 @@ class JobRun:
         decides."""
         try:
             self.progress.require_wanted()
-            with structlog.contextvars.bound_contextvars(job=self.id):
+            with structlog.contextvars.bound_contextvars(job=self.job.id):
                 result = self.work(self.progress)
-            told = ending(self.kind, result)
+            told = ending(self.job.kind, result)
             return {"state": DONE, "result": result, **({} if told is None else {"sentence": told})}
         except JobCancelled:
             if not self.progress.cancelled.is_set():
@@ -278,9 +291,10 @@ class JobRun:
         except ReviewError as error:
             return _failure(error.message, error.hint, error.pointer)
         except Exception:
-            log.exception("job failed", job=self.id, kind=self.kind)
+            log.exception("job failed", job=self.job.id, kind=self.job.kind)
             return _failure(
-                "something went wrong inside the server", f"The server's log names job {self.id}."
+                "something went wrong inside the server",
+                f"The server's log names job {self.job.id}.",
             )
 
 
@@ -304,23 +318,24 @@ class RunQueue:
     @property
     def ready(self) -> list[JobRun]:
         """Those that wait, and for nothing of their own dataset that runs."""
-        taken = {run.dataset_id for run in self.running} - {None}
-        return [run for run in self.waiting if run.dataset_id not in taken]
+        taken = {run.job.dataset_id for run in self.running} - {None}
+        return [run for run in self.waiting if run.job.dataset_id not in taken]
 
     def ready_beside(self, kinds: Collection[str]) -> list[JobRun]:
         """Those of some kinds that are ready, and of whose dataset nothing was asked for before."""
         first: dict[int | None, int] = {}
         for run in self.waiting:
-            first[run.dataset_id] = min(run.id, first.get(run.dataset_id, run.id))
+            first[run.job.dataset_id] = min(run.job.id, first.get(run.job.dataset_id, run.job.id))
         return [
             run
             for run in self.ready
-            if run.kind in kinds and (run.dataset_id is None or run.id == first[run.dataset_id])
+            if run.job.kind in kinds
+            and (run.job.dataset_id is None or run.job.id == first[run.job.dataset_id])
         ]
 
     def running_of(self, job_id: int) -> JobRun | None:
         """The run of a job, where it runs."""
-        return next((run for run in self.running if run.id == job_id), None)
+        return next((run for run in self.running if run.job.id == job_id), None)
 
     def joined_by(self, *runs: JobRun) -> RunQueue:
         """With more that wait."""

@@ -14,6 +14,7 @@ import threading
 from collections.abc import Callable, Collection, Iterable, Iterator
 from concurrent.futures import Executor
 from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext, suppress
+from dataclasses import replace
 from time import monotonic
 from typing import Any
 
@@ -82,21 +83,21 @@ class Jobs(JobRecords):
         self._workers: list[threading.Thread] = []
         self._turns: dict[str, int] = {}
         """When each person had a turn last, by the number of the turn."""
-        self._resumers: dict[str, Callable[[Job], Work]] = {}
+        self._resumers: dict[str, Work] = {}
         self._beginners: list[Callable[[], None]] = []
 
-    def resumes(self, kind: str, work_of: Callable[[Job], Work]) -> None:
+    def resumes(self, kind: str, work: Work) -> None:
         """Start jobs of a kind again after a restart; to be told before ``start``.
 
         Args:
             kind: The kind.
-            work_of: From a job's record (its ``request`` above all) to its work.
+            work: Finds what it is asked for in the job's record (``progress.job.request``).
         """
-        self._resumers[kind] = work_of
+        self._resumers[kind] = work
 
-    def makes(self, kind: str, work_of: Callable[[Job], Work]) -> None:
-        """How the work of a kind is made from its record, where a process carries out what another
-        one was asked for; it is not begun again after a death."""
+    def makes(self, kind: str, work: Work) -> None:
+        """How the work of a kind is done where a process carries out what another one was asked for;
+        it is not begun again after a death."""
 
     def leads(self) -> bool:
         """Whether this process carries out jobs and what else is one process's."""
@@ -164,8 +165,7 @@ class Jobs(JobRecords):
                 note_job(session, actor, job.id, kind, title, dataset_id)
             then(session, job)
             if known is None:
-                progress = JobProgress(job.id, self._closing)
-                enter(JobRun(job.id, kind, dataset_id, actor, work, progress))
+                enter(JobRun(work, JobProgress(job, self._closing)))
         if known is not None:
             return job
         self._announce(job)
@@ -187,7 +187,7 @@ class Jobs(JobRecords):
         if job.state in (DONE, FAILED):
             raise ConflictError(f"job {job_id} is over already")
         with self._changed:
-            run = next((item for item in self._queue.waiting if item.id == job_id), None)
+            run = next((item for item in self._queue.waiting if item.job.id == job_id), None)
             running = self._queue.running_of(job_id)
             if run is not None:
                 self._queue = self._queue.left_by(run)
@@ -206,7 +206,7 @@ class Jobs(JobRecords):
         self._save(job_id, dataset_id=dataset_id)
         running = self._queue.running_of(job_id)
         if running is not None:
-            running.dataset_id = dataset_id
+            running.progress.job = replace(running.job, dataset_id=dataset_id)
 
     def ids_of(self, dataset_id: int, *kinds: str) -> list[int]:
         """Ids of a dataset's jobs that wait or run here, of some kinds or, without any, of all.
@@ -215,9 +215,9 @@ class Jobs(JobRecords):
         nobody works on is none.
         """
         return [
-            run.id
+            run.job.id
             for run in self._queue.runs
-            if run.dataset_id == dataset_id and (not kinds or run.kind in kinds)
+            if run.job.dataset_id == dataset_id and (not kinds or run.job.kind in kinds)
         ]
 
     def end_with(self, session: Session, ids: Collection[int]) -> None:
@@ -228,7 +228,7 @@ class Jobs(JobRecords):
         """Let jobs write nothing more, nor begin: without asking the database, so that it can be
         called when a transaction is kept (``Session.once_kept``)."""
         for run in self._queue.runs:
-            if run.id in ids:
+            if run.job.id in ids:
                 run.progress.cancelled.set()
 
     def cancel_each(self, ids: Iterable[int]) -> None:
@@ -253,19 +253,19 @@ class Jobs(JobRecords):
         """
         self.cancel_kind(dataset_id)
         for run in self._queue.running:
-            if run.dataset_id == dataset_id and not run.over.wait(CLOSE_SECONDS):
-                raise ConflictError(f"job {run.id} of this dataset is still running")
+            if run.job.dataset_id == dataset_id and not run.over.wait(CLOSE_SECONDS):
+                raise ConflictError(f"job {run.job.id} of this dataset is still running")
 
     def wait(self, job_id: int, seconds: float) -> Job:
         """A job once it is over, or as it stands after some seconds."""
-        run = next((item for item in self._queue.runs if item.id == job_id), None)
+        run = next((item for item in self._queue.runs if item.job.id == job_id), None)
         if run is not None:
             run.over.wait(seconds)
         return self.get(job_id)
 
     def is_open(self, job_id: int, kind: str) -> bool:
         """Whether a job of a kind waits or runs here; waits for nothing."""
-        return any((run.id, run.kind) == (job_id, kind) for run in self._queue.runs)
+        return any((run.job.id, run.job.kind) == (job_id, kind) for run in self._queue.runs)
 
     def are_idle(self) -> bool:
         """Whether none waits or runs."""
@@ -288,17 +288,17 @@ class Jobs(JobRecords):
             worker.join(max(until - monotonic(), 0.0))
         if any(worker.is_alive() for worker in self._workers):
             for run in self._queue.running:
-                log.warning("a job did not end in time", job=run.id)
+                log.warning("a job did not end in time", job=run.job.id)
                 self._take_back(run)
 
     def _waiting_for(self, session: Session, new: NewJob) -> int | None:
         """Id of the waiting job of a kind and dataset; one without a dataset is its maker's."""
         place = (new.kind, new.dataset_id)
         for run in self._queue.waiting:
-            if (run.kind, run.dataset_id) != place:
+            if (run.job.kind, run.job.dataset_id) != place:
                 continue
-            if new.dataset_id is not None or need_job(session, run.id).actor == new.actor:
-                return run.id
+            if new.dataset_id is not None or need_job(session, run.job.id).actor == new.actor:
+                return run.job.id
         return None
 
     def _require_room(self, session: Session, actor: str) -> None:
@@ -310,13 +310,13 @@ class Jobs(JobRecords):
             )
         if own >= self._capacity - self._capacity // LEFT_TO_OTHERS:
             raise OverloadedError(
-                f"{own} jobs that you asked for wait already",
+                f"{own} of your jobs are already waiting",
                 hint="Send it again when some of them are done.",
             )
 
     def _who_waits(self, _session: Session) -> list[str]:
         """Who asked for each job that waits."""
-        return [run.actor for run in self._queue.waiting]
+        return [run.job.actor for run in self._queue.waiting]
 
     @contextmanager
     def _entry(self) -> Iterator[Callable[[JobRun], None]]:
@@ -359,9 +359,7 @@ class Jobs(JobRecords):
         return job.kind in self._resumers and job.tries < MOST_TRIES
 
     def _run(self, job: Job) -> JobRun:
-        work = self._resumers[job.kind](job)
-        progress = JobProgress(job.id, self._closing)
-        return JobRun(job.id, job.kind, job.dataset_id, job.actor, work, progress)
+        return JobRun(self._resumers[job.kind], JobProgress(job, self._closing))
 
     def _wake(self) -> None:
         if not self._workers and self._queue.waiting:
@@ -379,7 +377,7 @@ class Jobs(JobRecords):
             try:
                 self._carry_out(run)
             except Exception:
-                log.exception("the record of a job could not be written", job=run.id)
+                log.exception("the record of a job could not be written", job=run.job.id)
             finally:
                 with self._changed:
                     self._queue = self._queue.left_by(run)
@@ -396,13 +394,13 @@ class Jobs(JobRecords):
             if self._closing.is_set():
                 return None
             run = min(ready(), key=self._turn_of)
-            self._turns[run.actor] = max(self._turns.values(), default=0) + 1
+            self._turns[run.job.actor] = max(self._turns.values(), default=0) + 1
             self._queue = self._queue.begun(run)
             return run
 
     def _turn_of(self, run: JobRun) -> tuple[bool, int, int]:
         """Its place among those that may run: the smallest is the next."""
-        return run.kind not in PROMPT, self._turns.get(run.actor, 0), run.id
+        return run.job.kind not in PROMPT, self._turns.get(run.job.actor, 0), run.job.id
 
     def _carry_out(self, run: JobRun) -> None:
         if not self._begin(run):
@@ -423,7 +421,7 @@ class Jobs(JobRecords):
 
     def _begin(self, run: JobRun) -> bool:
         """Write that a job is begun; False where it shall not be."""
-        self._save(run.id, state=RUNNING, started=now(), begun=1)
+        self._save(run.job.id, state=RUNNING, started=now(), begun=1)
         return True
 
     def _take_back(self, run: JobRun) -> None:
@@ -432,7 +430,7 @@ class Jobs(JobRecords):
             counted, run.counted = run.counted, False
         if counted:
             with suppress(StorageError):
-                self._save(run.id, begun=-1)
+                self._save(run.job.id, begun=-1)
 
     def _finish(self, run: JobRun, by: str | None = None, **values: Any) -> Job | None:
         """Save how a job ended; ``by``: see ``cancel``. None where it cannot be written."""
@@ -440,7 +438,7 @@ class Jobs(JobRecords):
         # Where the disk is full for a moment, the record waits for it.
         for _ in range(5):
             try:
-                job = self._save_end(run.id, by, **{**place, "ended": now(), **values})
+                job = self._save_end(run.job.id, by, **{**place, "ended": now(), **values})
             except StorageError as error:
                 log.warning("the record of a job could not be written", error=str(error))
                 self._closing.wait(1.0)

@@ -51,8 +51,8 @@ _WORD = "job"
 class SharedProgress(JobProgress):
     """A progress of which another process may say that its work shall end."""
 
-    def __init__(self, job_id: int, closing: threading.Event, store: Store):
-        super().__init__(job_id, closing)
+    def __init__(self, job: Job, closing: threading.Event, store: Store):
+        super().__init__(job, closing)
         self._store = store
 
     def require_wanted(self) -> None:
@@ -72,7 +72,7 @@ class SharedJobs(Jobs):
 
     def __init__(self, store: Store, *, pool: Pool = nullcontext):
         super().__init__(store, pool=pool)
-        self._makers: dict[str, Callable[[Job], Work]] = {}
+        self._makers: dict[str, Work] = {}
         self._look, self._ended = threading.Event(), threading.Event()
         self._lost: threading.Event | None = None
         """Set once the claim is lost; None: it is another's."""
@@ -80,14 +80,14 @@ class SharedJobs(Jobs):
         self._alone = True
         """Before the start no other process knows of this one: what it is asked for it does itself."""
 
-    def makes(self, kind: str, work_of: Callable[[Job], Work]) -> None:
+    def makes(self, kind: str, work: Work) -> None:
         """See ``Jobs``."""
-        self._makers[kind] = work_of
+        self._makers[kind] = work
 
-    def resumes(self, kind: str, work_of: Callable[[Job], Work]) -> None:
+    def resumes(self, kind: str, work: Work) -> None:
         """See ``Jobs``."""
-        super().resumes(kind, work_of)
-        self.makes(kind, work_of)
+        super().resumes(kind, work)
+        self.makes(kind, work)
 
     def leads(self) -> bool:
         """See ``Jobs``."""
@@ -185,7 +185,9 @@ class SharedJobs(Jobs):
         try:
             self._store.say(f"{_WORD} {job.id}")
         except StorageError as error:
-            log.warning("other processes were not told of a job", job=job.id, error=error.message)
+            log.warning(
+                "other processes were not notified of a job", job=job.id, error=error.message
+            )
 
     def _hear(self, word: str) -> None:
         kind, _, number = word.partition(" ")
@@ -263,7 +265,7 @@ class SharedJobs(Jobs):
             rows = read_jobs(session, states=OPEN, limit=MOST)
         for job in reversed(rows):
             self._follow_ending(job)
-            if job.state == WAITING and all(run.id != job.id for run in self._queue.runs):
+            if job.state == WAITING and all(run.job.id != job.id for run in self._queue.runs):
                 self._join(job)
 
     def _follow_ending(self, job: Job) -> None:
@@ -273,20 +275,10 @@ class SharedJobs(Jobs):
 
     def _join(self, job: Job) -> None:
         lost = self._lost
-        maker = self._makers.get(job.kind)
-        if lost is None or maker is None:
+        work = self._makers.get(job.kind)
+        if lost is None or work is None:
             return
-        try:
-            work = maker(job)
-        except Exception:
-            log.exception("the work of a job could not be made", job=job.id)
-            sentence = "It could not be read what was asked for. Ask for it again."
-            problem = {"detail": sentence, "hint": None, "pointer": None}
-            ended: dict[str, Any] = {"state": FAILED, "ended": now(), "sentence": sentence}
-            self._save_end(job.id, **ended, problem=problem)
-            return
-        progress = SharedProgress(job.id, lost, self._store)
-        run = JobRun(job.id, job.kind, job.dataset_id, job.actor, work, progress)
+        run = JobRun(work, SharedProgress(job, lost, self._store))
         with self._changed:
             self._queue = self._queue.joined_by(run)
             self._wake()
@@ -302,8 +294,8 @@ class SharedJobs(Jobs):
         self._look.set()
 
     def _require_made(self, run: JobRun) -> None:
-        if run.kind not in self._makers:
-            raise RuntimeError(f"no process could make the work of {run.kind}")
+        if run.job.kind not in self._makers:
+            raise RuntimeError(f"no process could make the work of {run.job.kind}")
 
     def _waiting_for(self, session: Session, new: NewJob) -> int | None:
         """See ``Jobs``."""
@@ -320,11 +312,11 @@ class SharedJobs(Jobs):
     def _begin(self, run: JobRun) -> bool:
         """See ``Jobs``: another process may have ended or begun it."""
         with self._store.write() as session:
-            job = read_job(session, run.id)
+            job = read_job(session, run.job.id)
             if job is None or job.state != WAITING or not (self._alone or self.leads()):
                 return False
-            update_job(session, run.id, state=RUNNING, started=now(), begun=1)
-            job = need_job(session, run.id)
+            update_job(session, run.job.id, state=RUNNING, started=now(), begun=1)
+            job = need_job(session, run.job.id)
         self._announce(job)
         return True
 

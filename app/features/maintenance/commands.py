@@ -18,7 +18,8 @@ WHEN = "2030-01-31T18:00; without an offset in this machine's time."
 @commands.command()
 def maintenance(
     text: Annotated[
-        str | None, typer.Argument(help="The notice, one line; without it the present one is told.")
+        str | None,
+        typer.Argument(help=("The notice, one line; without it the present notice is printed.")),
     ] = None,
     starts: Annotated[
         str | None, typer.Option(metavar="TIME", help=f"Show it from then on: {WHEN}")

@@ -6,24 +6,27 @@ from fastapi import APIRouter, Request, Response
 from prometheus_client import CONTENT_TYPE_LATEST, CollectorRegistry, generate_latest
 
 from app.errors import BusyError, NotFoundError, OverloadedError, StorageError
-from app.features.maintenance.schemas import BannerDocument, Health, NewBanner, Readiness
-from app.features.maintenance.service import clear_banner, set_banner
+from app.features.maintenance.schemas import Health, NewBanner, Readiness
+from app.features.maintenance.service import Banner, clear_banner, set_banner
 from app.features.queue.changes import read_position
 from app.http.deps import Actor, AppStore
 from app.http.metrics import SharedNumbers
+from app.http.permissions import Action, may, open_to_all
 from app.http.problem import responses
+from app.http.request_limits import limit
+from app.http.route import Route
 
-maintenance_router = APIRouter(prefix="/maintenance", tags=["sessions"])
+maintenance_router = APIRouter(prefix="/maintenance", tags=["sessions"], route_class=Route)
 
 
 @maintenance_router.put("", operation_id="setMaintenance", responses=responses(413, 415))
-def put_maintenance(new: NewBanner, store: AppStore, actor: Actor) -> BannerDocument:
+@may(Action.ADMINISTER)
+def put_maintenance(new: NewBanner, store: AppStore, actor: Actor) -> Banner:
     """Show a notice on every page, in place of the one before.
 
     Windows that are open show it within some seconds; the login page has it, too.
     """
-    banner = set_banner(store, new.text, starts=new.starts, until=new.until, actor=actor)
-    return BannerDocument.model_validate(banner)
+    return set_banner(store, new.text, starts=new.starts, until=new.until, actor=actor)
 
 
 @maintenance_router.delete(
@@ -33,6 +36,7 @@ def put_maintenance(new: NewBanner, store: AppStore, actor: Actor) -> BannerDocu
     response_class=Response,
     responses={**responses(404), 204: {"description": "It is gone."}},
 )
+@may(Action.ADMINISTER)
 def delete_maintenance(store: AppStore, actor: Actor) -> Response:
     """Take the notice away."""
     if not clear_banner(store, actor=actor):
@@ -40,16 +44,20 @@ def delete_maintenance(store: AppStore, actor: Actor) -> Response:
     return Response(status_code=204)
 
 
-health_router = APIRouter(tags=["health"])
+health_router = APIRouter(tags=["health"], route_class=Route)
 
 
 @health_router.get("/healthz", operation_id="getHealth", responses=responses())
+@open_to_all
+@limit(None)
 async def get_health(request: Request) -> Health:
     """Whether the process answers; it needs no thread and no database."""
     return Health(status="ok", version=request.app.version)
 
 
 @health_router.get("/readyz", operation_id="getReadiness", responses=responses())
+@open_to_all
+@limit(None)
 def get_readiness(store: AppStore) -> Readiness:
     """Whether the database answers, keeps changes, and was not seen to be damaged; else 503."""
     store.require_undamaged()
@@ -70,6 +78,8 @@ def get_readiness(store: AppStore) -> Readiness:
     response_class=Response,
     responses={**responses(), 200: {"content": {CONTENT_TYPE_LATEST: {}}}},
 )
+@may(Action.ADMINISTER)
+@limit(None)
 def get_metrics(request: Request) -> Response:
     """Requests, lanes, event streams, processes, jobs, files and room, in Prometheus' text format."""
     shared: SharedNumbers | None = getattr(request.app.state, "shared_metrics", None)

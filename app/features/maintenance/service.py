@@ -12,6 +12,7 @@ from app.db.store import Store
 from app.errors import InputError
 from app.features.audit.audit_events import note_deed
 from app.features.maintenance.queries import find_banner, put_banner
+from app.finite import Moment
 from app.hosts import is_local
 
 LONGEST = 300
@@ -28,8 +29,8 @@ class Banner:
     """
 
     text: str
-    starts: str | None = None
-    until: str | None = None
+    starts: Moment | None = None
+    until: Moment | None = None
 
 
 def read_banner(store: Store) -> Banner | None:
@@ -85,8 +86,8 @@ def exposure_of(settings: Settings) -> str | None:
     secure = (settings.url or "").startswith("https://")
     if not is_local(settings.host) and not settings.team:
         return (
-            f"{settings.host} can be reached by other machines, and without accounts everybody who "
-            "reaches it could change everything. Use 127.0.0.1, or serve a team with --team."
+            f"{settings.host} can be reached from other machines, and without accounts anyone who "
+            f"reaches it could change everything. Use 127.0.0.1, or serve a team with --team."
         )
     if not is_local(settings.host) and not secure:
         return (

@@ -28,7 +28,7 @@ def pitch(
         str | None,
         typer.Argument(
             metavar="[IN]",
-            help="Folder or zip of line files; the name of a dataset, where nothing is called so.",
+            help="Folder or zip of line files, or else the name of a dataset.",
         ),
     ] = None,
     *,
@@ -85,7 +85,7 @@ def _of_dataset(
 
 
 def _print(found: DatasetPitches, match: str | None, json_: bool) -> None:
-    from app.features.datasets.match_choice import of_match
+    from app.features.datasets.service import of_match
 
     items = of_match(found.items, match)
     if json_:
@@ -169,7 +169,7 @@ def _pictures_of_dataset(
     workers: int | None,
     json_: bool,
 ) -> None:
-    from app.features.datasets.match_choice import need_match
+    from app.features.datasets.service import need_match
     from app.features.match_estimates.pictures import (
         change_pictures,
         estimate_pictures,
@@ -212,7 +212,7 @@ def print_sentences(states: Iterable[Any], as_json: bool) -> None:
     print_rows(
         states,
         as_json,
-        lambda state: {**asdict(state), "sentence": state.sentence},
+        asdict,
         lambda state: f"{state.match}: {state.sentence}" if state.match else state.sentence,
     )
 
@@ -237,7 +237,7 @@ def positions(
     Without --match it is shared where what it was estimated from has changed since. The policy
     must say calibration.share_position; `touchline solve` computes what follows.
     """
-    from app.features.datasets.match_choice import of_match
+    from app.features.datasets.service import of_match
     from app.features.match_estimates.positions import (
         get_positions,
         share_positions,

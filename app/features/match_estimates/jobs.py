@@ -49,27 +49,27 @@ class MatchesAsked:
     Attributes:
         jobs: Where it runs, and where what follows from it is queued.
         store: The database.
-        dataset_id: The dataset.
-        request: As its row keeps it, the same after a restart: ``match`` by name (none: all), and
-            what else its kind takes.
-        actor: Who wants it.
+        job: Its ``request`` has ``match`` by name (none: all), and what else its kind takes.
     """
 
     jobs: Jobs
     store: Store
-    dataset_id: int
-    request: dict[str, Json]
-    actor: str
+    job: Job
+
+    @property
+    def dataset_id(self) -> int:
+        """The dataset."""
+        return self.job.dataset_id or 0
 
     @property
     def matches(self) -> list[str] | None:
         """The matches by name; None: all."""
-        match = self.request.get("match")
+        match = self.job.request.get("match")
         return None if match is None else [match]
 
     def solve(self) -> None:
         """Solve what it leaves stale, soon."""
-        request_solve(self.jobs, self.store, self.dataset_id, actor=self.actor)
+        request_solve(self.jobs, self.store, self.dataset_id, actor=self.job.actor)
 
 
 def with_matches(store: Store, dataset: str | int, matches: Collection[str] | None) -> DatasetHead:
@@ -150,7 +150,7 @@ class MatchJob:
         return jobs.submit(
             self.kind,
             self.title.format(found.name),
-            self._work(MatchesAsked(jobs, store, found.id, request, actor)),
+            self._work(jobs, store),
             dataset_id=found.id,
             actor=actor,
             request=request,
@@ -158,13 +158,7 @@ class MatchJob:
 
     def take_up(self, jobs: Jobs, store: Store) -> None:
         """Let another process carry out what this one is asked for, or the next one go on with it."""
-
-        def work_of(job: Job) -> Work:
-            return self._work(
-                MatchesAsked(jobs, store, job.dataset_id or 0, job.request, job.actor)
-            )
-
-        (jobs.resumes if self.resumes else jobs.makes)(self.kind, work_of)
+        (jobs.resumes if self.resumes else jobs.makes)(self.kind, self._work(jobs, store))
 
     def take_back(
         self, jobs: Jobs, store: Store, dataset: str | int, match: str | None = None, *, actor: str
@@ -192,8 +186,8 @@ class MatchJob:
         jobs.cancel_each(ended)
         return job
 
-    def _work(self, asked: MatchesAsked) -> Work:
-        return lambda progress: self.work(asked, progress)
+    def _work(self, jobs: Jobs, store: Store) -> Work:
+        return lambda progress: self.work(MatchesAsked(jobs, store, progress.job), progress)
 
 
 def _estimate(asked: MatchesAsked, progress: JobProgress) -> Json:
@@ -226,7 +220,7 @@ def _share(asked: MatchesAsked, progress: JobProgress) -> Json:
                 asked.store,
                 asked.dataset_id,
                 asked.matches,
-                actor=asked.actor,
+                actor=asked.job.actor,
                 executor=executor,
                 progress=counting(progress, "matches"),
                 require_wanted=progress.require_wanted,
@@ -251,7 +245,7 @@ POSITIONS = MatchJob(
 def _adjust(asked: MatchesAsked, progress: JobProgress) -> Json:
     """The proposal and what of it was saved; ``what`` is asked for as ``rig.accept`` takes it (none:
     nothing), with the ``inputs`` of the proposal that a person saw: no other one is saved."""
-    what, inputs = asked.request["what"], asked.request["inputs"]
+    what, inputs = asked.job.request["what"], asked.job.request["inputs"]
     progress(0, None, "Adjusting cameras to lines and balls.")
     with asked.jobs.pool() as executor:
         proposed = propose(asked.store, asked.dataset_id, executor=executor)
@@ -262,7 +256,7 @@ def _adjust(asked: MatchesAsked, progress: JobProgress) -> Json:
                 "balls, lines or cameras have changed since that proposal",
                 hint="Look at a new one, and accept that.",
             )
-        accept(asked.store, proposed, what, actor=asked.actor)
+        accept(asked.store, proposed, what, actor=asked.job.actor)
         asked.solve()
     return {**proposal_values(proposed), "accepted": what}
 

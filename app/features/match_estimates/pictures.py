@@ -19,14 +19,14 @@ from app.features.datasets.service import need_dataset, read_dataset_head, requi
 from app.features.groups.edit import SetPicture
 from app.features.groups.group_edits import give_edits
 from app.features.groups.queries import StoredGroup, read_groups
-from app.features.match_estimates.picture_queries import MatchPictures, match_pictures
+from app.features.match_estimates.queries import MatchPictures, match_pictures
 from app.features.pitches.queries import groups_of_match, match_pitches
 from app.progress import TellProgress
 from app.soccer.group import Group, View
 from app.soccer.picture import PictureGeometry
 from app.soccer.policy import CalibrationPolicy
 from app.solving.match_picture import PictureEstimate, PictureFrame, estimate_match_picture
-from app.workers.fan_out import fan_out
+from app.workers.executors import fan_out
 
 _BATCH = 100
 

@@ -24,7 +24,7 @@ from app.features.groups.edit_codec import edit_from_json
 from app.features.groups.group_edits import give_edits
 from app.features.groups.queries import StoredGroup, read_groups
 from app.features.jobs.queries import Job
-from app.features.match_estimates.picture_queries import (
+from app.features.match_estimates.queries import (
     POSITION,
     MatchPositions,
     last_share,
@@ -40,7 +40,7 @@ from app.soccer.solution import SOLVER_VERSION, Calibration
 from app.solving.calibrate import calibrate_station, calibration_key
 from app.solving.match_model import FramePlace
 from app.solving.match_position import Places, pan_of, place_of
-from app.workers.fan_out import fan_out
+from app.workers.executors import fan_out
 
 _BATCH = 100
 _DIGITS = 4
@@ -52,13 +52,15 @@ class PositionState:
     """The shared position of one match.
 
     Attributes:
+        match: Name of the match.
         groups: How many it has.
         views: Pictures of the main camera that have lines.
-        shared: How many of them have a position.
-        mean: The mean of those, pitch frame, metres; None without any.
+        shared: How many of them have what the others say of its position.
+        mean: Where it stands on average, pitch frame, metres; None where none does.
         sigma_m: How far off it may be for one picture, the median over pictures and axes.
-        current: Whether it would be estimated from the same now; None where it never was.
+        current: Whether it would be estimated from the same now; None: nothing is shared.
         used: Whether the policy uses it.
+        sentence: All that in words.
     """
 
     match: str
@@ -69,22 +71,7 @@ class PositionState:
     sigma_m: float | None
     current: bool | None
     used: bool
-
-    @property
-    def sentence(self) -> str:
-        """What people read of it."""
-        if self.current is None:
-            return f"none of {self.views} pictures of the main camera uses a shared position"
-        verb = "use" if self.used else "keep"
-        kept = f"{self.shared} of {self.views} pictures of the main camera {verb} a shared position"
-        if self.mean is not None:
-            x, y, z = self.mean
-            kept += f", ({x:.1f}, {y:.1f}, {z:.1f}) m on average, sigma {self.sigma_m:.2f} m"
-        changed = "what it was estimated from has changed since"
-        if not self.used:
-            kept += "; the policy does not use it"
-            return kept if self.current else f"{kept}, and {changed}"
-        return kept if self.current else f"{kept}; {changed}: share it again"
+    sentence: str = ""
 
 
 @dataclass(frozen=True)
@@ -272,7 +259,7 @@ def _state(item: MatchPositions, then: str | None, policy: CalibrationPolicy) ->
     if item.positions:
         x, y, z = np.mean([at.mean for at in item.positions], axis=0).tolist()
         sigma = float(np.median([at.sigma for at in item.positions]))
-    return PositionState(
+    found = PositionState(
         match=item.match,
         groups=len(item.groups),
         views=item.views,
@@ -282,6 +269,22 @@ def _state(item: MatchPositions, then: str | None, policy: CalibrationPolicy) ->
         current=None if then is None else then == _inputs(item, policy),
         used=policy.share_position,
     )
+    return replace(found, sentence=_sentence(found))
+
+
+def _sentence(state: PositionState) -> str:
+    if state.current is None:
+        return f"none of {state.views} pictures of the main camera uses a shared position"
+    verb = "use" if state.used else "keep"
+    kept = f"{state.shared} of {state.views} pictures of the main camera {verb} a shared position"
+    if state.mean is not None:
+        x, y, z = state.mean
+        kept += f", ({x:.1f}, {y:.1f}, {z:.1f}) m on average, sigma {state.sigma_m:.2f} m"
+    changed = "what it was estimated from has changed since"
+    if not state.used:
+        kept += "; the policy does not use it"
+        return kept if state.current else f"{kept}, and {changed}"
+    return kept if state.current else f"{kept}; {changed}: share it again"
 
 
 def _inputs(item: MatchPositions, policy: CalibrationPolicy) -> str:

@@ -202,7 +202,7 @@ def take_back(store: Store, dataset: str | int, *, actor: str) -> int:
         ]
     if not adjusted:
         raise ConflictError(
-            "no static camera was adjusted by its last edit, so there is nothing to take back"
+            "no static camera was adjusted by its last edit, so there is nothing to undo"
         )
     states = [load_station(store, station) for station in adjusted]
     return undo_stations(store, states, actor=actor)

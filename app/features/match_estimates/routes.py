@@ -26,13 +26,19 @@ from app.features.solve.jobs import change_and_solve
 from app.http.cursor import paged
 from app.http.deps import Actor, AppServices, AppStore, DatasetPath
 from app.http.job_responses import by_job, job_answer
+from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import responses
+from app.http.request_limits import QUESTIONS, limit
 from app.http.respond import document, responds
+from app.http.route import Route
 
-positions_router = APIRouter(prefix="/datasets/{dataset}/positions", tags=["datasets"])
+positions_router = APIRouter(
+    prefix="/datasets/{dataset}/positions", tags=["datasets"], route_class=Route
+)
 
 
 @positions_router.get("", operation_id="listPositions", responses=responses(404))
+@may(Action.READ, dataset=OwnedKind.DATASET, whole=True)
 @paged()
 def list_positions(dataset: DatasetPath, store: AppStore) -> SharedPositionsDocument:
     """Where each match's main camera stands, as far as that is shared with its pictures."""
@@ -40,6 +46,7 @@ def list_positions(dataset: DatasetPath, store: AppStore) -> SharedPositionsDocu
 
 
 @positions_router.post("", operation_id="sharePositions", **by_job(404, 409, 413, 415))
+@may(Action.LEAD, dataset=OwnedKind.DATASET)
 @responds(job_answer)
 def share_positions(
     dataset: DatasetPath, request: MatchRequest, services: AppServices, actor: Actor
@@ -54,6 +61,7 @@ def share_positions(
 
 
 @positions_router.delete("", operation_id="takePositionsBack", **by_job(404, 409))
+@may(Action.LEAD, dataset=OwnedKind.DATASET)
 @responds(job_answer)
 def take_back_positions(
     dataset: DatasetPath,
@@ -68,10 +76,11 @@ def take_back_positions(
     return POSITIONS.take_back(services.jobs, services.store, dataset, match, actor=actor)
 
 
-rig_router = APIRouter(tags=["stations"])
+rig_router = APIRouter(tags=["stations"], route_class=Route)
 
 
 @rig_router.post("/datasets/{dataset}/rig", operation_id="adjustRig", **by_job(404, 409, 413, 415))
+@may(Action.LEAD, dataset=OwnedKind.DATASET)
 @responds(job_answer)
 def adjust_rig(
     dataset: DatasetPath, request: RigRequest, services: AppServices, actor: Actor
@@ -96,18 +105,21 @@ def _taken_back(count: int) -> Response:
     response_model=RigTakenBack,
     responses=responses(404, 409),
 )
+@may(Action.LEAD, dataset=OwnedKind.DATASET)
 @responds(_taken_back)
 def delete_rig(dataset: DatasetPath, services: AppServices, actor: Actor) -> int:
     """Take an accepted rig back, all its cameras at once; 409 when there is none."""
     return take_rig_back(services.jobs, services.store, dataset, actor=actor)
 
 
-noise_router = APIRouter(prefix="/datasets/{dataset}/noise", tags=["policies"])
+noise_router = APIRouter(prefix="/datasets/{dataset}/noise", tags=["policies"], route_class=Route)
 
 
 @noise_router.get(
     "", operation_id="getNoise", response_model=NoiseDocument, responses=responses(404)
 )
+@may(Action.READ, dataset=OwnedKind.DATASET, whole=True)
+@limit(QUESTIONS)
 def get_noise(dataset: DatasetPath, services: AppServices) -> noises.Noise:
     """Sigma of balls, given cameras and field lines with intervals, and what the policy says.
 
@@ -118,6 +130,8 @@ def get_noise(dataset: DatasetPath, services: AppServices) -> noises.Noise:
 
 
 @noise_router.post("", operation_id="acceptNoise", **by_job(404, 412))
+@may(Action.LEAD, dataset=OwnedKind.DATASET)
+@limit(QUESTIONS)
 @responds(job_answer)
 def accept_noise(dataset: DatasetPath, services: AppServices, actor: Actor) -> Job:
     """Judge by the estimates: `values` go into the policy, `factors` to the balls; the job solves.
@@ -134,6 +148,8 @@ def accept_noise(dataset: DatasetPath, services: AppServices, actor: Actor) -> J
 
 
 @noise_router.delete("", operation_id="takeNoiseBack", **by_job(404))
+@may(Action.LEAD, dataset=OwnedKind.DATASET)
+@limit(QUESTIONS)
 @responds(job_answer)
 def take_noise_back(dataset: DatasetPath, services: AppServices, actor: Actor) -> Job:
     """Take the balls of all cameras and people to be as noisy as the dataset's; the job solves.
@@ -147,10 +163,13 @@ def take_noise_back(dataset: DatasetPath, services: AppServices, actor: Actor) -
     return change_and_solve(services.jobs, services.store, dataset, change, actor=actor)
 
 
-pictures_router = APIRouter(prefix="/datasets/{dataset}/pictures", tags=["datasets"])
+pictures_router = APIRouter(
+    prefix="/datasets/{dataset}/pictures", tags=["datasets"], route_class=Route
+)
 
 
 @pictures_router.get("", operation_id="listMatchPictures", responses=responses(404))
+@may(Action.READ, dataset=OwnedKind.DATASET, whole=True)
 @paged()
 def list_match_pictures(dataset: DatasetPath, store: AppStore) -> MatchPicturesDocument:
     """What the pictures of each match's main camera are taken to be: stretched, cropped or neither."""
@@ -158,6 +177,7 @@ def list_match_pictures(dataset: DatasetPath, store: AppStore) -> MatchPicturesD
 
 
 @pictures_router.post("", operation_id="estimateMatchPictures", **by_job(404, 413, 415))
+@may(Action.LEAD, dataset=OwnedKind.DATASET)
 @responds(job_answer)
 def estimate_match_pictures(
     dataset: DatasetPath, request: MatchRequest, services: AppServices, actor: Actor
@@ -171,6 +191,7 @@ def estimate_match_pictures(
 
 
 @pictures_router.patch("", operation_id="setMatchPicture", **by_job(404, 413, 415))
+@may(Action.LEAD, dataset=OwnedKind.DATASET)
 @responds(job_answer)
 def set_match_picture(
     dataset: DatasetPath, change: MatchPictureChange, services: AppServices, actor: Actor

@@ -12,14 +12,19 @@ from app.features.notifications.service import Bell
 from app.features.people.session_routes import Me
 from app.http.cursor import Before, Cursor, first_below
 from app.http.deps import AppStore
+from app.http.permissions import Action, may
 from app.http.problem import responses
+from app.http.request_limits import LOOKS, limit
 from app.http.respond import as_document, responds
+from app.http.route import Route
 from app.http.team import AppTeam
 
-router = APIRouter(prefix="/bell", tags=["comments"])
+router = APIRouter(prefix="/bell", tags=["comments"], route_class=Route)
 
 
 @router.get("", operation_id="getBell", responses=responses(401, 409))
+@may(Action.ACCOUNT)
+@limit(LOOKS)
 def get_bell(
     store: AppStore,
     _team: AppTeam,
@@ -43,6 +48,7 @@ def get_bell(
     response_model=BellDocument,
     responses=responses(401, 409, 413, 415),
 )
+@may(Action.ACCOUNT)
 @responds(as_document(BellDocument.model_validate))
 def read_bell(said: BellRead, store: AppStore, _team: AppTeam, me: Me) -> Bell:
     """One has seen some of it, or all."""

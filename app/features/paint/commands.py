@@ -42,7 +42,7 @@ def paint(
     Pictures that were read for the lines that they have now are left alone. The policy must say
     calibration.source paint, as touchline does; `touchline solve` computes what follows.
     """
-    from app.features.datasets.match_choice import of_match
+    from app.features.datasets.service import of_match
     from app.features.paint.service import get_paint, read_paint, take_back_paint
 
     if show and undo:

@@ -26,8 +26,8 @@ def _read(asked: MatchesAsked, progress: JobProgress) -> Json:
             asked.store,
             asked.dataset_id,
             asked.matches,
-            actor=asked.actor,
-            run=asked.request["run"],
+            actor=asked.job.actor,
+            run=asked.job.request["run"],
             progress=counting(progress, "groups looked at"),
             require_wanted=progress.require_wanted,
         )

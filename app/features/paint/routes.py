@@ -33,14 +33,18 @@ from app.features.paint.service import get_paint
 from app.http.cursor import paged
 from app.http.deps import Actor, AppServices, AppStore, DatasetPath, DryRun, Id
 from app.http.job_responses import ACCEPTED, by_job, job_answer
+from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import responses
+from app.http.request_limits import IMAGES, LOOKS, limit
 from app.http.respond import document, responds
+from app.http.route import Route
 from app.worker_pool import PoolTask
 
-paint_router = APIRouter(prefix="/datasets/{dataset}/paint", tags=["datasets"])
+paint_router = APIRouter(prefix="/datasets/{dataset}/paint", tags=["datasets"], route_class=Route)
 
 
 @paint_router.get("", operation_id="listDatasetPaint", responses=responses(404))
+@may(Action.READ, dataset=OwnedKind.DATASET, whole=True)
 @paged()
 def list_paint(dataset: DatasetPath, store: AppStore) -> DatasetPaintDocument:
     """How many pictures of each match were read for their paint, and what came of it."""
@@ -48,6 +52,7 @@ def list_paint(dataset: DatasetPath, store: AppStore) -> DatasetPaintDocument:
 
 
 @paint_router.post("", operation_id="readDatasetPaint", **by_job(404, 409, 413, 415))
+@may(Action.LEAD, dataset=OwnedKind.DATASET)
 @responds(job_answer)
 def read_paint(
     dataset: DatasetPath, request: MatchRequest, services: AppServices, actor: Actor
@@ -61,6 +66,7 @@ def read_paint(
 
 
 @paint_router.delete("", operation_id="takeDatasetPaintBack", **by_job(404, 409))
+@may(Action.LEAD, dataset=OwnedKind.DATASET)
 @responds(job_answer)
 def take_back_paint(dataset: DatasetPath, services: AppServices, actor: Actor) -> Job:
     """Give all groups what they had before paint was read last; the job solves them.
@@ -71,7 +77,7 @@ def take_back_paint(dataset: DatasetPath, services: AppServices, actor: Actor) -
     return PAINT.take_back(services.jobs, services.store, dataset, actor=actor)
 
 
-view_paint_router = APIRouter(prefix="/views", tags=["views"])
+view_paint_router = APIRouter(prefix="/views", tags=["views"], route_class=Route)
 
 REFUSALS = (404, 409, 413, 415, 503)
 
@@ -82,6 +88,8 @@ REFUSALS = (404, 409, 413, 415, 503)
     response_model=PaintDocument,
     responses=responses(*REFUSALS),
 )
+@may(Action.ANNOTATE, view=OwnedKind.VIEW)
+@limit(IMAGES)
 async def read_view_paint(
     view: Id, wanted: PaintRequest, services: AppServices, request: Request
 ) -> PaintDocument | Response:
@@ -99,6 +107,8 @@ async def read_view_paint(
     response_model=ProposalDocument,
     responses=responses(404, 413, 415, 503),
 )
+@may(Action.ANNOTATE, view=OwnedKind.VIEW)
+@limit(IMAGES)
 async def propose_lines(
     view: Id, services: AppServices, request: Request, wanted: PaintRequest | None = None
 ) -> ProposalDocument | Response:
@@ -118,12 +128,13 @@ async def _answer(request: Request, question: PaintQuestion, ask: Callable[[], P
         return await ask().result_unless(request.is_disconnected)
 
 
-proposals_router = APIRouter(tags=["datasets"])
+proposals_router = APIRouter(tags=["datasets"], route_class=Route)
 
 
 @proposals_router.get(
     "/datasets/{dataset}/proposals", operation_id="listDatasetProposals", responses=responses(404)
 )
+@may(Action.READ, dataset=OwnedKind.DATASET, whole=True)
 @paged()
 def list_proposals(dataset: DatasetPath, store: AppStore) -> DatasetProposalsDocument:
     """For how many views of each match something is proposed; nothing of it counts."""
@@ -144,6 +155,7 @@ def list_proposals(dataset: DatasetPath, store: AppStore) -> DatasetProposalsDoc
         },
     },
 )
+@may(Action.LEAD, dataset=OwnedKind.DATASET)
 @responds(job_answer)
 def accept_proposed_lines(
     dataset: DatasetPath,
@@ -176,6 +188,7 @@ def _forgotten(gone: int) -> Response:
     response_model=ForgottenProposalsDocument,
     responses=responses(404),
 )
+@may(Action.LEAD, dataset=OwnedKind.DATASET)
 @responds(_forgotten)
 def forget(dataset: DatasetPath, services: AppServices) -> int:
     """Forget everything that was proposed for a dataset; lines that were accepted stay.
@@ -191,8 +204,10 @@ def forget(dataset: DatasetPath, services: AppServices) -> int:
     tags=["groups"],
     responses=responses(404),
 )
+@may(Action.READ, group=OwnedKind.GROUP)
+@limit(LOOKS)
 @paged()
 def group_proposals(group: Id, store: AppStore) -> GroupProposals:
     """What was proposed for the views of a group, with its lines and scores."""
     found = get_group_proposals(store, group)
-    return GroupProposals(items=[GroupProposal.of(*item) for item in found])
+    return GroupProposals(items=[GroupProposal.of_view(*item) for item in found])

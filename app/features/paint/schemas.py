@@ -2,43 +2,21 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, StrictBool
 
-from app.features.groups.schemas import LineDocuments, LineEdits, Point, lines_document
+from app.features.groups.schemas import LineDocuments, LineEdits, lines_document
 from app.features.match_estimates.schemas import MatchRequest
-from app.features.paint.proposal_queries import Proposal
+from app.features.paint.proposal_queries import MatchProposals, Proposal
+from app.features.paint.service import PaintState
 from app.http.documents import Document, ListDocument
 from app.paint.view_paint import ViewPaint
 from app.paint.view_proposal import ViewProposal
 from app.soccer.choices import ProposalOutcome
 
 
-class MatchPaintDocument(Document):
-    """What was read of the pictures of one match."""
-
-    match: str
-    groups: int
-    views: int = Field(description="Views of moving cameras that have lines.")
-    without_picture: int = Field(description="How many of them have no picture.")
-    read: int = Field(description="How many of their pictures were read.")
-    old: int | None = Field(
-        description="How many were read for other lines than their view has now, beside other "
-        "boxes of people, or by an older version; null where too many were read to compare them."
-    )
-    painted: int = Field(
-        description="How many of those place their camera, unless the lines changed since."
-    )
-    no_paint: int = Field(description="How many show too little paint.")
-    paint_disagrees: int = Field(
-        description="In how many the paint does not lie where the lines were drawn."
-    )
-    no_frame: int = Field(description="How many are missing or cannot be read.")
-    sentence: str = Field(description="All that in words.")
-
-
-class DatasetPaintDocument(ListDocument[MatchPaintDocument]):
+class DatasetPaintDocument(ListDocument[PaintState]):
     """What was read of the paint in a dataset's pictures, by name of the match."""
 
     used: bool = Field(description="Whether the policy uses it: `calibration.source`.")
@@ -108,9 +86,9 @@ class ProposalDocument(Document):
 
     outcome: ProposalOutcome
     sentence: str = Field(
-        description="Why nothing is proposed, or which drawn lines lie elsewhere; else empty."
+        description="Why no lines are proposed, or which drawn lines contradict the proposal; else empty."
     )
-    lines: dict[str, list[Point]] = Field(
+    lines: LineDocuments = Field(
         description="Points on the paint, pixels of the annotated size; none unless proposed, and "
         "none of markings that are drawn."
     )
@@ -125,29 +103,10 @@ class ProposalDocument(Document):
     @classmethod
     def of(cls, found: ViewProposal) -> ProposalDocument:
         """The document of a proposal."""
-        lines = {
-            name: [Point(x=point.x, y=point.y) for point in points]
-            for name, points in found.lines.items()
-        }
-        return cls.model_validate({**vars(found), "lines": lines})
+        return cls.model_validate({**vars(found), "lines": lines_document(found.lines)})
 
 
-class MatchProposalsDocument(Document):
-    """How far the views of one match are."""
-
-    match: str
-    views: int = Field(
-        description="Views with a picture and without a camera, given or of their lines; a static "
-        "camera counts once."
-    )
-    looked: int = Field(description="How many of them were looked at.")
-    proposed: int = Field(description="For how many of those lines are proposed.")
-    unsure: int = Field(description="For how many a camera was found that may be another's.")
-    nothing: int = Field(description="For how many there was none, or no picture.")
-    accepted: int = Field(description="Views that have lines as they were proposed by now.")
-
-
-class DatasetProposalsDocument(ListDocument[MatchProposalsDocument]):
+class DatasetProposalsDocument(ListDocument[MatchProposals]):
     """What was proposed for the views of a dataset, by name of the match."""
 
 
@@ -172,7 +131,7 @@ class ForgottenProposalsDocument(Document):
     forgotten: int = Field(description="How many proposals there were; accepted lines stay.")
 
 
-class GroupProposal(BaseModel):
+class GroupProposal(ProposalDocument):
     """What was proposed for one view: a prediction until its lines are saved."""
 
     view: int
@@ -181,35 +140,16 @@ class GroupProposal(BaseModel):
         description="Whether the view still has no given camera, and no lines or those beside "
         "which this was proposed because they determined no camera."
     )
-    outcome: ProposalOutcome
-    sentence: str = Field(
-        description="Why nothing is proposed, or which drawn lines lie elsewhere; else empty."
-    )
-    lines: LineDocuments = Field(
-        description="Points on the paint of markings that nobody drew, pixels of the annotated "
-        "size; none unless proposed."
-    )
-    supported: float | None = Field(description="Share of the visible markings that has paint.")
-    explained: float | None = Field(description="Share of line-like paint that has a marking.")
-    points: int = Field(description="How many places of paint the best camera lies on.")
-    error_px: float | None = Field(description="Median distance of the paint to its marking.")
-    runner_up: float | None = Field(
-        description="How much less the next best camera agrees; null where there is no other."
-    )
     frame: str = Field(description="Digest of the picture's bytes; empty where there were none.")
     version: str = Field(description="Of what read the picture.")
 
-    @staticmethod
-    def of(key: str, is_open: bool, found: Proposal) -> GroupProposal:
-        """The document of a proposal."""
-        names = GroupProposal.model_fields.keys() - {"view", "key", "open", "lines"}
-        return GroupProposal.model_construct(
-            view=found.view_id,
-            key=key,
-            open=is_open,
-            lines=lines_document(found.lines),
-            **{name: getattr(found, name) for name in names},
-        )
+    @classmethod
+    def of_view(cls, key: str, is_open: bool, found: Proposal) -> GroupProposal:
+        """The document of what was proposed for a view."""
+        shown = cls.model_fields.keys() - {"view", "key", "open"}
+        values: dict[str, Any] = {name: getattr(found, name) for name in shown}
+        values |= {"view": found.view_id, "key": key, "open": is_open}
+        return cls.model_construct(**{**values, "lines": lines_document(found.lines)})
 
 
 class GroupProposals(ListDocument[GroupProposal]):

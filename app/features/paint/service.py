@@ -59,6 +59,7 @@ class PaintState:
     """What was read of the pictures of one match.
 
     Attributes:
+        match: Name of the match.
         groups: How many it has.
         views: Views of moving cameras with lines.
         without_picture: How many of them have no picture.
@@ -70,6 +71,7 @@ class PaintState:
         no_paint: How many show too little of it.
         paint_disagrees: In how many it does not lie where the lines were drawn.
         no_frame: How many have no picture that can be read.
+        sentence: All that in words.
     """
 
     match: str
@@ -82,30 +84,7 @@ class PaintState:
     no_paint: int
     paint_disagrees: int
     no_frame: int
-
-    @property
-    def sentence(self) -> str:
-        """What people read of it."""
-        left = max(self.views - self.without_picture, self.read)
-        if not left:
-            return f"none of {self.views} views has a picture" if self.views else "nothing to read"
-        if self.read:
-            parts = [f"{self.read} of {left} pictures were read: {self.painted} by their paint"]
-        else:
-            parts = [f"the paint of none of {left} pictures was read"]
-        parts += [
-            f"{count} {words}"
-            for count, words in (
-                (self.no_paint, "with too little paint"),
-                (self.paint_disagrees, "with paint that disagrees with the lines"),
-                (self.no_frame, "missing or unreadable"),
-                (self.old, "to be read again"),
-            )
-            if count
-        ]
-        if self.without_picture:
-            parts.append(f"{self.without_picture} without a picture")
-        return ", ".join(parts)
+    sentence: str = ""
 
 
 @dataclass(frozen=True)
@@ -364,7 +343,7 @@ def _old(
 
 
 def _state(item: MatchPaint, old: int | None) -> PaintState:
-    return PaintState(
+    found = PaintState(
         match=item.match,
         groups=len(item.groups),
         views=item.views,
@@ -376,3 +355,27 @@ def _state(item: MatchPaint, old: int | None) -> PaintState:
         paint_disagrees=item.reasons.get(PAINT_DISAGREES, 0),
         no_frame=item.reasons.get(NO_FRAME, 0),
     )
+    return replace(found, sentence=_sentence(found))
+
+
+def _sentence(state: PaintState) -> str:
+    left = max(state.views - state.without_picture, state.read)
+    if not left:
+        return f"none of {state.views} views has a picture" if state.views else "nothing to read"
+    if state.read:
+        parts = [f"{state.read} of {left} pictures were read: {state.painted} by their paint"]
+    else:
+        parts = [f"the paint of none of {left} pictures was read"]
+    parts += [
+        f"{count} {words}"
+        for count, words in (
+            (state.no_paint, "with too little paint"),
+            (state.paint_disagrees, "with paint that disagrees with the lines"),
+            (state.no_frame, "missing or unreadable"),
+            (state.old, "to be read again"),
+        )
+        if count
+    ]
+    if state.without_picture:
+        parts.append(f"{state.without_picture} without a picture")
+    return ", ".join(parts)

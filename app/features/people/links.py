@@ -66,7 +66,7 @@ def hash_password(password: str, name: str, *, pointer: str = "/password") -> st
     if not SHORTEST <= len(password) <= LONGEST:
         raise InputError(
             f"a password has {SHORTEST} to {LONGEST} letters",
-            hint="Three or four words that nobody would put together are easy to keep in mind.",
+            hint="Three or four unrelated words are easy to remember.",
             pointer=pointer,
         )
     if password.casefold() == name.casefold():
@@ -74,7 +74,7 @@ def hash_password(password: str, name: str, *, pointer: str = "/password") -> st
     if _in_turn(lambda: _is_easy_to_guess(password, name)):
         raise InputError(
             "this password is easy to guess: it is one of the common ones, or made of few parts",
-            hint="Three or four words that nobody would put together are easy to keep in mind.",
+            hint="Three or four unrelated words are easy to remember.",
             pointer=pointer,
         )
     return _in_turn(lambda: HASHER.hash(password))
@@ -98,7 +98,7 @@ def is_password(password: str, known: str | None) -> bool:
 @cache
 def _nobodys() -> str:
     """A hash that no password is known of, which is asked where there is no account."""
-    return HASHER.hash("nobody's password, as long as others")
+    return HASHER.hash("a placeholder password, as long as others")
 
 
 def _in_turn(work: Callable[[], T]) -> T:
@@ -130,7 +130,12 @@ class Link:
 
 @dataclass(frozen=True)
 class Meant:
-    """Whom a link is for; ``name`` is None for the first admin, who chooses one."""
+    """Whom a link is for; ``name`` is None for the first admin, who chooses one.
+
+    Attributes:
+        name: None: for the first admin, who chooses one.
+        joined: They have a password already; the link gives another one.
+    """
 
     name: str | None
     joined: bool

@@ -16,7 +16,6 @@ from app.features.people.login_schemas import (
     MadeAccessToken,
     NewAccessToken,
     NewPasskey,
-    PasskeyDocument,
     PasskeyList,
     PasskeyLogin,
     PasskeyMade,
@@ -24,25 +23,27 @@ from app.features.people.login_schemas import (
 )
 from app.features.people.schemas import (
     CodeOnly,
-    EnrolmentDocument,
     PasswordOnly,
     RecoveryCodes,
-    SecondFactorDocument,
     SessionDocument,
     TeamSettings,
 )
+from app.features.people.second_factor import Enrolment, FactorState
 from app.features.people.session_routes import Me, session_of
 from app.http.cursor import paged
 from app.http.deps import AppStore, Id
+from app.http.permissions import Action, OwnedKind, may, open_to_all
 from app.http.problem import responses
+from app.http.route import Route, SecretRoute
 from app.http.team import AppTeam
 
-passkeys_router = APIRouter(tags=["sessions"])
+passkeys_router = APIRouter(tags=["sessions"], route_class=SecretRoute)
 OWN_PASSKEYS = "/session/passkeys"
 log = structlog.get_logger("touchline.access")
 
 
 @passkeys_router.get(OWN_PASSKEYS, operation_id="listPasskeys", responses=responses(401, 409))
+@may(Action.ACCOUNT, to_enrol=True)
 @paged()
 def list_passkeys(request: Request, team: AppTeam, me: Me) -> PasskeyList:
     """One's own passkeys, and whether there can be any at this address."""
@@ -52,7 +53,7 @@ def list_passkeys(request: Request, team: AppTeam, me: Me) -> PasskeyList:
         unavailable = None
     except ConflictError as error:
         unavailable = f"{error.message}. {error.hint}"
-    items = [PasskeyDocument.model_validate(one) for one in team.passkeys.of(me.person_id)]
+    items = team.passkeys.of(me.person_id)
     return PasskeyList(items=items, unavailable=unavailable)
 
 
@@ -61,6 +62,7 @@ def list_passkeys(request: Request, team: AppTeam, me: Me) -> PasskeyList:
     operation_id="beginPasskey",
     responses=responses(401, 409, 413, 415, 429),
 )
+@may(Action.ACCOUNT, to_enrol=True)
 def begin_passkey(said: PasswordOnly, request: Request, team: AppTeam, me: Me) -> CreationOptions:
     """What a browser needs to make a passkey; takes the password."""
     team.require_passwords()
@@ -74,11 +76,12 @@ def begin_passkey(said: PasswordOnly, request: Request, team: AppTeam, me: Me) -
     status_code=201,
     responses=responses(401, 409, 413, 415),
 )
+@may(Action.ACCOUNT, to_enrol=True)
 def make(new: NewPasskey, request: Request, team: AppTeam, me: Me) -> PasskeyMade:
     """Keep a passkey that the browser has made; every other session ends. It is a second factor, too."""
     credential = new.credential.model_dump()
     made, codes = team.passkeys.make(me, new.name, credential, team.site(request))
-    return PasskeyMade(passkey=PasskeyDocument.model_validate(made), codes=codes)
+    return PasskeyMade(passkey=made, codes=codes)
 
 
 @passkeys_router.delete(
@@ -87,6 +90,7 @@ def make(new: NewPasskey, request: Request, team: AppTeam, me: Me) -> PasskeyMad
     status_code=204,
     responses=responses(401, 404, 409, 413, 415, 429),
 )
+@may(Action.ACCOUNT)
 def remove_passkey(
     passkey: Id, said: PasswordOnly, request: Request, team: AppTeam, me: Me
 ) -> None:
@@ -100,6 +104,7 @@ def remove_passkey(
     operation_id="beginPasskeyLogin",
     responses=responses(409, 413, 415, 429),
 )
+@open_to_all
 def begin_login(request: Request, response: Response, team: AppTeam) -> RequestOptions:
     """What a browser needs to log in with a passkey; it is for this browser, which gets a cookie."""
     team.require_passwords()
@@ -115,6 +120,7 @@ def begin_login(request: Request, response: Response, team: AppTeam) -> RequestO
     operation_id="createSessionWithPasskey",
     responses=responses(401, 409, 413, 415, 429),
 )
+@open_to_all
 def log_in(
     said: PasskeyLogin, request: Request, response: Response, store: AppStore, team: AppTeam
 ) -> SessionDocument:
@@ -138,27 +144,28 @@ def log_in(
     return session_of(team.logins.find(token), store)
 
 
-second_factors_router = APIRouter(tags=["sessions"])
+second_factors_router = APIRouter(tags=["sessions"], route_class=SecretRoute)
+team_router = APIRouter(tags=["sessions"], route_class=Route)
 OWN_FACTOR = "/session/second-factor"
 
 
 @second_factors_router.get(
     OWN_FACTOR, operation_id="getSecondFactor", responses=responses(401, 409)
 )
-def get_second_factor(team: AppTeam, me: Me) -> SecondFactorDocument:
+@may(Action.ACCOUNT, to_enrol=True)
+def get_second_factor(team: AppTeam, me: Me) -> FactorState:
     """Whether a code is asked for after one's password, and how many recovery codes are left."""
-    return SecondFactorDocument.model_validate(team.factors.state(me.person_id))
+    return team.factors.state(me.person_id)
 
 
 @second_factors_router.post(
     OWN_FACTOR, operation_id="beginSecondFactor", responses=responses(401, 409, 413, 415, 429)
 )
-def begin_second_factor(
-    said: PasswordOnly, request: Request, team: AppTeam, me: Me
-) -> EnrolmentDocument:
+@may(Action.ACCOUNT, to_enrol=True)
+def begin_second_factor(said: PasswordOnly, request: Request, team: AppTeam, me: Me) -> Enrolment:
     """What an authenticator has to know, shown this once; nothing is asked for before it is confirmed."""
     team.count_try(request, me.name)
-    return EnrolmentDocument.model_validate(team.factors.begin(me, said.password))
+    return team.factors.begin(me, said.password)
 
 
 @second_factors_router.post(
@@ -166,6 +173,7 @@ def begin_second_factor(
     operation_id="confirmSecondFactor",
     responses=responses(401, 404, 409, 413, 415, 429),
 )
+@may(Action.ACCOUNT, to_enrol=True)
 def confirm(said: CodeOnly, team: AppTeam, me: Me) -> RecoveryCodes:
     """Ask for a code from now on; every other session ends. The recovery codes are shown this once."""
     team.tries.count_code(me.name)
@@ -178,6 +186,7 @@ def confirm(said: CodeOnly, team: AppTeam, me: Me) -> RecoveryCodes:
     status_code=204,
     responses=responses(401, 409, 413, 415, 429),
 )
+@may(Action.ACCOUNT, to_enrol=True)
 def remove_second_factor(said: PasswordOnly, request: Request, team: AppTeam, me: Me) -> None:
     """Stop asking for a code; 409 where everybody needs a second factor."""
     team.count_try(request, me.name)
@@ -190,30 +199,32 @@ def remove_second_factor(said: PasswordOnly, request: Request, team: AppTeam, me
     status_code=204,
     responses=responses(401, 404, 409),
 )
+@may(Action.ADMINISTER)
 def clear(user: Id, team: AppTeam, me: Me) -> None:
     """Take away the second factor of somebody who has lost it."""
     team.factors.clear(user, actor=me.actor)
 
 
-@second_factors_router.get("/team", operation_id="getTeam", responses=responses(401, 409))
+@team_router.get("/team", operation_id="getTeam", responses=responses(401, 409))
+@may(Action.ADMINISTER)
 def get_settings(team: AppTeam, _me: Me) -> TeamSettings:
     """What counts for everybody."""
     return TeamSettings(require_second_factor=team.factors.required())
 
 
-@second_factors_router.put(
-    "/team", operation_id="changeTeam", responses=responses(401, 409, 413, 415)
-)
+@team_router.put("/team", operation_id="changeTeam", responses=responses(401, 409, 413, 415))
+@may(Action.ADMINISTER)
 def put_settings(wanted: TeamSettings, team: AppTeam, me: Me) -> TeamSettings:
     """Let everybody need a second factor, or not; whoever has none makes one before anything else."""
     team.factors.require(wanted.require_second_factor, actor=me.actor)
     return wanted
 
 
-tokens_router = APIRouter(prefix="/tokens", tags=["tokens"])
+tokens_router = APIRouter(prefix="/tokens", tags=["tokens"], route_class=SecretRoute)
 
 
 @tokens_router.get("", operation_id="listTokens", responses=responses(401, 409))
+@may(Action.ACCOUNT)
 @paged()
 def list_tokens(team: AppTeam, me: Me) -> AccessTokenList:
     """One's own tokens, those that have expired too."""
@@ -226,6 +237,7 @@ def list_tokens(team: AppTeam, me: Me) -> AccessTokenList:
     status_code=201,
     responses=responses(401, 404, 409, 413, 415),
 )
+@may(Action.ACCOUNT, body={"dataset": OwnedKind.DATASET})
 def make_token(new: NewAccessToken, store: AppStore, team: AppTeam, me: Me) -> MadeAccessToken:
     """Make a token for a script of one's own; its text is shown this once, and kept nowhere."""
     limit = None if new.dataset is None else dataset_id(store, new.dataset)
@@ -236,6 +248,7 @@ def make_token(new: NewAccessToken, store: AppStore, team: AppTeam, me: Me) -> M
 @tokens_router.delete(
     "/{token}", operation_id="endToken", status_code=204, responses=responses(401, 404, 409)
 )
+@may(Action.ACCOUNT)
 def end_token(token: Id, team: AppTeam, me: Me) -> None:
     """End a token of one's own: whatever uses it is refused from now on."""
     team.tokens.end(token, me.person_id, actor=me.actor)

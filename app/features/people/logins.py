@@ -31,11 +31,11 @@ from app.features.people.queries import (
     rights_of,
     update_person,
 )
-from app.features.people.roles import Action, DatasetRoles, Role, Scope, may, note
+from app.features.people.roles import Action, DatasetRoles, Role, Scope, lets, note
 from app.features.people.visibility_queries import Reader, Sight
 from app.soccer.actors import with_token
 
-LEADING = tuple(role for role in Role if may(role, Action.LEAD))
+LEADING = tuple(role for role in Role if lets(role, Action.LEAD))
 """Roles that lead a dataset."""
 IDLE = timedelta(hours=12)
 """A session that nobody has used for so long has ended."""
@@ -121,7 +121,7 @@ class Login:
         if self.roles.is_admin:
             return None
         return Reader(
-            self.name, self.roles.blind, lambda one: may(self.roles.role_in(one), Action.REVIEW)
+            self.name, self.roles.blind, lambda one: lets(self.roles.role_in(one), Action.REVIEW)
         )
 
 
@@ -370,7 +370,7 @@ def _blind_in(roles: DatasetRoles, rights: Rights) -> dict[int, frozenset[int]]:
     found: dict[int, frozenset[int]] = {}
     for batch, dataset, waits in rights.blind:
         role = roles.role_in(dataset)
-        if may(role, Action.LEAD) or (may(role, Action.REVIEW) and not waits):
+        if lets(role, Action.LEAD) or (lets(role, Action.REVIEW) and not waits):
             continue
         found[dataset] = found.get(dataset, frozenset()) | {batch}
     return found

@@ -1,7 +1,7 @@
 """Ownership: which dataset what an address names belongs to, or whose it is while it has none.
 
-One plain function for each kind of thing. What it does not find, the routes do not find either:
-they are asked for something else then (``api/security/asked_datasets.py``).
+One plain function for each kind of thing. What it does not find is not there for whoever asks
+(``http/permissions.py``).
 """
 
 from __future__ import annotations
@@ -44,6 +44,8 @@ class OwnedKind(StrEnum):
     WORK = "work"
     """Groups that were given out."""
     UPLOAD = "upload"
+    FOLDER = "folder"
+    """One of the operator, which lies beside all datasets."""
 
 
 @dataclass(frozen=True)

@@ -84,7 +84,7 @@ class Answers:
             "the provider names an address that is not its own", address=repr(address)[:200]
         )
         raise ConflictError(
-            f"{self._rules.label} names an address that this server does not ask",
+            f"{self._rules.label} names an address to which this server sends no requests",
             hint="Whoever runs this server can allow it by TOUCHLINE_SSO_HOSTS.",
         )
 
@@ -100,7 +100,9 @@ class Answers:
             client.stream(method, address, headers=headers, content=body) as answer,
         ):
             if answer.headers.get("content-encoding", "identity") != "identity":
-                raise ValueError("the answer is packed, which nobody asked for")
+                raise ValueError(
+                    "the response is compressed, although the request did not allow it"
+                )
             if answer.is_redirect:
                 raise ValueError("the answer leads elsewhere")
             async for part in answer.aiter_raw():
@@ -135,7 +137,7 @@ KEPT = timedelta(hours=1)
 """So long we remember where the provider is and what its keys are."""
 AGAIN = timedelta(minutes=1)
 """Its keys are asked for no more often, whatever a token names."""
-REFUSED_HINT = "Try again; if it stays so, tell whoever runs this server."
+REFUSED_HINT = "Try again; if it fails again, tell the operator of this server."
 _HIDDEN = "client_secret_basic", "client_secret_post"
 _FORM = {"Content-Type": "application/x-www-form-urlencoded"}
 
@@ -326,7 +328,8 @@ class Provider:
 
     def _other(self, what: str) -> ConflictError:
         return ConflictError(
-            f"{self._rules.label} {what}", hint="Whoever runs this server can ask touchline doctor."
+            f"{self._rules.label} {what}",
+            hint="The operator of this server can run touchline doctor.",
         )
 
 

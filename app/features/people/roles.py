@@ -90,14 +90,14 @@ LEAST: Mapping[Action, Role] = {
 """The first role that may."""
 
 
-def may(role: Role, action: Action) -> bool:
+def lets(role: Role, action: Action) -> bool:
     """Whether a role lets somebody do that."""
     return _RANKS.index(role) >= _RANKS.index(LEAST[action])
 
 
 def require(role: Role, action: Action, where: str = "") -> None:
     """Raise ForbiddenError unless a role lets somebody do that; ``where`` it counts, in words."""
-    if not may(role, action):
+    if not lets(role, action):
         raise ForbiddenError(
             f"this needs the role {LEAST[action]}{where}; yours is {role}",
             hint="An admin of this server can change your role, a lead that in their dataset.",
@@ -110,9 +110,7 @@ def require_scope(scopes: Collection[Scope], action: Action) -> None:
         return
     lacks = next((scope for scope, allowed in SCOPES.items() if action in allowed), None)
     if lacks is None:
-        raise ForbiddenError(
-            "no token may do this", hint="It is done in the browser, by somebody who has logged in."
-        )
+        raise ForbiddenError("no token may do this", hint="Log in and do it in the browser.")
     raise ForbiddenError(
         f"this token lacks the scope {lacks}; it has {' and '.join(scopes)}",
         hint="Make another one under Account, with that scope.",
@@ -165,8 +163,8 @@ class DatasetRoles:
         """The datasets of which they are a lead, and nothing that is of none."""
         if self.is_admin:
             return EVERYTHING
-        all_but = may(self.everywhere, Action.LEAD)
-        named = {key for key, role in self.single.items() if may(role, Action.LEAD) != all_but}
+        all_but = lets(self.everywhere, Action.LEAD)
+        named = {key for key, role in self.single.items() if lets(role, Action.LEAD) != all_but}
         return Sight(all_but, frozenset(named), "")
 
     def sight(self, name: str) -> Sight:

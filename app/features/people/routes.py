@@ -18,7 +18,6 @@ from app.features.people.invitations import (
 )
 from app.features.people.login_schemas import AccessTokenList
 from app.features.people.schemas import (
-    InvitationDocument,
     InvitationList,
     InvitationReport,
     MemberDocument,
@@ -26,7 +25,6 @@ from app.features.people.schemas import (
     MemberList,
     NewLink,
     NewUser,
-    UserDocument,
     UserEdit,
     UserList,
     UserWithLink,
@@ -35,15 +33,17 @@ from app.features.people.service import Person
 from app.features.people.session_routes import Me
 from app.http.cursor import paged
 from app.http.deps import AppStore, DatasetPath, DryRun, Id
+from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import responses
+from app.http.route import Route, SecretRoute
 from app.http.team import AppTeam, Team
 
-users_router = APIRouter(prefix="/users", tags=["users"])
+users_router = APIRouter(prefix="/users", tags=["users"], route_class=SecretRoute)
 
 
 def _with_link(person: Person, row: Invitation) -> UserWithLink:
     return UserWithLink(
-        user=UserDocument.model_validate(person),
+        user=person,
         link=row.link,
         expires=row.expires,
         mailed=row.mailed,
@@ -52,6 +52,7 @@ def _with_link(person: Person, row: Invitation) -> UserWithLink:
 
 
 @users_router.get("", operation_id="listUsers", responses=responses(401, 409))
+@may(Action.ADMINISTER)
 @paged()
 def list_users(store: AppStore, team: AppTeam, _me: Me) -> UserList:
     """Everybody with an account, disabled ones too."""
@@ -69,6 +70,7 @@ def _list(store: Store, team: Team) -> UserList:
     status_code=201,
     responses=responses(401, 409, 413, 415),
 )
+@may(Action.ADMINISTER)
 def invite_user(
     new: NewUser, request: Request, store: AppStore, team: AppTeam, me: Me
 ) -> UserWithLink:
@@ -87,6 +89,7 @@ def invite_user(
     operation_id="inviteUsers",
     responses=responses(401, 409, 413, 415),
 )
+@may(Action.ADMINISTER)
 def invite_users(
     wanted: InvitationList,
     request: Request,
@@ -104,7 +107,7 @@ def invite_users(
     items = invite_many(store, rows, _post(team, request), actor=me.actor, dry_run=dry_run)
     refused = sum(item.state == "refused" for item in items)
     return InvitationReport(
-        items=[InvitationDocument.model_validate(item) for item in items],
+        items=items,
         dry_run=dry_run,
         invited=len(items) - refused,
         refused=refused,
@@ -119,9 +122,10 @@ def _post(team: Team, request: Request) -> Post:
 @users_router.patch(
     "/{user}",
     operation_id="changeUser",
-    response_model=UserDocument,
+    response_model=Person,
     responses=responses(401, 404, 409, 413, 415),
 )
+@may(Action.ADMINISTER)
 def change_user(user: Id, change: UserEdit, store: AppStore, _team: AppTeam, me: Me) -> Person:
     """Give somebody another role, disable or enable them; who is disabled is logged out.
 
@@ -137,6 +141,7 @@ def change_user(user: Id, change: UserEdit, store: AppStore, _team: AppTeam, me:
     operation_id="renewUserLink",
     responses=responses(401, 404, 409, 413, 415),
 )
+@may(Action.ADMINISTER)
 def renew_link(
     user: Id,
     request: Request,
@@ -159,6 +164,7 @@ def renew_link(
     operation_id="adoptLocalWork",
     responses=responses(401, 404, 409),
 )
+@may(Action.ADMINISTER)
 def adopt_work(user: Id, store: AppStore, team: AppTeam, me: Me) -> UserList:
     """Show what was done before there were accounts, under the name `local`, as somebody's; once.
 
@@ -171,6 +177,7 @@ def adopt_work(user: Id, store: AppStore, team: AppTeam, me: Me) -> UserList:
 @users_router.get(
     "/{user}/tokens", operation_id="listTokensOfUser", responses=responses(401, 404, 409)
 )
+@may(Action.ADMINISTER)
 @paged()
 def list_tokens(user: Id, store: AppStore, team: AppTeam, _me: Me) -> AccessTokenList:
     """The tokens with which somebody's scripts ask."""
@@ -184,15 +191,17 @@ def list_tokens(user: Id, store: AppStore, team: AppTeam, _me: Me) -> AccessToke
     status_code=204,
     responses=responses(401, 404, 409),
 )
+@may(Action.ADMINISTER)
 def end_token(user: Id, token: Id, team: AppTeam, me: Me) -> None:
     """End a token of somebody: whatever uses it is refused from now on."""
     team.tokens.end(token, user, actor=me.actor)
 
 
-members_router = APIRouter(prefix="/datasets/{dataset}/members", tags=["users"])
+members_router = APIRouter(prefix="/datasets/{dataset}/members", tags=["users"], route_class=Route)
 
 
 @members_router.get("", operation_id="listMembers", responses=responses(401, 404, 409))
+@may(Action.LEAD, dataset=OwnedKind.DATASET)
 @paged()
 def list_members(dataset: DatasetPath, store: AppStore, _team: AppTeam, _me: Me) -> MemberList:
     """Everybody who can log in, and what they are in the dataset."""
@@ -205,6 +214,7 @@ def list_members(dataset: DatasetPath, store: AppStore, _team: AppTeam, _me: Me)
     response_model=MemberDocument,
     responses=responses(401, 404, 409, 413, 415),
 )
+@may(Action.LEAD, dataset=OwnedKind.DATASET)
 def set_role(
     dataset: DatasetPath, user: Id, change: MemberEdit, store: AppStore, _team: AppTeam, me: Me
 ) -> members.Member:

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from datetime import datetime
-from typing import Annotated, Literal
+from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field, StrictBool
 from pydantic.config import JsonDict
 
-from app.features.maintenance.schemas import BannerDocument
-from app.features.people.invitations import MOST
+from app.features.maintenance.service import Banner
+from app.features.people.invitations import MOST, Invitation
 from app.features.people.logins import Way
+from app.features.people.members import SingleRole
 from app.features.people.roles import Action, Role
+from app.features.people.service import Person
 from app.http.documents import Document, ListDocument
 
 Name = Annotated[str, Field(min_length=1, max_length=200)]
@@ -36,8 +38,10 @@ class NewSession(BaseModel):
     password: Password
     code: Code | None = Field(
         default=None,
-        description="Of the second factor, or a recovery code; asked for by 401 with the pointer "
-        "`/code` where somebody has one.",
+        description=(
+            "Of the second factor, or a recovery code; requested by 401 with the pointer `/code` "
+            "if the person has one."
+        ),
     )
 
 
@@ -57,23 +61,6 @@ class CodeOnly(BaseModel):
     model_config = ConfigDict(extra="forbid", json_schema_extra={"examples": [{"code": "123456"}]})
 
     code: Code
-
-
-class SecondFactorDocument(Document):
-    """Whether more is asked for than one's password."""
-
-    on: bool = Field(description="There is an authenticator, or a passkey.")
-    required: bool = Field(description="Everybody needs a second factor here.")
-    codes_left: int = Field(description="Recovery codes that were not used yet.")
-    authenticator: bool = Field(description="There is an authenticator, which shows codes.")
-
-
-class EnrolmentDocument(Document):
-    """What an authenticator has to know; shown this once."""
-
-    secret: str
-    uri: str
-    picture: str = Field(description="The address as a QR code: a PNG, as a `data:` address.")
 
 
 class RecoveryCodes(Document):
@@ -125,21 +112,6 @@ class LinkUse(LinkLook):
     name: Name | None = None
 
 
-class LinkMeaning(Document):
-    """Whom a link is for."""
-
-    name: str | None = Field(description="Null: for the first admin, who chooses one.")
-    joined: bool = Field(description="They have a password already; the link gives another one.")
-
-
-class SingleRoleDocument(Document):
-    """What somebody is in one dataset, in place of what they are in all of them."""
-
-    id: int = Field(description="Of the dataset.")
-    dataset: str = Field(description="Its name.")
-    role: Role
-
-
 class WaysIn(Document):
     """How people log in here."""
 
@@ -153,7 +125,7 @@ class SessionDocument(Document):
     """Who asks."""
 
     team: bool = Field(description="People log in; else one person runs the server alone.")
-    name: str | None = Field(description="Null: nobody is logged in.")
+    name: str | None = Field(description="Null: not logged in.")
     role: Role | None = Field(description="In every dataset that `datasets` does not name.")
     enrol: bool = Field(
         default=False, description="They must make a second factor before anything else."
@@ -162,30 +134,28 @@ class SessionDocument(Document):
         default=None, description="How this session began; null: there is none."
     )
     ways: WaysIn | None = Field(
-        default=None, description="How people log in; told to whoever asks who they are."
+        default=None, description="How people log in; only for requests without a login."
     )
     moment: str | None = Field(
         default=None,
-        description="How things stand, for `since` of the events: what comes after this answer is "
-        "told then. Null: nobody is logged in, or they have just come.",
+        description=(
+            "Moment of this response, for `since` of the events: they begin after it. Null: not "
+            "logged in, or logged in just now."
+        ),
     )
-    maintenance: BannerDocument | None = Field(
+    maintenance: Banner | None = Field(
         default=None, description="The notice that everybody is shown; null: there is none."
     )
     may: list[Action] = Field(description="What the role lets them do.")
-    datasets: list[SingleRoleDocument] = Field(
-        default=[], description="Where they are something else."
-    )
-    allows: dict[Role, list[Action]] = Field(
-        default={}, description="What each role lets somebody do."
-    )
+    datasets: list[SingleRole] = Field(default=[], description="Where they are something else.")
+    allows: dict[Role, list[Action]] = Field(default={}, description="What each role allows.")
 
 
 class OpenSessionDocument(Document):
     """A session of one's own."""
 
     id: int
-    this: bool = Field(description="It is the one that asks.")
+    this: bool = Field(description="Whether it is the session of this request.")
     browser: str = Field(description="What the browser called itself.")
     address: str
     created: datetime
@@ -257,27 +227,7 @@ class InvitationList(BaseModel):
     people: Annotated[list[InvitedPerson], Field(min_length=1, max_length=MOST)]
 
 
-class InvitationDocument(Document):
-    """What became of one row."""
-
-    row: int = Field(description="Which of the list, from 1.")
-    name: str
-    role: str
-    state: Literal["invited", "possible", "refused"] = Field(
-        description="`possible`: they would be invited, says a dry run."
-    )
-    link: str | None = Field(
-        description="For whoever invites to hand over, shown this once; null: it went by mail, or "
-        "there is none."
-    )
-    expires: datetime | None = Field(description="Until when the link is good.")
-    mailed: bool = Field(description="The mail server has taken the letter with the link.")
-    problem: str | None = Field(
-        description="Why the row was refused, or its letter not sent; the link is then shown."
-    )
-
-
-class InvitationReport(ListDocument[InvitationDocument]):
+class InvitationReport(ListDocument[Invitation]):
     """What became of each row, in the order of the list."""
 
     dry_run: bool = Field(description="Nothing was done.")
@@ -297,35 +247,12 @@ class UserEdit(BaseModel):
     disabled: bool | None = None
 
 
-class UserDocument(Document):
-    """Somebody with an account."""
-
-    id: int
-    name: str
-    role: Role
-    disabled: bool
-    joined: bool = Field(description="They have chosen a password, or come by single sign-on.")
-    invited: bool = Field(description="A link waits for them with which they can.")
-    created: datetime
-    created_by: str
-    seen: datetime | None = Field(description="When a session was used last; null: none is open.")
-    second_factor: bool = Field(description="More is asked for than their password.")
-    tokens: int = Field(description="How many tokens of scripts they have.")
-    sign_on: str | None = Field(
-        default=None,
-        description="What their account of the provider is known by; null: none is linked.",
-    )
-    datasets: list[SingleRoleDocument] = Field(
-        default=[], description="In which datasets they are something else than `role`."
-    )
-
-
-class UserList(ListDocument[UserDocument]):
+class UserList(ListDocument[Person]):
     """Everybody, by name."""
 
     adopted_by: str | None = Field(
         default=None,
-        description="As whose that is shown which was done before there were accounts.",
+        description="Person to whom work from before there were accounts is attributed.",
     )
     mail: bool = Field(default=False, description="Invitations can go by mail here.")
 
@@ -333,7 +260,7 @@ class UserList(ListDocument[UserDocument]):
 class UserWithLink(Document):
     """Somebody, and the link to hand to them: it is shown this once."""
 
-    user: UserDocument
+    user: Person
     link: str | None = Field(description="Null: it went by mail.")
     expires: datetime
     mailed: bool = Field(
@@ -362,8 +289,8 @@ class MemberDocument(Document):
     id: int
     name: str
     role: Role = Field(description="What they are here.")
-    everywhere: Role = Field(description="What they are where nothing else is said.")
-    single: Role | None = Field(description="What is said of this dataset; null: nothing.")
+    everywhere: Role = Field(description="Their role in datasets without a role of their own.")
+    single: Role | None = Field(description="Their role in this dataset; null: none of its own.")
 
 
 class MemberList(ListDocument[MemberDocument]):

@@ -31,6 +31,7 @@ from app.features.people.queries import (
     update_person,
 )
 from app.features.people.roles import Role, checked_name, note, require_no_token
+from app.finite import Moment
 from app.soccer.actors import person_of
 
 
@@ -39,9 +40,13 @@ class Person:
     """Somebody with an account.
 
     Attributes:
-        joined: They have chosen a password, or come by single sign-on.
+        joined: Whether they have chosen a password or use single sign-on.
         invited: A link waits for them with which they can.
         seen: When a session of theirs was used last, in UTC; None: none is open.
+        second_factor: Whether they log in with a second factor.
+        tokens: How many tokens of scripts they have.
+        sign_on: What their account of the provider is known by; None: none is linked.
+        datasets: In which datasets they are something else than ``role``.
     """
 
     id: int
@@ -50,9 +55,9 @@ class Person:
     disabled: bool
     joined: bool
     invited: bool
-    created: str
+    created: Moment
     created_by: str
-    seen: str | None
+    seen: Moment | None
     second_factor: bool
     """A code is asked for after their password."""
     tokens: int
@@ -94,7 +99,7 @@ def require_no_people(store: Store) -> None:
     """
     if has_people(store):
         raise InputError(
-            "people have accounts here: without --team nobody would be asked who they are",
+            "this home has accounts: without --team the server would not ask for a login",
             hint="Serve with --team; or with --alone, if only you can reach this machine.",
         )
 
@@ -141,7 +146,7 @@ def renew_link(store: Store, person_id: int, *, actor: str) -> tuple[Person, Lin
             )
         if person.name == actor:
             raise ForbiddenError(
-                "nobody makes a link for themselves", hint="Change the password under Account."
+                "you cannot create a link for yourself", hint="Change the password under Account."
             )
         if person.disabled:
             raise ConflictError(f"{person.name} is disabled", hint="Enable them first.")

@@ -9,33 +9,34 @@ from fastapi import APIRouter, Depends, Request, Response
 
 from app.db.store import Store
 from app.errors import NotLoggedInError
-from app.features.maintenance.schemas import BannerDocument
 from app.features.maintenance.service import read_banner
 from app.features.people import links
+from app.features.people.links import Meant
 from app.features.people.logins import Login
 from app.features.people.members import read_single_roles
-from app.features.people.roles import SCOPES, Action, Role, may
+from app.features.people.roles import SCOPES, Role, lets
 from app.features.people.schemas import (
     LinkLook,
-    LinkMeaning,
     LinkUse,
     NewSession,
     OpenSessionDocument,
     OpenSessionList,
     PasswordEdit,
     SessionDocument,
-    SingleRoleDocument,
     WaysIn,
 )
 from app.http.access import login_of
 from app.http.cursor import paged
 from app.http.deps import AppServices, AppStore, Id
 from app.http.headers import bearer_of
+from app.http.permissions import Action, may, open_to_all
 from app.http.problem import responses
+from app.http.request_limits import LOGINS, LOOKS, limit
+from app.http.route import SecretRoute
 from app.http.team import AppTeam, Team
 from app.soccer.actors import LOCAL_USER
 
-router = APIRouter(tags=["sessions"])
+router = APIRouter(tags=["sessions"], route_class=SecretRoute)
 log = structlog.get_logger("touchline.access")
 
 
@@ -47,14 +48,14 @@ async def get_login(request: Request) -> Login:
     """
     login = login_of(request.scope)
     if login is None:
-        raise NotLoggedInError("nobody is logged in here", hint="Log in first.")
+        raise NotLoggedInError("you are not logged in", hint="Log in first.")
     return login
 
 
 Me = Annotated[Login, Depends(get_login)]
 
 
-ALLOWS = {role: [action for action in Action if may(role, action)] for role in Role}
+ALLOWS = {role: [action for action in Action if lets(role, action)] for role in Role}
 
 
 def session_of(login: Login | None, store: Store) -> SessionDocument:
@@ -72,12 +73,14 @@ def session_of(login: Login | None, store: Store) -> SessionDocument:
         enrol=login.must_enrol,
         way=login.way,
         may=allows[login.role],
-        datasets=[SingleRoleDocument(**vars(one)) for one in read_single_roles(store, login.roles)],
+        datasets=read_single_roles(store, login.roles),
         allows=allows,
     )
 
 
 @router.get("/session", operation_id="getSession", responses=responses(401, 429))
+@open_to_all
+@limit(LOOKS)
 def get_session(request: Request, services: AppServices) -> SessionDocument:
     """Who asks; nobody, before they have logged in. With a token: whose it is, and what it may."""
     team: Team | None = request.app.state.team
@@ -88,7 +91,7 @@ def get_session(request: Request, services: AppServices) -> SessionDocument:
             name=LOCAL_USER,
             role=Role.ADMIN,
             moment=services.events.moment(),
-            maintenance=_banner(services.store),
+            maintenance=read_banner(services.store),
             may=every,
             allows=ALLOWS,
         )
@@ -98,16 +101,13 @@ def get_session(request: Request, services: AppServices) -> SessionDocument:
     rules = team.sign_on and team.sign_on.rules
     ways = WaysIn(password=not (rules and rules.only), sign_on=rules.label if rules else None)
     moment = None if login is None or login.roles.blind else services.events.moment()
-    more = {"ways": ways, "moment": moment, "maintenance": _banner(services.store)}
+    more = {"ways": ways, "moment": moment, "maintenance": read_banner(services.store)}
     return found.model_copy(update=more)
 
 
-def _banner(store: Store) -> BannerDocument | None:
-    banner = read_banner(store)
-    return None if banner is None else BannerDocument.model_validate(banner)
-
-
 @router.post("/session", operation_id="createSession", responses=responses(401, 409, 413, 415, 429))
+@open_to_all
+@limit(LOGINS)
 def log_in(
     who: NewSession, request: Request, response: Response, store: AppStore, team: AppTeam
 ) -> SessionDocument:
@@ -155,6 +155,8 @@ def _begin(
 
 
 @router.delete("/session", operation_id="deleteSession", responses=responses(409))
+@open_to_all
+@limit(LOGINS)
 def log_out(
     request: Request, response: Response, store: AppStore, team: AppTeam
 ) -> SessionDocument:
@@ -171,6 +173,8 @@ def log_out(
     operation_id="changePassword",
     responses=responses(401, 409, 413, 415, 429),
 )
+@may(Action.ACCOUNT, to_enrol=True)
+@limit(LOGINS)
 def change_password(
     change: PasswordEdit,
     request: Request,
@@ -188,6 +192,7 @@ def change_password(
 
 
 @router.get("/sessions", operation_id="listSessions", responses=responses(401, 409))
+@may(Action.ACCOUNT)
 @paged()
 def list_sessions(team: AppTeam, me: Me) -> OpenSessionList:
     """One's own sessions, in this browser and others."""
@@ -201,6 +206,7 @@ def list_sessions(team: AppTeam, me: Me) -> OpenSessionList:
 @router.delete(
     "/sessions", operation_id="deleteOtherSessions", status_code=204, responses=responses(401, 409)
 )
+@may(Action.ACCOUNT)
 def end_others(team: AppTeam, me: Me) -> None:
     """End every session of one's own but this one."""
     team.logins.end_others(me)
@@ -212,21 +218,25 @@ def end_others(team: AppTeam, me: Me) -> None:
     status_code=204,
     responses=responses(401, 404, 409),
 )
+@may(Action.ACCOUNT)
 def end_session(session: Id, team: AppTeam, me: Me) -> None:
     """End a session of one's own."""
     team.logins.end(me, session)
 
 
 @router.post("/links/look", operation_id="lookAtLink", responses=responses(404, 409, 413, 415, 429))
-def look_at_link(asked: LinkLook, request: Request, store: AppStore, team: AppTeam) -> LinkMeaning:
+@open_to_all
+def look_at_link(asked: LinkLook, request: Request, store: AppStore, team: AppTeam) -> Meant:
     """Whom a link is for; 404 when it is not good any more."""
     team.count_try(request)
-    return LinkMeaning(**vars(links.look(store, asked.token)))
+    return Meant(**vars(links.look(store, asked.token)))
 
 
 @router.post(
     "/links/use", operation_id="useLink", responses=responses(401, 404, 409, 413, 415, 429)
 )
+@open_to_all
+@limit(LOGINS)
 def use_link(
     chosen: LinkUse, request: Request, response: Response, store: AppStore, team: AppTeam
 ) -> SessionDocument:

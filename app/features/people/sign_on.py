@@ -282,8 +282,11 @@ class SignOn:
         if person_by_name(session, name) is not None:
             # It may be the same person, and it may not: a name shows nothing.
             raise NotLoggedInError(
-                f"there is a {name} here already, who is not linked with this account",
-                hint="If that is you: log in otherwise, and link it under Account; or ask an admin for a link.",
+                f"there is a {name} here already, not linked with this account",
+                hint=(
+                    "If that is you: log in another way and link the account under Account, or ask "
+                    "an admin for a link."
+                ),
             )
         person_id = insert_person(session, name, self.rules.new_role, by=name)
         note(session, name, name, "came by single sign-on", self.rules.new_role)
@@ -327,10 +330,10 @@ class SignOn:
             raise NotLoggedInError(WRONG_CODE, hint=LOST, pointer=FACTOR)
 
     def _unknown(self) -> str:
-        return f"nobody here is linked with the account that {self.rules.label} names"
+        return f"no person here is linked with the account that {self.rules.label} names"
 
     def _ask(self) -> str:
-        return "An admin can send you a link; whoever has an account links it under Account."
+        return "An admin can send you a link; if you have an account, link it under Account."
 
     def _taken(self) -> ConflictError:
         return ConflictError(

@@ -10,7 +10,6 @@ from fastapi import APIRouter, Request, Response
 
 from app.errors import AccessError
 from app.features.people.login_schemas import (
-    IdentityDocument,
     OwnWaysDocument,
     SignOnAnswer,
     SignOnBegin,
@@ -21,10 +20,13 @@ from app.features.people.schemas import PasswordOnly
 from app.features.people.session_routes import Me, session_of
 from app.features.people.sign_on_rules import unlink, unlink_person, ways_of
 from app.http.deps import AppStore, Id
+from app.http.permissions import Action, may, open_to_all
 from app.http.problem import responses
+from app.http.request_limits import SIGN_ONS, limit
+from app.http.route import SecretRoute
 from app.http.team import AppTeam
 
-router = APIRouter(tags=["sessions"])
+router = APIRouter(tags=["sessions"], route_class=SecretRoute)
 log = structlog.get_logger("touchline.access")
 
 
@@ -33,6 +35,8 @@ log = structlog.get_logger("touchline.access")
     operation_id="beginSignOn",
     responses=responses(404, 409, 413, 415, 429),
 )
+@open_to_all
+@limit(SIGN_ONS)
 def begin(said: SignOnBegin, request: Request, response: Response, team: AppTeam) -> SignOnBegun:
     """Where to go to log in by single sign-on; it is for this browser, which gets a cookie."""
     sign_on = team.require_sign_on()
@@ -50,6 +54,8 @@ def begin(said: SignOnBegin, request: Request, response: Response, team: AppTeam
     operation_id="createSessionBySignOn",
     responses=responses(401, 404, 409, 413, 415, 429),
 )
+@open_to_all
+@limit(SIGN_ONS)
 def finish(
     said: SignOnAnswer, request: Request, response: Response, store: AppStore, team: AppTeam
 ) -> SignOnEnd:
@@ -84,15 +90,15 @@ def finish(
 
 
 @router.get("/session/identity", operation_id="getIdentity", responses=responses(401, 409))
+@may(Action.ACCOUNT)
 def get_identity(store: AppStore, team: AppTeam, me: Me) -> OwnWaysDocument:
     """How one can come in: whether there is a password, and which account of the provider is one's own."""
     ways, rules = ways_of(store, me.person_id), team.sign_on and team.sign_on.rules
-    found = None if ways.identity is None else IdentityDocument.model_validate(ways.identity)
     return OwnWaysDocument(
         password=ways.password,
         provider=rules.label if rules else None,
         only=bool(rules and rules.only),
-        identity=found,
+        identity=ways.identity,
     )
 
 
@@ -101,6 +107,8 @@ def get_identity(store: AppStore, team: AppTeam, me: Me) -> OwnWaysDocument:
     operation_id="beginIdentity",
     responses=responses(401, 409, 413, 415, 429),
 )
+@may(Action.ACCOUNT)
+@limit(SIGN_ONS)
 def begin_link(
     said: PasswordOnly, request: Request, response: Response, team: AppTeam, me: Me
 ) -> SignOnBegun:
@@ -119,6 +127,7 @@ def begin_link(
     status_code=204,
     responses=responses(401, 404, 409, 413, 415, 429),
 )
+@may(Action.ACCOUNT)
 def remove(said: PasswordOnly, request: Request, store: AppStore, team: AppTeam, me: Me) -> None:
     """Unlink one's account of the provider; 409 for whoever has no password. Takes the password."""
     team.count_try(request, me.name)
@@ -132,6 +141,7 @@ def remove(said: PasswordOnly, request: Request, store: AppStore, team: AppTeam,
     tags=["users"],
     responses=responses(401, 404, 409),
 )
+@may(Action.ADMINISTER)
 def remove_from(user: Id, store: AppStore, _team: AppTeam, me: Me) -> None:
     """Unlink somebody's account of the provider; their sessions that began with it end."""
     unlink_person(store, user, actor=me.actor)

@@ -12,6 +12,7 @@ from urllib.parse import urlsplit
 from app.config import Settings
 from app.db.session import Session
 from app.db.store import Store
+from app.durable import read_private
 from app.errors import ConflictError, ForbiddenError, InputError, NotFoundError, NotLoggedInError
 from app.features.people.login_queries import (
     count_linked,
@@ -23,7 +24,7 @@ from app.features.people.logins import Login, Way
 from app.features.people.queries import all_people, count_able, person_by_id
 from app.features.people.roles import Role, note, require_no_token
 from app.features.people.second_factor import require_password
-from app.private_file import read_private
+from app.finite import Moment
 
 ALL = "*"
 """In the place of a domain: whoever the provider knows."""
@@ -228,8 +229,8 @@ class Identity:
 
     issuer: str
     shown: str
-    created: str
-    used: str | None
+    created: Moment
+    used: Moment | None
 
 
 @dataclass(frozen=True)
@@ -292,7 +293,9 @@ def unlink_person(store: Store, person_id: int, *, actor: str) -> None:
     with store.write() as session:
         person = person_by_id(session, person_id)
         if person is not None and person.name == actor:
-            raise ForbiddenError("nobody unlinks themselves so", hint="Do it under Account.")
+            raise ForbiddenError(
+                "you cannot unlink your own account here", hint="Do it under Account."
+            )
         if person is None or delete_identity(session, person_id) is None:
             raise NotFoundError("no account of a provider is linked with that person")
         if person.role == Role.ADMIN and not count_able(session, Role.ADMIN):

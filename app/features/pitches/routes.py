@@ -16,14 +16,17 @@ from app.http.conflicts import current_state
 from app.http.cursor import paged
 from app.http.deps import Actor, AppServices, AppStore, DatasetPath, IfMatch
 from app.http.job_responses import by_job, job_address, job_answer
+from app.http.permissions import Action, OwnedKind, Where, may
 from app.http.problem import Responses, responses
 from app.http.respond import document, responds
+from app.http.route import Route
 from app.soccer.pitch import LENGTH_RANGE, WIDTH_RANGE, Pitch
 
-pitch_router = APIRouter(tags=["pitch"])
+pitch_router = APIRouter(tags=["pitch"], route_class=Route)
 
 
 @pitch_router.get("/pitch", operation_id="getPitch", responses=responses())
+@may(Action.READ, where=Where.SOMEWHERE)
 def get_pitch(
     length: Annotated[float, Query(ge=LENGTH_RANGE[0], le=LENGTH_RANGE[1])] = 105.0,
     width: Annotated[float, Query(ge=WIDTH_RANGE[0], le=WIDTH_RANGE[1])] = 68.0,
@@ -32,7 +35,9 @@ def get_pitch(
     return PitchDocument.of(Pitch(length, width))
 
 
-pitches_router = APIRouter(prefix="/datasets/{dataset}/pitches", tags=["datasets"])
+pitches_router = APIRouter(
+    prefix="/datasets/{dataset}/pitches", tags=["datasets"], route_class=Route
+)
 
 TAGGED = {"ETag": {"description": "Of the sizes in use.", "schema": {"type": "string"}}}
 LOCATED = {"Location": {"description": "Of the job.", "schema": {"type": "string"}}}
@@ -47,6 +52,7 @@ CHANGED: Responses = {
 @pitches_router.get(
     "", operation_id="listPitches", responses={**responses(404), 200: {"headers": TAGGED}}
 )
+@may(Action.READ, dataset=OwnedKind.DATASET, whole=True)
 @paged()
 def list_pitches(dataset: DatasetPath, store: AppStore, response: Response) -> PitchesDocument:
     """How large the pitch of each match is taken to be, and how large its lines show it.
@@ -60,6 +66,7 @@ def list_pitches(dataset: DatasetPath, store: AppStore, response: Response) -> P
 
 
 @pitches_router.post("", operation_id="estimatePitches", **by_job(404))
+@may(Action.LEAD, dataset=OwnedKind.DATASET)
 @responds(job_answer)
 def estimate_pitches(dataset: DatasetPath, services: AppServices, actor: Actor) -> Job:
     """Estimate the pitches of the matches whose lines were not looked at as they are now.
@@ -85,6 +92,7 @@ def _sized(sized: PitchJob) -> Response:
     response_model=JobDocument,
     responses={**responses(404, 412, 413, 415, 428), **CHANGED},
 )
+@may(Action.LEAD, dataset=OwnedKind.DATASET)
 @responds(_sized)
 def set_pitch(
     dataset: DatasetPath,

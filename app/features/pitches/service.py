@@ -16,8 +16,7 @@ from app.db.log import LogEntry
 from app.db.session import Session
 from app.db.store import Store
 from app.errors import GeometryError, InputError
-from app.features.datasets.match_choice import need_match
-from app.features.datasets.service import read_dataset_head
+from app.features.datasets.service import need_match, read_dataset_head
 from app.features.groups.digest import digest
 from app.features.groups.edit import SetPitch
 from app.features.groups.edit_codec import edit_from_json
@@ -41,7 +40,7 @@ from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy, digested_calibration
 from app.soccer.solution import SOLVER_VERSION
 from app.solving.pitch_size import PitchEstimate, PitchFrame, estimate_pitch
-from app.workers.fan_out import fan_out
+from app.workers.executors import fan_out
 
 
 @dataclass(frozen=True)

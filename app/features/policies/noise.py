@@ -20,7 +20,7 @@ from app.features.datasets.service import need_dataset, read_dataset_head, save_
 from app.features.groups.ball_noise import give_factors, read_placed
 from app.features.groups.state import GroupState, read_states
 from app.features.independent_annotations.queries import is_copy
-from app.features.match_estimates.noise_queries import Factor, Factors, factor_of, read_factors
+from app.features.match_estimates.queries import Factor, Factors, factor_of, read_factors
 from app.features.policies.service import PolicyState, apply_policy, read_policy
 from app.features.policies.text import CUSTOM, policy_with
 from app.features.solutions.queries import newest_solution, present_solutions
@@ -86,7 +86,7 @@ class Noise:
     Attributes:
         groups: Groups that were looked at, of ``solved`` ones.
         stations: Noise of the balls of static cameras of which enough is seen.
-        people: The same of who placed balls last.
+        people: The same for the people who placed the balls last.
         factors: How noisy balls of both together are, where anything is unlike the dataset.
         used: The factors that the views of the dataset carry.
         follows: Whether the policy takes the estimates over with each solve of the dataset.

@@ -19,11 +19,13 @@ from app.http.conflicts import current_state
 from app.http.cursor import paged
 from app.http.deps import Actor, AppServices, AppStore, DatasetPath, IfMatch
 from app.http.job_responses import job_address
+from app.http.permissions import Action, OwnedKind, Where, may
 from app.http.problem import Responses, responses
 from app.http.respond import document, responds
+from app.http.route import Route
 from app.soccer.policy import POLICIES, THRESHOLDS, Policy
 
-router = APIRouter(tags=["policies"])
+router = APIRouter(tags=["policies"], route_class=Route)
 
 TAGGED = {"ETag": {"description": "The policy's state.", "schema": {"type": "string"}}}
 LOCATED = {"Location": {"description": "Of the job.", "schema": {"type": "string"}}}
@@ -36,6 +38,7 @@ CHANGED: Responses = {
 
 
 @router.get("/policies", operation_id="listPolicies", responses=responses())
+@may(Action.READ, where=Where.SOMEWHERE)
 @paged()
 def list_policies() -> PolicyCatalogue:
     """The policies that come with the software, and what can be set in one."""
@@ -50,6 +53,7 @@ def list_policies() -> PolicyCatalogue:
     operation_id="getPolicy",
     responses={**responses(404), 200: {"headers": TAGGED}},
 )
+@may(Action.READ, dataset=OwnedKind.DATASET)
 def get_policy(dataset: DatasetPath, store: AppStore, response: Response) -> PolicyStateDocument:
     """What judges the dataset, and what judged it before."""
     policy = PolicyStateDocument.of(read_policy(store, dataset))
@@ -70,6 +74,7 @@ def _judged(judged: PolicyJob) -> Response:
     response_model=JobDocument,
     responses={**responses(404, 412, 413, 415, 428), **CHANGED},
 )
+@may(Action.LEAD, dataset=OwnedKind.DATASET)
 @responds(_judged)
 def put_policy(
     dataset: DatasetPath,

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from app.private_file import keep_private
+from app.durable import keep_private
 from app.sample.order import GROUPS, SEED, SampleOrder
 from app.terminal.opened import opened_store
 from app.terminal.options import Json, Workers, acting, read_settings

@@ -19,7 +19,7 @@ class LessonWords:
 
     Attributes:
         question: What to look for, without giving the answer away.
-        hint: Where to look, for somebody who is stuck.
+        hint: A hint where to look.
         fault: What was wrong, said once the group is judged.
         best: What to do about it, and with which keys.
     """
@@ -73,8 +73,10 @@ WORDS = {
     "undrawn_line": LessonWords(
         question="This group fails because of its field lines, but no annotated line looks wrong. "
         "What else counts?",
-        hint="Look for white paint that carries a thin dotted line and no points: it can be seen, "
-        "and nobody annotated it. Such lines count as missed.",
+        hint=(
+            "Look for white paint with a thin dotted line and no points: it is visible, but not "
+            "annotated. Such lines count as missed."
+        ),
         fault="In view {view} nobody annotated {markings}, although they can be seen.",
         best="Press Enter: it leads to the line with its name chosen. Click two points on the "
         "paint and press Escape. When the card says that the group passes, press A.",

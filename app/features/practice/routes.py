@@ -19,10 +19,13 @@ from app.features.practice.service import (
 from app.http.access import login_of
 from app.http.deps import Actor, AppServices, Id, Sees
 from app.http.job_responses import by_job, job_answer
+from app.http.permissions import Action, OwnedKind, Where, may
 from app.http.problem import responses
+from app.http.request_limits import LOOKS, limit
 from app.http.respond import responds
+from app.http.route import Route
 
-router = APIRouter(tags=["practice"])
+router = APIRouter(tags=["practice"], route_class=Route)
 
 
 async def _person(request: Request) -> str | None:
@@ -40,6 +43,7 @@ Person = Annotated[str | None, Depends(_person)]
     response_model=PracticeDocument,
     responses=responses(),
 )
+@may(Action.READ, where=Where.SOMEWHERE)
 def get_practice(services: AppServices, sight: Sees, person: Person) -> Practice:
     """Every lesson and what has come of it; none until the practice is made.
 
@@ -53,6 +57,7 @@ def get_practice(services: AppServices, sight: Sees, person: Person) -> Practice
     operation_id="startPractice",
     **by_job(409, 413, 415, 503),
 )
+@may(Action.ANNOTATE, where=Where.OWN)
 @responds(job_answer)
 def start_practice(
     request: PracticeBody, services: AppServices, actor: Actor, person: Person
@@ -80,6 +85,8 @@ def start_practice(
     response_model=LessonDocument,
     responses=responses(404),
 )
+@may(Action.READ, group=OwnedKind.GROUP)
+@limit(LOOKS)
 def get_lesson(group: Id, services: AppServices) -> PracticeLesson:
     """What a practice group asks, and whether it was answered rightly; 404 for other groups."""
     return read_lesson(services.settings, load(services.store, group))

@@ -29,7 +29,7 @@ class LessonDocument(Document):
     total: int
     title: str
     question: str = Field(description="What to look for; does not give the answer away.")
-    hint: str = Field(description="Where to look, for somebody who is stuck.")
+    hint: str = Field(description="A hint where to look.")
     verdict: str
     state: LessonState = Field(
         validation_alias=AliasPath("feedback", "state"),

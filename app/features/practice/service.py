@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import zipfile
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +19,7 @@ from app.features.groups.state import GroupState, read_states
 from app.features.imports.queries import known_groups
 from app.features.imports.sources import Source, import_source
 from app.features.jobs.queries import Job
-from app.features.jobs.run import JobProgress, Work, run_job_in_worker
+from app.features.jobs.run import JobProgress, run_job_in_worker
 from app.features.jobs.service import Jobs, Pool
 from app.features.people.queries import person_by_name, set_dataset_role
 from app.features.people.roles import Role, note
@@ -98,7 +98,7 @@ def request_practice(
     return jobs.submit(
         KIND,
         "Begin the practice again" if again else "Make the practice groups",
-        practice_work(store, again=again, actor=actor, person=person),
+        partial(practice_work, store),
         actor=actor,
         request={"again": again, "person": person},
         once=True,
@@ -108,31 +108,23 @@ def request_practice(
 def resume_practice(jobs: Jobs, store: Store) -> None:
     """Let what an earlier server was at go on."""
 
-    def work_of(job: Job) -> Work:
-        asked = job.request or {}
-        again = bool(asked.get("again"))
-        return practice_work(store, again=again, actor=job.actor, person=asked.get("person"))
-
-    jobs.resumes(KIND, work_of)
+    jobs.resumes(KIND, partial(practice_work, store))
 
 
-def practice_work(store: Store, *, again: bool, actor: str, person: str | None) -> Work:
+def practice_work(store: Store, progress: JobProgress) -> Json:
     """The work itself; its result names the dataset and its first group."""
-
-    def work(progress: JobProgress) -> Json:
-        return run_job_in_worker(
-            store,
-            "practice",
-            "the practice groups",
-            _make_dataset,
-            again,
-            actor,
-            person,
-            dataset_id=None,
-            progress=progress,
-        )
-
-    return work
+    asked = progress.job.request or {}
+    return run_job_in_worker(
+        store,
+        "practice",
+        "the practice groups",
+        _make_dataset,
+        bool(asked.get("again")),
+        progress.job.actor,
+        asked.get("person"),
+        dataset_id=None,
+        progress=progress,
+    )
 
 
 def _make_dataset(

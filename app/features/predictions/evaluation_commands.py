@@ -34,7 +34,7 @@ def _size(panel: str, text: str, *names: str) -> Any:
 
 
 Predictions = Annotated[
-    str | None, typer.Argument(help="File, folder or zip of ball boxes, or the name of a set.")
+    Path | None, typer.Argument(help="File, folder or zip of ball boxes, or the name of a set.")
 ]
 Format = Annotated[
     AnyPredictionFormat,
@@ -78,7 +78,7 @@ CamerasSize = Annotated[
     _size(CAMERAS, "Size of the images of these cameras."),
 ]
 Careful = Annotated[
-    str | None,
+    Path | None,
     typer.Option(
         rich_help_panel=CAREFUL,
         help="Reference boxes, one a frame, which the dataset's are measured with: a file, folder or "
@@ -151,12 +151,13 @@ def evaluate(
     if predictions is None and careful is None and cameras is None:
         raise typer.BadParameter("name predictions, --cameras or --careful")
     from app.features.predictions.evaluation_run import EvaluationRequest
-    from app.features.predictions.sources import PredictionSource, SourcesRequest
+    from app.features.predictions.reader import PredictionFiles
+    from app.features.predictions.sources import SourcesRequest
 
     request = SourcesRequest(
         EvaluationRequest(name=name, groups=groups, split=split, boxes=boxes, min_score=min_score),
-        PredictionSource(predictions, format_, images, category, size, cameras, cameras_size),
-        PredictionSource(careful, careful_format, None, careful_category, careful_size),
+        PredictionFiles(predictions, format_, images, cameras, category, size, cameras_size),
+        PredictionFiles(careful, careful_format, category=careful_category, size=careful_size),
         version,
     )
     request.check()

@@ -306,7 +306,7 @@ def _set_counts(sets: Mapping[str, PredictionSet]) -> dict[str, int]:
 
 def _no_frames(dataset: DatasetHead, request: EvaluationRequest) -> InputError:
     of = f' in the split "{request.split}"' if request.split else ""
-    hint = "Groups take part when the policy passes them and nobody rejected them."
+    hint = "Groups take part when the policy passes them and they are not rejected."
     if request.groups == "accepted":
         hint = "Nobody has accepted a group; evaluate the passing ones, or accept some."
     return InputError(f'no group of "{dataset.name}" takes part{of}', hint=hint)

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import asdict
+from functools import partial
 from typing import Any
 
 from app.db.json_columns import Json
 from app.db.store import Store
 from app.features.datasets.service import get_dataset_head
 from app.features.jobs.queries import Job
-from app.features.jobs.run import JobProgress, Work, run_job_in_worker
+from app.features.jobs.run import JobProgress, run_job_in_worker
 from app.features.jobs.service import Jobs
 from app.features.predictions.accept import AcceptReport, AcceptRequest, accept, plan_accept
 from app.features.predictions.evaluation import list_evaluations
@@ -37,7 +39,7 @@ def request_evaluation(
     return jobs.submit(
         EVALUATE,
         f"Evaluate {request.name or 'predictions'} on {found.name}",
-        evaluation_work(store, found.id, request, actor),
+        partial(evaluation_work, store),
         dataset_id=found.id,
         actor=actor,
         request=asdict(request),
@@ -57,7 +59,7 @@ def request_accept(
     return jobs.submit(
         ACCEPT,
         f"Accept {len(plan.changes)} predictions of {plan.predictions.name}",
-        accept_work(store, found.id, request, actor),
+        partial(accept_work, store),
         dataset_id=found.id,
         actor=actor,
         request={"accept": asdict(request)},
@@ -68,64 +70,41 @@ def resume_evaluations(jobs: Jobs, store: Store) -> None:
     """Let evaluations that an earlier server was at go on, and another process accept predictions
     than the one that was asked."""
 
-    def work_of(job: Job) -> Work:
-        request, dataset_id = EvaluationRequest(**job.request), job.dataset_id or 0
+    def evaluating(progress: JobProgress) -> Json:
+        # The server may have stopped between the result and the record of its job.
+        done = _evaluated_since(store, progress.job)
+        return evaluation_work(store, progress) if done is None else evaluation_result(done)
 
-        def work(progress: JobProgress) -> Json:
-            # The server may have stopped between the result and the record of its job.
-            done = _evaluated_since(store, dataset_id, request, job.created)
-            if done is not None:
-                return evaluation_result(done)
-            return evaluation_work(store, dataset_id, request, job.actor)(progress)
-
-        return work
-
-    def accepting(job: Job) -> Work:
-        values = dict(job.request["accept"])
-        views = None if values["views"] is None else tuple(values["views"])
-        request = AcceptRequest(**{**values, "views": views})
-        return accept_work(store, job.dataset_id or 0, request, job.actor)
-
-    jobs.resumes(EVALUATE, work_of)
-    jobs.makes(ACCEPT, accepting)
+    jobs.resumes(EVALUATE, evaluating)
+    jobs.makes(ACCEPT, partial(accept_work, store))
 
 
-def evaluation_work(store: Store, dataset_id: int, request: EvaluationRequest, actor: str) -> Work:
+def evaluation_work(store: Store, progress: JobProgress) -> Json:
     """The work of evaluating; its result names the evaluation."""
-
-    def work(progress: JobProgress) -> Json:
-        return run_job_in_worker(
-            store,
-            "evaluating",
-            "the evaluation",
-            _evaluate,
-            dataset_id,
-            request,
-            actor,
-            dataset_id=dataset_id,
-            progress=progress,
-        )
-
-    return work
+    request = EvaluationRequest(**progress.job.request)
+    return _in_worker(store, "evaluating", "the evaluation", _evaluate, request, progress)
 
 
-def accept_work(store: Store, dataset_id: int, request: AcceptRequest, actor: str) -> Work:
+def accept_work(store: Store, progress: JobProgress) -> Json:
     """The work of accepting; its result counts what changed."""
+    values = progress.job.request["accept"]
+    views = None if values["views"] is None else tuple(values["views"])
+    request = AcceptRequest(**{**values, "views": views})
+    return _in_worker(store, "accepting", "the acceptance", _accept, request, progress)
 
-    def work(progress: JobProgress) -> Json:
-        return run_job_in_worker(
-            store,
-            "accepting",
-            "the acceptance",
-            _accept,
-            dataset_id,
-            request,
-            actor,
-            dataset_id=dataset_id,
-            progress=progress,
-        )
 
-    return work
+def _in_worker(
+    store: Store,
+    kind: str,
+    what: str,
+    work: Callable[..., Json],
+    request: object,
+    progress: JobProgress,
+) -> Json:
+    where, actor = progress.dataset_id, progress.job.actor
+    return run_job_in_worker(
+        store, kind, what, work, where, request, actor, dataset_id=where, progress=progress
+    )
 
 
 def _evaluate(
@@ -152,14 +131,13 @@ def accept_result(report: AcceptReport) -> dict[str, Any]:
     return {"changed": report.views, "groups": report.groups, "refused": dict(report.refused)}
 
 
-def _evaluated_since(
-    store: Store, dataset_id: int, request: EvaluationRequest, since: str
-) -> StoredEvaluation | None:
+def _evaluated_since(store: Store, job: Job) -> StoredEvaluation | None:
+    request = EvaluationRequest(**job.request)
     asked = (request.predictions, request.careful, request.version, request.split, request.boxes)
-    for item in list_evaluations(store, dataset_id):
+    for item in list_evaluations(store, job.dataset_id or 0):
         pins = item.pins
         sets = (item.prediction_set_id, item.careful_set_id, item.version_id)
         same = (*sets, pins.get("split"), pins.get("boxes")) == asked
-        if item.created >= since and same:
+        if item.created >= job.created and same:
             return item
     return None

@@ -10,6 +10,7 @@ from app.config import Settings
 from app.errors import DatasetFormatError, InputError, TooLargeError
 from app.evaluation.frame_names import FrameNames
 from app.evaluation.prediction_files import (
+    AUTO,
     ReadPredictedCameras,
     read_predicted_cameras,
     read_predictions,
@@ -36,8 +37,9 @@ class PredictionFiles:
     """Files of predictions, and how to read them.
 
     Attributes:
-        path: File, folder or zip of ball boxes, or None.
-        format: ``coco``, ``yolo``, ``csv``, or ``auto``.
+        path: File, folder or zip of ball boxes, or None; of a command also the name of a set that is
+            there.
+        format: ``auto``, ``coco``, ``yolo`` or ``csv``.
         images: The COCO document that numbers in ``coco`` results refer to, or None.
         cameras: Folder or zip of SoccerNet camera JSON, or None.
         category: The class that is the ball, where the file has several.
@@ -46,7 +48,7 @@ class PredictionFiles:
     """
 
     path: Path | None
-    format: str = "coco"
+    format: str = AUTO
     images: Path | None = None
     cameras: Path | None = None
     category: int | None = None
@@ -66,6 +68,33 @@ class PredictionFiles:
                 "there is nothing to read: neither boxes nor cameras", pointer="/upload"
             )
         return found
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether it names nothing at all."""
+        return self.path is None and self.cameras is None
+
+    def check(self, prefix: str = "") -> None:
+        """Refuse options of a command that nothing uses: those of files where none is read.
+
+        Args:
+            prefix: Before the names of its options, ``careful-``.
+
+        Raises:
+            InputError: Naming the option.
+        """
+        given = {
+            f"{prefix}format": self.format != AUTO,
+            "images": self.images is not None,
+            f"{prefix}category": self.category is not None,
+            f"{prefix}size": self.size is not None,
+        }
+        unused = next((name for name, is_given in given.items() if is_given), None)
+        if unused is not None and (self.path is None or not self.path.exists()):
+            there = "there is none" if self.path is None else f'"{self.path}" is no file'
+            raise InputError(f"--{unused} says how to read a file of boxes, and {there}")
+        if self.cameras_size is not None and self.cameras is None:
+            raise InputError("--cameras-size is the size of predicted cameras, and there are none")
 
 
 def uploaded_files(

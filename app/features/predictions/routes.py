@@ -33,10 +33,13 @@ from app.http.conflicts import current_state
 from app.http.cursor import paged
 from app.http.deps import Actor, AppServices, AppStore, DatasetPath, DryRun, Id, IfMatch
 from app.http.job_responses import ACCEPTED, job_answer
+from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import responses
+from app.http.request_limits import LOOKS, limit
 from app.http.respond import document, no_content, responds
+from app.http.route import Route
 
-router = APIRouter(tags=["predictions"])
+router = APIRouter(tags=["predictions"], route_class=Route)
 
 LOCATION = {"Location": {"description": "Of the set.", "schema": {"type": "string"}}}
 
@@ -44,6 +47,7 @@ LOCATION = {"Location": {"description": "Of the set.", "schema": {"type": "strin
 @router.get(
     "/datasets/{dataset}/predictions", operation_id="listPredictions", responses=responses(404)
 )
+@may(Action.READ, dataset=OwnedKind.DATASET, whole=True)
 @paged()
 def list_predictions(dataset: DatasetPath, store: AppStore) -> PredictionSetList:
     """The sets of predictions of a dataset, the newest first."""
@@ -64,6 +68,15 @@ def _added(found: review.PredictionSet) -> Response:
     responses={
         **responses(404, 409, 413, 415),
         201: {"headers": LOCATION, "description": "The set, with what could not be read."},
+    },
+)
+@may(
+    Action.LEAD,
+    dataset=OwnedKind.DATASET,
+    body={
+        "upload": OwnedKind.UPLOAD,
+        "images_upload": OwnedKind.UPLOAD,
+        "cameras_upload": OwnedKind.UPLOAD,
     },
 )
 @responds(_added)
@@ -103,6 +116,7 @@ def _accepted(found: AcceptReport | Job) -> Response:
         },
     },
 )
+@may(Action.LEAD, body={"dataset": OwnedKind.DATASET, "predictions": OwnedKind.PREDICTIONS})
 @responds(_accepted)
 def accept_predictions(
     request: AcceptBody, services: AppServices, actor: Actor, dry_run: DryRun = False
@@ -126,6 +140,7 @@ def accept_predictions(
     response_model=PredictionSetDocument,
     responses=responses(404),
 )
+@may(Action.READ, predictions=OwnedKind.PREDICTIONS)
 def get_predictions(predictions: Id, store: AppStore) -> review.PredictionSet:
     """One set of predictions."""
     return review.get_predictions(store, predictions)
@@ -137,6 +152,7 @@ def get_predictions(predictions: Id, store: AppStore) -> review.PredictionSet:
     status_code=204,
     responses=responses(404),
 )
+@may(Action.LEAD, predictions=OwnedKind.PREDICTIONS)
 @responds(no_content)
 def delete_predictions(predictions: Id, store: AppStore, actor: Actor) -> None:
     """Throw a set away; evaluations of it stay, and so do balls that were accepted from it."""
@@ -146,6 +162,8 @@ def delete_predictions(predictions: Id, store: AppStore, actor: Actor) -> None:
 @router.get(
     "/views/{view}/predictions", operation_id="getViewPredictions", responses=responses(404)
 )
+@may(Action.READ, view=OwnedKind.VIEW)
+@limit(LOOKS)
 @paged()
 def get_view_predictions(view: Id, store: AppStore) -> ViewPredictions:
     """What was predicted for a view."""
@@ -159,6 +177,8 @@ def get_view_predictions(view: Id, store: AppStore) -> ViewPredictions:
 @router.get(
     "/groups/{group}/predictions", operation_id="getGroupPredictions", responses=responses(404)
 )
+@may(Action.READ, group=OwnedKind.GROUP)
+@limit(LOOKS)
 @paged()
 def get_group_predictions(group: Id, store: AppStore) -> GroupPredictionsDocument:
     """What was predicted for all views of a group, and where its accepted balls come from."""
@@ -171,6 +191,7 @@ def get_group_predictions(group: Id, store: AppStore) -> GroupPredictionsDocumen
     response_model=GroupDocument,
     responses={**responses(*CONFLICTS), **CHANGED},
 )
+@may(Action.ANNOTATE, view=OwnedKind.VIEW)
 @responds(group_answer)
 def accept_prediction(
     view: Id,

@@ -54,7 +54,7 @@ class PredictionRequest(BaseModel):
         "same reading, where there is one; else a new one, named after its file.",
     )
     format: AnyPredictionFormat = Field(
-        default="coco", description="`auto`: as the endings of the files tell."
+        default="coco", description="`auto`: by the endings of the files."
     )
     upload: Upload | None = None
     images_upload: Upload | None = Field(

@@ -100,7 +100,7 @@ _ASKED = (
     ),
     _text("split", "train, test and so on, all of it"),
     _text("match", "part of the match's name", ()),
-    _text("reviewer", "who decided"),
+    _text("reviewer", "person who decided"),
     _text("view", "key of a view, or how many views there are", ()),
     _text("label", "part of the label or of the key, as a bare word", ()),
     _text("key", "key of the group, all of it"),
@@ -109,7 +109,7 @@ _ASKED = (
         "comments", "choice", "comments on it",
         values=(*WHETHER, "open", "resolved"),
     ),
-    _text("mentions", "whom an open comment mentions, by name"),
+    _text("mentions", "person mentioned in an open comment, by name"),
     QueryField(
         "annotations", "choice",
         "result of its independent annotations; waiting: they differ and need a decision (reviewers)",
@@ -170,7 +170,7 @@ ORDERS = (
     QueryOrder("split", "split", "by letters"),
     QueryOrder("reviewer", "reviewer", "by letters"),
     QueryOrder("label", "label", "by letters"),
-    QueryOrder("number", "number", "as in the dataset; the order where none is asked"),
+    QueryOrder("number", "number", "as in the dataset; the default order"),
 )
 """Equal groups stand as in the dataset."""
 

@@ -23,19 +23,25 @@ from app.features.queue.statistics_schemas import (
 )
 from app.http.cursor import paged
 from app.http.deps import AppServices, AppStore, DatasetPath, Id, QueryText
+from app.http.permissions import Action, OwnedKind, Where, may
 from app.http.problem import responses
+from app.http.request_limits import QUESTIONS, limit
+from app.http.route import Route
 
-query_fields_router = APIRouter(tags=["queue"])
+query_fields_router = APIRouter(tags=["queue"], route_class=Route)
 
 
 @query_fields_router.get("/query-fields", operation_id="listQueryFields", responses=responses())
+@may(Action.READ, where=Where.SOMEWHERE)
 @paged()
 def list_query_fields() -> QueryFieldList:
     """Every field of a query with its operators, unit and values, and every order."""
     return QueryFieldList(items=FIELDS, sorts=ORDERS)
 
 
-statistics_router = APIRouter(prefix="/datasets/{dataset}/statistics", tags=["datasets"])
+statistics_router = APIRouter(
+    prefix="/datasets/{dataset}/statistics", tags=["datasets"], route_class=Route
+)
 
 
 @statistics_router.get(
@@ -44,6 +50,7 @@ statistics_router = APIRouter(prefix="/datasets/{dataset}/statistics", tags=["da
     response_model=StatisticsDocument,
     responses=responses(404),
 )
+@may(Action.READ, dataset=OwnedKind.DATASET)
 def get_statistics(
     dataset: DatasetPath, services: AppServices, query: QueryText = ""
 ) -> Statistics:
@@ -57,7 +64,9 @@ def get_statistics(
     return services.statistics.statistics(found)
 
 
-timeline_router = APIRouter(prefix="/datasets/{dataset}/timeline", tags=["datasets"])
+timeline_router = APIRouter(
+    prefix="/datasets/{dataset}/timeline", tags=["datasets"], route_class=Route
+)
 
 MatchName = Annotated[
     str | None, Query(max_length=500, description="Groups of this match alone; default: of all.")
@@ -65,6 +74,7 @@ MatchName = Annotated[
 
 
 @timeline_router.get("", operation_id="getTimeline", responses=responses(404))
+@may(Action.READ, dataset=OwnedKind.DATASET)
 def get_timeline(
     dataset: DatasetPath, store: AppStore, query: QueryText = "", match: MatchName = None
 ) -> TimelineDocument:
@@ -72,12 +82,14 @@ def get_timeline(
     return TimelineDocument.of(read_timeline(store, dataset_id(store, dataset), query, match))
 
 
-insight_router = APIRouter(tags=["insight"])
+insight_router = APIRouter(tags=["insight"], route_class=Route)
 
 
 @insight_router.get(
     "/groups/{group}/remedies", operation_id="getRemedies", responses=responses(404)
 )
+@may(Action.READ, group=OwnedKind.GROUP)
+@limit(QUESTIONS)
 @paged()
 def get_remedies(group: Id, store: AppStore) -> Remedies:
     """Small edits with which a group that fails would pass, each tried out; saves nothing."""
@@ -91,6 +103,8 @@ def get_remedies(group: Id, store: AppStore) -> Remedies:
 @insight_router.get(
     "/views/{view}/influence", operation_id="getInfluence", responses=responses(404)
 )
+@may(Action.READ, view=OwnedKind.VIEW)
+@limit(QUESTIONS)
 @paged()
 def get_influence(view: Id, store: AppStore) -> Influences:
     """What the camera of a view would be without each of its markings; saves nothing."""

@@ -86,25 +86,27 @@ class GroupRow(Document):
         description="Diameter of the ball there: annotated, or, of a point, as optimised."
     )
     agreement: float | None = Field(
-        description="Of the view in use whose camera agrees least with its paint: supported times "
-        "explained; null where no paint was read."
+        description=(
+            "Lowest agreement of a camera with its paint among the views in use: supported times "
+            "explained; null: no paint was read."
+        )
     )
     x_m: float | None
     y_m: float | None
     views: int
     pictures: int = Field(description="Views that have a picture; 0: nothing to look at.")
     findings: list[str] = Field(description="Kinds that are open.")
-    dismissed: list[str] = Field(description="Kinds that somebody has checked and dismissed.")
+    dismissed: list[str] = Field(description="Kinds of dismissed findings.")
     reviewer: str | None
     reason: str | None
     override: str | None = Field(description="The gate that was overridden with a reason.")
     fixed: bool
     comments: int = Field(description="Threads of comments that are open.")
     takes: int | None = Field(
-        description="How many people handed in an annotation of their own; null: for reviewers alone."
+        description="How many people submitted an independent annotation; null: shown to reviewers only."
     )
     came_to: Literal["agreed", "open", "decided"] | None = Field(
-        description="What these came to; `open`: they differ, and somebody has to decide."
+        description="Outcome of comparing them; `open`: they differ, and a reviewer has to decide."
     )
     changed: datetime
     thumbnail: str | None
@@ -144,13 +146,6 @@ class GroupPage(ListDocument[GroupRow]):
     total: int = Field(description="How many match in all.")
 
 
-class GroupIds(Document):
-    """Ids of groups that match, in order."""
-
-    ids: list[int]
-    total: int = Field(description="How many match in all.")
-
-
 class Neighbours(Document, shows=QueueNeighbours):
     """Where a group stands among those that match, and what comes before and after it."""
 
@@ -171,13 +166,12 @@ class FindingRow(Document):
     confidence: float | None
     sentence: str
     fix: FixDocument | None
-    offers: list[OfferDocument] = Field(description="Edits that mend it.")
+    offers: list[OfferDocument] = Field(description="Edits that correct it.")
     guide: GuideDocument | None = Field(
-        description="Where a person is led who has to look or draw; null where edits are offered, "
-        "or nothing."
+        description="Where a person has to look or draw; null if edits are offered, or nothing."
     )
     dismissed: DismissedDocument | None = Field(
-        description="Who has checked the finding and found it fine; null: nobody."
+        description="Person who dismissed the finding; null: not dismissed."
     )
 
     @staticmethod

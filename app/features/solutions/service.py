@@ -24,7 +24,6 @@ from app.features.groups.queries import read_groups
 from app.features.groups.view_queries import read_stations, station_pitches
 from app.features.policies.queries import policy_history
 from app.features.queue.queries import refresh_queue
-from app.features.solutions.given_cameras import contradicted, sentence_of
 from app.features.solutions.kept_queries import KeptSolution, kept_solutions
 from app.features.solutions.queries import (
     EncodedSolution,
@@ -43,12 +42,47 @@ from app.progress import TellProgress
 from app.soccer.group import Group, Station
 from app.soccer.pitch import Pitch
 from app.soccer.policy import Policy
-from app.soccer.solution import Calibration, Solution
+from app.soccer.solution import GAMMAS_PERCENT, Calibration, Solution
 from app.solving.another_tau import alike_under, has_smaller_tau, retold
 from app.solving.calibrate import calibrate_station, calibration_key, view_keys
 from app.solving.facts_codec import facts_from_bytes, facts_to_bytes
 from app.solving.solve import solve_with_facts
-from app.workers.fan_out import fan_out
+from app.workers.executors import fan_out
+
+
+def contradicted(stations: Iterable[tuple[Station, Pitch]], policy: Policy) -> dict[str, float]:
+    """JaC of the static cameras whose lines do not fit the camera that was given, by their keys.
+
+    Args:
+        stations: Cameras, each with a pitch that it shows.
+        policy: With the gate of JaC that they fail.
+    """
+    gamma, found = GAMMAS_PERCENT.index(policy.jac_gamma_percent), dict[str, float]()
+    for station, pitch in stations:
+        is_given = station.given is not None and station.calibration == "given"
+        if not (station.shared and station.lines and is_given):
+            continue
+        jac = calibrate_station(station, pitch, policy.calibration).jac
+        if jac is not None and jac[gamma] <= policy.min_jac:
+            found[station.key] = jac[gamma]
+    return found
+
+
+def sentence_of(off: Mapping[str, float], where: str, how: str) -> str:
+    """What ``contradicted`` found, and what to do.
+
+    Args:
+        off: What it found.
+        where: Which groups that concerns.
+        how: What imports again without the lines.
+    """
+    low, high = (f"{jac:.2f}" for jac in (min(off.values()), max(off.values())))
+    return (
+        f"The lines of {', '.join(sorted(off))} do not fit the given "
+        f"calibration (JaC {low if low == high else f'{low} to {high}'}): "
+        f"{where}. Were they drawn on another day, {how} takes the given cameras as they are and "
+        "leaves their lines aside."
+    )
 
 
 def calibration_keys(groups: Iterable[Group], policy: Policy) -> set[str]:

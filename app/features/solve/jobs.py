@@ -6,6 +6,7 @@ from collections.abc import Callable
 from concurrent.futures import Executor
 from contextlib import nullcontext
 from dataclasses import dataclass
+from functools import partial
 from typing import TypeVar
 
 from app.db.json_columns import Json
@@ -15,7 +16,7 @@ from app.features.datasets.queries import dataset_name, group_ids
 from app.features.datasets.service import dataset_id, get_dataset_head, list_datasets
 from app.features.jobs.queries import Job
 from app.features.jobs.records import Then
-from app.features.jobs.run import JobProgress, Work, counting
+from app.features.jobs.run import JobProgress, counting
 from app.features.jobs.service import Jobs, Pool
 from app.features.pitches.service import (
     DatasetPitches,
@@ -147,7 +148,7 @@ def request_solve(
     return jobs.submit(
         KIND,
         title or f"Solve {name}",
-        solve_work(store, dataset_id, jobs.pool, actor=actor, edited=edited),
+        partial(solve_work, store, jobs.pool),
         dataset_id=dataset_id,
         actor=actor,
         request={EDITED: True} if edited else None,
@@ -246,12 +247,7 @@ def request_pitches(
 
 def resume_solving(jobs: Jobs, store: Store) -> None:
     """Let solving that an earlier server was at go on."""
-
-    def work(job: Job) -> Work:
-        edited = bool(job.request and job.request.get(EDITED))
-        return solve_work(store, job.dataset_id or 0, jobs.pool, actor=job.actor, edited=edited)
-
-    jobs.resumes(KIND, work)
+    jobs.resumes(KIND, partial(solve_work, store, jobs.pool))
 
 
 def solve_leftovers(jobs: Jobs, store: Store, *, actor: str) -> None:
@@ -261,33 +257,21 @@ def solve_leftovers(jobs: Jobs, store: Store, *, actor: str) -> None:
             request_solve(jobs, store, dataset.id, actor=actor)
 
 
-def solve_work(
-    store: Store,
-    dataset_id: int,
-    pool: Pool = nullcontext,
-    *,
-    actor: str = LOCAL_USER,
-    edited: bool = False,
-) -> Work:
+def solve_work(store: Store, pool: Pool, progress: JobProgress) -> Json:
     """The work itself: what to do is found in the data when it starts."""
-
-    def work(progress: JobProgress) -> Json:
-        found = get_dataset_head(store, dataset_id)
-        progress(0, None, f"Solving {found.name}.")
-        stale, whole = len(stale_groups(store, dataset_id)), _group_count(store, dataset_id)
-        # A change of the policy may have met an edit's job that waited.
-        follow = not edited or stale > MOSTLY * whole
-        large = (
-            stale >= WORTH_A_POOL or len(stale_matches(store, dataset_id)) >= MATCHES_WORTH_A_POOL
-        )
-        with pool() if large else nullcontext() as executor:
-            told = counting(progress, "groups solved")
-            report = solve_fully(store, dataset_id, executor, told, actor=actor, follow=follow)
-        count_yield(store, dataset_id, report, progress)
-        progress(report.total, report.total, report.sentence)
-        return {"policy": found.policy.name, **_report(report)}
-
-    return work
+    actor, edited = progress.job.actor, bool((progress.job.request or {}).get(EDITED))
+    found = get_dataset_head(store, progress.dataset_id)
+    progress(0, None, f"Solving {found.name}.")
+    stale, whole = len(stale_groups(store, found.id)), _group_count(store, found.id)
+    # A change of the policy may have met an edit's job that waited.
+    follow = not edited or stale > MOSTLY * whole
+    large = stale >= WORTH_A_POOL or len(stale_matches(store, found.id)) >= MATCHES_WORTH_A_POOL
+    with pool() if large else nullcontext() as executor:
+        told = counting(progress, "groups solved")
+        report = solve_fully(store, found.id, executor, told, actor=actor, follow=follow)
+    count_yield(store, found.id, report, progress)
+    progress(report.total, report.total, report.sentence)
+    return {"policy": found.policy.name, **_report(report)}
 
 
 def _group_count(store: Store, dataset_id: int) -> int:

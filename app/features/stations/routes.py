@@ -27,11 +27,14 @@ from app.features.stations.service import (
 from app.finite import MAX_ID
 from app.http.conflicts import current_state
 from app.http.deps import Actor, AppServices, AppStore, Id, IfMatch
+from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import Responses, responses
+from app.http.request_limits import LOOKS, limit
 from app.http.respond import responds
+from app.http.route import Route
 from app.http.services import Services
 
-router = APIRouter(prefix="/stations", tags=["stations"])
+router = APIRouter(prefix="/stations", tags=["stations"], route_class=Route)
 
 GroupOfStation = Annotated[
     int | None,
@@ -52,6 +55,8 @@ STATION_CHANGED: Responses = {**responses(*CONFLICTS), **CHANGED}
         200: {"headers": {"ETag": {"description": "The station's.", "schema": {"type": "string"}}}},
     },
 )
+@may(Action.READ, station=OwnedKind.STATION)
+@limit(LOOKS)
 def get_station(station: Id, store: AppStore, response: Response) -> StationDetail:
     """A station with its lines and its own ETag."""
     state = load_station(store, station)
@@ -65,6 +70,7 @@ def get_station(station: Id, store: AppStore, response: Response) -> StationDeta
     response_model=GroupDocument,
     responses=STATION_CHANGED,
 )
+@may(Action.ANNOTATE, station=OwnedKind.STATION, group=OwnedKind.GROUP)
 @responds(group_answer)
 def patch_lines(
     station: Id,
@@ -89,6 +95,7 @@ def patch_lines(
     response_model=GroupDocument,
     responses=STATION_CHANGED,
 )
+@may(Action.ANNOTATE, station=OwnedKind.STATION, group=OwnedKind.GROUP)
 @responds(group_answer)
 def patch_station(
     station: Id,
@@ -109,6 +116,7 @@ def patch_station(
     response_model=GroupDocument,
     responses=STATION_CHANGED,
 )
+@may(Action.ANNOTATE, station=OwnedKind.STATION, group=OwnedKind.GROUP)
 @responds(group_answer)
 def undo(
     station: Id,
@@ -127,6 +135,7 @@ def undo(
     response_model=GroupDocument,
     responses=STATION_CHANGED,
 )
+@may(Action.ANNOTATE, station=OwnedKind.STATION, group=OwnedKind.GROUP)
 @responds(group_answer)
 def redo(
     station: Id,

@@ -54,7 +54,12 @@ picture, and nobody says why it shall be accepted all the same."""
 
 @dataclass(frozen=True)
 class Refusal:
-    """Groups that a bulk verdict leaves alone, and why."""
+    """Groups that a bulk verdict leaves alone.
+
+    Attributes:
+        reason: ``submitted`` (independent annotations that are closed), ``unsolved``, ``needs_note``
+            (they fail a gate), ``unusable_ball`` or ``no_picture``.
+    """
 
     reason: str
     groups: int
@@ -372,7 +377,7 @@ class BatchRun:
         given = find_batch(session, self.batch)
         if given is None or given.is_taken_back:
             raise ConflictError(
-                "the verdicts that were given so far have been taken back",
+                "the verdicts given so far have been undone",
                 hint="Give the verdict again, under another Idempotency-Key.",
             )
         return given

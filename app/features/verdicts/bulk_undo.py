@@ -31,7 +31,12 @@ from app.features.verdicts.service import check_verdict
 
 @dataclass(frozen=True)
 class UndoReport:
-    """What undoing a batch did; ``kept`` are groups that somebody has judged since."""
+    """What undoing a batch did; ``kept`` are groups that somebody has judged since.
+
+    Attributes:
+        restored: Groups that have the verdict of before again.
+        kept: Groups that a person has judged since.
+    """
 
     batch: int
     restored: int
@@ -150,9 +155,9 @@ class RedoReport:
     """What giving a batch again did.
 
     Attributes:
-        batch: The new batch, which can be taken back like any other; None when nothing changed.
+        batch: The new batch, which can be undone like any other; None when nothing changed.
         changed: Groups that have the verdict again.
-        kept: Groups that somebody has judged or edited since; they stay as they are.
+        kept: Groups that a person has judged or edited since; they stay as they are.
         refused: Groups that the verdict cannot be given to any more, and why.
     """
 
@@ -212,11 +217,11 @@ def _report(batch: StoredBulkVerdict, run: BatchRun, refused: Counter[str]) -> R
 def _spans(batch: StoredBulkVerdict) -> Spans:
     """First and last id of the verdicts that took a batch back, chunk by chunk."""
     if batch.undone is None:
-        raise ConflictError("this batch was not taken back, so there is nothing to give again")
+        raise ConflictError("this batch was not undone, so there is nothing to redo")
     if batch.undo_spans is None:
         raise ConflictError(
-            "this batch was taken back by an older version of Touchline, which kept no record "
-            "of the groups",
+            "this batch was undone by an older version of Touchline, which kept no record of the "
+            "groups",
             hint="Give the verdict once more in the queue.",
         )
     return chunks(batch.undo_spans)
@@ -233,7 +238,7 @@ def _begun(session: Session, batch_id: int, actor: str) -> int | None:
     if again.actor != actor:
         raise ConflictError(
             f"{again.actor} has begun to give this batch again",
-            hint=f"Let {again.actor} finish it, or take back what was given.",
+            hint=f"Let {again.actor} finish it, or undo the verdicts given so far.",
         )
     return again.id
 

@@ -14,23 +14,25 @@ from app.features.groups.schemas import GroupDocument
 from app.features.groups.state import GroupState
 from app.features.verdicts import bulk, bulk_undo
 from app.features.verdicts import bulk_undo as bulk_redo
+from app.features.verdicts.bulk_undo import RedoReport, UndoReport
 from app.features.verdicts.schemas import (
     BatchList,
     BulkResult,
     BulkVerdict,
     DismissalEdit,
-    RedoDocument,
-    UndoDocument,
     VerdictEdit,
 )
 from app.features.verdicts.service import set_verdict
 from app.http.conflicts import current_state
 from app.http.cursor import MAX_ITEMS, Cursor, parse_cursor
 from app.http.deps import Actor, AppServices, AppStore, DatasetPath, DryRun, Id, IfMatch
+from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import responses
+from app.http.request_limits import EDITS, limit
 from app.http.respond import as_document, document, responds
+from app.http.route import Route
 
-router = APIRouter()
+router = APIRouter(route_class=Route)
 
 
 @router.put(
@@ -40,6 +42,8 @@ router = APIRouter()
     response_model=GroupDocument,
     responses={**responses(*CONFLICTS), **CHANGED},
 )
+@may(Action.REVIEW, group=OwnedKind.GROUP)
+@limit(EDITS)
 @responds(group_answer)
 def put_verdict(
     group: Id,
@@ -66,6 +70,7 @@ def put_verdict(
     response_model=GroupDocument,
     responses={**responses(*CONFLICTS), **CHANGED},
 )
+@may(Action.REVIEW, group=OwnedKind.GROUP)
 @responds(group_answer)
 def put_dismissal(
     group: Id, said: DismissalEdit, services: AppServices, actor: Actor, if_match: IfMatch
@@ -96,6 +101,7 @@ def put_dismissal(
     response_model=BulkResult,
     responses=responses(404, 409, 413, 415),
 )
+@may(Action.REVIEW, dataset=OwnedKind.DATASET)
 @responds(as_document(BulkResult.done))
 def post_verdicts(
     dataset: DatasetPath,
@@ -123,6 +129,7 @@ def post_verdicts(
     operation_id="listVerdictBatches",
     responses=responses(404),
 )
+@may(Action.READ, dataset=OwnedKind.DATASET, whole=True)
 def list_batches(
     dataset: DatasetPath,
     store: AppStore,
@@ -140,10 +147,11 @@ def list_batches(
     "/verdict-batches/{batch}/redo",
     tags=["verdicts"],
     operation_id="redoVerdictBatch",
-    response_model=RedoDocument,
+    response_model=RedoReport,
     responses=responses(404, 409),
 )
-@responds(as_document(RedoDocument.model_validate))
+@may(Action.REVIEW, batch=OwnedKind.BATCH)
+@responds(document)
 def redo_batch(batch: Id, store: AppStore, actor: Actor) -> bulk_redo.RedoReport:
     """Give the verdicts of a batch again that was taken back, as a new batch.
 
@@ -157,10 +165,11 @@ def redo_batch(batch: Id, store: AppStore, actor: Actor) -> bulk_redo.RedoReport
     "/verdict-batches/{batch}/undo",
     tags=["verdicts"],
     operation_id="undoVerdictBatch",
-    response_model=UndoDocument,
+    response_model=UndoReport,
     responses=responses(404, 409),
 )
-@responds(as_document(UndoDocument.model_validate))
+@may(Action.REVIEW, batch=OwnedKind.BATCH)
+@responds(document)
 def undo_batch(batch: Id, store: AppStore, actor: Actor) -> bulk_undo.UndoReport:
     """Give each group of a batch the verdict back that it had before; 409 the second time.
 

@@ -19,6 +19,7 @@ from app.features.verdicts.queries import (
     insert_verdicts,
     next_verdict_id,
 )
+from app.finite import Moment
 from app.soccer.choices import VerdictState
 from app.soccer.group import Group
 from app.soccer.reasons import REASONS, checked_note, require_words
@@ -131,8 +132,8 @@ def _require_seen(group: Group, verdict: Verdict) -> None:
     seen = any(view.media is not None for view in group.views)
     if verdict.state == "accepted" and verdict.note is None and not seen:
         raise InputError(
-            "this group has no picture in any view, so nobody can have looked at it; accepting "
-            "it needs a note that says what it was judged by",
+            "this group has no picture in any view; accepting it needs a note that says what it "
+            "was judged by",
             hint="Import it again with its frames, or say in the note why it is right.",
             pointer="/note",
         )
@@ -170,7 +171,7 @@ class Reviewer:
     rejected: int
     deferred: int
     today: int
-    last: str
+    last: Moment
 
 
 def list_reviewers(store: Store, dataset_id: int) -> list[Reviewer]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 from app.db.json_columns import Json
@@ -9,7 +10,7 @@ from app.db.store import Store
 from app.errors import OverloadedError
 from app.features.datasets.service import get_dataset_head
 from app.features.jobs.queries import DONE, Job
-from app.features.jobs.run import JobProgress, Work, run_job_in_worker
+from app.features.jobs.run import JobProgress, run_job_in_worker
 from app.features.jobs.service import Jobs
 from app.features.versions.freeze import FreezeRequest, freeze, plan_freeze
 from app.features.versions.service import FREEZE, Version, get_version, list_versions
@@ -36,7 +37,7 @@ def request_freeze(
     return jobs.submit(
         FREEZE,
         f"Freeze {found.name} as {_called(request)}",
-        freeze_work(store, found.id, request, actor),
+        partial(freeze_work, store),
         dataset_id=found.id,
         actor=actor,
         request=_request_values(request),
@@ -49,7 +50,7 @@ def request_verify(jobs: Jobs, store: Store, version_id: int, *, actor: str) -> 
     return jobs.submit(
         VERIFY,
         f"Verify {version.name} of {version.dataset}",
-        verify_work(store, version_id, actor),
+        partial(verify_work, store),
         dataset_id=version.dataset_id,
         actor=actor,
         request={"version": version_id},
@@ -59,68 +60,52 @@ def request_verify(jobs: Jobs, store: Store, version_id: int, *, actor: str) -> 
 def resume_versions(jobs: Jobs, store: Store) -> None:
     """Let freezing and verifying that an earlier server was at go on."""
 
-    def freezing(job: Job) -> Work:
-        values = dict(job.request)
-        request = FreezeRequest(**{**values, "split": Split.of(values["split"])})
-        dataset_id = job.dataset_id or 0
-
-        def work(progress: JobProgress) -> Json:
-            # The server may have stopped between the version and the record of its job.
-            done = _frozen_by(jobs, store, job, request)
-            if done is not None:
-                return version_result(done)
-            return freeze_work(store, dataset_id, request, job.actor)(progress)
-
-        return work
+    def freezing(progress: JobProgress) -> Json:
+        # The server may have stopped between the version and the record of its job.
+        done = _frozen_by(jobs, store, progress.job, _request_of(progress.job))
+        return freeze_work(store, progress) if done is None else version_result(done)
 
     jobs.resumes(FREEZE, freezing)
-    jobs.resumes(VERIFY, lambda job: verify_work(store, job.request["version"], job.actor))
+    jobs.resumes(VERIFY, partial(verify_work, store))
 
 
-def freeze_work(store: Store, dataset_id: int, request: FreezeRequest, actor: str) -> Work:
+def freeze_work(store: Store, progress: JobProgress) -> Json:
     """The work of freezing; its result names the version."""
+    job, request = progress.job, _request_of(progress.job)
+    progress(0, None, f"Freezing {_called(request)}.")
+    return run_job_in_worker(
+        store,
+        "freezing",
+        "the freeze",
+        _freeze,
+        progress.dataset_id,
+        request,
+        job.actor,
+        dataset_id=progress.dataset_id,
+        progress=progress,
+    )
 
-    def work(progress: JobProgress) -> Json:
-        progress(0, None, f"Freezing {_called(request)}.")
+
+def verify_work(store: Store, progress: JobProgress) -> Json:
+    """The work of verifying; its result is the report, which the version keeps, too."""
+    version, actor = get_version(store, progress.job.request["version"]), progress.job.actor
+    progress(0, None, f"Verifying {version.name}.")
+    try:
         return run_job_in_worker(
             store,
-            "freezing",
-            "the freeze",
-            _freeze,
-            dataset_id,
-            request,
+            "verifying",
+            "the verification",
+            _verify,
+            version.id,
             actor,
-            dataset_id=dataset_id,
+            dataset_id=version.dataset_id,
             progress=progress,
         )
-
-    return work
-
-
-def verify_work(store: Store, version_id: int, actor: str) -> Work:
-    """The work of verifying; its result is the report, which the version keeps, too."""
-
-    def work(progress: JobProgress) -> Json:
-        version = get_version(store, version_id)
-        progress(0, None, f"Verifying {version.name}.")
-        try:
-            return run_job_in_worker(
-                store,
-                "verifying",
-                "the verification",
-                _verify,
-                version_id,
-                actor,
-                dataset_id=version.dataset_id,
-                progress=progress,
-            )
-        except OverloadedError as error:
-            # A process that ended did not come to keeping it; one that never began says nothing.
-            if isinstance(error.__cause__, WorkerEnded):
-                keep_failure(store, version_id, error.message, actor=actor)
-            raise
-
-    return work
+    except OverloadedError as error:
+        # A process that ended did not come to keeping it; one that never began says nothing.
+        if isinstance(error.__cause__, WorkerEnded):
+            keep_failure(store, version.id, error.message, actor=actor)
+        raise
 
 
 def version_result(version: Version) -> dict[str, Any]:
@@ -146,6 +131,10 @@ def _verify(store: Store, version_id: int, actor: str, progress: TellProgress) -
 
 def _request_values(request: FreezeRequest) -> Json:
     return {**vars(request), "split": request.split.values()}
+
+
+def _request_of(job: Job) -> FreezeRequest:
+    return FreezeRequest(**{**job.request, "split": Split.of(job.request["split"])})
 
 
 def _called(request: FreezeRequest) -> str:

@@ -11,11 +11,10 @@ from app.features.jobs.schemas import JobDocument
 from app.features.versions import jobs as version_jobs
 from app.features.versions import service as versions
 from app.features.versions.diff import changelog, diff_versions
-from app.features.versions.freeze import plan_freeze
+from app.features.versions.freeze import FreezePlan, plan_freeze
 from app.features.versions.membership import version_manifest
 from app.features.versions.schemas import (
     Changelog,
-    FreezePlanDocument,
     VersionDiffDocument,
     VersionDocument,
     VersionList,
@@ -25,10 +24,12 @@ from app.features.versions.schemas import (
 from app.http.cursor import paged
 from app.http.deps import Actor, AppServices, AppStore, DatasetPath, DryRun
 from app.http.job_responses import ACCEPTED, by_job, job_answer
+from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import responses
 from app.http.respond import document, responds
+from app.http.route import Route
 
-router = APIRouter(tags=["versions"])
+router = APIRouter(tags=["versions"], route_class=Route)
 
 
 def called(
@@ -52,6 +53,7 @@ VersionId = Annotated[int, Depends(called)]
 
 
 @router.get("/datasets/{dataset}/versions", operation_id="listVersions", responses=responses(404))
+@may(Action.READ, dataset=OwnedKind.DATASET, whole=True)
 @paged()
 def list_versions(dataset: DatasetPath, store: AppStore) -> VersionList:
     """The frozen versions of a dataset, newest first."""
@@ -67,9 +69,10 @@ def list_versions(dataset: DatasetPath, store: AppStore) -> VersionList:
     responses={
         **responses(404, 409, 413, 415),
         **ACCEPTED,
-        200: {"model": FreezePlanDocument, "description": "After a dry run: what would be frozen."},
+        200: {"model": FreezePlan, "description": "After a dry run: what would be frozen."},
     },
 )
+@may(Action.LEAD, dataset=OwnedKind.DATASET)
 @responds(job_answer)
 def freeze_version(
     dataset: DatasetPath,
@@ -85,7 +88,7 @@ def freeze_version(
     """
     if dry_run or request.dry_run:
         plan = plan_freeze(services.store, dataset, request.value())
-        return document(FreezePlanDocument.model_validate(plan))
+        return document(plan)
     return version_jobs.request_freeze(
         services.jobs, services.store, dataset, request.value(), actor=actor
     )
@@ -97,6 +100,7 @@ def freeze_version(
     response_model=VersionDocument,
     responses=responses(404),
 )
+@may(Action.READ, version=OwnedKind.VERSION, dataset=OwnedKind.DATASET)
 def get_version(version: VersionId, store: AppStore) -> versions.Version:
     """One version."""
     return versions.get_version(store, version)
@@ -105,12 +109,14 @@ def get_version(version: VersionId, store: AppStore) -> versions.Version:
 @router.get(
     "/versions/{version}/manifest", operation_id="getVersionManifest", responses=responses(404)
 )
+@may(Action.READ, version=OwnedKind.VERSION, dataset=OwnedKind.DATASET)
 def get_manifest(version: VersionId, store: AppStore) -> VersionManifest:
     """What a version says of itself: counts, settings, licence, overrides, changelog."""
     return VersionManifest.model_validate(version_manifest(store, version))
 
 
 @router.get("/versions/{version}/changelog", operation_id="getChangelog", responses=responses(404))
+@may(Action.READ, version=OwnedKind.VERSION, dataset=OwnedKind.DATASET)
 def get_changelog(version: VersionId, store: AppStore) -> Changelog:
     """What changed since the version before, in sentences."""
     found = versions.get_version(store, version)
@@ -118,6 +124,7 @@ def get_changelog(version: VersionId, store: AppStore) -> Changelog:
 
 
 @router.get("/versions/{version}/diff", operation_id="diffVersions", responses=responses(404))
+@may(Action.READ, version=OwnedKind.VERSION, dataset=OwnedKind.DATASET)
 def get_diff(
     version: VersionId,
     store: AppStore,
@@ -141,6 +148,7 @@ def get_diff(
     operation_id="verifyVersion",
     **by_job(404),
 )
+@may(Action.LEAD, version=OwnedKind.VERSION, dataset=OwnedKind.DATASET)
 @responds(job_answer)
 def verify_version(version: VersionId, services: AppServices, actor: Actor) -> Job:
     """Compute a version from scratch and compare it bit for bit; the job's result reports."""

@@ -40,7 +40,7 @@ from app.soccer.solution import SOLVER_VERSION, Calibration
 from app.soccer.split import Splitter
 from app.solving.calibrate import calibrate_station, calibration_key
 from app.solving.solve import solve
-from app.workers.fan_out import fan_out
+from app.workers.executors import fan_out
 
 CHUNK = 40
 """Groups a task."""

@@ -9,10 +9,8 @@ from fastapi import APIRouter, Query
 from app.features.webhooks import service as webhooks
 from app.features.webhooks.messages import CHOSEN
 from app.features.webhooks.schemas import (
-    DeliveryDocument,
     DeliveryList,
     NewWebhook,
-    WebhookDocument,
     WebhookEdit,
     WebhookList,
     WebhookWithSecret,
@@ -20,17 +18,22 @@ from app.features.webhooks.schemas import (
 from app.features.webhooks.service import Delivery, Webhook
 from app.http.cursor import Before, Cursor, first_below, paged
 from app.http.deps import Actor, AppStore, DatasetPath, Id
+from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import responses
+from app.http.route import SecretRoute
 
-router = APIRouter(prefix="/datasets/{dataset}/webhooks", tags=["webhooks"])
+router = APIRouter(
+    prefix="/datasets/{dataset}/webhooks", tags=["webhooks"], route_class=SecretRoute
+)
 
 
 def _with_secret(made: tuple[Webhook, str]) -> WebhookWithSecret:
     webhook, secret = made
-    return WebhookWithSecret(webhook=WebhookDocument.model_validate(webhook), secret=secret)
+    return WebhookWithSecret(webhook=webhook, secret=secret)
 
 
 @router.get("", operation_id="listWebhooks", responses=responses(404))
+@may(Action.LEAD, dataset=OwnedKind.DATASET)
 @paged()
 def list_webhooks(dataset: DatasetPath, store: AppStore) -> WebhookList:
     """Who is told what happens in a dataset."""
@@ -44,6 +47,7 @@ def list_webhooks(dataset: DatasetPath, store: AppStore) -> WebhookList:
     status_code=201,
     responses=responses(404, 409, 413, 415),
 )
+@may(Action.LEAD, dataset=OwnedKind.DATASET)
 def make_webhook(
     dataset: DatasetPath, new: NewWebhook, store: AppStore, actor: Actor
 ) -> WebhookWithSecret:
@@ -54,9 +58,10 @@ def make_webhook(
 @router.patch(
     "/{webhook}",
     operation_id="changeWebhook",
-    response_model=WebhookDocument,
+    response_model=Webhook,
     responses=responses(404, 409, 413, 415),
 )
+@may(Action.LEAD, dataset=OwnedKind.DATASET)
 def change_webhook(
     dataset: DatasetPath, webhook: Id, change: WebhookEdit, store: AppStore, actor: Actor
 ) -> Webhook:
@@ -69,12 +74,14 @@ def change_webhook(
 @router.delete(
     "/{webhook}", operation_id="deleteWebhook", status_code=204, responses=responses(404)
 )
+@may(Action.LEAD, dataset=OwnedKind.DATASET)
 def delete_webhook(dataset: DatasetPath, webhook: Id, store: AppStore, actor: Actor) -> None:
     """Tell an address nothing more, and forget what it was told."""
     webhooks.remove_webhook(store, dataset, webhook, actor=actor)
 
 
 @router.post("/{webhook}/secret", operation_id="renewWebhookSecret", responses=responses(404))
+@may(Action.LEAD, dataset=OwnedKind.DATASET)
 def renew_secret(
     dataset: DatasetPath, webhook: Id, store: AppStore, actor: Actor
 ) -> WebhookWithSecret:
@@ -86,15 +93,17 @@ def renew_secret(
     "/{webhook}/ping",
     operation_id="pingWebhook",
     status_code=201,
-    response_model=DeliveryDocument,
+    response_model=Delivery,
     responses=responses(404, 409),
 )
+@may(Action.LEAD, dataset=OwnedKind.DATASET)
 def ping_webhook(dataset: DatasetPath, webhook: Id, store: AppStore, actor: Actor) -> Delivery:
     """Send a message of the kind `ping`, to see whether messages arrive."""
     return webhooks.send_ping(store, dataset, webhook, actor=actor)
 
 
 @router.get("/{webhook}/deliveries", operation_id="listWebhookDeliveries", responses=responses(404))
+@may(Action.LEAD, dataset=OwnedKind.DATASET)
 def list_deliveries(
     dataset: DatasetPath,
     webhook: Id,
@@ -113,9 +122,10 @@ def list_deliveries(
 @router.post(
     "/{webhook}/deliveries/{delivery}",
     operation_id="sendWebhookDeliveryAgain",
-    response_model=DeliveryDocument,
+    response_model=Delivery,
     responses=responses(404, 409),
 )
+@may(Action.LEAD, dataset=OwnedKind.DATASET)
 def send_again(dataset: DatasetPath, webhook: Id, delivery: Id, store: AppStore) -> Delivery:
     """Send a message once more, at once."""
     return webhooks.send_again(store, dataset, webhook, delivery)

@@ -256,9 +256,9 @@ class WebhookSender:
                 if self._leads():
                     wait = self._followed()
             except ReviewError as error:
-                log.warning("webhooks could not be told", error=str(error))
+                log.warning("webhook messages could not be sent", error=str(error))
             except Exception:
-                log.exception("webhooks could not be told")
+                log.exception("webhook messages could not be sent")
             self._closing.wait(LOOK_SECONDS)
             self._wake.wait(wait)
 

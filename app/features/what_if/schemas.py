@@ -164,6 +164,5 @@ class YieldDocument(Document):
     gained: int = Field(description="Groups that pass and do not under the present policy.")
     lost: int = Field(description="Groups that pass under the present policy and do not here.")
     needs_solving: list[str] = Field(
-        description="Thresholds that were changed and whose effect is known only after solving "
-        "again."
+        description="Changed thresholds whose effect is known only after solving again."
     )

@@ -6,7 +6,7 @@ import { useCallback, useState } from 'preact/hooks';
 
 import { getStation } from '../../api/calibration.js';
 import { ApiError, sentenceOf } from '../../api/problem.js';
-import { deleteRig, postRig } from '../../api/rig.js';
+import { deleteRig, postRig } from '../../api/match_estimates.js';
 import { capital, count, fixed, metres, pixelText, pixels, plural } from '../../lib/format.js';
 import { useResource } from '../../lib/resource.js';
 import { follow, isOver } from '../../state/jobs.js';
@@ -16,7 +16,7 @@ import { FormDialog } from '../dialog.js';
 import { JobProgress } from '../job_progress.js';
 
 /** @import {JobJson} from '../../api/jobs.js' */
-/** @import {Accepted, RigProposal} from '../../api/rig.js' */
+/** @import {Accepted, RigProposal} from '../../api/match_estimates.js' */
 
 const CHOICES = /** @type {{name: Accepted, label: string, note: string}[]} */ ([
 	{ name: 'cameras', label: 'The adjusted cameras', note: 'balls move; can be undone' },

@@ -12,6 +12,7 @@ import time
 import zipfile
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, cast
 
@@ -36,6 +37,7 @@ from app.soccer.media import Media
 from app.worker_process import WorkerProcess
 from tests.e2e.service import serving
 from tests.moto_server import SIGNED, Door, store_settings, stored_settings
+from tests.unit.features.jobs.steps import a_job
 
 
 @pytest.fixture(scope="session")
@@ -143,7 +145,7 @@ class TestExportApart:
 
     def test_it_appears_whole(self, imported: Store, door: Door, apart: Apart) -> None:
         to = "s3://frames/apart/league.zip"
-        result = apart.export(to, JobProgress(31, threading.Event()))
+        result = apart.export(to, JobProgress(a_job(31), threading.Event()))
         out = find_path(imported.settings, to)
         assert (result["bytes"], apart.half_written()) == (out.size, [])
         assert len(apart.processes) == 1 and os.getpid() not in apart.processes
@@ -164,7 +166,7 @@ class TestExportApart:
     ) -> None:
         apart.killed = True
         with pytest.raises(OverloadedError, match="the process of the export was killed"):
-            apart.export("s3://frames/apart/killed.zip", JobProgress(31, threading.Event()))
+            apart.export("s3://frames/apart/killed.zip", JobProgress(a_job(31), threading.Event()))
         assert apart.half_written() == []
 
 
@@ -172,7 +174,7 @@ class CancelledAt(JobProgress):
     """The progress of a job that somebody cancels when it says a sentence."""
 
     def __init__(self, sentence: str):
-        super().__init__(31, threading.Event())
+        super().__init__(a_job(31), threading.Event())
         self._sentence = sentence
 
     def __call__(self, done: int, total: int | None = None, sentence: str = "") -> None:
@@ -214,7 +216,8 @@ class Apart:
         request |= {"images": "copy", "to": to}
         frames = cast(Frames, self)
         number = dataset_id(self._store, "league")
-        return export_work(self._store, self._folder, frames, number, request)(progress)
+        progress.job = replace(progress.job, dataset_id=number, request=request)
+        return export_work(self._store, self._folder, frames, progress)
 
     def half_written(self) -> list[str]:
         """Names of what is not complete in the folder of exports."""

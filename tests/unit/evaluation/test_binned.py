@@ -6,7 +6,7 @@ import pytest
 
 from app.evaluation.binned import DISTANCE, PARALLAX, SIZE, detection_table, error_figure
 from app.evaluation.frame import Detection, JudgedFrame
-from app.evaluation.monocular import measure_frame
+from app.evaluation.localization import measure_frame
 from app.evaluation.result import FrameResult
 from tests.unit.evaluation.conftest import DIAMETER
 

@@ -94,7 +94,7 @@ class TestFleissKappa:
         assert 0.3 < found.low < 0.43 < found.high < 0.6
 
     def test_asks_for_as_many_judgements_of_each(self) -> None:
-        with pytest.raises(ValueError, match="equally many"):
+        with pytest.raises(ValueError, match="same number"):
             fleiss_kappa(["aab", "ab"])
 
 

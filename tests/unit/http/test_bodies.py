@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import json
 import time
 from typing import Any
@@ -17,16 +16,12 @@ from app.http.bodies import (
     MAX_DEPTH,
     MAX_NAME,
     MAX_NAMES,
-    MAX_STRANGERS_BYTES,
     MAX_VALUES,
     BodyError,
-    JsonBodies,
     _without_strings,
     read_json,
     require_json_type,
 )
-
-JSON = [(b"content-type", b"application/json")]
 
 
 def refusal(body: bytes) -> str:
@@ -152,126 +147,6 @@ class TestRequireJsonType:
         with pytest.raises(BodyError) as caught:
             require_json_type(kinds)
         assert caught.value.status == 415
-
-
-class Exchange:
-    """One request against ``JsonBodies``, chunk by chunk."""
-
-    def __init__(self, chunks: list[bytes], headers: list[tuple[bytes, bytes]], method: str):
-        self.chunks = chunks
-        self.taken = 0
-        self.reached: bytes | None = None
-        self.status = 0
-        self.scope = {"type": "http", "method": method, "headers": headers, "path": "/"}
-
-    async def receive(self) -> dict[str, Any]:
-        chunk = self.chunks[self.taken]
-        self.taken += 1
-        more = self.taken < len(self.chunks)
-        return {"type": "http.request", "body": chunk, "more_body": more}
-
-    async def send(self, message: dict[str, Any]) -> None:
-        self.status = message.get("status", self.status)
-
-    async def app(self, scope: Any, receive: Any, send: Any) -> None:
-        self.reached = (await receive())["body"]
-        self.status = 204
-
-    def run(self, max_bytes: int) -> Exchange:
-        asyncio.run(JsonBodies(self.app, max_bytes)(self.scope, self.receive, self.send))
-        return self
-
-
-class TestJsonBodies:
-    def test_the_body_arrives_whole_behind_it(self) -> None:
-        done = Exchange([b'{"a"', b": 1}"], JSON, "PATCH").run(100)
-        assert (done.status, done.reached) == (204, b'{"a": 1}')
-
-    def test_a_body_of_the_very_cap_passes_and_one_byte_more_does_not(self) -> None:
-        assert Exchange([b'"' + b"a" * 8 + b'"'], JSON, "POST").run(10).status == 204
-        assert Exchange([b'"' + b"a" * 9 + b'"'], JSON, "POST").run(10).status == 413
-
-    def test_an_honest_length_is_refused_before_a_byte_is_read(self) -> None:
-        headers = [*JSON, (b"content-length", b"11")]
-        done = Exchange([b"a" * 11], headers, "POST").run(10)
-        assert (done.status, done.taken) == (413, 0)
-
-    def test_a_chunked_body_is_cut_off_at_the_cap(self) -> None:
-        done = Exchange([b"a" * 4] * 1000, JSON, "POST").run(10)
-        assert (done.status, done.taken) == (413, 3)
-
-    @pytest.mark.parametrize(
-        ("path", "status"),
-        [
-            ("/api/v1/session", 413),
-            ("/api/v1/session/sign-on", 413),
-            ("/api/v1/links/use", 413),
-            ("/api/v1/sessions", 204),
-            ("/api/v1/groups/1/preview", 204),
-        ],
-    )
-    def test_who_is_not_known_yet_brings_less(self, path: str, status: int) -> None:
-        body = b'"' + b"a" * MAX_STRANGERS_BYTES + b'"'
-        asked = Exchange([body], JSON, "POST")
-        asked.scope["path"] = path
-        assert asked.run(2 * MAX_STRANGERS_BYTES).status == status
-        asked = Exchange([body[:-3] + b'"'], JSON, "POST")
-        asked.scope["path"] = path
-        assert asked.run(2 * MAX_STRANGERS_BYTES).status == 204
-
-    @pytest.mark.parametrize(
-        ("length", "status"), [(b"-1", 400), (b"1e9", 400), (b"\xb2", 400), (b"9" * 30, 413)]
-    )
-    def test_a_length_that_no_body_has_is_refused(self, length: bytes, status: int) -> None:
-        headers = [*JSON, (b"content-length", length)]
-        assert Exchange([b"1"], headers, "POST").run(10).status == status
-
-    def test_a_request_without_a_body_needs_no_type(self) -> None:
-        assert Exchange([b""], [], "POST").run(10).status == 204
-
-    @pytest.mark.parametrize("kind", [b"application/json", b"Application/JSON; charset=UTF-8"])
-    def test_json_in_utf_8_arrives(self, kind: bytes) -> None:
-        done = Exchange([b'"\xc3\xa4"'], [(b"content-type", kind)], "POST").run(10)
-        assert (done.status, done.reached) == (204, b'"\xc3\xa4"')
-
-    def test_a_body_of_another_type_never_arrives(self) -> None:
-        done = Exchange([b"a=1"], [(b"content-type", b"text/plain")], "POST").run(10)
-        assert (done.status, done.reached) == (415, None)
-
-
-class TestStreamedBodies:
-    def test_bytes_pass_as_they_come_and_nothing_else_does(self) -> None:
-        assert _ask("POST", b"application/octet-stream") == [b"\x00{not json", b"more"]
-        assert _ask("POST", b"application/json") == 415
-        assert _ask("POST", b"application/octet-stream; charset=x") == 415
-        assert _ask("PUT", b"application/octet-stream") == 415
-
-
-def _ask(method: str, kind: bytes) -> Any:
-    """What the application behind sees of two chunks, or the status of a refusal."""
-    chunks = [b"\x00{not json", b"more"]
-    seen: list[bytes] = []
-    statuses: list[int] = []
-
-    async def app(scope: Any, receive: Any, send: Any) -> None:
-        while True:
-            message = await receive()
-            seen.append(message["body"])
-            if not message.get("more_body"):
-                return
-
-    async def receive() -> Any:
-        body = chunks.pop(0)
-        return {"type": "http.request", "body": body, "more_body": bool(chunks)}
-
-    async def send(message: Any) -> None:
-        if message["type"] == "http.response.start":
-            statuses.append(message["status"])
-
-    scope = {"type": "http", "method": method, "path": "/up", "headers": [(b"content-type", kind)]}
-    guarded = JsonBodies(app, streamed=frozenset({"/up"}))
-    asyncio.run(guarded(scope, receive, send))
-    return statuses[0] if statuses else seen
 
 
 class TestNullCharacters:

@@ -11,7 +11,9 @@ from typing import Any
 import httpx
 import pytest
 import uvicorn
+from fastapi import Request
 from sqlalchemy import update
+from starlette.responses import Response
 from structlog.testing import capture_logs
 
 from app.admission import release_admission
@@ -20,7 +22,7 @@ from app.db.stored_responses import StoredResponseModel, shorten_responses
 from app.errors import StorageError
 from app.features.verdicts import routes as verdicts
 from app.features.verdicts.service import set_verdict
-from app.http.idempotency import Idempotency
+from app.http.idempotency import Idempotency, RequestDigest
 from app.http.request_limits import EDITS
 from app.http.server import Server, listen
 from tests.waiting import SECONDS
@@ -263,43 +265,37 @@ class TestRepetitionsThatWait:
 class TestStreamed:
     def test_an_upload_is_known_by_its_bytes_which_are_not_held(self, app) -> None:
         parts: list[int] = []
+        idempotency = Idempotency()
 
-        async def upload(scope: Any, receive: Any, send: Any) -> None:
-            more = True
-            while more:
-                message = await receive()
-                parts.append(len(message["body"]))
-                more = message["more_body"]
-            await send({"type": "http.response.start", "status": 201, "headers": []})
-            await send({"type": "http.response.body", "body": str(len(parts)).encode()})
-
-        middleware = Idempotency(upload, "local")
-
-        async def call(chunks: list[bytes]) -> list[dict[str, Any]]:
-            sent: list[dict[str, Any]] = []
+        async def call(chunks: list[bytes]) -> Response:
             waiting = list(chunks)
 
             async def receive() -> dict[str, Any]:
                 body = waiting.pop(0)
                 return {"type": "http.request", "body": body, "more_body": bool(waiting)}
 
-            async def send(message: dict[str, Any]) -> None:
-                sent.append(message)
-
             headers = [(b"idempotency-key", b"u"), (b"content-type", b"application/octet-stream")]
-            scope = {
-                "type": "http",
-                "app": app,
-                "method": "POST",
-                "path": "/u",
-                "query_string": b"",
-            }
-            await middleware({**scope, "headers": headers}, receive, send)
-            return sent
+            scope = {"type": "http", "app": app, "method": "POST", "path": "/u"}
+            request = Request({**scope, "query_string": b"", "headers": headers}, receive)
+            digest = RequestDigest(request, is_streamed=True)
 
-        first = asyncio.run(call([b"ab", b"c"]))
-        again = asyncio.run(call([b"a", b"bc"]))
-        other = asyncio.run(call([b"abd"]))
+            async def upload() -> Response:
+                more = True
+                while more:
+                    message = await digest.receive()
+                    parts.append(len(message["body"]))
+                    more = message["more_body"]
+                return Response(str(len(parts)), 201)
+
+            async def nothing_is_hidden() -> bool:
+                return False
+
+            return await idempotency.answer(request, digest, "local", nothing_is_hidden, upload)
+
+        async def all_told() -> list[Response]:
+            return [await call(chunks) for chunks in ([b"ab", b"c"], [b"a", b"bc"], [b"abd"])]
+
+        first, again, other = asyncio.run(all_told())
         assert parts == [2, 1]
-        assert [found[0]["status"] for found in (first, again, other)] == [201, 201, 422]
-        assert again[1]["body"] == first[1]["body"] == b"2"
+        assert [found.status_code for found in (first, again, other)] == [201, 201, 422]
+        assert again.body == first.body == b"2"

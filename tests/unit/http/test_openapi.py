@@ -8,7 +8,7 @@ from jsonschema import Draft202012Validator
 from openapi_spec_validator import validate
 
 from app.http.property_descriptions import PARAMETERS, PROPERTIES
-from app.http.rules import OPEN, RULES
+from app.http.route import routes_of
 
 Document = dict[str, Any]
 
@@ -74,6 +74,17 @@ class TestDocument:
                 told = f"{name}.{key}: describe it in its model or in property_words.py"
                 assert one.get("description"), told
 
+    def test_a_value_that_is_served_has_all_its_fields_and_the_words_of_its_docstring(
+        self, document
+    ) -> None:
+        schema = document["components"]["schemas"]["Banner"]
+        starts = schema["properties"]["starts"]
+        assert schema["required"] == ["text", "starts", "until"]
+        assert "default" not in starts
+        assert {"type": "string", "format": "date-time"} in starts["anyOf"]
+        assert "null" in starts["description"]
+        assert "Attributes" not in schema["description"]
+
     def test_every_shared_description_is_used(self, document) -> None:
         said = {
             (name, key, one["description"])
@@ -106,9 +117,12 @@ class TestDocument:
                     count += 1
         assert count > 100
 
-    def test_says_with_what_one_may_ask(self, document) -> None:
+    def test_says_with_what_one_may_ask(self, app, document) -> None:
+        routes = dict(routes_of(app))
         schemes = document["components"]["securitySchemes"]
         assert (schemes["session"]["in"], schemes["token"]["scheme"]) == ("cookie", "bearer")
         assert document["security"] == [{"session": []}, {"token": []}, {}]
         for name, operation in operations(document):
-            assert (operation.get("security") == []) == (RULES[name] is OPEN), name
+            assert (operation.get("security") == []) == (routes[name].permission.action is None), (
+                name
+            )

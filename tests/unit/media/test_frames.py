@@ -119,7 +119,7 @@ class TestFrames:
         [
             ("crash", ImageError, "made its process crash"),
             ("be_killed", OverloadedError, "killed"),
-            ("be_told_to_end", OverloadedError, "told to end"),
+            ("be_told_to_end", OverloadedError, "was stopped"),
         ],
     )
     def test_what_may_be_the_machines_doing_is_tried_again(

@@ -10,16 +10,16 @@ import pytest
 from app.geometry.resection import Sightings, X, Z
 from app.soccer.pitch import CIRCLES, MARKINGS, Pitch
 from app.soccer.policy import CalibrationPolicy
-from app.solving.observations import observe
-from app.solving.paint_camera import PaintProblem, offsets_of
-from app.solving.paint_terms import painted_terms, size_terms
-from app.solving.resect import ResectionProblem
-from app.solving.stadium_priors import (
+from app.solving.lone_frame import (
     CROWN_SIGMA_M,
     INWARD_SIGMA_M,
     LINE_SIGMA_M,
     PAINT_SIZE_SIGMA_M,
 )
+from app.solving.observations import observe
+from app.solving.paint_camera import PaintProblem, offsets_of
+from app.solving.paint_terms import painted_terms, size_terms
+from app.solving.resect import ResectionProblem
 from tests.cameras import SIZE
 from tests.unit.solving.conftest import MAIN, click
 

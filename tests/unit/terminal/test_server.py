@@ -414,7 +414,7 @@ class TestRefusals:
 
     def test_without_a_token_it_asks_for_one(self, place: Place) -> None:
         done = CliRunner().invoke(app, ["--server", place.url, "datasets", "list"])
-        assert "asks who you are" in str(done.exception)
+        assert "requires a login" in str(done.exception)
 
     @pytest.mark.parametrize(
         ("url", "sentence"),
@@ -433,14 +433,14 @@ class TestRefusals:
     def test_tls_that_fails_is_told_as_such(self, place: Place) -> None:
         secure = place.url.replace("http://", "https://")
         done = CliRunner().invoke(app, ["--server", secure, "datasets", "list"])
-        assert "cannot prove who it is" in str(done.exception)
+        assert "cannot prove its identity" in str(done.exception)
 
     def test_an_answer_that_only_sounds_like_it_is_told_as_it_is(self) -> None:
         server = ServerPlace("http://127.0.0.1:8000", None)
         said = RequestError("there is no dataset crossland", None, 404)
         assert _explained(server, said).message == "there is no dataset crossland"
         broken = UnreachableError("the SSL handshake failed")
-        assert "cannot prove who it is" in _explained(server, broken).message
+        assert "cannot prove its identity" in _explained(server, broken).message
 
     @pytest.mark.parametrize("named", ["tables", "figures"])
     def test_no_name_of_a_server_leads_out_of_the_folder(self, tmp_path: Path, named: str) -> None:

@@ -14,7 +14,7 @@ import pytest
 from app.errors import ClusterError, InputError, NotFoundError
 from app.workers import cluster
 from app.workers.cluster import Cluster, SchedulerPlace, build, carry_out, read_place, require_same
-from app.workers.fan_out import fan_out
+from app.workers.executors import fan_out
 from tests.certificates import write_keys
 from tests.waiting import SECONDS
 

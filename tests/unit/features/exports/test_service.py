@@ -109,7 +109,7 @@ class TestExport:
 
     @pytest.mark.parametrize("out", ["out", "out.zip"])
     def test_nothing_to_export_leaves_no_file(self, store, three, tmp_path, out: str) -> None:
-        with pytest.raises(InputError, match="nobody has accepted"):
+        with pytest.raises(InputError, match="no group has been accepted"):
             export(store, "demo", "soccernet-v3d", tmp_path / out)
         assert not (tmp_path / out).exists()
 
@@ -379,6 +379,6 @@ class TestPossibleFormats:
         assert named == [form for form in FORMATS if not form.startswith("issia")]
 
     def test_that_nothing_is_accepted_is_no_matter_of_the_format(self, store, three) -> None:
-        with pytest.raises(InputError, match="nobody has accepted") as caught:
+        with pytest.raises(InputError, match="no group has been accepted") as caught:
             require_possible(store, "demo", "issia")
         assert caught.value.hint is None

@@ -3,7 +3,7 @@ from __future__ import annotations
 from concurrent.futures import ThreadPoolExecutor
 from threading import Event
 
-from app.workers.fan_out import AHEAD, fan_out
+from app.workers.executors import AHEAD, fan_out
 from tests.waiting import SECONDS
 
 

@@ -16,7 +16,7 @@ from app.features.groups.submit import load, preview, solved, submit, submit_all
 from app.features.groups.undo import undo
 from app.features.imports.edits_export import carried_group
 from app.features.imports.ingest import ingest
-from app.features.match_estimates.noise_queries import (
+from app.features.match_estimates.queries import (
     NOISE,
     Factor,
     factor_of,

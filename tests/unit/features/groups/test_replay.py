@@ -16,7 +16,7 @@ from app.features.groups.undo import redo, undo
 from app.features.imports.cameras import ingest_cameras
 from app.features.imports.ingest import ingest
 from app.features.imports.spare import SpareFrame, ingest_spare
-from app.features.match_estimates.noise_queries import Factor
+from app.features.match_estimates.queries import Factor
 from app.features.policies.service import change_policy
 from app.features.stations.service import load_station, submit_station, undo_station
 from app.features.verdicts.service import set_verdict

@@ -67,7 +67,7 @@ class TestIngest:
         (group,) = fill(make_group())
         take = begin_take(store, group, person="ann")
         name = load(store, take.copy_id).dataset
-        with pytest.raises(ConflictError, match="own annotations"):
+        with pytest.raises(ConflictError, match="independent annotations"):
             ingest(store, name, [make_group(7)], source="test", actor="lea")
         assert load(store, take.copy_id).group == load(store, group).group
 

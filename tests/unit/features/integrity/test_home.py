@@ -175,5 +175,5 @@ class TestExamineSurroundings:
         assert found["uploads"].sentence.startswith("1 kept")
         assert upload.id in str(found["uploads"].mend)
         assert found["leftovers"].sentence.startswith("1 half-written")
-        assert found["spare calibrations"].sentence.startswith("1 that")
-        assert all(found[name].ok for name in ("uploads", "leftovers", "spare calibrations"))
+        assert found["unused calibrations"].sentence.startswith("1 that")
+        assert all(found[name].ok for name in ("uploads", "leftovers", "unused calibrations"))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import fields
 from types import ModuleType
 from typing import Any
 
@@ -15,6 +16,13 @@ from app.features.jobs.queries import Job
 from app.features.jobs.run import JobProgress
 from app.features.jobs.service import Jobs
 from tests.waiting import SECONDS
+
+
+def a_job(number: int = 1, **values: Any) -> Job:
+    """A job that waits."""
+    known: dict[str, Any] = {item.name: None for item in fields(Job)}
+    words = {"kind": "export", "title": "Export", "state": "waiting", "actor": "ann"}
+    return Job(**{**known, **words, "id": number, "done": 0, "sentence": "", **values})
 
 
 class Gate:

@@ -21,7 +21,7 @@ from app.features.imports.ingest import ensure_dataset
 from app.features.jobs import run as module
 from app.features.jobs.run import JobProgress, run_job_in_worker
 from app.features.jobs.service import Jobs
-from tests.unit.features.jobs.steps import Gate, submit
+from tests.unit.features.jobs.steps import Gate, a_job, submit
 from tests.waiting import SECONDS
 
 
@@ -104,7 +104,7 @@ class TestRunQueue:
         assert first.started.wait(SECONDS)
         for _ in range(6):
             submit(jobs, lambda _: None)
-        with pytest.raises(OverloadedError, match="6 jobs that you asked for wait already"):
+        with pytest.raises(OverloadedError, match="6 of your jobs are already waiting"):
             submit(jobs, lambda _: None)
         jobs.submit("bulk", "Some work", lambda _: None, actor="bob")
         first.finish.set()
@@ -156,7 +156,7 @@ def large(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def progress() -> JobProgress:
-    return JobProgress(1, threading.Event())
+    return JobProgress(a_job(), threading.Event())
 
 
 def run_job(store: Store, work: Any, *arguments: Any, **options: Any) -> Any:
@@ -225,11 +225,11 @@ class TestRunJobInWorker:
         closing = threading.Event()
         threading.Timer(0.5, closing.set).start()
         with pytest.raises(JobCancelled):
-            run_job(store, end, dataset_id=None, progress=JobProgress(1, closing))
+            run_job(store, end, dataset_id=None, progress=JobProgress(a_job(), closing))
 
     def test_one_that_was_told_to_end_is_a_sentence_that_says_so(
         self, store: Store, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         monkeypatch.setattr(module, "STOP_SECONDS", 0.0)
-        with pytest.raises(OverloadedError, match=r"^the process of the export was told to end$"):
+        with pytest.raises(OverloadedError, match=r"^the process of the export was stopped$"):
             run_job(store, be_told_to_end, dataset_id=None)

@@ -282,7 +282,7 @@ def job_that_servers_died_at(store: Store, deaths: int) -> int:
         job = insert_job(session, NewJob("import", "Import", "ann"))
     for _ in range(deaths):
         jobs, gate = Jobs(store), Gate()
-        jobs.resumes("import", lambda found, gate=gate: gate)
+        jobs.resumes("import", gate)
         jobs.start()
         assert gate.started.wait(SECONDS)
         # What a server says that is killed: nothing any more.
@@ -314,7 +314,7 @@ class TestRestart:
         assert gate.started.wait(SECONDS)
         first.close()
         second = Jobs(store)
-        second.resumes("import", lambda found: lambda progress: found.request["source"] + 1)
+        second.resumes("import", lambda progress: progress.job.request["source"] + 1)
         second.start()
         done = second.wait(job.id, SECONDS)
         assert (done.state, done.result, second.find()) == ("done", 6, [done])
@@ -326,7 +326,7 @@ class TestRestart:
     ) -> None:
         job = job_that_servers_died_at(store, deaths)
         later = Jobs(store)
-        later.resumes("import", lambda found: lambda progress: 7)
+        later.resumes("import", lambda progress: 7)
         later.start()
         found = later.wait(job, SECONDS)
         assert found.state == state
@@ -344,7 +344,7 @@ class TestRestart:
             first.close()
             assert first.get(job.id).tries == 0
             first, gate = Jobs(store), Gate(9)
-            first.resumes("import", lambda found, gate=gate: gate)
+            first.resumes("import", gate)
             first.start()
         gate.finish.set()
         assert first.wait(job.id, SECONDS).result == 9

@@ -89,7 +89,7 @@ def opened(store: Store, claims: Claims, work: Work) -> Iterator[Open]:
         jobs = SharedJobs(store)
         # As if it had been started when another one led.
         jobs._alone = False
-        jobs.resumes("solve", lambda _job: own)
+        jobs.resumes("solve", own)
         opened.append(jobs)
         return jobs
 
@@ -191,7 +191,7 @@ class TestSharedJobs:
         self, opened: Open, work: Work
     ) -> None:
         jobs = opened()
-        jobs.makes("bulk", lambda job: job.request["nothing of the kind"])
+        jobs.makes("bulk", lambda progress: progress.job.request["nothing of the kind"])
         spoiled = jobs.submit("bulk", "Accept", lambda _: None, actor="ann")
         jobs.start()
         work.go_on.release()
@@ -209,7 +209,7 @@ def test_a_progress_whose_claim_is_lost_wants_nothing(store: Store, opened: Open
     from app.features.jobs.shared import SharedProgress
 
     lost = threading.Event()
-    progress = SharedProgress(ask(opened()).id, lost, store)
+    progress = SharedProgress(ask(opened()), lost, store)
     progress.require_wanted()
     lost.set()
     with pytest.raises(JobCancelled):

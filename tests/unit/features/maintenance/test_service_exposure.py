@@ -28,7 +28,7 @@ def test_what_strangers_cannot_reach_or_read_is_safe(safe: dict[str, Any]) -> No
 @pytest.mark.parametrize(
     ("unsafe", "says"),
     [
-        ({"host": "0.0.0.0"}, "without accounts everybody"),
+        ({"host": "0.0.0.0"}, "without accounts anyone"),
         ({"host": "10.0.0.7", "url": "https://touchline.example.org"}, "without accounts"),
         ({"host": "0.0.0.0", "team": True}, "Put a proxy with TLS in front"),
         ({"host": "0.0.0.0", "team": True, "url": "http://a.example.org"}, "Put a proxy"),

@@ -14,8 +14,8 @@ from app.features.groups.state_snapshot import read_ledger
 from app.features.groups.submit import load, submit
 from app.features.groups.undo import undo
 from app.features.imports.ingest import ingest
-from app.features.match_estimates import picture_queries as positions_in_store
 from app.features.match_estimates import positions as editing
+from app.features.match_estimates import queries as positions_in_store
 from app.features.match_estimates.positions import (
     get_positions,
     share_positions,

@@ -244,5 +244,5 @@ class TestTakeBack:
             assert stations(store, proposed)[key] == state.station
 
     def test_there_must_be_something_to_take_back(self, store, ids) -> None:
-        with pytest.raises(ConflictError, match="nothing to take back"):
+        with pytest.raises(ConflictError, match="nothing to undo"):
             take_back(store, "demo", actor="ann")

@@ -268,5 +268,5 @@ class TestServe:
         run("users", "add", "anna")
         refused = run("serve", "--port", "0")
         assert refused.exit_code == 1
-        assert "have accounts here" in str(refused.exception)
+        assert "has accounts" in str(refused.exception)
         assert run("serve", "--port", "0", "--alone").exit_code == 0

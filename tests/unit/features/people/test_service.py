@@ -25,7 +25,7 @@ from app.features.people import links
 from app.features.people import links as passwords
 from app.features.people.logins import IDLE, LASTS, Login, Logins
 from app.features.people.queries import update_person
-from app.features.people.roles import Action, DatasetRoles, Role, checked_name, may, require
+from app.features.people.roles import Action, DatasetRoles, Role, checked_name, lets, require
 from app.features.people.service import change_person, find_person, invite, list_people, renew_link
 from tests.databases import all_that_is_kept
 
@@ -79,7 +79,7 @@ def found(logins: Logins, token: str) -> Login:
 class TestRoles:
     def test_each_role_may_what_those_before_it_may(self) -> None:
         for action in Action:
-            allowed = [may(role, action) for role in Role]
+            allowed = [lets(role, action) for role in Role]
             assert allowed == sorted(allowed)
             assert allowed[-1]
 

@@ -40,7 +40,7 @@ def reader_of() -> Iterator[Callable[..., PredictionReader]]:
 
 def written(path: Path, content: bytes) -> PredictionFiles:
     path.write_bytes(content)
-    return PredictionFiles(path)
+    return PredictionFiles(path, "coco")
 
 
 class TestUploadedFiles:

@@ -362,7 +362,7 @@ class TestUndoBatch:
     ) -> None:
         monkeypatch.setattr(bulk, "CHUNK", 1)
         before_write(store, monkeypatch, 3, lambda: undo_batch(store, 1, actor="eve"))
-        with pytest.raises(ConflictError, match="have been taken back"):
+        with pytest.raises(ConflictError, match="have been undone"):
             give_verdicts(store, 1, "", "deferred", actor="ben")
         assert set(statuses(store)) == {"unreviewed"}
         (found,) = list_batches(store, 1)

@@ -129,7 +129,7 @@ class TestRedoBatch:
         done = redo_batch(store, undone, actor="ben")
         with pytest.raises(ConflictError, match="given again already"):
             redo_batch(store, undone, actor="ben")
-        with pytest.raises(ConflictError, match="was not taken back"):
+        with pytest.raises(ConflictError, match="was not undone"):
             redo_batch(store, done.batch, actor="ben")
         with pytest.raises(NotFoundError):
             redo_batch(store, 99, actor="ben")

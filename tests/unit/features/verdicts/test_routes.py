@@ -222,7 +222,7 @@ class TestStoppedBetweenChunks:
         api.post("/api/v1/verdict-batches/1/undo")
         refused = api.post(VERDICTS, json=self.BODY, headers=self.KEY)
         assert refused.status_code == 409
-        assert "taken back" in refused.json()["detail"]
+        assert "undone" in refused.json()["detail"]
 
     def test_a_batch_is_taken_back_whole(self, app, api, monkeypatch) -> None:
         api.post(VERDICTS, json=self.BODY)

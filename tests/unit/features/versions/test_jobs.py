@@ -11,11 +11,13 @@ import pytest
 from app.db.store import Store
 from app.errors import JobCancelled, OverloadedError
 from app.features.jobs import run as job_run
+from app.features.jobs.queries import Job
 from app.features.jobs.run import JobProgress
 from app.features.versions.freeze import FreezeRequest, freeze
 from app.features.versions.jobs import verify_work
 from app.features.versions.service import Version, get_version
 from app.worker_process import WorkerProcess
+from tests.unit.features.jobs.steps import a_job
 
 
 @pytest.fixture
@@ -24,11 +26,15 @@ def version(store: Store, fill: Any, make_group: Any) -> Version:
     return freeze(store, "demo", FreezeRequest("v1", groups="passing"), actor="ann")
 
 
+def asked(version: Version, actor: str) -> Job:
+    return a_job(kind="verify", actor=actor, request={"version": version.id})
+
+
 class Killed(JobProgress):
     """The progress of a job whose process is killed at its first step."""
 
-    def __init__(self, *, cancelled: bool = False):
-        super().__init__(1, threading.Event())
+    def __init__(self, version: Version, *, cancelled: bool = False):
+        super().__init__(asked(version, "ben"), threading.Event())
         self._cancels = cancelled
 
     def __call__(self, done: int, total: int | None = None, sentence: str = "") -> None:
@@ -52,7 +58,7 @@ class TestVerifyWork:
         self, store: Store, version: Version
     ) -> None:
         with pytest.raises(OverloadedError, match="the process of the verification was killed"):
-            verify_work(store, version.id, "ben")(Killed())
+            verify_work(store, Killed(version))
         kept = get_version(store, version.id).verified
         assert kept is not None
         assert (kept.actor, kept.report) == ("ben", None)
@@ -64,10 +70,10 @@ class TestVerifyWork:
         def refuse(_child: WorkerProcess, *_: Any, **__: Any) -> None:
             raise OverloadedError("no process could be started for this") from OSError(12, "memory")
 
-        verify_work(store, version.id, "ann")(JobProgress(1, threading.Event()))
+        verify_work(store, JobProgress(asked(version, "ann"), threading.Event()))
         monkeypatch.setattr("app.db.database_worker.WorkerProcess.run", refuse)
         with pytest.raises(OverloadedError, match="no process"):
-            verify_work(store, version.id, "ben")(JobProgress(2, threading.Event()))
+            verify_work(store, JobProgress(asked(version, "ben"), threading.Event()))
         kept = get_version(store, version.id).verified
         assert kept is not None and (kept.actor, kept.problem) == ("ann", None)
 
@@ -75,5 +81,5 @@ class TestVerifyWork:
         self, store: Store, version: Version
     ) -> None:
         with pytest.raises(JobCancelled):
-            verify_work(store, version.id, "ben")(Killed(cancelled=True))
+            verify_work(store, Killed(version, cancelled=True))
         assert get_version(store, version.id).verified is None

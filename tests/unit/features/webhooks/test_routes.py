@@ -44,7 +44,7 @@ def test_one_is_made_changed_tried_and_deleted(api, hooks: str) -> None:
     assert (again.status_code, again.json()["state"]) == (200, "waiting")
     assert api.post(f"{one}/secret").json()["secret"] != secret
     off = api.patch(one, json={"on": False, "kinds": ["job.done"]}).json()
-    assert (off["kinds"], off["off"]) == (["job.done"], "somebody turned it off")
+    assert (off["kinds"], off["off"]) == (["job.done"], "a person turned it off")
     assert api.post(f"{one}/ping").status_code == 409
     assert api.delete(one).status_code == 204
     assert api.delete(one).status_code == 404

@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from app.formats.record_ids import IdIndex, id_text
+from app.formats.fields import IdIndex, id_text
 
 
 class TestIdText:

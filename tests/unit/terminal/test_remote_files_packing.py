@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from app.errors import UnsafePathError
-from app.formats.packing import as_one_file, unpack
+from app.terminal.remote_files import as_one_file, unpack
 
 
 @pytest.fixture

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from app.formats.looks_like import HEAD_BYTES, looks_like
+from app.formats.guess_format import HEAD_BYTES, looks_like
 from tests.unit.formats.foreign_coco import coco, write
 
 VOC = "<annotation><filename>a.jpg</filename><object><name>ball</name></object></annotation>"

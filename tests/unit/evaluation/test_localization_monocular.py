@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from app.evaluation.frame import Detection, JudgedFrame
-from app.evaluation.monocular import measure_frame, place_error
+from app.evaluation.localization import measure_frame, place_error
 from app.soccer.frames import Box, ImagePoint
 from tests.unit.evaluation.conftest import DIAMETER, camera_at
 

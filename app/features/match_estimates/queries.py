@@ -1,22 +1,78 @@
-"""Pictures of matches, and positions of main cameras that matches share."""
+"""Matches in the database: pictures, shared positions, and accepted noise of balls."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import groupby
-from typing import Any
+from typing import Any, NamedTuple
 
-from sqlalchemy import func, select
+from sqlalchemy import func, select, update
 
-from app.db.json_columns import as_written, parse
+from app.canonical import canonical
+from app.db.json_columns import Json, as_written, parse
 from app.db.log import LogEntry, LogModel, read_entries
 from app.db.session import Session
-from app.features.datasets.tables import GroupModel, StationModel, ViewModel
+from app.features.datasets.tables import DatasetModel, GroupModel, StationModel, ViewModel
 from app.features.groups.codecs import picture_from_json, positions_from_json
 from app.features.groups.digest import digest
 from app.soccer.group import SharedPosition
 from app.soccer.picture import PictureGeometry
+
+NOISE = "noise"
+"""Kind of the log's entries on noise: what is accepted for a dataset, and one for each group."""
+
+
+class Factor(NamedTuple):
+    """How noisy balls of a camera that a person places are beside the dataset's.
+
+    Attributes:
+        camera: Key of a static camera; None: any other.
+        person: Who places the ball; None: anybody else, or the dataset itself.
+        ratio: Of both sigmas; one where they may be alike.
+    """
+
+    camera: str | None
+    person: str | None
+    ratio: float
+
+
+Factors = tuple[Factor, ...]
+
+
+def read_factors(session: Session, dataset_id: int) -> Factors:
+    """The factors that are accepted for a dataset; none where all balls are alike."""
+    return factors_of(
+        session.scalar(select(DatasetModel.noise).where(DatasetModel.id == dataset_id))
+    )
+
+
+def factors_of(text: str | None) -> Factors:
+    """The factors that a dataset's row holds."""
+    if text is None:
+        return ()
+    with as_written():
+        return tuple(Factor(*row) for row in parse(text))
+
+
+def write_factors(session: Session, dataset_id: int, factors: Factors) -> None:
+    """Accept factors for a dataset; its groups are the caller's to change."""
+    text = canonical(factors_to_json(factors)) if factors else None
+    mine = DatasetModel.id == dataset_id
+    session.execute(update(DatasetModel).where(mine).values(noise=text))
+
+
+def factors_to_json(factors: Factors) -> Json:
+    """``[[camera, person, ratio], ...]``."""
+    return [list(item) for item in factors]
+
+
+def factor_of(factors: Sequence[Factor], camera: str | None, person: str | None) -> float:
+    """How noisy a ball is beside the dataset's; a camera or person that is not named is any other."""
+    known = {(item.camera, item.person): item.ratio for item in factors}
+    cameras, people = {item.camera for item in factors}, {item.person for item in factors}
+    place = camera if camera in cameras else None, person if person in people else None
+    return known.get(place, 1.0)
 
 
 @dataclass(frozen=True)
@@ -24,7 +80,8 @@ class MatchPictures:
     """The pictures of a match's main camera as they are in use.
 
     Attributes:
-        frames: How many have lines.
+        match: Name of the match.
+        frames: How many of them have lines.
         picture: What was done to most of them; None: they are as they were taken.
         mixed: They are not all alike.
     """

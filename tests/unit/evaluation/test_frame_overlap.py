@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from app.evaluation.overlap import iou, size_error_percent
+from app.evaluation.frame import iou, size_error_percent
 from app.soccer.frames import Box
 
 SIDES = st.floats(1, 100)

@@ -7,8 +7,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from app.geometry.camera import Camera
-from app.sample import observability
-from app.sample.observability import certainty
+from app.sample import cameras as observability
+from app.sample.cameras import certainty
 from app.sample.scene import Scene
 from app.sample.views import COARSE, inside
 

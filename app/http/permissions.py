@@ -1,0 +1,366 @@
+"""Permissions: who may ask a route, and of which datasets; each route says it by ``@may``.
+
+What a request names (a group in its path, a dataset in its body) says which dataset it is about; what its
+reader does not see is not there. Nobody is let through by a route that does not say who may.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+from typing import Annotated, Any, TypeVar
+from urllib.parse import parse_qsl
+
+from pydantic import Field, TypeAdapter, ValidationError
+
+from app.db.store import Store
+from app.errors import ForbiddenError, NotFoundError
+from app.features.datasets.service import no_dataset
+from app.features.people.logins import Login
+from app.features.people.ownership import (
+    Named,
+    Ownership,
+    find_ownership,
+    is_hidden_from,
+    role_at,
+)
+from app.features.people.ownership import OwnedKind as OwnedKind
+from app.features.people.roles import Action as Action
+from app.features.people.roles import DatasetRoles, Role, require
+from app.features.people.visibility_queries import EVERYTHING, Sight
+from app.features.queue.fields import asks_blind
+from app.finite import MAX_ID, quoted
+
+E = TypeVar("E", bound=Callable[..., Any])
+
+
+class Where(StrEnum):
+    """Where somebody has to have a role, besides in the datasets of what a request names."""
+
+    NAMED = "named"
+    """Nowhere else."""
+    SOMEWHERE = "somewhere"
+    """Anywhere, where nothing is named; what is listed is left to ``Login.sight``."""
+    EVERYWHERE = "everywhere"
+    """In all datasets: it is about what belongs to none."""
+    OWN = "own"
+    """Anywhere: it makes a dataset of one's own, which a token of one dataset does not."""
+
+
+@dataclass(frozen=True)
+class Permission:
+    """Who may ask a route.
+
+    Attributes:
+        action: What it does; None: anybody may, also before they have logged in.
+        names: What parameters of the path or the query name, by the parameter.
+        body: What fields of a JSON body name; a slash leads into an object.
+        where: Where else a role counts.
+        whole: Whether it tells of all groups of the dataset at once.
+        to_enrol: Whether who needs a second factor and has none may ask it.
+    """
+
+    action: Action | None
+    names: Mapping[str, OwnedKind] = field(default_factory=dict)
+    body: Mapping[str, OwnedKind] = field(default_factory=dict)
+    where: Where = Where.NAMED
+    whole: bool = False
+    to_enrol: bool = False
+
+
+_PERMISSION = "permission"
+OPEN = Permission(None)
+"""For everybody, also before they have logged in: the application itself, which holds no data."""
+
+
+def may(
+    action: Action,
+    *,
+    body: Mapping[str, OwnedKind] | None = None,
+    where: Where = Where.NAMED,
+    whole: bool = False,
+    to_enrol: bool = False,
+    **names: OwnedKind,
+) -> Callable[[E], E]:
+    """Say who may ask a route: whose role lets them do that wherever what it names is.
+
+    Args:
+        action: What it does.
+        body: See ``Permission``.
+        where: See ``Permission``.
+        whole: See ``Permission``.
+        to_enrol: See ``Permission``.
+        names: What each parameter of the path or the query names; ``with_`` is called ``with``.
+    """
+    things = {name.rstrip("_"): kind for name, kind in names.items()}
+    found = Permission(action, things, body or {}, where, whole, to_enrol)
+    of_none = action in (Action.ACCOUNT, Action.ADMINISTER)
+    if not (of_none or things or body or where is not Where.NAMED):
+        raise TypeError("say what the route names, or where else a role counts")
+    return _says(found)
+
+
+def open_to_all(endpoint: E) -> E:
+    """Say that anybody may ask a route, also before they have logged in."""
+    return _says(OPEN)(endpoint)
+
+
+def permission_of(endpoint: Callable[..., Any]) -> Permission | None:
+    """Who may ask a route, by the function that answers; None: nobody has said."""
+    found: Permission | None = getattr(endpoint, _PERMISSION, None)
+    return found
+
+
+def _says(permission: Permission) -> Callable[[E], E]:
+    def decorate(endpoint: E) -> E:
+        setattr(endpoint, _PERMISSION, permission)
+        return endpoint
+
+    return decorate
+
+
+WHOLE = frozenset(
+    {
+        OwnedKind.VERSION,
+        OwnedKind.EXPORT,
+        OwnedKind.JOB,
+        OwnedKind.PREDICTIONS,
+        OwnedKind.EVALUATION,
+        OwnedKind.BATCH,
+    }
+)
+"""Kinds that tell of all groups of a dataset at once."""
+HERE, ALL = " in this dataset", " in all datasets"
+"""Where a role would have to be, in a refusal."""
+OWNED = frozenset({OwnedKind.JOB, OwnedKind.EXPORT, OwnedKind.UPLOAD})
+"""Kinds that belong to somebody while they have no dataset."""
+TEXTS = frozenset(
+    {
+        OwnedKind.DATASET,
+        OwnedKind.NEW_DATASET,
+        OwnedKind.VERSION,
+        OwnedKind.EXPORT,
+        OwnedKind.UPLOAD,
+    }
+)
+QUERIES = ("q", "query")
+"""Names under which requests send queries of groups."""
+_ID: TypeAdapter[int] = TypeAdapter(Annotated[int, Field(ge=1, le=MAX_ID)])
+
+
+@dataclass(frozen=True)
+class Mention:
+    """One thing that a request names, and where: ``place`` is ``path``, ``query`` or ``body``."""
+
+    place: str
+    field: str
+    named: Named
+
+
+@dataclass(frozen=True)
+class OwnedMention:
+    """Where something is that a request mentions; ``ownership`` None: nowhere that the reader sees."""
+
+    mention: Mention
+    ownership: Ownership | None
+
+
+@dataclass(frozen=True)
+class AskedAbout:
+    """A request as far as it says what it is about: its query and its JSON body, read already."""
+
+    permission: Permission
+    query: tuple[tuple[str, str], ...]
+    body: Any
+    mentions: tuple[Mention, ...]
+
+    @staticmethod
+    def of(
+        permission: Permission, path: Mapping[str, str], query_string: str, body: Any
+    ) -> AskedAbout:
+        """What a request names, by the parameters of its path and the rest of it."""
+        query = tuple(parse_qsl(query_string, keep_blank_values=True))
+        return AskedAbout(permission, query, body, tuple(_mentions(permission, path, query, body)))
+
+
+def require_allowed(store: Store, asked: AskedAbout, login: Login) -> list[OwnedMention]:
+    """Where everything is that a request names, as far as its reader may know.
+
+    Raises:
+        ForbiddenError: They may not do that where they see what it names.
+    """
+    owned = _owned(store, asked, login)
+    _require_roles(asked, owned, login)
+    return owned
+
+
+def missing(store: Store, owned: list[OwnedMention]) -> NotFoundError | None:
+    """That something is not there of what a request names, or not for its reader; both sound alike."""
+    for item in owned:
+        named = item.mention.named
+        if item.ownership is None and named.kind is not OwnedKind.NEW_DATASET:
+            if named.kind is OwnedKind.DATASET:
+                return no_dataset(store, str(named.by)[:200])
+            return NotFoundError(f"there is no {named.kind} {quoted(str(named.by), 80)}")
+    return None
+
+
+def is_hidden(store: Store, owned: list[OwnedMention]) -> bool:
+    """Whether anything that a request mentions is there, and its reader does not see it."""
+    return any(
+        item.ownership is None
+        and item.mention.named.kind is not OwnedKind.NEW_DATASET
+        and find_ownership(store, item.mention.named, EVERYTHING) is not None
+        for item in owned
+    )
+
+
+def takes_looking(asked: AskedAbout, login: Login) -> bool:
+    """Whether ``require_allowed`` has to ask the database."""
+    named = (mention.named for mention in asked.mentions)
+    return not login.roles.is_admin and any(_is_looked_for(one, login.roles) for one in named)
+
+
+def _owned(store: Store, asked: AskedAbout, login: Login) -> list[OwnedMention]:
+    """Where everything is that a request mentions.
+
+    Each is found by one indexed statement, and none is asked for where it decides nothing: an
+    admin sees everything, and who is the same everywhere is so there.
+    """
+    if login.roles.is_admin:
+        return []
+    found: list[OwnedMention] = []
+    sight = login.sight
+    # What a query names comes first: it says which of the versions of a name is meant.
+    for mention in sorted(asked.mentions, key=lambda item: item.place != "query"):
+        ownership = _ownership(store, mention.named, login, sight)
+        if mention.place == "query" and ownership is not None and ownership.dataset is not None:
+            sight = Sight(False, frozenset({ownership.dataset}), login.owner)
+        found.append(OwnedMention(mention, ownership))
+    return found
+
+
+def _require_roles(asked: AskedAbout, owned: list[OwnedMention], login: Login) -> None:
+    roles, permission = login.roles, asked.permission
+    action, where = permission.action, permission.where
+    if roles.is_admin or action is None:
+        return
+    if where is Where.EVERYWHERE or _names_what_is_nobodys(asked):
+        require(roles.everywhere, action, ALL)
+    elif where is Where.OWN and roles.limited:
+        require(Role.NONE, action, ALL)
+    elif not asked.mentions and action is Action.ADMINISTER:
+        require(roles.everywhere, action)
+    elif not asked.mentions and not (where is Where.SOMEWHERE and action is Action.READ):
+        require(roles.highest, action)
+    for item in owned:
+        if item.mention.named.kind is OwnedKind.NEW_DATASET:
+            _require_new(item.ownership, roles, action)
+        elif item.ownership is not None:
+            here = HERE if roles.single and item.ownership.dataset is not None else ""
+            role = role_at(item.ownership, roles, login.owner)
+            require(role, action, here)
+            if asks_what_is_blind(asked):
+                require(role, Action.REVIEW, here)
+            whole = item.mention.named.kind in WHOLE or permission.whole
+            if whole and item.ownership.dataset in roles.blind:
+                raise ForbiddenError(
+                    "you annotate copies of groups of this dataset without seeing the originals",
+                    hint="Numbers over all its groups are shown once the batch is closed.",
+                )
+
+
+def asks_what_is_blind(asked: AskedAbout) -> bool:
+    """Whether a query of groups asks what others made of them: annotators are not to know.
+
+    Queries are parameters, and fields of bodies, named ``q`` or ``query``.
+    """
+    texts = [value for name, value in asked.query if name in QUERIES]
+    return any(asks_blind(text) for text in (*texts, *_queries_in(asked.body)))
+
+
+def _queries_in(body: Any) -> Iterator[str]:
+    """The queries that a JSON body holds, however deep."""
+    waiting = [body]
+    while waiting:
+        value = waiting.pop()
+        if isinstance(value, dict):
+            yield from (text for name in QUERIES if isinstance(text := value.get(name), str))
+            waiting.extend(value.values())
+        elif isinstance(value, list):
+            waiting.extend(value)
+
+
+def _names_what_is_nobodys(asked: AskedAbout) -> bool:
+    """Whether a body names a folder of the operator, which lies beside all datasets."""
+    return any(
+        kind is OwnedKind.FOLDER and _field(asked.body, name) is not None
+        for name, kind in asked.permission.body.items()
+    )
+
+
+def _require_new(present: Ownership | None, roles: DatasetRoles, action: Action) -> None:
+    """What is made where it is not there; whoever cannot know that it is, is not told."""
+    role = roles.everywhere if present is None else roles.role_in(present.dataset)
+    if role is not Role.NONE or present is None:
+        require(role, action, HERE if present is not None and roles.single else ALL)
+        return
+    require(roles.everywhere, action, ALL)
+    raise ForbiddenError(
+        "there is a dataset of that name, in which you have no role", hint="Choose another name."
+    )
+
+
+def _ownership(store: Store, named: Named, login: Login, sight: Sight) -> Ownership | None:
+    roles: DatasetRoles = login.roles
+    if not _is_looked_for(named, roles):
+        return None if roles.everywhere is Role.NONE else Ownership(None, frozenset({login.owner}))
+    found = find_ownership(store, named, sight)
+    if found is None or named.kind is OwnedKind.NEW_DATASET:
+        return found
+    hidden = role_at(found, roles, login.owner) is Role.NONE or is_hidden_from(
+        store, named, found, login.reader
+    )
+    return None if hidden else found
+
+
+def _is_looked_for(named: Named, roles: DatasetRoles) -> bool:
+    """Whether it matters where something is: who is the same everywhere is so there."""
+    return bool(roles.single or roles.blind) or named.kind in OWNED | {OwnedKind.NEW_DATASET}
+
+
+def _mentions(
+    permission: Permission,
+    path: Mapping[str, str],
+    query: tuple[tuple[str, str], ...],
+    body: Any,
+) -> Iterator[Mention]:
+    names = permission.names
+    for name, kind in names.items():
+        if name in path:
+            yield from _mention("path", name, kind, path[name])
+    for name, value in query:
+        if name in names and name not in path:
+            yield from _mention("query", name, names[name], value)
+    for name, kind in permission.body.items():
+        found = None if kind is OwnedKind.FOLDER else _field(body, name)
+        if isinstance(found, str if kind in TEXTS else int) and not isinstance(found, bool):
+            yield from _mention("body", name, kind, found)
+
+
+def _mention(place: str, name: str, kind: OwnedKind, value: str | int) -> Iterator[Mention]:
+    """Nothing for what is no id: the route refuses it by the same rule."""
+    if kind in TEXTS:
+        yield Mention(place, name, Named(kind, value))
+        return
+    try:
+        yield Mention(place, name, Named(kind, _ID.validate_python(value)))
+    except ValidationError:
+        return
+
+
+def _field(body: Any, name: str) -> Any:
+    for part in name.split("/"):
+        body = body.get(part) if isinstance(body, dict) else None
+    return body

@@ -1,0 +1,264 @@
+"""A route: the way of every request from its address to the function that answers it.
+
+Who asks, the body, whether they may, whether it was answered before, a turn, and then the function. What
+of it applies to a route stands with the route: ``@may``, ``@limit``, its body, its class.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Coroutine, Iterator
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+from fastapi import FastAPI, Request
+from fastapi.routing import APIRoute, iter_route_contexts
+from starlette.exceptions import HTTPException
+from starlette.requests import Request as StarletteRequest
+from starlette.responses import Response, StreamingResponse
+from starlette.routing import Mount
+from starlette.types import Receive, Scope, Send
+from starlette.websockets import WebSocketClose
+
+from app.features.people.logins import Login
+from app.http.access import Access, actor_of
+from app.http.bodies import (
+    BYTES,
+    MAX_STRANGERS_BYTES,
+    BodyError,
+    read_body,
+    read_json,
+    require_bytes,
+    require_json_type,
+)
+from app.http.idempotency import Idempotency, RequestDigest
+from app.http.origin import SAFE_METHODS
+from app.http.permissions import AskedAbout, OwnedMention, Permission, permission_of
+from app.http.request_limits import Doors, lane_of, turn
+from app.soccer.actors import LOCAL_USER
+
+Handler = Callable[[Request], Coroutine[Any, Any, Response]]
+
+
+@dataclass(frozen=True)
+class Gate:
+    """What the requests of one server share on their way.
+
+    Attributes:
+        access: Who asks; None on a server that somebody runs alone.
+        idempotency: What was answered before.
+        doors: Who is at work, and who waits.
+        max_json_bytes: Of a body.
+    """
+
+    access: Access | None
+    idempotency: Idempotency
+    doors: Doors
+    max_json_bytes: int
+
+
+def gate_of(scope: Scope) -> Gate:
+    """That of the application that a request came to."""
+    gate: Gate = scope["app"].state.gate
+    return gate
+
+
+class Route(APIRoute):
+    """A route that says who may ask it; raises TypeError where it does not."""
+
+    stores_response = True
+    """Whether its response is stored for a repetition under the same key."""
+    permission: Permission
+
+    def __init__(self, path: str, endpoint: Callable[..., Any], **options: Any):
+        permission = permission_of(endpoint)
+        if permission is None:
+            raise TypeError(f"{path}: say who may ask it, with @may below the route")
+        self.permission = permission
+        self.lane = lane_of(endpoint, options.get("methods") or ("GET",))
+        content = (options.get("openapi_extra") or {}).get("requestBody", {}).get("content", {})
+        self._takes_bytes = BYTES in content
+        super().__init__(path, endpoint, **options)
+
+    def get_route_handler(self) -> Handler:
+        """What answers a request, all told."""
+        return partial(self._answer, super().get_route_handler())
+
+    async def handle(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Answer; a method that is not answered here is nothing that a stranger is told."""
+        if self.methods and scope["method"] not in self.methods:
+            await require_somebody(scope)
+        await super().handle(scope, receive, send)
+
+    async def _answer(self, handler: Handler, request: Request) -> Response:
+        gate, access, login = gate_of(request.scope), None, None
+        if self.permission.action is not None and (access := gate.access) is not None:
+            login = await access.log_in(request.scope)
+        body = Body()
+        if request.method not in SAFE_METHODS:
+            try:
+                body = await self._read(gate, request)
+            except BodyError as error:
+                return error.response()
+        if access is None or login is None:
+            return await self._once(gate, request, body, handler)
+        return await self._as(access, login, gate, request, body, handler)
+
+    async def _as(
+        self,
+        access: Access,
+        login: Login,
+        gate: Gate,
+        request: Request,
+        body: Body,
+        handler: Handler,
+    ) -> Response:
+        """The answer to somebody, if they may have it."""
+        scope = request.scope
+        asked = AskedAbout.of(
+            self.permission,
+            request.path_params,
+            scope["query_string"].decode("latin-1"),
+            body.value,
+        )
+        owned = await access.allow(asked, login)
+        access.admit(scope, login)
+        _call_by_id(scope, owned)
+
+        async def work(request: Request) -> Response:
+            await access.require_there(owned)
+            return await handler(request)
+
+        hidden = partial(access.is_hidden, owned)
+        response = await self._once(gate, request, body, work, hidden)
+        if isinstance(response, StreamingResponse) and response.media_type == "text/event-stream":
+            return access.while_allowed(response, asked, login)
+        return response
+
+    async def _once(
+        self,
+        gate: Gate,
+        request: Request,
+        body: Body,
+        handler: Handler,
+        hidden: Callable[[], Coroutine[Any, Any, bool]] | None = None,
+    ) -> Response:
+        """The answer that was given before, else a new one."""
+        if request.method in SAFE_METHODS or not self.stores_response:
+            return await self._in_turn(gate, ReadRequest(request, body), handler)
+        digest = RequestDigest(
+            request, body.value, has_value=body.has_value, is_streamed=self._takes_bytes
+        )
+        read = ReadRequest(request, body, digest.receive if self._takes_bytes else None)
+        return await gate.idempotency.answer(
+            request,
+            digest,
+            actor_of(request.scope, LOCAL_USER),
+            hidden or _nothing_is_hidden,
+            partial(self._in_turn, gate, read, handler),
+        )
+
+    async def _read(self, gate: Gate, request: Request) -> Body:
+        """The body of a request that may change something.
+
+        Raises:
+            BodyError: It cannot be used.
+        """
+        types = request.headers.getlist("content-type")
+        if self._takes_bytes:
+            require_bytes(types)
+            return Body()
+        most = gate.max_json_bytes
+        if self.permission.action is None:
+            most = min(most, MAX_STRANGERS_BYTES)
+        sent = await read_body(request.headers, request.receive, most)
+        if not sent:
+            return Body(sent)
+        require_json_type(types)
+        return Body(sent, read_json(sent), has_value=True)
+
+    async def _in_turn(self, gate: Gate, request: Request, handler: Handler) -> Response:
+        door = gate.doors.of(self.lane, request.scope)
+        async with turn(door, request.scope) as refusal:
+            return refusal or await handler(request)
+
+
+class SecretRoute(Route):
+    """A route that shows a secret, or ends one: what it answers is stored nowhere."""
+
+    stores_response = False
+
+
+@dataclass(frozen=True)
+class Body:
+    """What a request brings: its bytes, None where they are not read here, and their JSON value."""
+
+    sent: bytes | None = None
+    value: Any = None
+    has_value: bool = False
+
+
+class ReadRequest(StarletteRequest):
+    """A request whose body has been read, or is read by ``receive`` as it passes."""
+
+    def __init__(self, request: Request, body: Body, receive: Receive | None = None):
+        super().__init__(request.scope, receive or request.receive)
+        if body.sent is not None:
+            self._body = body.sent
+        if body.has_value:
+            self._json = body.value
+
+
+async def require_somebody(scope: Scope) -> None:
+    """Raise NotLoggedInError where a stranger asks a server of a team."""
+    access = gate_of(scope).access
+    if access is not None:
+        await access.log_in(scope)
+
+
+async def nothing_here(scope: Scope, receive: Receive, send: Send) -> None:
+    """Answer where there is no route: that is nothing that a stranger is told.
+
+    Raises:
+        NotLoggedInError: A stranger asks a server of a team.
+        HTTPException: There is nothing at that address.
+    """
+    if scope["type"] == "http":
+        await require_somebody(scope)
+        raise HTTPException(status_code=404)
+    await WebSocketClose()(scope, receive, send)
+
+
+def require_permissions(app: FastAPI) -> None:
+    """Raise TypeError where a route of an application is none that says who may ask it.
+
+    Folders of files are mounted for everybody: those of the browser application, and no others.
+    """
+    for context in iter_route_contexts(app.routes):
+        route = context.original_route
+        is_file = isinstance(route, Mount) and route.name in ("assets", "static")
+        if not (is_file or isinstance(route, Route)):
+            raise TypeError(f"{context.path}: make it by a router with route_class=Route")
+
+
+def routes_of(app: FastAPI) -> Iterator[tuple[str, Route]]:
+    """Every route of an application, by its methods and its address."""
+    for context in iter_route_contexts(app.routes):
+        if isinstance(context.original_route, Route):
+            for method in sorted((context.methods or set()) - {"HEAD"}):
+                yield f"{method} {context.path}", context.original_route
+
+
+async def _nothing_is_hidden() -> bool:
+    return False
+
+
+def _call_by_id(scope: Scope, owned: list[OwnedMention]) -> None:
+    """Ask by its id for what has a name that several have, of which its reader sees one."""
+    called = {
+        item.mention.field: item.ownership.called
+        for item in owned
+        if item.mention.place == "path" and item.ownership is not None and item.ownership.called
+    }
+    if called:
+        scope["path_params"] = {**scope["path_params"], **called}
