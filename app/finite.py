@@ -1,4 +1,5 @@
-"""Values on their way out as JSON: numbers that are infinite or NaN become null, texts are quoted.
+"""Values on their way out as JSON: numbers that are infinite or NaN become null, texts are quoted,
+times are told in UTC with a Z.
 
 JSON, CSV and logs have no infinity and no NaN that every reader understands. A number that is
 neither known nor finite leaves as null, as an empty cell, as nothing.
@@ -9,12 +10,38 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping
-from typing import Any
+from datetime import date, datetime
+from typing import Annotated, Any
 
 import msgspec
 
 MAX_ID = 2**63 - 1
 """The largest whole number that a column of ids, and an answer, holds."""
+
+
+class _Told:
+    """How a time of a value that is served is told; the value itself keeps the text of the database."""
+
+    def __init__(self, kind: type[date]):
+        self._kind = kind
+
+    def __get_pydantic_core_schema__(self, _source: Any, _handler: Any) -> Any:
+        # What starts fast, such as the command line, does not import pydantic.
+        from pydantic_core import core_schema
+
+        told = (
+            core_schema.datetime_schema() if self._kind is datetime else core_schema.date_schema()
+        )
+        written = core_schema.plain_serializer_function_ser_schema(
+            self._kind.fromisoformat, return_schema=told, when_used="json"
+        )
+        return {**told, "serialization": written}
+
+
+Moment = Annotated[str, _Told(datetime)]
+"""A time as ``text_of`` writes it; RFC 3339 where it is served."""
+Day = Annotated[str, _Told(date)]
+"""A day, ISO 8601."""
 
 
 def finite(value: Any) -> Any:

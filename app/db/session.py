@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from contextvars import ContextVar
 from datetime import UTC, datetime
-from typing import TYPE_CHECKING, Protocol, Self
+from typing import TYPE_CHECKING, Any, Protocol, Self, TypeVar, cast
 
-from sqlalchemy import Connection, Engine
+from sqlalchemy import Connection, Engine, Executable
 
 if TYPE_CHECKING:
     from app.db.stored_responses import IdempotencyKey
+
+Row = TypeVar("Row")
 
 
 class PendingResponse(Protocol):
@@ -58,6 +60,24 @@ class Session(Connection):
     def idempotency_key(self) -> IdempotencyKey | None:
         """Under which the request was sent whose work this is; None: there is none."""
         return None if self._pending is None else self._pending.key
+
+    def rows(
+        self, kind: type[Row], statement: Executable, values: Mapping[str, Any] | None = None
+    ) -> Sequence[Row]:
+        """What a statement finds that asks for all columns of a table.
+
+        Args:
+            kind: The table; a row reads as its model does, and follows no changes.
+            statement: What is asked.
+            values: Of its parameters.
+        """
+        return cast(Sequence[Row], self.execute(statement, values).all())
+
+    def row(
+        self, kind: type[Row], statement: Executable, values: Mapping[str, Any] | None = None
+    ) -> Row | None:
+        """The same of a statement that finds one row at most; None: it finds none."""
+        return cast(Row | None, self.execute(statement, values).one_or_none())
 
     def respond(self, outcome: object) -> None:
         """Answer the request whose work this is with an outcome, once this is committed.

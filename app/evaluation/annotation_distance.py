@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from scipy.special import chdtrc
@@ -22,7 +23,10 @@ from app.solving.jaccard import camera_jaccard
 EXPLAINED_P = 0.05
 """A difference with a smaller p-value is larger than both uncertainties explain."""
 
-SEEN, HIDDEN, OUT, NONE, SEVERAL = "seen", "occluded", "out_of_view", "none", "several"
+Side = Literal["a", "b"]
+"""The two whose annotations are compared."""
+BallState = Literal["seen", "occluded", "out_of_view", "none", "several"]
+"""How somebody saw the ball of a view."""
 
 
 @dataclass(frozen=True)
@@ -37,7 +41,7 @@ class LineDistance:
     """
 
     marking: str
-    only: str | None = None
+    only: Side | None = None
     mean_px: float | None = None
     largest_px: float | None = None
 
@@ -52,8 +56,8 @@ class BallDistance:
         diameter_px: Difference of both diameters, b less a; None unless both drew boxes.
     """
 
-    a: str
-    b: str
+    a: BallState
+    b: BallState
     center_px: float | None = None
     diameter_px: float | None = None
 
@@ -71,8 +75,8 @@ class ViewDistance:
         view: Its key.
         included: Whether each of a and b left it in the group.
         lines: Markings that either drew, by name.
-        jac: JaC of a's camera with b's lines, and of b's camera with a's, at the least of
-            ``GAMMAS_PERCENT``; None where there is no camera or no line.
+        jac: JaC of a's camera with b's lines, and of b's camera with a's, at 0.5 % of
+            the diagonal; None where there is no camera or no line.
         position_m: Between both cameras; None where either is missing.
     """
 
@@ -159,7 +163,7 @@ def compare_lines(a: Lines, b: Lines) -> tuple[LineDistance, ...]:
     for marking in sorted({*a, *b}):
         first, second = _points(a, marking), _points(b, marking)
         if not len(first) or not len(second):
-            only = "a" if len(first) else "b"
+            only: Side = "a" if len(first) else "b"
             if len(first) or len(second):
                 found.append(LineDistance(marking, only))
             continue
@@ -210,14 +214,14 @@ def compare_balls_3d(a: Ball3D | None, b: Ball3D | None) -> Ball3DDistance:
     return Ball3DDistance(True, True, float(np.linalg.norm(step)), sigmas, p_value)
 
 
-def ball_state(balls: tuple[BallAnnotation, ...]) -> str:
+def ball_state(balls: tuple[BallAnnotation, ...]) -> BallState:
     """What a person says of the ball in a view: ``seen``, ``occluded``, ``out_of_view``, ..."""
     seen = [ball for ball in balls if not ball.out_of_view]
     if len(seen) > 1:
-        return SEVERAL
+        return "several"
     if seen:
-        return HIDDEN if seen[0].occluded else SEEN
-    return OUT if balls else NONE
+        return "occluded" if seen[0].occluded else "seen"
+    return "out_of_view" if balls else "none"
 
 
 def _compare_views(

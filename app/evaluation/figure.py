@@ -6,6 +6,7 @@ import csv
 import io
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 from app.evaluation.table import FrameRange, Table
 from app.formats.csv_text import Value, cell
@@ -50,7 +51,7 @@ class Series:
     label: str
     x: tuple[float, ...]
     y: tuple[float, ...]
-    kind: str = "line"
+    kind: Literal["line", "dashed", "points"] = "line"
     low: tuple[float, ...] = ()
     high: tuple[float, ...] = ()
     count: tuple[int, ...] = ()
@@ -63,7 +64,7 @@ class Series:
 class Mark:
     """A dashed line across the panel; ``axis`` is ``x`` or ``y``."""
 
-    axis: str
+    axis: Literal["x", "y"]
     at: float
     label: str
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -32,7 +33,7 @@ class Coefficient:
         items: How many items it was computed from.
     """
 
-    name: str
+    name: Literal["cohen", "fleiss", "krippendorff"]
     value: float | None
     low: float | None
     high: float | None
@@ -101,7 +102,9 @@ def krippendorff_alpha(rated: Rated) -> Coefficient:
 
 
 def _coefficient(
-    name: str, parts: FloatArray, compute: Callable[[FloatArray], tuple[FloatArray, FloatArray]]
+    name: Literal["cohen", "fleiss", "krippendorff"],
+    parts: FloatArray,
+    compute: Callable[[FloatArray], tuple[FloatArray, FloatArray]],
 ) -> Coefficient:
     """A coefficient from each item's part, shape (N, ...), and its interval by resampling."""
     items = len(parts)

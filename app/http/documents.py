@@ -1,15 +1,16 @@
-"""The base of documents, and a cache of identical ones."""
+"""The base of documents, values that are their own documents, and a cache of identical ones."""
 
 from __future__ import annotations
 
 from collections import OrderedDict
 from collections.abc import Callable
 from dataclasses import fields
+from functools import cache
 from inspect import get_annotations
 from threading import Lock
 from typing import Any, Generic, TypeVar, get_type_hints
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, TypeAdapter
 
 Item = TypeVar("Item")
 
@@ -29,6 +30,17 @@ class Document(BaseModel):
             hints = get_type_hints(shows, include_extras=True)
             shown = {field.name: hints[field.name] for field in fields(shows)}
             cls.__annotations__ = shown | get_annotations(cls)
+
+
+def json_of(value: Any) -> bytes:
+    """The JSON of a document, or of a frozen dataclass, which is its own; no number is infinite or NaN."""
+    kind: Any = type(value)
+    return _writer(kind).dump_json(value)
+
+
+@cache
+def _writer(kind: Any) -> TypeAdapter[Any]:
+    return TypeAdapter(kind)
 
 
 class ListDocument(Document, Generic[Item]):

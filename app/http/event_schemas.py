@@ -7,7 +7,7 @@ from datetime import datetime
 from pydantic import BaseModel, Field
 
 from app.features.jobs.schemas import JobDocument
-from app.features.maintenance.schemas import BannerDocument
+from app.features.maintenance.service import Banner
 from app.http.documents import Document
 
 
@@ -50,7 +50,7 @@ class WorkEvent(BaseModel):
 class MaintenanceEvent(BaseModel):
     """The notice of maintenance is another one."""
 
-    banner: BannerDocument | None = Field(description="Null: it was taken away.")
+    banner: Banner | None = Field(description="Null: it was taken away.")
 
 
 EVENTS: dict[str, type[BaseModel]] = {

@@ -27,7 +27,6 @@ from app.features.batches.leases import Lease
 from app.features.jobs.queries import Job
 from app.features.jobs.schemas import JobDocument
 from app.features.jobs.service import Jobs
-from app.features.maintenance.schemas import BannerDocument
 from app.features.maintenance.service import Banner, read_banner
 from app.features.people.visibility_queries import EVERYTHING, Sight
 from app.features.queue.changes import (
@@ -37,6 +36,7 @@ from app.features.queue.changes import (
     read_position,
     read_solved_since,
 )
+from app.http.documents import json_of
 from app.http.event_schemas import (
     DatasetEvent,
     GroupEvent,
@@ -163,7 +163,7 @@ class Events:
     def banner(self) -> str:
         """The notice of maintenance as JSON; empty: there is none."""
         banner = read_banner(self._store)
-        return "" if banner is None else BannerDocument.model_validate(banner).model_dump_json()
+        return "" if banner is None else json_of(banner).decode()
 
     def solved_since(self, solution: int, feed: Feed) -> list[bytes]:
         """Solutions that arrived after one, for a listener that has read what was there then."""
@@ -273,8 +273,7 @@ class Events:
         before, self._banner = self._banner, read_banner(self._store)
         if first or self._banner == before:
             return
-        banner = self._banner and BannerDocument.model_validate(self._banner)
-        event = _event("maintenance", MaintenanceEvent(banner=banner))
+        event = _event("maintenance", MaintenanceEvent(banner=self._banner))
         _tell({feed: [event] for feed in feeds})
 
     def tell_lease(self, lease: Lease) -> None:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import inspect
 import re
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Iterator, Mapping
+from dataclasses import is_dataclass
+from typing import Any, get_args, get_type_hints
 
 from fastapi import APIRouter, FastAPI, Request
-from fastapi.openapi.utils import get_openapi
+from fastapi.openapi.utils import get_fields_from_routes, get_openapi
 from pydantic import BaseModel
 from starlette.responses import JSONResponse
 
@@ -180,6 +182,7 @@ TAGS = {
 }
 
 
+_ATTRIBUTE = re.compile(r"^ {4}(\w[\w, ]*): (.*(?:\n {8}.*)*)", re.MULTILINE)
 REFERENCE = "#/components/schemas/{model}"
 
 
@@ -223,10 +226,41 @@ def _document(app: FastAPI) -> dict[str, Any]:
         described = model.model_json_schema(ref_template=REFERENCE)
         schemas.update(described.pop("$defs", {}))
         schemas[model.__name__] = described
+    shown = [field.field_info.annotation for field in get_fields_from_routes(app.routes)]
+    for kind in {value for model in (*shown, *models) for value in _values(model)}:
+        _describe_value(kind, schemas)
     _describe_schemas(schemas)
     _secure(document, routes)
     _give_examples(document)
     return document
+
+
+def _values(kind: Any, above: frozenset[Any] = frozenset()) -> Iterator[type[Any]]:
+    """Frozen values that a response holds, which are their own models."""
+    if kind in above:
+        return
+    hints: Any = get_args(kind)
+    if isinstance(kind, type) and is_dataclass(kind):
+        yield kind
+        hints = get_type_hints(kind).values()
+    elif isinstance(kind, type) and issubclass(kind, BaseModel):
+        hints = [field.annotation for field in kind.model_fields.values()]
+    for hint in hints:
+        yield from _values(hint, above | {kind})
+
+
+def _describe_value(kind: type[Any], schemas: Mapping[str, dict[str, Any]]) -> None:
+    """Say of a value that all its fields are there, and what each is as its docstring does."""
+    schema, text = schemas[kind.__name__], inspect.cleandoc(kind.__doc__ or "")
+    text = text.replace("``", "`").replace("None", "null")
+    schema["description"], _, attributes = text.partition("\n\nAttributes:\n")
+    schema["required"] = list(schema["properties"])
+    for names, words in _ATTRIBUTE.findall(attributes):
+        for name in names.split(", "):
+            if name in schema["properties"]:
+                schema["properties"][name]["description"] = " ".join(words.split())
+    for one in schema["properties"].values():
+        one.pop("default", None)
 
 
 def _describe_schemas(schemas: dict[str, Any]) -> None:

@@ -15,7 +15,9 @@ from starlette.staticfiles import StaticFiles
 from starlette.types import Receive, Scope, Send
 
 from app.errors import StorageError
+from app.http import request_limits
 from app.http.permissions import open_to_all
+from app.http.request_limits import limit
 from app.http.route import Route
 from app.http.site import IndexPage, Site
 
@@ -180,6 +182,7 @@ def install_pages(
         return index
 
     @open_to_all
+    @limit(request_limits.PAGES)
     def page(request: Request) -> Response:
         index = found()
         if moment is not None:
@@ -192,12 +195,14 @@ def install_pages(
         return Response(index.html, media_type="text/html", headers=headers)
 
     @open_to_all
+    @limit(None)
     def styles(version: str) -> Response:
         content = found().styles
         headers = {"Cache-Control": FOR_GOOD if version == site.version else REVALIDATED}
         return Response(content, media_type="text/css", headers=headers)
 
     @open_to_all
+    @limit(request_limits.PAGES)
     def elsewhere(request: Request) -> Response:
         """People who mistyped an address are told so by the page, programs by a problem."""
         if "text/html" not in request.headers.get("accept", ""):

@@ -8,11 +8,11 @@ from functools import partial, wraps
 from typing import Annotated, Any, Concatenate, ParamSpec, TypeVar
 
 from fastapi import Depends, Request
-from pydantic import BaseModel
 from starlette.responses import Response
 
 from app.db.idempotency import KeyedRequest, PendingResponse
 from app.db.stored_responses import StoredResponse
+from app.http.documents import json_of
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -59,14 +59,12 @@ def stored_form(response: Response, digest: str) -> StoredResponse:
     return StoredResponse(digest, response.status_code, headers, bytes(response.body))
 
 
-def document(
-    content: BaseModel, status: int = 200, headers: dict[str, str] | None = None
-) -> Response:
-    """A document as it is sent."""
-    return Response(content.model_dump_json(), status, headers, "application/json")
+def document(content: Any, status: int = 200, headers: dict[str, str] | None = None) -> Response:
+    """A document, or a frozen value that is its own, as it is sent."""
+    return Response(json_of(content), status, headers, "application/json")
 
 
-def as_document(show: Callable[[T], BaseModel], status: int = 200) -> Callable[[T], Response]:
+def as_document(show: Callable[[T], Any], status: int = 200) -> Callable[[T], Response]:
     """How an outcome is sent of which ``show`` makes a document."""
     return lambda outcome: document(show(outcome), status)
 

@@ -1,7 +1,7 @@
 """A route: the way of every request from its address to the function that answers it.
 
 Who asks, the body, whether they may, whether it was answered before, a turn, and then the function. What
-of it applies to a route stands with the route: ``@may``, its body, its class.
+of it applies to a route stands with the route: ``@may``, ``@limit``, its body, its class.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from app.http.bodies import (
 from app.http.idempotency import Idempotency, RequestDigest
 from app.http.origin import SAFE_METHODS
 from app.http.permissions import AskedAbout, OwnedMention, Permission, permission_of
-from app.http.request_limits import Doors, turn
+from app.http.request_limits import Doors, lane_of, turn
 from app.soccer.actors import LOCAL_USER
 
 Handler = Callable[[Request], Coroutine[Any, Any, Response]]
@@ -75,6 +75,7 @@ class Route(APIRoute):
         if permission is None:
             raise TypeError(f"{path}: say who may ask it, with @may below the route")
         self.permission = permission
+        self.lane = lane_of(endpoint, options.get("methods") or ("GET",))
         content = (options.get("openapi_extra") or {}).get("requestBody", {}).get("content", {})
         self._takes_bytes = BYTES in content
         super().__init__(path, endpoint, **options)
@@ -144,7 +145,7 @@ class Route(APIRoute):
     ) -> Response:
         """The answer that was given before, else a new one."""
         if request.method in SAFE_METHODS or not self.stores_response:
-            return await _in_turn(gate, ReadRequest(request, body), handler)
+            return await self._in_turn(gate, ReadRequest(request, body), handler)
         digest = RequestDigest(
             request, body.value, has_value=body.has_value, is_streamed=self._takes_bytes
         )
@@ -154,7 +155,7 @@ class Route(APIRoute):
             digest,
             actor_of(request.scope, LOCAL_USER),
             hidden or _nothing_is_hidden,
-            partial(_in_turn, gate, read, handler),
+            partial(self._in_turn, gate, read, handler),
         )
 
     async def _read(self, gate: Gate, request: Request) -> Body:
@@ -175,6 +176,11 @@ class Route(APIRoute):
             return Body(sent)
         require_json_type(types)
         return Body(sent, read_json(sent), has_value=True)
+
+    async def _in_turn(self, gate: Gate, request: Request, handler: Handler) -> Response:
+        door = gate.doors.of(self.lane, request.scope)
+        async with turn(door, request.scope) as refusal:
+            return refusal or await handler(request)
 
 
 class SecretRoute(Route):
@@ -241,11 +247,6 @@ def routes_of(app: FastAPI) -> Iterator[tuple[str, Route]]:
         if isinstance(context.original_route, Route):
             for method in sorted((context.methods or set()) - {"HEAD"}):
                 yield f"{method} {context.path}", context.original_route
-
-
-async def _in_turn(gate: Gate, request: Request, handler: Handler) -> Response:
-    async with turn(gate.doors.of(request.scope), request.scope) as refusal:
-        return refusal or await handler(request)
 
 
 async def _nothing_is_hidden() -> bool:

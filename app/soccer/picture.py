@@ -30,10 +30,6 @@ class PictureGeometry:
             diagonals.
         sigma: Standard deviations of the aspect (as a share) and of both shifts; where they are
             wide, the lines of the view itself say what the numbers are.
-
-    Example:
-        >>> PictureGeometry(4 / 3, (0.0, 0.0)).middle(ImageSize(1920, 1080))
-        (959.5, 539.5)
     """
 
     aspect: float = 1.0

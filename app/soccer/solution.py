@@ -360,6 +360,11 @@ class Gate:
     """One gate as judged for the group.
 
     ``margin`` is how far the value is from the threshold, as ``margin_of`` counts it.
+
+    Attributes:
+        margin: Distance of the value from the threshold, as a share of the threshold: 0.25 is
+            better than required by a quarter of the threshold, -0.25 worse by a quarter. None if
+            the gate is off or not judged, or if the threshold is 0.
     """
 
     name: str

@@ -33,7 +33,7 @@ PLAIN_WORDS = """
     counts cross css csv cursor curve damped database datasets day delete deps descriptions details detect devices
     diagram dialect dialog diff differences dismissals distance documents drags drawing drawn durable editor
     empty engine enrol ephemeral errors estimator evaluate event events executors export exports facets
-    facts fair faults fields figure figures files finder finite first fit fixture folder folders form format formats
+    facts faults fields figure figures files finder finite first fit fixture folder folders form format formats
     frozen gestures give glossary gold grass grid guess guide guideline guidelines hand header headers heat help
     histograms history hit home hooks hosts idempotency identity if image images import imports index indexing info init insert
     insight invitation invitations invite items jaccard join json kept kernels key keys known konva last latest
@@ -51,7 +51,7 @@ PLAIN_WORDS = """
     solving source sources sphere spill spread sqlite squares stacks stage staging standpoints starts state
     statements statistics steps storage store stored straight stream strict submit suggested suggestions summary
     surface swap synloc tab table take takes tall team term terminal text threads threshold ticks tokens
-    tools trace tracing transfer tree trees triangulate tries truth turns types undo undrawn upload v3 v3d video
+    tools trace tracing transfer tree trees triangulate tries truth types undo undrawn upload v3 v3d video
     viewport viewports virtual visibility wal walk warm web what when whiskers window words work worker workspace
     write writer zip
 """

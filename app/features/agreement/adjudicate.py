@@ -15,10 +15,12 @@ from app.features.groups.state import GroupState
 from app.features.groups.submit import load_solved
 from app.features.groups.view_paint import PaintFollower
 from app.features.independent_annotations.adopt import adopt_take
+from app.features.independent_annotations.queries import Take
 from app.features.independent_annotations.return_work import hand_back_take
-from app.features.independent_annotations.service import Take, TakeView
+from app.features.independent_annotations.service import TakeView
 from app.features.people.members import list_members
 from app.features.people.roles import Action, lets
+from app.finite import Moment
 from app.soccer.actors import LOCAL_USER, person_of
 
 
@@ -36,7 +38,7 @@ class OpenCase:
     people: tuple[str, ...]
     worst: float
     disagreements: int
-    since: str
+    since: Moment
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,6 @@ from app.features.agreement.schemas import (
     CaseDocument,
     Decision,
     GroupComparisonDocument,
-    LimitsDocument,
     LimitsEdit,
     WaitingList,
 )
@@ -30,7 +29,8 @@ from app.http.cursor import paged
 from app.http.deps import Actor, AppServices, AppStore, DatasetPath, Id
 from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import responses
-from app.http.respond import as_document, document, no_content, responds
+from app.http.request_limits import LOOKS, QUESTIONS, limit
+from app.http.respond import document, no_content, responds
 from app.http.route import Route
 
 router = APIRouter(tags=["agreement"], route_class=Route)
@@ -47,6 +47,7 @@ OfBatch = Annotated[
     responses=responses(404),
 )
 @may(Action.READ, group=OwnedKind.GROUP, with_=OwnedKind.GROUP)
+@limit(QUESTIONS)
 def compare(
     group: Id,
     store: AppStore,
@@ -89,11 +90,11 @@ def get_agreement_file(dataset: DatasetPath, store: AppStore, of_batch: OfBatch 
 @router.put(
     "/datasets/{dataset}/agreement/limits",
     operation_id="setAgreementLimits",
-    response_model=LimitsDocument,
+    response_model=AgreementLimits,
     responses=responses(404, 413, 415),
 )
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
-@responds(as_document(LimitsDocument.model_validate))
+@responds(document)
 def put_limits(
     dataset: DatasetPath, edit: LimitsEdit, store: AppStore, actor: Actor
 ) -> AgreementLimits:
@@ -119,6 +120,7 @@ def list_waiting(dataset: DatasetPath, store: AppStore) -> WaitingList:
     responses=responses(404),
 )
 @may(Action.REVIEW, group=OwnedKind.GROUP)
+@limit(LOOKS)
 def get_case(group: Id, store: AppStore, actor: Actor) -> Response:
     """The annotations of a group that disagree, beside each other."""
     return document(CaseDocument.of(adjudicate.get_case(store, group, actor=actor)))

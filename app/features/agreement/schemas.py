@@ -7,8 +7,12 @@ from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from app.evaluation.agreement_limits import Disagreement, Spread
-from app.evaluation.annotation_distance import Ball3DDistance, LineDistance, ViewDistance
+from app.evaluation.agreement_limits import AgreementLimits, Disagreement, Spread
+from app.evaluation.annotation_distance import (
+    Ball3DDistance,
+    ViewDistance,
+)
+from app.evaluation.rater_agreement import Coefficient
 from app.features.agreement.adjudicate import Case, OpenCase
 from app.features.agreement.compare import AnnotationPair, Comparison
 from app.features.agreement.summary import GroupAgreement, PeopleAgreement
@@ -16,49 +20,6 @@ from app.features.groups.schemas import GroupDocument
 from app.finite import MAX_ID
 from app.http.documents import Document, ListDocument
 from app.soccer.choices import VerdictState
-
-Side = Literal["a", "b"]
-BallState = Literal["seen", "occluded", "out_of_view", "none", "several"]
-
-
-class LimitsDocument(Document):
-    """The most that two annotations may differ by and still agree."""
-
-    line_px: float = Field(description="Any point of a line from the line of the other, pixels.")
-    markings: int = Field(description="Markings of a view that one alone drew.")
-    ball_px: float = Field(description="Centres of the ball, pixels.")
-    diameter_px: float = Field(description="Its diameters, pixels.")
-    ball_m: float = Field(description="3D balls, metres.")
-    jac: float = Field(description="The least JaC of one's camera with the other's lines.")
-
-
-class LineDistanceDocument(Document, shows=LineDistance):
-    """One marking as both drew it."""
-
-    only: Side | None = Field(description="Who alone drew it; null: both did.")
-    mean_px: float | None = Field(
-        description="Mean distance of each one's points from the other's line."
-    )
-
-
-class BallDistanceDocument(Document):
-    """The ball of a view as both saw it."""
-
-    a: BallState
-    b: BallState
-    center_px: float | None
-    diameter_px: float | None = Field(description="Of b less that of a.")
-
-
-class ViewDistanceDocument(Document, shows=ViewDistance):
-    """One view."""
-
-    lines: list[LineDistanceDocument]
-    ball: BallDistanceDocument
-    jac: tuple[float | None, float | None] = Field(
-        description="Of a's camera with b's lines, and of b's with a's, at 0.5 % of the diagonal."
-    )
-    position_m: float | None = Field(description="Between both cameras.")
 
 
 class Ball3DDistanceDocument(Document, shows=Ball3DDistance):
@@ -76,21 +37,15 @@ class Ball3DDistanceDocument(Document, shows=Ball3DDistance):
 class GroupDistanceDocument(Document):
     """How far two annotations lie apart."""
 
-    views: list[ViewDistanceDocument]
+    views: list[ViewDistance]
     ball: Ball3DDistanceDocument
-
-
-class DisagreementDocument(Document, shows=Disagreement):
-    """Something that two annotations say differently."""
-
-    sentence: str = Field(description="For people; a and b stand for the two.")
 
 
 class AnnotationPairDocument(Document, shows=AnnotationPair):
     """Two of the annotations, by their places in `groups`, from 0."""
 
     distance: GroupDistanceDocument
-    disagreements: list[DisagreementDocument] = Field(description="The worst first.")
+    disagreements: list[Disagreement] = Field(description="The worst first.")
 
 
 class GroupComparisonDocument(Document):
@@ -98,7 +53,7 @@ class GroupComparisonDocument(Document):
 
     groups: list[GroupDocument]
     pairs: list[AnnotationPairDocument] = Field(description="Those that disagree most first.")
-    limits: LimitsDocument
+    limits: AgreementLimits
     worst_views: list[str] = Field(description="Keys of the views, the worst first.")
 
     @staticmethod
@@ -135,38 +90,21 @@ class LimitsEdit(BaseModel):
     jac: float = Field(ge=0, le=1, allow_inf_nan=False)
 
 
-class CoefficientDocument(Document):
-    """A coefficient of agreement: 1 is complete, 0 what chance gives."""
-
-    name: Literal["cohen", "fleiss", "krippendorff"]
-    value: float | None = Field(description="Null where too few people annotated to disagree.")
-    low: float | None = Field(description="Lower end of the 95 % interval.")
-    high: float | None
-    observed: float | None = Field(description="Share of pairs of verdicts that agree.")
-    items: int = Field(description="Groups that it is computed from.")
-
-
-class SpreadDocument(Document, shows=Spread):
-    """The middle and the bad end of a measure."""
-
-    tail: float | None = Field(description="95th percentile; of JaC the 5th.")
-
-
 class SpreadsDocument(Document):
     """Distances of lines, balls, diameters (px), 3D balls (m), JaC, cameras (m)."""
 
-    line_px: SpreadDocument
-    ball_px: SpreadDocument
-    diameter_px: SpreadDocument
-    ball_m: SpreadDocument
-    jac: SpreadDocument
-    position_m: SpreadDocument
+    line_px: Spread
+    ball_px: Spread
+    diameter_px: Spread
+    ball_m: Spread
+    jac: Spread
+    position_m: Spread
 
 
 class PeopleAgreementDocument(Document, shows=PeopleAgreement):
     """How far two people agree, or all of them."""
 
-    kappa: CoefficientDocument | None = Field(
+    kappa: Coefficient | None = Field(
         description="Cohen's of two; Fleiss' of all, where each group has equally many verdicts."
     )
     spreads: SpreadsDocument
@@ -194,20 +132,14 @@ class AgreementDocument(Document):
     )
     open: int = Field(description="Groups that wait for a decision.")
     decided: int
-    limits: LimitsDocument
-    alpha: CoefficientDocument
+    limits: AgreementLimits
+    alpha: Coefficient
     overall: PeopleAgreementDocument
     pairs: list[PeopleAgreementDocument]
     groups: list[GroupAgreementDocument] = Field(description="The worst first.")
 
 
-class WaitingDocument(Document, shows=OpenCase):
-    """A group that waits for a decision."""
-
-    since: datetime
-
-
-class WaitingList(ListDocument[WaitingDocument]):
+class WaitingList(ListDocument[OpenCase]):
     """Groups that wait for a decision, those that disagree most first."""
 
 

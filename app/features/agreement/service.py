@@ -34,8 +34,8 @@ from app.features.groups.state import GroupState
 from app.features.groups.submit import solved
 from app.features.groups.view_paint import PaintFollower
 from app.features.independent_annotations.adopt import adopt_take, give_verdict_of
-from app.features.independent_annotations.queries import INDEPENDENT, takes_of_group
-from app.features.independent_annotations.service import Take, find_take_of
+from app.features.independent_annotations.queries import INDEPENDENT, Take, takes_of_group
+from app.features.independent_annotations.service import find_take_of
 from app.features.solutions.codec import to_json
 from app.features.webhooks.queries import DISPUTED, announce, stamp
 from app.soccer.actors import SCRIPT
@@ -153,8 +153,7 @@ def weigh_left(store: Store, paint: PaintFollower | None = None) -> int:
 def ready_takes(store: Store, group_id: int, batch_id: int | None) -> list[Take]:
     """What was handed in of a group in a batch (None: in none), and not decided about, in order."""
     with store.read() as session:
-        rows = takes_of_group(session, group_id)
-    takes = [Take(**row._mapping) for row in rows]
+        takes = takes_of_group(session, group_id)
     found = [
         take
         for take in takes
@@ -223,7 +222,7 @@ def _keep(store: Store, takes: Sequence[Take], values: Mapping[str, Any]) -> boo
     """Let a group wait for a decision; False where somebody went on or decided meanwhile."""
     group_id, batch_id = values["group_id"], takes[0].batch_id
     with store.write() as session:
-        now_there = [Take(**row._mapping) for row in takes_of_group(session, group_id)]
+        now_there = takes_of_group(session, group_id)
         known = _known(session, group_id, batch_id)
         if any(take not in now_there for take in takes) or (known and known.state != OPEN):
             return False

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import fields
 from datetime import UTC, datetime
 from typing import Annotated, Literal
 
@@ -12,7 +13,7 @@ from starlette.responses import Response
 
 from app.features.audit import service as audit
 from app.features.audit.queries import AuditQuery
-from app.features.audit.schemas import AuditDocument, AuditEntryDocument
+from app.features.audit.schemas import AuditDocument
 from app.features.audit.service import KINDS, AuditEntry, AuditPage, Family
 from app.features.datasets.service import dataset_id
 from app.features.people.visibility_queries import EVERYTHING, Sight
@@ -21,12 +22,13 @@ from app.formats.csv_text import csv_line
 from app.http.access import login_of
 from app.http.cursor import Before, Cursor, first_below
 from app.http.deps import AppStore
+from app.http.documents import json_of
 from app.http.permissions import Action, OwnedKind, Where, may
 from app.http.problem import responses
 from app.http.route import Route
 
 router = APIRouter(prefix="/audit", tags=["users"], route_class=Route)
-COLUMNS = tuple(AuditEntryDocument.model_fields)
+COLUMNS = tuple(field.name for field in fields(AuditEntry))
 
 
 async def get_led(request: Request) -> Sight:
@@ -135,4 +137,4 @@ def _csv(found: Iterator[AuditEntry]) -> Iterator[str]:
 
 def _json_lines(found: Iterator[AuditEntry]) -> Iterator[str]:
     for entry in found:
-        yield AuditEntryDocument.model_validate(entry).model_dump_json() + "\n"
+        yield json_of(entry).decode() + "\n"

@@ -14,6 +14,7 @@ from app.features.audit.queries import AuditQuery as AuditQuery
 from app.features.audit.queries import AuditRow, audit_rows
 from app.features.comments.queries import find_group
 from app.features.people.visibility_queries import Sight
+from app.finite import Moment
 from app.plural import plural
 
 MOST_LOOKED_AT = 20_000
@@ -60,14 +61,17 @@ class AuditEntry:
     """One thing that somebody said or did.
 
     Attributes:
+        actor: Name of the person, with the name of the token for a script's request.
+        kind: Of the entry in the log.
         sentence: What, in words.
+        dataset: None: of none, or it is gone.
         network: From which address, where that is known.
         address: Of the page that it is about; None where there is none.
-        hash: Of the entry in the chain.
+        hash: Of the entry, in the chain of the log.
     """
 
     id: int
-    at: str
+    at: Moment
     actor: str
     family: Family
     kind: str

@@ -34,8 +34,9 @@ from app.features.batches.queries import (
     waiting_group,
 )
 from app.features.batches.service import WORK, Batch, Here, Part, read_batch
+from app.features.independent_annotations.queries import Take
 from app.features.independent_annotations.return_work import checked_reason, note_hand_back
-from app.features.independent_annotations.service import HandedBack, Take, read_handed_back
+from app.features.independent_annotations.service import HandedBack, read_handed_back
 from app.features.people.visibility_queries import is_blind
 
 LASTS = timedelta(minutes=3)

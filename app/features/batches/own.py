@@ -22,11 +22,12 @@ from app.features.independent_annotations.known_truth import (
 )
 from app.features.independent_annotations.queries import (
     INDEPENDENT,
+    Take,
     count_left,
     take_of_copy,
     takes_of_batch,
 )
-from app.features.independent_annotations.service import Take, read_take
+from app.features.independent_annotations.service import read_take
 from app.features.independent_annotations.submission_queries import require_open, submit_copy
 from app.features.people.visibility_queries import READER, judges_in
 from app.features.queue.fields import asks_blind

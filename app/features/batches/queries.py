@@ -169,9 +169,9 @@ def groups_of(session: Session, batch_id: int) -> Sequence[Any]:
     return session.execute(statement).all()
 
 
-def group_in(session: Session, batch_id: int, group_id: int) -> Any | None:
+def group_in(session: Session, batch_id: int, group_id: int) -> BatchGroupModel | None:
     """A group of a batch."""
-    return session.execute(_GROUP, {"batch": batch_id, "group": group_id}).one_or_none()
+    return session.row(BatchGroupModel, _GROUP, {"batch": batch_id, "group": group_id})
 
 
 def groups_returned(session: Session, batch_ids: Collection[int], person: str) -> Sequence[Any]:
@@ -265,14 +265,14 @@ def _leased(*where: ColumnElement[bool]) -> ColumnElement[bool]:
     return exists().where(LeaseModel.group_id == BatchGroupModel.group_id, *where)
 
 
-def leases_on(session: Session, group_id: int, at: str) -> Sequence[Any]:
+def leases_on(session: Session, group_id: int, at: str) -> Sequence[LeaseModel]:
     """The leases on a group that last, the oldest first."""
-    return session.execute(_LEASES_ON, {"group": group_id, "at": at}).all()
+    return session.rows(LeaseModel, _LEASES_ON, {"group": group_id, "at": at})
 
 
-def leases_of(session: Session, batch_ids: Collection[int], at: str) -> Sequence[Any]:
+def leases_of(session: Session, batch_ids: Collection[int], at: str) -> Sequence[LeaseModel]:
     """The leases in batches that last."""
-    return session.execute(_LEASES_IN, {"ids": list(batch_ids), "at": at}).all()
+    return session.rows(LeaseModel, _LEASES_IN, {"ids": list(batch_ids), "at": at})
 
 
 def keep_lease(

@@ -33,6 +33,7 @@ from app.http.cursor import paged
 from app.http.deps import Actor, AppServices, AppStore, DatasetPath, Id, Sees
 from app.http.permissions import Action, OwnedKind, Where, may
 from app.http.problem import responses
+from app.http.request_limits import EDITS, LOOKS, limit
 from app.http.respond import as_document, document, no_content, responds
 from app.http.route import Route
 from app.http.services import Services
@@ -75,6 +76,7 @@ def _told(services: Services, lease: Lease) -> Lease:
 
 @router.get("/work", operation_id="getMyWork", responses=responses())
 @may(Action.READ, where=Where.SOMEWHERE)
+@limit(LOOKS)
 @paged()
 def my_work(store: AppStore, sight: Sees, asks: Asks) -> MyWork:
     """Open batches of whoever asks; on a server without accounts all of them."""
@@ -179,6 +181,7 @@ def list_batch_groups(batch: Id, store: AppStore) -> BatchGroupList:
     responses=responses(404, 409, 413, 415),
 )
 @may(Action.ANNOTATE, batch=OwnedKind.WORK)
+@limit(EDITS)
 def take_next(batch: Id, come: NextGroup, services: AppServices, asks: Asks) -> Lease:
     """Take the next group that waits for whoever asks, and that nobody else has open.
 
@@ -195,6 +198,7 @@ def take_next(batch: Id, come: NextGroup, services: AppServices, asks: Asks) -> 
     responses=responses(404, 409, 413, 415),
 )
 @may(Action.ANNOTATE, batch=OwnedKind.WORK)
+@limit(EDITS)
 def take_group(batch: Id, group: Id, how: LeaseRequest, services: AppServices, asks: Asks) -> Lease:
     """Take a group, or keep it for another three minutes; 409 where somebody has it open."""
     worker = asks.of_batch(services.store, batch)
@@ -209,6 +213,7 @@ def take_group(batch: Id, group: Id, how: LeaseRequest, services: AppServices, a
     responses=responses(404),
 )
 @may(Action.ANNOTATE, batch=OwnedKind.WORK)
+@limit(EDITS)
 def give_back(batch: Id, group: Id, services: AppServices, asks: Asks) -> None:
     """Leave a group to others."""
     worker = asks.of_batch(services.store, batch)

@@ -8,9 +8,9 @@ from typing import Annotated
 from pydantic import BaseModel, ConfigDict, Field
 
 from app.features.batches.progress import Pace
-from app.features.batches.service import MOST_GROUPS, MOST_VERDICTS, RAREST_GOLD, Part
+from app.features.batches.service import MOST_GROUPS, MOST_VERDICTS, RAREST_GOLD, BatchGroup, Part
 from app.features.datasets.service import MAX_TITLE
-from app.features.independent_annotations.schemas import HandedBackDocument
+from app.features.independent_annotations.service import HandedBack
 from app.features.queue.query import MAX_LISTED_LENGTH
 from app.finite import MAX_ID
 from app.http.documents import Document, ListDocument
@@ -107,21 +107,7 @@ class WorkBatchList(ListDocument[WorkBatchDocument]):
     """Batches; open ones and those that are due first come first."""
 
 
-class BatchGroupDocument(Document):
-    """A group of a batch."""
-
-    group: int
-    number: int = Field(description="Its place in the dataset.")
-    place: int = Field(description="Its place in the batch, from 1.")
-    handed_in: datetime | None
-    handed_in_by: str | None = Field(
-        description="Also after it was returned to them: then `handed_in` is null."
-    )
-    settled: datetime | None
-    here: list[str] = Field(description="Who has it open.")
-
-
-class BatchGroupList(ListDocument[BatchGroupDocument]):
+class BatchGroupList(ListDocument[BatchGroup]):
     """The groups of a batch in the order in which they are given out."""
 
 
@@ -156,7 +142,7 @@ class LeaseDocument(Document):
     until: datetime | None = Field(description="When the lease ends unless it is taken again.")
     here: list[PresenceDocument] = Field(description="People who have the group open.")
     handed_in_by: str | None = Field(description="Person who submitted it; null: not submitted.")
-    handed_back: HandedBackDocument | None = Field(
+    handed_back: HandedBack | None = Field(
         description="Why its annotator has it back; null: they have not."
     )
     place: int | None = Field(
@@ -175,7 +161,7 @@ class MyBatchDocument(Document):
     batch: WorkBatchDocument
     parts: list[Part]
     left: int = Field(description="Groups that one may still get.")
-    handed_back: list[HandedBackDocument] = Field(
+    handed_back: list[HandedBack] = Field(
         description="Submitted groups that were returned to the person, in the order of the batch."
     )
 

@@ -31,12 +31,14 @@ from app.features.batches.queries import (
 )
 from app.features.datasets.service import checked_title, dataset_id
 from app.features.independent_annotations.gold_queries import gold_heads
-from app.features.notifications.service import RingKind, tell
+from app.features.notifications.queries import RingKind
+from app.features.notifications.service import tell
 from app.features.people.members import list_members
 from app.features.people.roles import Action, lets
 from app.features.queue.listing_queries import Listing
 from app.features.queue.query import MAX_LISTED_LENGTH, parse_query
 from app.features.webhooks.queries import GIVEN_OUT, HANDED_ON, announce_batch
+from app.finite import Moment
 from app.plural import plural
 from app.soccer.actors import person_of
 
@@ -141,14 +143,21 @@ class Batch:
 
 @dataclass(frozen=True)
 class BatchGroup:
-    """A group of a batch; ``here`` are the names of those who have it open."""
+    """A group of a batch; ``here`` are the names of those who have it open.
+
+    Attributes:
+        number: Its place in the dataset.
+        place: Its place in the batch, from 1.
+        handed_in_by: Also after it was returned to them: then ``handed_in`` is None.
+        here: Who has it open.
+    """
 
     group: int
     number: int
     place: int
-    handed_in: str | None
+    handed_in: Moment | None
     handed_in_by: str | None
-    settled: str | None
+    settled: Moment | None
     here: list[str]
 
 

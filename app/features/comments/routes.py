@@ -19,6 +19,7 @@ from app.http.cursor import paged
 from app.http.deps import Actor, AppStore, Id
 from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import responses
+from app.http.request_limits import LOOKS, limit
 from app.http.respond import document, no_content, responds
 from app.http.route import Route
 
@@ -27,6 +28,7 @@ router = APIRouter(prefix="/groups/{group}", tags=["comments"], route_class=Rout
 
 @router.get("/people", operation_id="listPeopleOfGroup", responses=responses(404))
 @may(Action.ANNOTATE, group=OwnedKind.GROUP)
+@limit(LOOKS)
 def list_people(group: Id, store: AppStore) -> PeopleOfGroup:
     """Who can be mentioned in comments on the group: everybody who sees it."""
     return PeopleOfGroup(names=comments.people_of(store, group))
@@ -34,6 +36,7 @@ def list_people(group: Id, store: AppStore) -> PeopleOfGroup:
 
 @router.get("/threads", operation_id="listThreads", responses=responses(404))
 @may(Action.READ, group=OwnedKind.GROUP)
+@limit(LOOKS)
 @paged()
 def list_threads(group: Id, store: AppStore, actor: Actor) -> ThreadList:
     """What people say to each other about the group, the oldest thread first."""

@@ -26,7 +26,8 @@ from app.features.comments.queries import (
     set_mentions,
     set_resolved,
 )
-from app.features.notifications.service import RingKind, tell
+from app.features.notifications.queries import RingKind
+from app.features.notifications.service import tell
 from app.features.people.logins import read_roles
 from app.features.people.queries import members, person_by_name
 from app.features.people.roles import Role

@@ -56,12 +56,12 @@ def policy_of(text: str) -> Policy:
         return policy_from_json(parse(text))
 
 
-def dataset_rows(session: Session) -> Sequence[Any]:
+def dataset_rows(session: Session) -> Sequence[DatasetModel]:
     """The rows of all datasets, those of copies too, by name."""
-    return session.execute(_ROWS.order_by(DatasetModel.name)).all()
+    return session.rows(DatasetModel, _ROWS.order_by(DatasetModel.name))
 
 
-def find_dataset(session: Session, dataset: str | int) -> Any | None:
+def find_dataset(session: Session, dataset: str | int) -> DatasetModel | None:
     """The row of a dataset by name or id, or None."""
     if isinstance(dataset, int) or (
         len(dataset) <= _DIGITS and dataset.isascii() and dataset.isdigit()
@@ -74,7 +74,7 @@ def find_dataset(session: Session, dataset: str | int) -> Any | None:
         return None
     else:
         statement = _ROWS.where(DatasetModel.name == dataset)
-    return session.execute(statement).one_or_none()
+    return session.row(DatasetModel, statement)
 
 
 def next_dataset_id(session: Session, *, copies: bool = False) -> int:

@@ -31,6 +31,7 @@ from app.http.deps import Actor, AppServices, AppStore, DatasetPath, SeesWhole
 from app.http.job_responses import ACCEPTED, job_address
 from app.http.permissions import Action, OwnedKind, Where, may
 from app.http.problem import Responses, responses
+from app.http.request_limits import ZIPS, limit
 from app.http.respond import document, no_content, responds
 from app.http.route import Route
 from app.http.services import Services
@@ -171,6 +172,7 @@ async def written(export: ExportId, services: AppServices) -> str:
     responses={**responses(404, 409, 503), **ZIP},
 )
 @may(Action.READ, export=OwnedKind.EXPORT)
+@limit(ZIPS)
 def get_content(
     export: Annotated[str, Depends(written)], services: AppServices, request: Request
 ) -> Response:

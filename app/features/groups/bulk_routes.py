@@ -14,6 +14,7 @@ from app.features.solutions.service import solve_encoded
 from app.http.deps import STRONG_ETAG, Actor, AppServices, DatasetPath, DryRun
 from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import responses
+from app.http.request_limits import LARGE, limit
 from app.http.respond import as_document, document, responds
 from app.http.route import Route
 
@@ -27,6 +28,7 @@ router = APIRouter(prefix="/datasets/{dataset}/edits", tags=["views"], route_cla
     responses=responses(404, 413, 415),
 )
 @may(Action.ANNOTATE, dataset=OwnedKind.DATASET)
+@limit(LARGE)
 @responds(as_document(BulkEditDocument.of))
 def edit_many(
     dataset: DatasetPath,

@@ -18,14 +18,8 @@ from app.features.groups.solution_schemas import SolutionDocument
 from app.features.groups.state import GroupState
 from app.features.people.roles import lets
 from app.features.queue import service as queue
-from app.features.queue.schemas import (
-    GroupIds,
-    GroupPage,
-    GroupRow,
-    History,
-    LogEntryDocument,
-    Neighbours,
-)
+from app.features.queue.schemas import GroupPage, GroupRow, History, LogEntryDocument, Neighbours
+from app.features.queue.service import Ids
 from app.finite import MAX_ID
 from app.http.access import login_of
 from app.http.conflicts import current_state
@@ -42,6 +36,7 @@ from app.http.deps import (
 )
 from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import Responses, responses
+from app.http.request_limits import EDITS, LOOKS, PREVIEWS, limit
 from app.http.respond import document, responds
 from app.http.route import Route
 
@@ -119,13 +114,12 @@ def list_group_ids(
     start: Annotated[
         int, Query(alias="from", ge=0, le=MAX_ID, description="Position of the first, from 0.")
     ] = 0,
-) -> GroupIds:
+) -> Ids:
     """The ids alone of the groups that match, in the order of the list.
 
     What `id:12,15,19` in a query takes, and what a loop over a whole dataset needs.
     """
-    found = queue.list_ids(store, dataset_id(store, dataset), query, limit, start)
-    return GroupIds(ids=list(found.ids), total=found.total)
+    return queue.list_ids(store, dataset_id(store, dataset), query, limit, start)
 
 
 @router.get(
@@ -135,6 +129,7 @@ def list_group_ids(
     responses={**responses(404), 200: {"headers": ETAG}, 304: {"description": "Not changed."}},
 )
 @may(Action.READ, group=OwnedKind.GROUP)
+@limit(LOOKS)
 def get_group(group: Id, store: AppStore, request: Request) -> Response:
     """One group, complete: annotations, solution, verdict."""
     if "if-none-match" in request.headers:
@@ -146,6 +141,7 @@ def get_group(group: Id, store: AppStore, request: Request) -> Response:
 
 @router.get("/{group}/solution", operation_id="getSolution", responses=responses(404))
 @may(Action.READ, group=OwnedKind.GROUP)
+@limit(LOOKS)
 def get_solution(group: Id, store: AppStore) -> SolutionDocument:
     """The solution of a group."""
     state = submit.load_solved(store, group)
@@ -161,6 +157,7 @@ def get_solution(group: Id, store: AppStore) -> SolutionDocument:
     responses=responses(404),
 )
 @may(Action.READ, group=OwnedKind.GROUP)
+@limit(LOOKS)
 def get_neighbours(group: Id, store: AppStore, query: QueryText = "") -> queue.Neighbours:
     """Where the group stands among those that match, and up to five before and after."""
     return queue.neighbours(store, group, query)
@@ -168,6 +165,7 @@ def get_neighbours(group: Id, store: AppStore, query: QueryText = "") -> queue.N
 
 @router.get("/{group}/history", operation_id="getHistory", responses=responses(404))
 @may(Action.READ, group=OwnedKind.GROUP)
+@limit(LOOKS)
 @paged()
 def get_history(group: Id, store: AppStore) -> History:
     """Everything that was said about the group and changed of its static cameras, oldest first."""
@@ -176,6 +174,7 @@ def get_history(group: Id, store: AppStore) -> History:
 
 @router.get("/{group}/history/{entry}", operation_id="getHistoryStep", responses=responses(404))
 @may(Action.READ, group=OwnedKind.GROUP)
+@limit(LOOKS)
 def get_step(group: Id, entry: Id, store: AppStore) -> StepDocument:
     """What one entry of the history has changed: the views that differ, before and after."""
     return StepDocument.of(read_step(store, group, entry))
@@ -188,6 +187,7 @@ def get_step(group: Id, entry: Id, store: AppStore) -> StepDocument:
     responses=responses(404, 409, 413, 415),
 )
 @may(Action.READ, group=OwnedKind.GROUP)
+@limit(PREVIEWS)
 async def preview_group(
     group: Id, changes: PreviewRequest, services: AppServices, request: Request
 ) -> Response:
@@ -203,6 +203,7 @@ async def preview_group(
     responses={**responses(*CONFLICTS), **CHANGED},
 )
 @may(Action.ANNOTATE, group=OwnedKind.GROUP)
+@limit(EDITS)
 @responds(group_answer)
 def undo(group: Id, services: AppServices, actor: Actor, if_match: IfMatch) -> GroupState:
     """Take the last edit back; 409 when there is none."""
@@ -218,6 +219,7 @@ def undo(group: Id, services: AppServices, actor: Actor, if_match: IfMatch) -> G
     responses={**responses(*CONFLICTS), **CHANGED},
 )
 @may(Action.ANNOTATE, group=OwnedKind.GROUP)
+@limit(EDITS)
 @responds(group_answer)
 def redo(group: Id, services: AppServices, actor: Actor, if_match: IfMatch) -> GroupState:
     """Do again what was undone last; 409 when there is nothing."""

@@ -272,18 +272,6 @@ class VerdictDocument(Document):
     override: str | None = Field(description="The gate that it was accepted against.")
 
 
-class PictureDocument(Document):
-    """What was done to a picture since it was taken; `sigma` is wide where its lines say it."""
-
-    aspect: float = Field(description="Width of a pixel by its height: 1.05 is stretched by 5 %.")
-    shift: tuple[float, float] = Field(
-        description="Of the optical axis from the middle, right and down, in half diagonals."
-    )
-    sigma: tuple[float, float, float] = Field(
-        description="Standard deviations of the aspect and of both shifts."
-    )
-
-
 class StationDocument(Document):
     """The camera station of a view; a shared one is a static camera."""
 
@@ -292,14 +280,10 @@ class StationDocument(Document):
     shared: bool
     calibration: CalibrationChoice = Field(description="Which calibration counts when both exist.")
     has_given: bool
-    picture: PictureDocument | None = Field(
+    picture: PictureGeometry | None = Field(
         description="What was done to the picture since the camera took it; null: nothing is recorded."
     )
     etag: str = Field(description="For If-Match on `/stations/{id}/lines`.")
-
-
-class LeftOutDocument(Document, shows=LeftOut):
-    """Why a person left a view out of its group."""
 
 
 class ViewDocument(Document):
@@ -312,7 +296,7 @@ class ViewDocument(Document):
     width: int
     height: int
     included: bool
-    left_out: LeftOutDocument | None = Field(
+    left_out: LeftOut | None = Field(
         description="Reason why a person left the view out, if they gave one."
     )
     station: StationDocument
@@ -415,7 +399,7 @@ def _view(state: GroupState, view: View, index: int, label: str) -> ViewDocument
         width=view.size.width,
         height=view.size.height,
         included=view.included,
-        left_out=None if why is None else LeftOutDocument.model_validate(why),
+        left_out=None if why is None else why,
         station=_station(state, view),
         lines=lines_document(view.station.lines),
         proposed=[*view.station.proposed],
@@ -441,9 +425,7 @@ def _station(state: GroupState, view: View) -> StationDocument:
         "shared": station.shared,
         "calibration": station.calibration,
         "has_given": station.given is not None,
-        "picture": None
-        if station.picture is None
-        else PictureDocument.model_validate(station.picture),
+        "picture": None if station.picture is None else station.picture,
         "etag": state.station_etags[station.key],
     }
     return StationDocument.model_construct(**values)

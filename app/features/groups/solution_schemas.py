@@ -21,7 +21,7 @@ from app.soccer.finding import Dismissal, Finding, Fix
 from app.soccer.frames import Box, ImageSize
 from app.soccer.group import Group
 from app.soccer.pitch import Pitch
-from app.soccer.solution import GAMMAS_PERCENT, BallFit, Calibration, Pair, Solution, Suspect
+from app.soccer.solution import GAMMAS_PERCENT, BallFit, Calibration, Gate, Pair, Solution, Suspect
 from app.solving.calibrate import DRAWN_DIGITS
 from app.solving.jaccard import project_markings
 
@@ -102,10 +102,6 @@ class SuspectDocument(Document, shows=Suspect):
     error_px: Measured
 
 
-class CameraSigmaDocument(Document, shows=CameraSigma):
-    """One standard deviation of each number of a camera."""
-
-
 class PaintFitDocument(Document):
     """How a camera and the paint of its picture agree."""
 
@@ -131,7 +127,7 @@ class CalibrationDocument(Document):
 
     source: str = Field(description="`given`, `lines` or `paint`.")
     camera: Annotated[CameraDocument, BeforeValidator(_camera)] | None
-    sigma: CameraSigmaDocument | None = Field(
+    sigma: CameraSigma | None = Field(
         description="How well the camera is known; null for a given one of which nothing more is known."
     )
     reason: str | None = Field(description="Why there is no camera.")
@@ -271,25 +267,6 @@ class BestBallDocument(Document):
     )
 
 
-class GateDocument(Document):
-    """One gate as judged for the group."""
-
-    name: str
-    passed: bool
-    active: bool
-    value: float | None
-    threshold: float | None
-    margin: float | None = Field(
-        description=(
-            "Distance of the value from the threshold, as a share of the threshold: 0.25 is better "
-            "than required by a quarter of the threshold, -0.25 worse by a quarter. Null if the "
-            "gate is off or not judged, or if the threshold is 0."
-        )
-    )
-    sentence: str
-    view: str | None
-
-
 class FailingGate(Document):
     """The gate to name to a person."""
 
@@ -389,7 +366,7 @@ class SolutionDocument(Document):
     policy_hash: str
     passes: bool
     first_failing: FailingGate | None
-    gates: list[GateDocument]
+    gates: list[Gate]
     views: list[ViewSolutionDocument]
     pairs: list[PairDocument]
     point: str = Field(

@@ -38,7 +38,7 @@ from app.http.cursor import paged
 from app.http.deps import Actor, AppServices, Id, IfMatch, etag_matches
 from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import Responses, responses
-from app.http.request_limits import is_large
+from app.http.request_limits import EDITS, IMAGES, is_large, limit
 from app.http.respond import responds
 from app.http.route import Route
 from app.http.services import Services
@@ -55,7 +55,7 @@ SECONDS = 3600
 CLIENT_GONE = 499
 """What the log calls the answer that nobody reads."""
 NO_NEIGHBOURS = "This dataset has no frames before or after this one."
-IMAGES: Responses = {
+FRAME: Responses = {
     200: {
         "description": "The frame as JPEG, PNG or WebP.",
         "content": {
@@ -75,6 +75,7 @@ IMAGES: Responses = {
     responses={**responses(*CONFLICTS), **CHANGED},
 )
 @may(Action.ANNOTATE, view=OwnedKind.VIEW)
+@limit(EDITS)
 @responds(group_answer)
 def patch_lines(
     view: Id,
@@ -102,6 +103,7 @@ def patch_lines(
     responses={**responses(*CONFLICTS), **CHANGED},
 )
 @may(Action.ANNOTATE, view=OwnedKind.VIEW)
+@limit(EDITS)
 @responds(group_answer)
 def patch_ball(
     view: Id,
@@ -122,6 +124,7 @@ def patch_ball(
     responses={**responses(*CONFLICTS), **CHANGED},
 )
 @may(Action.ANNOTATE, view=OwnedKind.VIEW)
+@limit(EDITS)
 @responds(group_answer)
 def patch_view(
     view: Id, change: ViewEdit, services: AppServices, actor: Actor, if_match: IfMatch
@@ -158,9 +161,10 @@ def _submit(
     "/{view}/image",
     operation_id="getImage",
     response_class=Response,
-    responses={**responses(404, 413, 503), **IMAGES},
+    responses={**responses(404, 413, 503), **FRAME},
 )
 @may(Action.READ, view=OwnedKind.VIEW)
+@limit(IMAGES)
 async def get_image(
     view: Id,
     services: AppServices,
@@ -202,6 +206,7 @@ async def get_image(
     responses=responses(404, 503),
 )
 @may(Action.READ, view=OwnedKind.VIEW)
+@limit(IMAGES)
 @paged()
 async def get_neighbours(
     view: Id, services: AppServices, request: Request

@@ -7,16 +7,16 @@ from typing import Annotated
 from fastapi import APIRouter, Path, Query, Request, Response
 
 from app.features.guidelines import service as guidelines
+from app.features.guidelines.service import Guidelines
 from app.features.independent_annotations.schemas import (
     GuidelinePictureDocument,
-    GuidelinesDocument,
     GuidelinesEdit,
     NewGuidelinePicture,
 )
 from app.http.deps import Actor, AppServices, AppStore, DatasetPath, etag_matches
 from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import responses
-from app.http.respond import as_document, responds
+from app.http.respond import as_document, document, responds
 from app.http.route import Route
 
 router = APIRouter(prefix="/datasets/{dataset}/guidelines", tags=["takes"], route_class=Route)
@@ -27,7 +27,7 @@ Digest = Annotated[str, Path(pattern=r"^[0-9a-f]{64}$", description="SHA-256 of 
 @router.get(
     "",
     operation_id="getGuidelines",
-    response_model=GuidelinesDocument,
+    response_model=Guidelines,
     responses=responses(404),
 )
 @may(Action.READ, dataset=OwnedKind.DATASET)
@@ -45,11 +45,11 @@ def get_guidelines(
 @router.put(
     "",
     operation_id="writeGuidelines",
-    response_model=GuidelinesDocument,
+    response_model=Guidelines,
     responses=responses(404, 409, 413, 415),
 )
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
-@responds(as_document(GuidelinesDocument.model_validate))
+@responds(document)
 def write_guidelines(
     dataset: DatasetPath, edit: GuidelinesEdit, store: AppStore, actor: Actor
 ) -> guidelines.Guidelines:

@@ -21,6 +21,7 @@ from app.features.guidelines.queries import (
     told_dataset,
 )
 from app.features.imports.upload_queries import upload_path
+from app.finite import Moment
 from app.media.frames import Frames
 from app.soccer.media import Media
 
@@ -36,7 +37,7 @@ class GuidelineVersion:
     """One version: its number from 1, and who wrote it when."""
 
     number: int
-    written: str
+    written: Moment
     written_by: str
 
 
@@ -45,9 +46,9 @@ class Guidelines:
     """What annotators are told.
 
     Attributes:
-        dataset: Id of the dataset whose guidelines they are.
+        dataset: Whose guidelines they are; copies have those of what they copy.
         number: Of this version; 0: there are no guidelines.
-        text: In Markdown; ``![words](DIGEST)`` shows a picture.
+        text: Markdown; ``![words](DIGEST)`` in a line of its own is a picture.
         versions: All of them, the newest first.
     """
 

@@ -32,6 +32,7 @@ from app.http.deps import Actor, AppServices, DryRun, Sees
 from app.http.job_responses import by_job, job_answer
 from app.http.permissions import Action, OwnedKind, Where, may
 from app.http.problem import responses
+from app.http.request_limits import UPLOADS, limit
 from app.http.respond import no_content, responds
 from app.http.route import Route
 from app.http.services import Services
@@ -128,6 +129,7 @@ BODY: dict[str, Any] = {
     },
 )
 @may(Action.LEAD, where=Where.SOMEWHERE)
+@limit(UPLOADS)
 async def upload_file(
     request: Request, services: AppServices, actor: Actor, name: FileName, response: Response
 ) -> UploadDocument:

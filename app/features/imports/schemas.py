@@ -132,11 +132,7 @@ class ImportBody(BaseModel):
         )
 
 
-class FolderEntry(Document, shows=FolderItem):
-    """A folder or a file that an import can name."""
-
-
-class FolderDocument(ListDocument[FolderEntry]):
+class FolderDocument(ListDocument[FolderItem]):
     """What is in a folder that the operator allows; without a path, the folders themselves."""
 
     path: str

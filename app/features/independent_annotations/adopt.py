@@ -29,8 +29,8 @@ from app.features.groups.submit import current_etag, solved_in, submit
 from app.features.groups.view_paint import PaintFollower
 from app.features.groups.view_queries import groups_of_station, save_station
 from app.features.independent_annotations.copying import aligned
-from app.features.independent_annotations.queries import GOLD, update_take
-from app.features.independent_annotations.service import Take, get_take, read_take
+from app.features.independent_annotations.queries import GOLD, Take, update_take
+from app.features.independent_annotations.service import get_take, read_take
 from app.features.independent_annotations.submission_queries import KIND
 from app.features.queue.queries import refresh_queue
 from app.features.verdicts.queries import (

@@ -17,7 +17,7 @@ Point3 = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
-class AnnotationError:
+class DistanceFromTruth:
     """How far an annotation is from the truth.
 
     Attributes:
@@ -37,7 +37,9 @@ class AnnotationError:
     ball_m: float | None
 
 
-def error_of(truth: Group, said: Group, ball: Point3 | None, own: Point3 | None) -> AnnotationError:
+def error_of(
+    truth: Group, said: Group, ball: Point3 | None, own: Point3 | None
+) -> DistanceFromTruth:
     """The error of an annotation; views are those of the truth that the annotation has, too.
 
     Args:
@@ -51,7 +53,7 @@ def error_of(truth: Group, said: Group, ball: Point3 | None, own: Point3 | None)
     missing = sum(len({*view.station.lines} - {*other.station.lines}) for view, other in pairs)
     centers = [(_center(view), _center(other)) for view, other in pairs]
     balls = [float(np.hypot(a.x - b.x, a.y - b.y)) for a, b in centers if a and b]
-    return AnnotationError(
+    return DistanceFromTruth(
         line_px=float(np.median(lines)) if lines else None,
         lines_missing=missing,
         ball_px=max(balls) if balls else None,
@@ -76,7 +78,7 @@ def world_error(
     said: Group,
     ball: Point3,
     own: Point3 | None,
-) -> AnnotationError:
+) -> DistanceFromTruth:
     """The error of an annotation against the true cameras and ball, and nobody's annotation.
 
     A marking's distance is the mean of its annotated points' from where the true camera shows it;
@@ -101,7 +103,7 @@ def world_error(
         lines += [float(one.distances.mean()) for one in measured if one.distances.size]
     centers = [(_center(other), known.center) for _, other, known in seen]
     balls = [float(np.hypot(a.x - b.x, a.y - b.y)) for a, b in centers if a is not None]
-    return AnnotationError(
+    return DistanceFromTruth(
         line_px=float(np.median(lines)) if lines else None,
         lines_missing=sum(
             len({*view.station.lines} - {*other.station.lines}) for view, other, _ in seen

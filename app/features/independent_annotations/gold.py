@@ -20,7 +20,7 @@ from app.features.groups.submit import load_solved
 from app.features.groups.view_queries import group_dataset
 from app.features.independent_annotations.copying import aligned
 from app.features.independent_annotations.errors import (
-    AnnotationError,
+    DistanceFromTruth,
     TrueView,
     error_of,
     world_error,
@@ -34,9 +34,10 @@ from app.features.independent_annotations.gold_queries import (
     start_gold,
     unmark_gold,
 )
-from app.features.independent_annotations.queries import GOLD, is_copy, takes_in
+from app.features.independent_annotations.queries import GOLD, Take, is_copy, takes_in
 from app.features.independent_annotations.submission_queries import submissions_of
 from app.features.solutions.service import known_calibrations
+from app.finite import Moment
 from app.formats.camera_json import camera_from_json
 from app.soccer.frames import ImagePoint
 from app.soccer.group import Group
@@ -64,12 +65,17 @@ class TruthSource(StrEnum):
 
 @dataclass(frozen=True)
 class GoldGroup:
-    """A gold group; ``start`` is what its annotators begin with, ``source`` where its truth is from."""
+    """A gold group; ``start`` is what its annotators begin with, ``source`` where its truth is from.
+
+    Attributes:
+        source: Where its truth is from: what it held when it was marked, the sample's own files, or
+            a frozen version.
+    """
 
     group: int
     label: str
     start: str
-    marked: str
+    marked: Moment
     marked_by: str
     source: TruthSource
 
@@ -90,7 +96,7 @@ class GoldResult:
     verdict: str | None
     true_verdict: str
     right: bool | None
-    error: AnnotationError
+    error: DistanceFromTruth
     submissions: int = 1
 
 
@@ -307,10 +313,12 @@ class _Submission:
     solution: Solution | None
 
 
-def _first(session: Session, take: Any, made: Sequence[Mapping[str, Any]]) -> _Submission:
+def _first(session: Session, take: Take, made: Sequence[Mapping[str, Any]]) -> _Submission:
     """What somebody submitted first of a copy; as the copy is now where no entry holds it."""
     (state,) = read_states(session, [take.copy_id])
     if not made:
+        # Whoever has submitted nothing of it has handed it in.
+        assert take.handed_in is not None
         return _Submission(take.handed_in, take.verdict, state.group, state.solution)
     first = made[0]
     stored = need_group(session, take.copy_id)

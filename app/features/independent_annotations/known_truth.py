@@ -24,8 +24,14 @@ from app.features.groups.queries import StoredGroup, read_groups
 from app.features.groups.submit import solved
 from app.features.independent_annotations.gold import KIND, TruthSource, check_start
 from app.features.independent_annotations.gold_queries import fresh_gold, mark_gold
-from app.features.independent_annotations.queries import GOLD, INDEPENDENT, is_copy, takes_of_batch
-from app.features.independent_annotations.service import Take, begin
+from app.features.independent_annotations.queries import (
+    GOLD,
+    INDEPENDENT,
+    Take,
+    is_copy,
+    takes_of_batch,
+)
+from app.features.independent_annotations.service import begin
 from app.features.queue.listing_queries import Listing
 from app.features.queue.query import MAX_LISTED_LENGTH, parse_query
 from app.features.versions.queries import BATCH, read_rows
@@ -65,7 +71,12 @@ class GoldChoice:
 
 @dataclass(frozen=True)
 class GoldChosen:
-    """What came of it: groups that are gold by now, and how many of those asked for are not."""
+    """What came of it: groups that are gold by now, and how many of those asked for are not.
+
+    Attributes:
+        groups: Groups that are gold by now.
+        left_out: Groups without known true values.
+    """
 
     groups: tuple[int, ...]
     left_out: int
@@ -251,7 +262,7 @@ def begin_next(
 
 def _next(session: Session, terms: Terms, person: str, chance: Random) -> Take | None:
     takes = takes_of_batch(session, terms.batch_id, terms.dataset_id)
-    mine = [Take(**row._mapping) for row in takes if row.person == person]
+    mine = [take for take in takes if take.person == person]
     waiting = next((take for take in mine if take.handed_in is None), None)
     if waiting is not None:
         return waiting

@@ -24,6 +24,38 @@ _READY = (TakeModel.kind == INDEPENDENT, TakeModel.handed_in.is_not(None))
 _OF_COPY = _TAKES.where(TakeModel.copy_id == bindparam("copy"))
 
 
+@dataclass(frozen=True)
+class Take:
+    """A person's own annotation of a group.
+
+    Attributes:
+        group_id: The original.
+        copy_id: The group that is the copy; it is opened and edited like any other.
+        kind: ``independent``, or ``gold`` where the original's truth is known: for leads alone.
+        place: Which one of this person in this batch it is, from 1.
+        verdict: What they judged; None: nothing.
+        settled: When something was decided about it; None: not yet.
+    """
+
+    id: int
+    batch_id: int | None
+    group_id: int
+    copy_id: int
+    person: str
+    kind: str
+    place: int
+    begun: str
+    handed_in: str | None
+    verdict: str | None
+    settled: str | None
+
+
+def _takes(
+    session: Session, statement: Select[*tuple[Any, ...]], values: dict[str, Any] | None = None
+) -> list[Take]:
+    return [Take(**row._mapping) for row in session.execute(statement, values)]
+
+
 def insert_take(
     session: Session,
     *,
@@ -43,14 +75,14 @@ def insert_take(
     return identity
 
 
-def find_take(session: Session, take_id: int) -> Any | None:
+def find_take(session: Session, take_id: int) -> Take | None:
     """A take by its id."""
-    return session.execute(_TAKES.where(TakeModel.id == take_id)).one_or_none()
+    return next(iter(_takes(session, _TAKES.where(TakeModel.id == take_id))), None)
 
 
-def take_of_copy(session: Session, copy_id: int) -> Any | None:
+def take_of_copy(session: Session, copy_id: int) -> Take | None:
     """The take whose copy a group is; None for an ordinary group."""
-    return session.execute(_OF_COPY, {"copy": copy_id}).one_or_none()
+    return next(iter(_takes(session, _OF_COPY, {"copy": copy_id})), None)
 
 
 def closed_copies(session: Session, dataset_id: int) -> set[int]:
@@ -60,18 +92,18 @@ def closed_copies(session: Session, dataset_id: int) -> set[int]:
     return set(session.scalars(statement.where(GroupModel.dataset_id == dataset_id, closed)))
 
 
-def takes_of_group(session: Session, group_id: int) -> Sequence[Any]:
+def takes_of_group(session: Session, group_id: int) -> list[Take]:
     """The takes of a group in the order in which they began."""
     mine = TakeModel.group_id == group_id
-    return session.execute(_TAKES.where(mine).order_by(TakeModel.id)).all()
+    return _takes(session, _TAKES.where(mine).order_by(TakeModel.id))
 
 
-def takes_of_batch(session: Session, batch_id: int | None, dataset_id: int) -> Sequence[Any]:
+def takes_of_batch(session: Session, batch_id: int | None, dataset_id: int) -> list[Take]:
     """The takes of a batch (None: of none) of a dataset, in the order in which they began."""
     batch = TakeModel.batch_id
     mine = batch.is_(None) if batch_id is None else batch == batch_id
     statement = _TAKES.where(mine, TakeModel.copy_id.in_(_copies_of(dataset_id)))
-    return session.execute(statement.order_by(TakeModel.id)).all()
+    return _takes(session, statement.order_by(TakeModel.id))
 
 
 def count_left(
@@ -132,7 +164,7 @@ def open_takes(session: Session, batch_ids: Collection[int], person: str) -> Seq
 
 def takes_in(
     session: Session, dataset_id: int, person: str | None = None, kind: str | None = None
-) -> Sequence[Any]:
+) -> list[Take]:
     """The takes of a dataset, of one person or one kind where these are named, oldest first."""
     statement = _TAKES.join(GroupModel, GroupModel.id == TakeModel.copy_id).join(
         CopyDatasetModel, CopyDatasetModel.dataset_id == GroupModel.dataset_id
@@ -142,7 +174,7 @@ def takes_in(
         where.append(TakeModel.person == person)
     if kind is not None:
         where.append(TakeModel.kind == kind)
-    return session.execute(statement.where(*where).order_by(TakeModel.id)).all()
+    return _takes(session, statement.where(*where).order_by(TakeModel.id))
 
 
 def names_of(session: Session, copy_ids: Sequence[int]) -> Sequence[Any]:

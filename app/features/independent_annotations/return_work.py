@@ -11,7 +11,8 @@ from app.features.groups.state import need_group
 from app.features.independent_annotations.queries import take_of_copy
 from app.features.independent_annotations.service import TakeView, read_take, show
 from app.features.independent_annotations.submission_queries import KIND, RETURNED, return_copy
-from app.features.notifications.service import RingKind, tell
+from app.features.notifications.queries import RingKind
+from app.features.notifications.service import tell
 from app.features.webhooks.queries import HANDED_BACK, announce, stamp
 from app.soccer.actors import person_of
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from fastapi import APIRouter, BackgroundTasks, Request
+from fastapi import APIRouter, BackgroundTasks, Request, Response
 
 from app.features.agreement.adjudicate import take_over
 from app.features.agreement.service import after_hand_in
@@ -11,25 +11,25 @@ from app.features.groups.schemas import GroupDocument
 from app.features.groups.state import GroupState
 from app.features.independent_annotations import gold
 from app.features.independent_annotations import service as takes
+from app.features.independent_annotations.gold import GoldGroup
 from app.features.independent_annotations.known_truth import GoldChoice, GoldChosen, mark_known
 from app.features.independent_annotations.return_work import hand_back_take
 from app.features.independent_annotations.schemas import (
     GoldChoiceDocument,
-    GoldChosenDocument,
     GoldEdit,
-    GoldGroupDocument,
     GoldReportDocument,
     HandBack,
-    TakeDocument,
     TakeList,
 )
+from app.features.independent_annotations.service import TakeView
 from app.features.people.roles import lets
 from app.http.access import login_of
 from app.http.cursor import paged
 from app.http.deps import Actor, AppServices, AppStore, DatasetPath, Id
 from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import responses
-from app.http.respond import as_document, responds
+from app.http.request_limits import LOOKS, limit
+from app.http.respond import document, responds
 from app.http.route import Route
 
 takes_router = APIRouter(tags=["takes"], route_class=Route)
@@ -47,18 +47,22 @@ def list_takes(dataset: DatasetPath, store: AppStore, request: Request, actor: A
         lambda dataset_id: login is None or lets(login.roles.role_in(dataset_id), Action.LEAD),
         person=actor,
     )
-    return TakeList(items=[TakeDocument.model_validate(one) for one in found])
+    return TakeList(items=found)
+
+
+def _begun(take: TakeView) -> Response:
+    return document(take, 201)
 
 
 @takes_router.post(
     "/groups/{group}/takes",
     operation_id="beginTake",
-    response_model=TakeDocument,
+    response_model=TakeView,
     status_code=201,
     responses=responses(404, 409),
 )
 @may(Action.ANNOTATE, group=OwnedKind.GROUP)
-@responds(as_document(TakeDocument.model_validate, 201))
+@responds(_begun)
 def begin(group: Id, store: AppStore, actor: Actor) -> takes.TakeView:
     """Begin an own annotation of a group, on a copy that nobody else sees; the one begun, if so."""
     return takes.begin_take(store, group, person=actor)
@@ -67,10 +71,11 @@ def begin(group: Id, store: AppStore, actor: Actor) -> takes.TakeView:
 @takes_router.get(
     "/groups/{group}/take",
     operation_id="getTake",
-    response_model=TakeDocument,
+    response_model=TakeView,
     responses=responses(404),
 )
 @may(Action.READ, group=OwnedKind.GROUP)
+@limit(LOOKS)
 def get_take(group: Id, store: AppStore) -> takes.TakeView:
     """Whose own annotation a group is; 404 for an ordinary group."""
     return takes.shown(store, takes.get_take_of(store, group))
@@ -79,11 +84,11 @@ def get_take(group: Id, store: AppStore) -> takes.TakeView:
 @takes_router.post(
     "/groups/{group}/hand-in",
     operation_id="handInTake",
-    response_model=TakeDocument,
+    response_model=TakeView,
     responses=responses(403, 404, 409),
 )
 @may(Action.ANNOTATE, group=OwnedKind.GROUP)
-@responds(as_document(TakeDocument.model_validate))
+@responds(document)
 def hand_in(
     group: Id, services: AppServices, actor: Actor, background: BackgroundTasks
 ) -> takes.TakeView:
@@ -97,11 +102,11 @@ def hand_in(
 @takes_router.post(
     "/groups/{group}/hand-back",
     operation_id="handBackTake",
-    response_model=TakeDocument,
+    response_model=TakeView,
     responses=responses(404, 409, 413, 415),
 )
 @may(Action.LEAD, group=OwnedKind.GROUP)
-@responds(as_document(TakeDocument.model_validate))
+@responds(document)
 def hand_back(
     group: Id, store: AppStore, actor: Actor, why: HandBack | None = None
 ) -> takes.TakeView:
@@ -145,11 +150,11 @@ def get_report(dataset: DatasetPath, store: AppStore) -> gold.GoldReport:
 @gold_router.post(
     "/datasets/{dataset}/gold",
     operation_id="chooseGoldGroups",
-    response_model=GoldChosenDocument,
+    response_model=GoldChosen,
     responses=responses(404, 409, 413, 415),
 )
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
-@responds(as_document(GoldChosenDocument.model_validate))
+@responds(document)
 def choose(
     dataset: DatasetPath, choice: GoldChoiceDocument, store: AppStore, actor: Actor
 ) -> GoldChosen:
@@ -162,11 +167,11 @@ def choose(
 @gold_router.put(
     "/groups/{group}/gold",
     operation_id="markGold",
-    response_model=GoldGroupDocument,
+    response_model=GoldGroup,
     responses=responses(404, 409, 413, 415),
 )
 @may(Action.LEAD, group=OwnedKind.GROUP)
-@responds(as_document(GoldGroupDocument.model_validate))
+@responds(document)
 def mark(group: Id, edit: GoldEdit, store: AppStore, actor: Actor) -> gold.GoldGroup:
     """Say that what a group holds now, with its verdict, is true."""
     return gold.mark(store, group, edit.start, actor=actor)
@@ -175,11 +180,11 @@ def mark(group: Id, edit: GoldEdit, store: AppStore, actor: Actor) -> gold.GoldG
 @gold_router.patch(
     "/groups/{group}/gold",
     operation_id="changeGold",
-    response_model=GoldGroupDocument,
+    response_model=GoldGroup,
     responses=responses(404, 413, 415),
 )
 @may(Action.LEAD, group=OwnedKind.GROUP)
-@responds(as_document(GoldGroupDocument.model_validate))
+@responds(document)
 def change(group: Id, edit: GoldEdit, store: AppStore, actor: Actor) -> gold.GoldGroup:
     """Let annotators of a gold group begin with something else; what is true of it stays."""
     return gold.start_with(store, group, edit.start, actor=actor)
@@ -188,11 +193,11 @@ def change(group: Id, edit: GoldEdit, store: AppStore, actor: Actor) -> gold.Gol
 @gold_router.delete(
     "/groups/{group}/gold",
     operation_id="unmarkGold",
-    response_model=GoldGroupDocument,
+    response_model=GoldGroup,
     responses=responses(404),
 )
 @may(Action.LEAD, group=OwnedKind.GROUP)
-@responds(as_document(GoldGroupDocument.model_validate))
+@responds(document)
 def unmark(group: Id, store: AppStore, actor: Actor) -> gold.GoldGroup:
     """Let a gold group be an ordinary one again; what people made of it is no longer shown."""
     return gold.unmark(store, group, actor=actor)

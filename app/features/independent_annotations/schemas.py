@@ -7,7 +7,8 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from app.features.guidelines.service import MAX_LETTERS, GuidelineVersion
+from app.features.guidelines.service import MAX_LETTERS
+from app.features.independent_annotations.errors import DistanceFromTruth
 from app.features.independent_annotations.gold import GoldGroup, GoldResult, Middle, PersonResults
 from app.features.independent_annotations.known_truth import MOST
 from app.features.independent_annotations.return_work import MAX_REASON
@@ -16,16 +17,6 @@ from app.features.queue.query import MAX_LISTED_LENGTH
 from app.finite import MAX_ID
 from app.http.documents import Document, ListDocument
 from app.soccer.choices import GoldStart
-
-
-class HandedBackDocument(Document):
-    """That a group was handed back to somebody who had handed it in."""
-
-    group: int = Field(description="What they work on; of an annotation of their own, the copy.")
-    title: str
-    by: str = Field(description="Who handed it back.")
-    at: datetime
-    reason: str = Field(description="Why; may be empty.")
 
 
 class HandBack(BaseModel):
@@ -52,31 +43,7 @@ class TakeHandBack(HandBack):
     take: Annotated[int, Field(ge=1, le=MAX_ID)]
 
 
-class TakeDocument(Document, shows=TakeView):
-    """Somebody's own annotation of a group, made on a copy that nobody else sees."""
-
-    batch: int | None = Field(description="The batch that it is for; null: none.")
-    group: int = Field(description="The copy: a group like any other.")
-    dataset: int = Field(description="Of the groups that this is a copy of one of.")
-    of: int | None = Field(description="The group that it is a copy of, where that may be known.")
-    number: int | None = Field(
-        description="Number of that group in its dataset, where that may be known."
-    )
-    title: str = Field(
-        description="What people call the group; where it may not be known, the copy."
-    )
-    place: int = Field(description="Which one of this person in this batch, from 1.")
-    begun: datetime
-    handed_in: datetime | None
-    settled: datetime | None = Field(
-        description="When it was decided; null: not yet, or not disclosed to its person."
-    )
-    handed_back: HandedBackDocument | None = Field(
-        description="Why its person has it back; null: they have not."
-    )
-
-
-class TakeList(ListDocument[TakeDocument]):
+class TakeList(ListDocument[TakeView]):
     """Own annotations, oldest first: for a lead everybody's, else those of whoever asks."""
 
 
@@ -124,84 +91,34 @@ class GoldChoiceDocument(BaseModel):
     start: GoldStart = "imported"
 
 
-class GoldChosenDocument(Document):
-    """What came of it."""
-
-    groups: list[int] = Field(description="Groups that are gold by now.")
-    left_out: int = Field(description="Groups without known true values.")
-
-
-class GoldGroupDocument(Document, shows=GoldGroup):
-    """A group whose truth is known."""
-
-    marked: datetime
-    source: Literal["verdict", "sample", "version"] = Field(
-        description="Where its truth is from: what it held when it was marked, the sample's own files, "
-        "or a frozen version."
-    )
-
-
-class AnnotationErrorDocument(Document):
-    """How far an annotation is from the truth."""
-
-    line_px: float | None = Field(
-        description="Median over the markings that both have of their mean distance, pixels."
-    )
-    lines_missing: int = Field(description="Markings of the truth that were not drawn.")
-    ball_px: float | None = Field(description="Largest distance of the balls in a view, pixels.")
-    balls_missing: int = Field(description="Views in which one has a ball and the other none.")
-    ball_m: float | None = Field(description="Distance of the 3D balls, metres.")
-
-
 class GoldResultDocument(Document, shows=GoldResult):
     """What one person made of a gold group."""
 
     handed_in: datetime = Field(description="When they submitted it first.")
     true_verdict: str = Field(title="Known Verdict")
     right: bool | None = Field(description="Whether they judged as is true; null: not judged.")
-    error: AnnotationErrorDocument
+    error: DistanceFromTruth
     submissions: int = Field(
         description="How often they submitted it. The first one is measured; there are more where a "
         "lead returned it."
     )
 
 
-class MiddleDocument(Document, shows=Middle):
-    """A median with an interval of 95 %, which fewer than six numbers do not have."""
-
-
 class PersonResultsDocument(Document, shows=PersonResults):
     """What somebody made of gold groups, oldest first."""
 
     results: list[GoldResultDocument]
-    line_px: MiddleDocument
-    ball_px: MiddleDocument
-    ball_m: MiddleDocument
+    line_px: Middle
+    ball_px: Middle
+    ball_m: Middle
     right_low: float | None = Field(description="Wilson's interval of the share, 95 %.")
 
 
 class GoldReportDocument(Document):
     """The gold groups of a dataset, and how far each person is from what is true of them."""
 
-    groups: list[GoldGroupDocument]
+    groups: list[GoldGroup]
     people: list[PersonResultsDocument]
-
-
-class GuidelineVersionDocument(Document, shows=GuidelineVersion):
-    """One version of the guidelines."""
-
-    written: datetime
-
-
-class GuidelinesDocument(Document):
-    """What annotators of a dataset are told."""
-
-    dataset: int = Field(
-        description="Whose guidelines they are; copies have those of what they copy."
-    )
-    number: int = Field(description="0: there are no guidelines.")
-    text: str = Field(description="Markdown; `![words](DIGEST)` in a line of its own is a picture.")
-    versions: list[GuidelineVersionDocument]
 
 
 class GuidelinesEdit(BaseModel):

@@ -25,6 +25,7 @@ from app.features.independent_annotations.gold_queries import common_start
 from app.features.independent_annotations.queries import (
     GOLD,
     INDEPENDENT,
+    Take,
     count_takes,
     find_take,
     insert_take,
@@ -36,6 +37,7 @@ from app.features.independent_annotations.queries import (
 from app.features.independent_annotations.submission_queries import RETURNED, submit_copy
 from app.features.people.visibility_queries import READER
 from app.features.queue.listing_queries import read_columns
+from app.finite import Moment
 from app.soccer.actors import person_of
 
 _KINDS = ("work", "take")
@@ -44,12 +46,18 @@ _KINDS = ("work", "take")
 
 @dataclass(frozen=True)
 class HandedBack:
-    """A group that was handed back: by whom, when, and why; the reason may be empty."""
+    """A group that was handed back: by whom, when, and why; the reason may be empty.
+
+    Attributes:
+        group: What they work on; of an annotation of their own, the copy.
+        by: Who handed it back.
+        reason: Why; may be empty.
+    """
 
     group: int
     title: str
     by: str
-    at: str
+    at: Moment
     reason: str
 
 
@@ -73,40 +81,16 @@ def read_handed_back(session: Session, group_ids: Sequence[int]) -> dict[int, Ha
 
 
 @dataclass(frozen=True)
-class Take:
-    """A person's own annotation of a group.
-
-    Attributes:
-        group_id: The original.
-        copy_id: The group that is the copy; it is opened and edited like any other.
-        kind: ``independent``, or ``gold`` where the original's truth is known: for leads alone.
-        place: Which one of this person in this batch it is, from 1.
-        verdict: What they judged; None: nothing.
-        settled: When something was decided about it; None: not yet.
-    """
-
-    id: int
-    batch_id: int | None
-    group_id: int
-    copy_id: int
-    person: str
-    kind: str
-    place: int
-    begun: str
-    handed_in: str | None
-    verdict: str | None
-    settled: str | None
-
-
-@dataclass(frozen=True)
 class TakeView:
     """A take as everybody may see it who sees its copy; that it is a gold one it does not say.
 
     Attributes:
-        group: The copy.
-        dataset: Of what it is a copy.
+        batch: The batch that it is for; None: none.
+        group: The copy: a group like any other.
+        dataset: Of the groups that this is a copy of one of.
         of, number: The original, and its number in its dataset; None where its person is not told.
         title: What people call the group; where its person is not told, what they call the copy.
+        place: Which one of this person in this batch, from 1.
         settled: When something was decided about it; None: not yet, or its person is not told.
         handed_back: Why its person has it back; None: they have not, or handed it in again.
     """
@@ -120,10 +104,10 @@ class TakeView:
     title: str
     person: str
     place: int
-    begun: str
-    handed_in: str | None
+    begun: Moment
+    handed_in: Moment | None
     verdict: str | None
-    settled: str | None
+    settled: Moment | None
     handed_back: HandedBack | None = None
 
 
@@ -175,7 +159,7 @@ def begin(
     others = [one for one in takes_of_group(session, group_id) if one.batch_id == batch_id]
     for one in others:
         if one.person == person:
-            return _take(one)
+            return one
     if take_of_copy(session, group_id) is not None:
         raise ConflictError(
             "this is an own annotation already", hint="Begin from the group that it is of."
@@ -247,8 +231,7 @@ def get_take_of(store: Store, copy_id: int) -> Take:
 def find_take_of(store: Store, copy_id: int) -> Take | None:
     """The take whose copy a group is; None for an ordinary group."""
     with store.glance() as session:
-        row = take_of_copy(session, copy_id)
-    return None if row is None else _take(row)
+        return take_of_copy(session, copy_id)
 
 
 def list_takes(
@@ -268,7 +251,7 @@ def list_takes(
     with store.read() as session:
         dataset_id = need_dataset(session, dataset)
         whose = None if sees_all(dataset_id) else person_of(person)
-        found = [_take(row) for row in takes_in(session, dataset_id, whose)]
+        found = takes_in(session, dataset_id, whose)
         return _shown(session, found)
 
 
@@ -329,8 +312,4 @@ def read_take(session: Session, take_id: int) -> Take:
     row = find_take(session, take_id)
     if row is None:
         raise NotFoundError(f"there is no annotation {take_id}")
-    return _take(row)
-
-
-def _take(row: Any) -> Take:
-    return Take(**row._mapping)
+    return row

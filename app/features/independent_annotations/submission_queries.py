@@ -16,7 +16,7 @@ from app.errors import ConflictError, ForbiddenError
 from app.features.agreement.queries import forget_open
 from app.features.groups.codecs import group_to_json
 from app.features.groups.queries import read_groups
-from app.features.independent_annotations.queries import take_of_copy, update_take
+from app.features.independent_annotations.queries import Take, take_of_copy, update_take
 from app.soccer.actors import LOCAL_USER, person_of
 
 KIND = "take"
@@ -27,7 +27,7 @@ RETURNED = "handed back"
 _ONLY_LEADS = "Only a lead can return it, and says why."
 
 
-def require_open(take: Any | None) -> None:
+def require_open(take: Take | None) -> None:
     """Raise ConflictError where a copy was submitted; ``None`` is an ordinary group.
 
     Whether it was adjudicated since the sentence does not say: copies of gold groups never are.
@@ -38,7 +38,7 @@ def require_open(take: Any | None) -> None:
         )
 
 
-def _require_person(take: Any, actor: str) -> None:
+def _require_person(take: Take, actor: str) -> None:
     """Raise ForbiddenError where a copy is somebody else's."""
     # On a server without accounts everybody is the local user.
     if person_of(actor) not in (take.person, LOCAL_USER):
@@ -46,7 +46,7 @@ def _require_person(take: Any, actor: str) -> None:
 
 
 def submit_copy(
-    session: Session, take: Any, *, actor: str, at: str, verdict: str | None = None
+    session: Session, take: Take, *, actor: str, at: str, verdict: str | None = None
 ) -> None:
     """Submit a copy, with its person's verdict where they judged it.
 
@@ -89,7 +89,7 @@ def judge_copy(session: Session, copy_id: int, state: str, *, actor: str, at: st
         update_take(session, take.id, verdict=None)
 
 
-def return_copy(session: Session, take: Any) -> None:
+def return_copy(session: Session, take: Take) -> None:
     """Let the person of a submitted copy go on with it; the caller logs who returned it, and why.
 
     What was compared with it waits for no decision any more.

@@ -23,7 +23,8 @@ from app.features.jobs.queries import (
 )
 from app.features.jobs.queries import Job as Job
 from app.features.jobs.run import JobRun
-from app.features.notifications.service import RingKind, tell
+from app.features.notifications.queries import RingKind
+from app.features.notifications.service import tell
 from app.features.people.visibility_queries import EVERYTHING, Sight
 from app.soccer.actors import person_of
 

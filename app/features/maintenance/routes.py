@@ -6,13 +6,14 @@ from fastapi import APIRouter, Request, Response
 from prometheus_client import CONTENT_TYPE_LATEST, CollectorRegistry, generate_latest
 
 from app.errors import BusyError, NotFoundError, OverloadedError, StorageError
-from app.features.maintenance.schemas import BannerDocument, Health, NewBanner, Readiness
-from app.features.maintenance.service import clear_banner, set_banner
+from app.features.maintenance.schemas import Health, NewBanner, Readiness
+from app.features.maintenance.service import Banner, clear_banner, set_banner
 from app.features.queue.changes import read_position
 from app.http.deps import Actor, AppStore
 from app.http.metrics import SharedNumbers
 from app.http.permissions import Action, may, open_to_all
 from app.http.problem import responses
+from app.http.request_limits import limit
 from app.http.route import Route
 
 maintenance_router = APIRouter(prefix="/maintenance", tags=["sessions"], route_class=Route)
@@ -20,13 +21,12 @@ maintenance_router = APIRouter(prefix="/maintenance", tags=["sessions"], route_c
 
 @maintenance_router.put("", operation_id="setMaintenance", responses=responses(413, 415))
 @may(Action.ADMINISTER)
-def put_maintenance(new: NewBanner, store: AppStore, actor: Actor) -> BannerDocument:
+def put_maintenance(new: NewBanner, store: AppStore, actor: Actor) -> Banner:
     """Show a notice on every page, in place of the one before.
 
     Windows that are open show it within some seconds; the login page has it, too.
     """
-    banner = set_banner(store, new.text, starts=new.starts, until=new.until, actor=actor)
-    return BannerDocument.model_validate(banner)
+    return set_banner(store, new.text, starts=new.starts, until=new.until, actor=actor)
 
 
 @maintenance_router.delete(
@@ -49,6 +49,7 @@ health_router = APIRouter(tags=["health"], route_class=Route)
 
 @health_router.get("/healthz", operation_id="getHealth", responses=responses())
 @open_to_all
+@limit(None)
 async def get_health(request: Request) -> Health:
     """Whether the process answers; it needs no thread and no database."""
     return Health(status="ok", version=request.app.version)
@@ -56,6 +57,7 @@ async def get_health(request: Request) -> Health:
 
 @health_router.get("/readyz", operation_id="getReadiness", responses=responses())
 @open_to_all
+@limit(None)
 def get_readiness(store: AppStore) -> Readiness:
     """Whether the database answers, keeps changes, and was not seen to be damaged; else 503."""
     store.require_undamaged()
@@ -77,6 +79,7 @@ def get_readiness(store: AppStore) -> Readiness:
     responses={**responses(), 200: {"content": {CONTENT_TYPE_LATEST: {}}}},
 )
 @may(Action.ADMINISTER)
+@limit(None)
 def get_metrics(request: Request) -> Response:
     """Requests, lanes, event streams, processes, jobs, files and room, in Prometheus' text format."""
     shared: SharedNumbers | None = getattr(request.app.state, "shared_metrics", None)

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from datetime import datetime
 from typing import Annotated, Literal
 
 from pydantic import AwareDatetime, BaseModel, ConfigDict, Field
 
 from app.features.maintenance.service import LONGEST
-from app.http.documents import Document
 
 
 class NewBanner(BaseModel):
@@ -31,16 +29,6 @@ class NewBanner(BaseModel):
     )
     until: AwareDatetime | None = Field(
         default=None, description="When it is no longer shown; null: when it is deleted."
-    )
-
-
-class BannerDocument(Document):
-    """A notice of maintenance."""
-
-    text: str
-    starts: datetime | None = Field(description="When it begins to be shown; null: at once.")
-    until: datetime | None = Field(
-        description="When it is no longer shown; null: when it is deleted."
     )
 
 

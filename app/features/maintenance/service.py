@@ -12,6 +12,7 @@ from app.db.store import Store
 from app.errors import InputError
 from app.features.audit.audit_events import note_deed
 from app.features.maintenance.queries import find_banner, put_banner
+from app.finite import Moment
 from app.hosts import is_local
 
 LONGEST = 300
@@ -28,8 +29,8 @@ class Banner:
     """
 
     text: str
-    starts: str | None = None
-    until: str | None = None
+    starts: Moment | None = None
+    until: Moment | None = None
 
 
 def read_banner(store: Store) -> Banner | None:

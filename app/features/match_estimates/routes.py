@@ -28,6 +28,7 @@ from app.http.deps import Actor, AppServices, AppStore, DatasetPath
 from app.http.job_responses import by_job, job_answer
 from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import responses
+from app.http.request_limits import QUESTIONS, limit
 from app.http.respond import document, responds
 from app.http.route import Route
 
@@ -118,6 +119,7 @@ noise_router = APIRouter(prefix="/datasets/{dataset}/noise", tags=["policies"], 
     "", operation_id="getNoise", response_model=NoiseDocument, responses=responses(404)
 )
 @may(Action.READ, dataset=OwnedKind.DATASET, whole=True)
+@limit(QUESTIONS)
 def get_noise(dataset: DatasetPath, services: AppServices) -> noises.Noise:
     """Sigma of balls, given cameras and field lines with intervals, and what the policy says.
 
@@ -129,6 +131,7 @@ def get_noise(dataset: DatasetPath, services: AppServices) -> noises.Noise:
 
 @noise_router.post("", operation_id="acceptNoise", **by_job(404, 412))
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
+@limit(QUESTIONS)
 @responds(job_answer)
 def accept_noise(dataset: DatasetPath, services: AppServices, actor: Actor) -> Job:
     """Judge by the estimates: `values` go into the policy, `factors` to the balls; the job solves.
@@ -146,6 +149,7 @@ def accept_noise(dataset: DatasetPath, services: AppServices, actor: Actor) -> J
 
 @noise_router.delete("", operation_id="takeNoiseBack", **by_job(404))
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
+@limit(QUESTIONS)
 @responds(job_answer)
 def take_noise_back(dataset: DatasetPath, services: AppServices, actor: Actor) -> Job:
     """Take the balls of all cameras and people to be as noisy as the dataset's; the job solves.

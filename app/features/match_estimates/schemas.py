@@ -6,9 +6,10 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from app.features.groups.schemas import PictureDocument, PictureEdit
+from app.features.groups.schemas import PictureEdit
 from app.features.policies.noise import Advice
 from app.http.documents import Document, ListDocument
+from app.soccer.picture import PictureGeometry
 from app.solving.ball_noise import Sigma
 from app.solving.line_noise import Interval
 
@@ -18,7 +19,7 @@ class MatchPictureDocument(Document):
 
     match: str
     frames: int = Field(description="How many of them have lines.")
-    picture: PictureDocument | None = Field(
+    picture: PictureGeometry | None = Field(
         description="What was done to most of them; null: they are as they were taken."
     )
     mixed: bool = Field(description="They are not all alike.")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from enum import StrEnum
 from typing import Any
 
 from sqlalchemy import ColumnElement, delete, func, insert, literal, select, update
@@ -13,6 +14,17 @@ from app.features.comments.tables import BellModel
 from app.features.datasets.tables import DatasetModel
 from app.features.groups.insert_queries import next_id
 from app.features.people.visibility_queries import Sight, seen_anywhere
+from app.finite import Moment
+
+
+class RingKind(StrEnum):
+    """Why somebody is told."""
+
+    MENTION = "mention"
+    REPLY = "reply"
+    JOB = "job"
+    ASSIGNED = "assigned"
+    RETURNED = "returned"
 
 
 @dataclass(frozen=True)
@@ -21,20 +33,21 @@ class Ring:
 
     Attributes:
         kind: ``mention``, ``reply``, ``job``, ``assigned`` or ``returned``.
+        actor: Who did it.
         address: Of the page that it is about.
         dataset: Name of its dataset; None where it has none.
         read: When they have seen it; None: not yet.
     """
 
     id: int
-    at: str
-    kind: str
+    at: Moment
+    kind: RingKind
     actor: str
     sentence: str
     address: str
     dataset: str | None
     group_id: int | None
-    read: str | None
+    read: Moment | None
 
 
 def insert_ring(session: Session, person_id: int, values: dict[str, Any]) -> int:
@@ -69,7 +82,8 @@ def read_rings(
     )
     if before is not None:
         statement = statement.where(BellModel.id < before)
-    return [Ring(**row._mapping) for row in session.execute(statement)]
+    rows = session.execute(statement)
+    return [Ring(**{**row._mapping, "kind": RingKind(row.kind)}) for row in rows]
 
 
 def count_unread(session: Session, person_id: int, sight: Sight, since: str) -> int:

@@ -14,6 +14,7 @@ from app.http.cursor import Before, Cursor, first_below
 from app.http.deps import AppStore
 from app.http.permissions import Action, may
 from app.http.problem import responses
+from app.http.request_limits import LOOKS, limit
 from app.http.respond import as_document, responds
 from app.http.route import Route
 from app.http.team import AppTeam
@@ -23,6 +24,7 @@ router = APIRouter(prefix="/bell", tags=["comments"], route_class=Route)
 
 @router.get("", operation_id="getBell", responses=responses(401, 409))
 @may(Action.ACCOUNT)
+@limit(LOOKS)
 def get_bell(
     store: AppStore,
     _team: AppTeam,

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
-from enum import StrEnum
 
 from app.db.session import Session, now, text_of
 from app.db.store import Store
 from app.features.notifications.queries import (
     Ring,
+    RingKind,
     count_unread,
     forget_rings,
     insert_ring,
@@ -24,16 +24,6 @@ from app.soccer.actors import person_of
 
 KEPT_DAYS = 90
 """So long somebody can read what they were told."""
-
-
-class RingKind(StrEnum):
-    """Why somebody is told."""
-
-    MENTION = "mention"
-    REPLY = "reply"
-    JOB = "job"
-    ASSIGNED = "assigned"
-    RETURNED = "returned"
 
 
 @dataclass(frozen=True)

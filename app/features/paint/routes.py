@@ -35,6 +35,7 @@ from app.http.deps import Actor, AppServices, AppStore, DatasetPath, DryRun, Id
 from app.http.job_responses import ACCEPTED, by_job, job_answer
 from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import responses
+from app.http.request_limits import IMAGES, LOOKS, limit
 from app.http.respond import document, responds
 from app.http.route import Route
 from app.worker_pool import PoolTask
@@ -88,6 +89,7 @@ REFUSALS = (404, 409, 413, 415, 503)
     responses=responses(*REFUSALS),
 )
 @may(Action.ANNOTATE, view=OwnedKind.VIEW)
+@limit(IMAGES)
 async def read_view_paint(
     view: Id, wanted: PaintRequest, services: AppServices, request: Request
 ) -> PaintDocument | Response:
@@ -106,6 +108,7 @@ async def read_view_paint(
     responses=responses(404, 413, 415, 503),
 )
 @may(Action.ANNOTATE, view=OwnedKind.VIEW)
+@limit(IMAGES)
 async def propose_lines(
     view: Id, services: AppServices, request: Request, wanted: PaintRequest | None = None
 ) -> ProposalDocument | Response:
@@ -202,6 +205,7 @@ def forget(dataset: DatasetPath, services: AppServices) -> int:
     responses=responses(404),
 )
 @may(Action.READ, group=OwnedKind.GROUP)
+@limit(LOOKS)
 @paged()
 def group_proposals(group: Id, store: AppStore) -> GroupProposals:
     """What was proposed for the views of a group, with its lines and scores."""

@@ -7,6 +7,7 @@ import io
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
+from typing import Literal
 from urllib.parse import urlsplit
 
 from app.db.store import Store
@@ -15,7 +16,7 @@ from app.features.people.links import Link
 from app.features.people.queries import person_by_name
 from app.features.people.roles import Role, checked_name, require_no_token
 from app.features.people.service import Person, insert_invited, invite, renew_link
-from app.finite import quoted
+from app.finite import Moment, quoted
 from app.mail import Letter, MailServer, checked_address
 
 MOST = 500
@@ -44,21 +45,22 @@ class Invitation:
     """What became of one row of a list.
 
     Attributes:
+        row: Which of the list, from 1.
         state: ``invited``; ``reset``, who has a way in already; ``possible``, on a dry run; or
             ``refused``.
         link: Address of the link, for whoever invites to hand over; None: there is none, or it went
             by mail.
-        expires: Until when it is good.
+        expires: Until when the link is good.
         mailed: The mail server has taken the letter with the link.
-        problem: Why the row was refused, or its letter not sent.
+        problem: Why the row was refused, or its letter not sent; the link is then shown.
     """
 
     row: int
     name: str
     role: str
-    state: str
+    state: Literal["invited", "reset", "possible", "refused"]
     link: str | None = None
-    expires: str | None = None
+    expires: Moment | None = None
     mailed: bool = False
     problem: str | None = None
 
@@ -132,7 +134,7 @@ def renew_one(
     """
     address = checked_address(email, pointer="/email") if email else None
     person, link = renew_link(store, person_id, actor=actor)
-    state = "reset" if person.joined else "invited"
+    state: Literal["reset", "invited"] = "reset" if person.joined else "invited"
     row = Invitation(1, person.name, person.role, state, expires=link.expires)
     return person, post.hand_over([(row, link, address)], actor)[0]
 

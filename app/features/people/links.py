@@ -130,7 +130,12 @@ class Link:
 
 @dataclass(frozen=True)
 class Meant:
-    """Whom a link is for; ``name`` is None for the first admin, who chooses one."""
+    """Whom a link is for; ``name`` is None for the first admin, who chooses one.
+
+    Attributes:
+        name: None: for the first admin, who chooses one.
+        joined: They have a password already; the link gives another one.
+    """
 
     name: str | None
     joined: bool

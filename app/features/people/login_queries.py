@@ -66,12 +66,14 @@ def _found(leading: tuple[str, ...]) -> Select[*tuple[Any, ...]]:
     )
 
 
-def logins_of(session: Session, person_id: int, *, at: str, idle_since: str) -> Sequence[Any]:
+def logins_of(
+    session: Session, person_id: int, *, at: str, idle_since: str
+) -> Sequence[LoginModel]:
     """The sessions of a person that have not ended, the one that was used last first."""
     statement = select(*LoginModel.__table__.columns).where(
         LoginModel.person_id == person_id, LoginModel.expires > at, LoginModel.seen > idle_since
     )
-    return session.execute(statement.order_by(LoginModel.seen.desc())).all()
+    return session.rows(LoginModel, statement.order_by(LoginModel.seen.desc()))
 
 
 def touch_login(session: Session, login_id: int, at: str) -> None:
@@ -113,15 +115,15 @@ def insert_passkey(session: Session, values: dict[str, Any]) -> int:
     return int(done.scalar_one())
 
 
-def find_passkey(session: Session, credential: str) -> Any | None:
+def find_passkey(session: Session, credential: str) -> PasskeyModel | None:
     """The passkey of a credential's id, in base64url."""
-    return session.execute(_ALL.where(PasskeyModel.credential == credential)).one_or_none()
+    return session.row(PasskeyModel, _ALL.where(PasskeyModel.credential == credential))
 
 
-def passkeys_of(session: Session, person_id: int) -> Sequence[Any]:
+def passkeys_of(session: Session, person_id: int) -> Sequence[PasskeyModel]:
     """The passkeys of a person, the oldest first."""
     mine = _ALL.where(PasskeyModel.person_id == person_id)
-    return session.execute(mine.order_by(PasskeyModel.id)).all()
+    return session.rows(PasskeyModel, mine.order_by(PasskeyModel.id))
 
 
 def use_passkey(session: Session, passkey_id: int, sign_count: int, at: str) -> None:
@@ -147,17 +149,15 @@ def delete_passkeys(session: Session, person_id: int) -> bool:
 _ALL_IDENTITIES = select(*IdentityModel.__table__.columns)
 
 
-def find_identity(session: Session, issuer: str, subject: str) -> Any | None:
+def find_identity(session: Session, issuer: str, subject: str) -> IdentityModel | None:
     """The account of a subject at a provider, where it is somebody's."""
     same = (IdentityModel.issuer == issuer, IdentityModel.subject == subject)
-    return session.execute(_ALL_IDENTITIES.where(*same)).one_or_none()
+    return session.row(IdentityModel, _ALL_IDENTITIES.where(*same))
 
 
-def identity_of(session: Session, person_id: int) -> Any | None:
+def identity_of(session: Session, person_id: int) -> IdentityModel | None:
     """The account of a person."""
-    return session.execute(
-        _ALL_IDENTITIES.where(IdentityModel.person_id == person_id)
-    ).one_or_none()
+    return session.row(IdentityModel, _ALL_IDENTITIES.where(IdentityModel.person_id == person_id))
 
 
 def put_identity(session: Session, values: dict[str, Any]) -> None:

@@ -16,7 +16,6 @@ from app.features.people.login_schemas import (
     MadeAccessToken,
     NewAccessToken,
     NewPasskey,
-    PasskeyDocument,
     PasskeyList,
     PasskeyLogin,
     PasskeyMade,
@@ -24,13 +23,12 @@ from app.features.people.login_schemas import (
 )
 from app.features.people.schemas import (
     CodeOnly,
-    EnrolmentDocument,
     PasswordOnly,
     RecoveryCodes,
-    SecondFactorDocument,
     SessionDocument,
     TeamSettings,
 )
+from app.features.people.second_factor import Enrolment, FactorState
 from app.features.people.session_routes import Me, session_of
 from app.http.cursor import paged
 from app.http.deps import AppStore, Id
@@ -55,7 +53,7 @@ def list_passkeys(request: Request, team: AppTeam, me: Me) -> PasskeyList:
         unavailable = None
     except ConflictError as error:
         unavailable = f"{error.message}. {error.hint}"
-    items = [PasskeyDocument.model_validate(one) for one in team.passkeys.of(me.person_id)]
+    items = team.passkeys.of(me.person_id)
     return PasskeyList(items=items, unavailable=unavailable)
 
 
@@ -83,7 +81,7 @@ def make(new: NewPasskey, request: Request, team: AppTeam, me: Me) -> PasskeyMad
     """Keep a passkey that the browser has made; every other session ends. It is a second factor, too."""
     credential = new.credential.model_dump()
     made, codes = team.passkeys.make(me, new.name, credential, team.site(request))
-    return PasskeyMade(passkey=PasskeyDocument.model_validate(made), codes=codes)
+    return PasskeyMade(passkey=made, codes=codes)
 
 
 @passkeys_router.delete(
@@ -155,21 +153,19 @@ OWN_FACTOR = "/session/second-factor"
     OWN_FACTOR, operation_id="getSecondFactor", responses=responses(401, 409)
 )
 @may(Action.ACCOUNT, to_enrol=True)
-def get_second_factor(team: AppTeam, me: Me) -> SecondFactorDocument:
+def get_second_factor(team: AppTeam, me: Me) -> FactorState:
     """Whether a code is asked for after one's password, and how many recovery codes are left."""
-    return SecondFactorDocument.model_validate(team.factors.state(me.person_id))
+    return team.factors.state(me.person_id)
 
 
 @second_factors_router.post(
     OWN_FACTOR, operation_id="beginSecondFactor", responses=responses(401, 409, 413, 415, 429)
 )
 @may(Action.ACCOUNT, to_enrol=True)
-def begin_second_factor(
-    said: PasswordOnly, request: Request, team: AppTeam, me: Me
-) -> EnrolmentDocument:
+def begin_second_factor(said: PasswordOnly, request: Request, team: AppTeam, me: Me) -> Enrolment:
     """What an authenticator has to know, shown this once; nothing is asked for before it is confirmed."""
     team.count_try(request, me.name)
-    return EnrolmentDocument.model_validate(team.factors.begin(me, said.password))
+    return team.factors.begin(me, said.password)
 
 
 @second_factors_router.post(

@@ -8,8 +8,10 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, StrictInt
 
 from app.features.people.access_tokens import DAYS, MOST_DAYS
+from app.features.people.passkeys import Passkey
 from app.features.people.roles import Scope
 from app.features.people.schemas import EXAMPLE, Code, Name, SessionDocument, Token
+from app.features.people.sign_on_rules import Identity
 from app.http.documents import Document, ListDocument
 
 Base64url = Annotated[str, Field(min_length=1, max_length=16_384, pattern=r"^[A-Za-z0-9_-]+$")]
@@ -117,16 +119,7 @@ class RequestOptions(Document):
     )
 
 
-class PasskeyDocument(Document):
-    """A passkey of one's own."""
-
-    id: int
-    name: str
-    created: datetime
-    used: datetime | None = Field(description="When it logged in last; null: never.")
-
-
-class PasskeyList(ListDocument[PasskeyDocument]):
+class PasskeyList(ListDocument[Passkey]):
     """One's own passkeys, the oldest first."""
 
     unavailable: str | None = Field(
@@ -137,7 +130,7 @@ class PasskeyList(ListDocument[PasskeyDocument]):
 class PasskeyMade(Document):
     """A new passkey, and recovery codes where its person had none: they are shown this once."""
 
-    passkey: PasskeyDocument
+    passkey: Passkey
     codes: list[str]
 
 
@@ -199,22 +192,13 @@ class SignOnEnd(Document):
     to: str
 
 
-class IdentityDocument(Document):
-    """The account of the provider that is one's own."""
-
-    issuer: str
-    shown: str = Field(description="What people know it by.")
-    created: datetime
-    used: datetime | None = Field(description="When one came by it last; null: never.")
-
-
 class OwnWaysDocument(Document):
     """How one can come in."""
 
     password: bool = Field(description="There is a password.")
     provider: str | None = Field(description="What people call the provider; null: there is none.")
     only: bool = Field(description="Nobody comes in otherwise.")
-    identity: IdentityDocument | None
+    identity: Identity | None
 
 
 class NewAccessToken(BaseModel):

@@ -41,7 +41,12 @@ class Member:
 
 @dataclass(frozen=True)
 class SingleRole:
-    """What a person is in one dataset."""
+    """What a person is in one dataset.
+
+    Attributes:
+        id: Of the dataset.
+        dataset: Its name.
+    """
 
     id: int
     dataset: str

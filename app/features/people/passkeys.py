@@ -49,6 +49,7 @@ from app.features.people.second_factor import (
     new_codes,
     require_password,
 )
+from app.finite import Moment
 
 log = structlog.get_logger("touchline.access")
 
@@ -75,12 +76,16 @@ class PasskeySite:
 
 @dataclass(frozen=True)
 class Passkey:
-    """A passkey as its person is shown it; ``used`` None: never yet."""
+    """A passkey as its person is shown it; ``used`` None: never yet.
+
+    Attributes:
+        used: When it logged in last; None: never.
+    """
 
     id: int
     name: str
-    created: str
-    used: str | None
+    created: Moment
+    used: Moment | None
 
 
 class Passkeys:

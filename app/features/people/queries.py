@@ -58,14 +58,14 @@ def all_people(session: Session) -> Sequence[Any]:
     ).all()
 
 
-def person_by_name(session: Session, name: str) -> Any | None:
+def person_by_name(session: Session, name: str) -> PersonModel | None:
     """The person of a name."""
-    return session.execute(_PEOPLE.where(PersonModel.name == name)).one_or_none()
+    return session.row(PersonModel, _PEOPLE.where(PersonModel.name == name))
 
 
-def person_by_id(session: Session, person_id: int) -> Any | None:
+def person_by_id(session: Session, person_id: int) -> PersonModel | None:
     """The person of an id."""
-    return session.execute(_PEOPLE.where(PersonModel.id == person_id)).one_or_none()
+    return session.row(PersonModel, _PEOPLE.where(PersonModel.id == person_id))
 
 
 def count_people(session: Session) -> int:
@@ -112,12 +112,12 @@ def insert_link(
     session.execute(insert(OneTimeLinkModel), {**values, "created_by": by, "expires": expires})
 
 
-def find_link(session: Session, token_hash: str, at: str) -> Any | None:
+def find_link(session: Session, token_hash: str, at: str) -> OneTimeLinkModel | None:
     """A link that is still good at a time."""
     statement = select(*OneTimeLinkModel.__table__.columns).where(
         OneTimeLinkModel.token_hash == token_hash, OneTimeLinkModel.expires > at
     )
-    return session.execute(statement).one_or_none()
+    return session.row(OneTimeLinkModel, statement)
 
 
 def forget_links(session: Session, person_id: int | None) -> None:

@@ -18,7 +18,6 @@ from app.features.people.invitations import (
 )
 from app.features.people.login_schemas import AccessTokenList
 from app.features.people.schemas import (
-    InvitationDocument,
     InvitationList,
     InvitationReport,
     MemberDocument,
@@ -26,7 +25,6 @@ from app.features.people.schemas import (
     MemberList,
     NewLink,
     NewUser,
-    UserDocument,
     UserEdit,
     UserList,
     UserWithLink,
@@ -45,7 +43,7 @@ users_router = APIRouter(prefix="/users", tags=["users"], route_class=SecretRout
 
 def _with_link(person: Person, row: Invitation) -> UserWithLink:
     return UserWithLink(
-        user=UserDocument.model_validate(person),
+        user=person,
         link=row.link,
         expires=row.expires,
         mailed=row.mailed,
@@ -109,7 +107,7 @@ def invite_users(
     items = invite_many(store, rows, _post(team, request), actor=me.actor, dry_run=dry_run)
     refused = sum(item.state == "refused" for item in items)
     return InvitationReport(
-        items=[InvitationDocument.model_validate(item) for item in items],
+        items=items,
         dry_run=dry_run,
         invited=len(items) - refused,
         refused=refused,
@@ -124,7 +122,7 @@ def _post(team: Team, request: Request) -> Post:
 @users_router.patch(
     "/{user}",
     operation_id="changeUser",
-    response_model=UserDocument,
+    response_model=Person,
     responses=responses(401, 404, 409, 413, 415),
 )
 @may(Action.ADMINISTER)

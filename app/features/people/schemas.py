@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from datetime import datetime
-from typing import Annotated, Literal
+from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field, StrictBool
 from pydantic.config import JsonDict
 
-from app.features.maintenance.schemas import BannerDocument
-from app.features.people.invitations import MOST
+from app.features.maintenance.service import Banner
+from app.features.people.invitations import MOST, Invitation
 from app.features.people.logins import Way
+from app.features.people.members import SingleRole
 from app.features.people.roles import Action, Role
+from app.features.people.service import Person
 from app.http.documents import Document, ListDocument
 
 Name = Annotated[str, Field(min_length=1, max_length=200)]
@@ -59,23 +61,6 @@ class CodeOnly(BaseModel):
     model_config = ConfigDict(extra="forbid", json_schema_extra={"examples": [{"code": "123456"}]})
 
     code: Code
-
-
-class SecondFactorDocument(Document):
-    """Whether more is asked for than one's password."""
-
-    on: bool = Field(description="There is an authenticator, or a passkey.")
-    required: bool = Field(description="Everybody needs a second factor here.")
-    codes_left: int = Field(description="Recovery codes that were not used yet.")
-    authenticator: bool = Field(description="There is an authenticator, which shows codes.")
-
-
-class EnrolmentDocument(Document):
-    """What an authenticator has to know; shown this once."""
-
-    secret: str
-    uri: str
-    picture: str = Field(description="The address as a QR code: a PNG, as a `data:` address.")
 
 
 class RecoveryCodes(Document):
@@ -127,21 +112,6 @@ class LinkUse(LinkLook):
     name: Name | None = None
 
 
-class LinkMeaning(Document):
-    """Whom a link is for."""
-
-    name: str | None = Field(description="Null: for the first admin, who chooses one.")
-    joined: bool = Field(description="They have a password already; the link gives another one.")
-
-
-class SingleRoleDocument(Document):
-    """What somebody is in one dataset, in place of what they are in all of them."""
-
-    id: int = Field(description="Of the dataset.")
-    dataset: str = Field(description="Its name.")
-    role: Role
-
-
 class WaysIn(Document):
     """How people log in here."""
 
@@ -173,13 +143,11 @@ class SessionDocument(Document):
             "logged in, or logged in just now."
         ),
     )
-    maintenance: BannerDocument | None = Field(
+    maintenance: Banner | None = Field(
         default=None, description="The notice that everybody is shown; null: there is none."
     )
     may: list[Action] = Field(description="What the role lets them do.")
-    datasets: list[SingleRoleDocument] = Field(
-        default=[], description="Where they are something else."
-    )
+    datasets: list[SingleRole] = Field(default=[], description="Where they are something else.")
     allows: dict[Role, list[Action]] = Field(default={}, description="What each role allows.")
 
 
@@ -259,26 +227,7 @@ class InvitationList(BaseModel):
     people: Annotated[list[InvitedPerson], Field(min_length=1, max_length=MOST)]
 
 
-class InvitationDocument(Document):
-    """What became of one row."""
-
-    row: int = Field(description="Which of the list, from 1.")
-    name: str
-    role: str
-    state: Literal["invited", "possible", "refused"] = Field(
-        description="`possible`: they would be invited, says a dry run."
-    )
-    link: str | None = Field(
-        description="Link to pass on to the person, shown only this once; null: sent by mail, or none."
-    )
-    expires: datetime | None = Field(description="Until when the link is good.")
-    mailed: bool = Field(description="The mail server has taken the letter with the link.")
-    problem: str | None = Field(
-        description="Why the row was refused, or its letter not sent; the link is then shown."
-    )
-
-
-class InvitationReport(ListDocument[InvitationDocument]):
+class InvitationReport(ListDocument[Invitation]):
     """What became of each row, in the order of the list."""
 
     dry_run: bool = Field(description="Nothing was done.")
@@ -298,30 +247,7 @@ class UserEdit(BaseModel):
     disabled: bool | None = None
 
 
-class UserDocument(Document):
-    """Somebody with an account."""
-
-    id: int
-    name: str
-    role: Role
-    disabled: bool
-    joined: bool = Field(description="Whether they have chosen a password or use single sign-on.")
-    invited: bool = Field(description="A link waits for them with which they can.")
-    created: datetime
-    created_by: str
-    seen: datetime | None = Field(description="When a session was used last; null: none is open.")
-    second_factor: bool = Field(description="Whether they log in with a second factor.")
-    tokens: int = Field(description="How many tokens of scripts they have.")
-    sign_on: str | None = Field(
-        default=None,
-        description="What their account of the provider is known by; null: none is linked.",
-    )
-    datasets: list[SingleRoleDocument] = Field(
-        default=[], description="In which datasets they are something else than `role`."
-    )
-
-
-class UserList(ListDocument[UserDocument]):
+class UserList(ListDocument[Person]):
     """Everybody, by name."""
 
     adopted_by: str | None = Field(
@@ -334,7 +260,7 @@ class UserList(ListDocument[UserDocument]):
 class UserWithLink(Document):
     """Somebody, and the link to hand to them: it is shown this once."""
 
-    user: UserDocument
+    user: Person
     link: str | None = Field(description="Null: it went by mail.")
     expires: datetime
     mailed: bool = Field(

@@ -43,7 +43,11 @@ FRESH = timedelta(minutes=10)
 @dataclass(frozen=True)
 class Enrolment:
     """What an authenticator has to know, shown once: as text, as an address, and as a picture of
-    that (a data: address of a PNG)."""
+    that (a data: address of a PNG).
+
+    Attributes:
+        picture: The address as a QR code: a PNG, as a ``data:`` address.
+    """
 
     secret: str
     uri: str
@@ -55,6 +59,9 @@ class FactorState:
     """Whether somebody has a second factor, needs one, and how many recovery codes are left.
 
     Attributes:
+        on: There is an authenticator, or a passkey.
+        required: Everybody needs a second factor here.
+        codes_left: Recovery codes that were not used yet.
         authenticator: It is (also) an authenticator, which shows codes.
     """
 

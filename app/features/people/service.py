@@ -31,6 +31,7 @@ from app.features.people.queries import (
     update_person,
 )
 from app.features.people.roles import Role, checked_name, note, require_no_token
+from app.finite import Moment
 from app.soccer.actors import person_of
 
 
@@ -42,6 +43,10 @@ class Person:
         joined: Whether they have chosen a password or use single sign-on.
         invited: A link waits for them with which they can.
         seen: When a session of theirs was used last, in UTC; None: none is open.
+        second_factor: Whether they log in with a second factor.
+        tokens: How many tokens of scripts they have.
+        sign_on: What their account of the provider is known by; None: none is linked.
+        datasets: In which datasets they are something else than ``role``.
     """
 
     id: int
@@ -50,9 +55,9 @@ class Person:
     disabled: bool
     joined: bool
     invited: bool
-    created: str
+    created: Moment
     created_by: str
-    seen: str | None
+    seen: Moment | None
     second_factor: bool
     """A code is asked for after their password."""
     tokens: int

@@ -9,22 +9,20 @@ from fastapi import APIRouter, Depends, Request, Response
 
 from app.db.store import Store
 from app.errors import NotLoggedInError
-from app.features.maintenance.schemas import BannerDocument
 from app.features.maintenance.service import read_banner
 from app.features.people import links
+from app.features.people.links import Meant
 from app.features.people.logins import Login
 from app.features.people.members import read_single_roles
 from app.features.people.roles import SCOPES, Role, lets
 from app.features.people.schemas import (
     LinkLook,
-    LinkMeaning,
     LinkUse,
     NewSession,
     OpenSessionDocument,
     OpenSessionList,
     PasswordEdit,
     SessionDocument,
-    SingleRoleDocument,
     WaysIn,
 )
 from app.http.access import login_of
@@ -33,6 +31,7 @@ from app.http.deps import AppServices, AppStore, Id
 from app.http.headers import bearer_of
 from app.http.permissions import Action, may, open_to_all
 from app.http.problem import responses
+from app.http.request_limits import LOGINS, LOOKS, limit
 from app.http.route import SecretRoute
 from app.http.team import AppTeam, Team
 from app.soccer.actors import LOCAL_USER
@@ -74,13 +73,14 @@ def session_of(login: Login | None, store: Store) -> SessionDocument:
         enrol=login.must_enrol,
         way=login.way,
         may=allows[login.role],
-        datasets=[SingleRoleDocument(**vars(one)) for one in read_single_roles(store, login.roles)],
+        datasets=read_single_roles(store, login.roles),
         allows=allows,
     )
 
 
 @router.get("/session", operation_id="getSession", responses=responses(401, 429))
 @open_to_all
+@limit(LOOKS)
 def get_session(request: Request, services: AppServices) -> SessionDocument:
     """Who asks; nobody, before they have logged in. With a token: whose it is, and what it may."""
     team: Team | None = request.app.state.team
@@ -91,7 +91,7 @@ def get_session(request: Request, services: AppServices) -> SessionDocument:
             name=LOCAL_USER,
             role=Role.ADMIN,
             moment=services.events.moment(),
-            maintenance=_banner(services.store),
+            maintenance=read_banner(services.store),
             may=every,
             allows=ALLOWS,
         )
@@ -101,17 +101,13 @@ def get_session(request: Request, services: AppServices) -> SessionDocument:
     rules = team.sign_on and team.sign_on.rules
     ways = WaysIn(password=not (rules and rules.only), sign_on=rules.label if rules else None)
     moment = None if login is None or login.roles.blind else services.events.moment()
-    more = {"ways": ways, "moment": moment, "maintenance": _banner(services.store)}
+    more = {"ways": ways, "moment": moment, "maintenance": read_banner(services.store)}
     return found.model_copy(update=more)
-
-
-def _banner(store: Store) -> BannerDocument | None:
-    banner = read_banner(store)
-    return None if banner is None else BannerDocument.model_validate(banner)
 
 
 @router.post("/session", operation_id="createSession", responses=responses(401, 409, 413, 415, 429))
 @open_to_all
+@limit(LOGINS)
 def log_in(
     who: NewSession, request: Request, response: Response, store: AppStore, team: AppTeam
 ) -> SessionDocument:
@@ -160,6 +156,7 @@ def _begin(
 
 @router.delete("/session", operation_id="deleteSession", responses=responses(409))
 @open_to_all
+@limit(LOGINS)
 def log_out(
     request: Request, response: Response, store: AppStore, team: AppTeam
 ) -> SessionDocument:
@@ -177,6 +174,7 @@ def log_out(
     responses=responses(401, 409, 413, 415, 429),
 )
 @may(Action.ACCOUNT, to_enrol=True)
+@limit(LOGINS)
 def change_password(
     change: PasswordEdit,
     request: Request,
@@ -228,16 +226,17 @@ def end_session(session: Id, team: AppTeam, me: Me) -> None:
 
 @router.post("/links/look", operation_id="lookAtLink", responses=responses(404, 409, 413, 415, 429))
 @open_to_all
-def look_at_link(asked: LinkLook, request: Request, store: AppStore, team: AppTeam) -> LinkMeaning:
+def look_at_link(asked: LinkLook, request: Request, store: AppStore, team: AppTeam) -> Meant:
     """Whom a link is for; 404 when it is not good any more."""
     team.count_try(request)
-    return LinkMeaning(**vars(links.look(store, asked.token)))
+    return Meant(**vars(links.look(store, asked.token)))
 
 
 @router.post(
     "/links/use", operation_id="useLink", responses=responses(401, 404, 409, 413, 415, 429)
 )
 @open_to_all
+@limit(LOGINS)
 def use_link(
     chosen: LinkUse, request: Request, response: Response, store: AppStore, team: AppTeam
 ) -> SessionDocument:

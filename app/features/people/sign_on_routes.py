@@ -10,7 +10,6 @@ from fastapi import APIRouter, Request, Response
 
 from app.errors import AccessError
 from app.features.people.login_schemas import (
-    IdentityDocument,
     OwnWaysDocument,
     SignOnAnswer,
     SignOnBegin,
@@ -23,6 +22,7 @@ from app.features.people.sign_on_rules import unlink, unlink_person, ways_of
 from app.http.deps import AppStore, Id
 from app.http.permissions import Action, may, open_to_all
 from app.http.problem import responses
+from app.http.request_limits import SIGN_ONS, limit
 from app.http.route import SecretRoute
 from app.http.team import AppTeam
 
@@ -36,6 +36,7 @@ log = structlog.get_logger("touchline.access")
     responses=responses(404, 409, 413, 415, 429),
 )
 @open_to_all
+@limit(SIGN_ONS)
 def begin(said: SignOnBegin, request: Request, response: Response, team: AppTeam) -> SignOnBegun:
     """Where to go to log in by single sign-on; it is for this browser, which gets a cookie."""
     sign_on = team.require_sign_on()
@@ -54,6 +55,7 @@ def begin(said: SignOnBegin, request: Request, response: Response, team: AppTeam
     responses=responses(401, 404, 409, 413, 415, 429),
 )
 @open_to_all
+@limit(SIGN_ONS)
 def finish(
     said: SignOnAnswer, request: Request, response: Response, store: AppStore, team: AppTeam
 ) -> SignOnEnd:
@@ -92,12 +94,11 @@ def finish(
 def get_identity(store: AppStore, team: AppTeam, me: Me) -> OwnWaysDocument:
     """How one can come in: whether there is a password, and which account of the provider is one's own."""
     ways, rules = ways_of(store, me.person_id), team.sign_on and team.sign_on.rules
-    found = None if ways.identity is None else IdentityDocument.model_validate(ways.identity)
     return OwnWaysDocument(
         password=ways.password,
         provider=rules.label if rules else None,
         only=bool(rules and rules.only),
-        identity=found,
+        identity=ways.identity,
     )
 
 
@@ -107,6 +108,7 @@ def get_identity(store: AppStore, team: AppTeam, me: Me) -> OwnWaysDocument:
     responses=responses(401, 409, 413, 415, 429),
 )
 @may(Action.ACCOUNT)
+@limit(SIGN_ONS)
 def begin_link(
     said: PasswordOnly, request: Request, response: Response, team: AppTeam, me: Me
 ) -> SignOnBegun:

@@ -24,6 +24,7 @@ from app.features.people.logins import Login, Way
 from app.features.people.queries import all_people, count_able, person_by_id
 from app.features.people.roles import Role, note, require_no_token
 from app.features.people.second_factor import require_password
+from app.finite import Moment
 
 ALL = "*"
 """In the place of a domain: whoever the provider knows."""
@@ -228,8 +229,8 @@ class Identity:
 
     issuer: str
     shown: str
-    created: str
-    used: str | None
+    created: Moment
+    used: Moment | None
 
 
 @dataclass(frozen=True)

@@ -21,6 +21,7 @@ from app.http.deps import Actor, AppServices, Id, Sees
 from app.http.job_responses import by_job, job_answer
 from app.http.permissions import Action, OwnedKind, Where, may
 from app.http.problem import responses
+from app.http.request_limits import LOOKS, limit
 from app.http.respond import responds
 from app.http.route import Route
 
@@ -85,6 +86,7 @@ def start_practice(
     responses=responses(404),
 )
 @may(Action.READ, group=OwnedKind.GROUP)
+@limit(LOOKS)
 def get_lesson(group: Id, services: AppServices) -> PracticeLesson:
     """What a practice group asks, and whether it was answered rightly; 404 for other groups."""
     return read_lesson(services.settings, load(services.store, group))

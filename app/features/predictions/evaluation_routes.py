@@ -6,14 +6,13 @@ from enum import StrEnum
 from typing import Annotated, Literal
 
 from fastapi import APIRouter, Query, Response
-from pydantic import BaseModel
 
 from app.errors import NotFoundError
 from app.evaluation.comparison import FIELDS
-from app.evaluation.figure import FIGURES, figure_csv, table_csv
+from app.evaluation.figure import FIGURES, Figure, figure_csv, table_csv
 from app.evaluation.figure_png import figure_png
 from app.evaluation.result import NUMBERS
-from app.evaluation.table import TABLES
+from app.evaluation.table import TABLES, Table
 from app.features.jobs.queries import Job
 from app.features.predictions import evaluation as review
 from app.features.predictions.evaluation_schemas import (
@@ -21,9 +20,7 @@ from app.features.predictions.evaluation_schemas import (
     EvaluationBody,
     EvaluationDocument,
     EvaluationList,
-    FigureDocument,
     FrameList,
-    TableDocument,
 )
 from app.features.predictions.jobs import request_evaluation
 from app.features.versions.service import version_called
@@ -33,7 +30,8 @@ from app.http.deps import Actor, AppServices, AppStore, DatasetPath, Id
 from app.http.job_responses import by_job, job_answer
 from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import Responses, responses
-from app.http.respond import no_content, responds
+from app.http.request_limits import IMAGES, limit
+from app.http.respond import document, no_content, responds
 from app.http.route import Route
 
 router = APIRouter(tags=["evaluations"], route_class=Route)
@@ -50,7 +48,7 @@ Bound = Annotated[float | None, Query(ge=-1e9, le=1e9, allow_inf_nan=False)]
 JSON_FILE, CSV_FILE, PNG_FILE = "application/json", "text/csv", "image/png"
 
 
-def _files(description: str, document: type[BaseModel], *others: str) -> Responses:
+def _files(description: str, document: type[object], *others: str) -> Responses:
     """What a route answers that gives a document as JSON, and as files of other types."""
     content: dict[str, object] = {}
     for kind in others:
@@ -60,10 +58,10 @@ def _files(description: str, document: type[BaseModel], *others: str) -> Respons
 
 
 FIGURE_FILES = _files(
-    "The figure: its values as JSON or CSV, or drawn as PNG.", FigureDocument, CSV_FILE, PNG_FILE
+    "The figure: its values as JSON or CSV, or drawn as PNG.", Figure, CSV_FILE, PNG_FILE
 )
 TABLE_FILES = _files(
-    "The table: as JSON, or as CSV with intervals and denominators.", TableDocument, CSV_FILE
+    "The table: as JSON, or as CSV with intervals and denominators.", Table, CSV_FILE
 )
 
 
@@ -134,6 +132,7 @@ def delete_evaluation(evaluation: Id, store: AppStore, actor: Actor) -> None:
     responses={**responses(404), **FIGURE_FILES},
 )
 @may(Action.READ, evaluation=OwnedKind.EVALUATION)
+@limit(IMAGES)
 def get_figure(
     evaluation: Id,
     figure: FigureName,
@@ -144,7 +143,7 @@ def get_figure(
     found = review.get_figure(store, evaluation, str(figure))
     name = f"touchline-{evaluation}-{figure}.{ending}"
     if ending == "json":
-        return _json(FigureDocument.model_validate(found))
+        return document(found)
     if ending == "csv":
         return _csv(figure_csv(found), name)
     shown = {"Content-Disposition": f'inline; filename="{name}"'}
@@ -171,7 +170,7 @@ def get_table(
             f'evaluation {evaluation} has no table "{table}"', hint=f"It has {', '.join(tables)}."
         )
     if ending == "json":
-        return _json(TableDocument.model_validate(found))
+        return document(found)
     return _csv(table_csv(found), f"touchline-{evaluation}-{table}.csv")
 
 
@@ -225,10 +224,6 @@ def compare_evaluations(
     """How this evaluation differs from another of the same dataset; changes are this minus that."""
     found = review.compare(store, other, evaluation, str(field))
     return ComparisonDocument.of(found, limit, parse_cursor(cursor) or 0)
-
-
-def _json(document: BaseModel) -> Response:
-    return Response(document.model_dump_json(), media_type=JSON_FILE)
 
 
 def _csv(text: str, name: str) -> Response:

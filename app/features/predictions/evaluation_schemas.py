@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from datetime import datetime
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 
-from app.evaluation.comparison import Difference
-from app.evaluation.figure import Axis, Mark
+from app.evaluation.comparison import Difference, FrameDifference
 from app.evaluation.result import FrameResult
-from app.evaluation.table import Cell, Column, FrameRange, Row
+from app.evaluation.table import Cell, Table
 from app.features.predictions.evaluation import RunComparison, read_tables
 from app.features.predictions.evaluation_run import MAX_NAME, EvaluationRequest
 from app.features.versions.schemas import VersionId
@@ -62,35 +61,6 @@ class EvaluationBody(BaseModel):
         return EvaluationRequest(**{**self.model_dump(), "version": version})
 
 
-class CellDocument(Document, shows=Cell):
-    """One number with its 95 % interval, computed from `count` of `of` items."""
-
-
-class ColumnDocument(Document, shows=Column):
-    """What a column holds; `better` is `higher`, `lower` or empty."""
-
-
-class FramesLink(Document, shows=FrameRange):
-    """The frames behind a number, as parameters of `/evaluations/{id}/frames`."""
-
-
-class RowDocument(Document, shows=Row):
-    """One line of a table, its cells in the order of the columns."""
-
-    cells: list[CellDocument]
-    frames: FramesLink | None
-
-
-class TableDocument(Document):
-    """A table; `note` says over what it was computed."""
-
-    name: str
-    title: str
-    note: str
-    columns: list[ColumnDocument]
-    rows: list[RowDocument]
-
-
 _HEADLINE = (
     ("detection", "all", "ap_50"),
     ("localization", "oracle", "mae_m"),
@@ -118,7 +88,7 @@ class EvaluationRow(Document):
     careful: int | None = Field(validation_alias="careful_set_id")
     version: int | None = Field(validation_alias="version_id")
     counts: dict[str, int]
-    headline: Annotated[dict[str, CellDocument], BeforeValidator(_headline)] = Field(
+    headline: Annotated[dict[str, Cell], BeforeValidator(_headline)] = Field(
         validation_alias="tables",
         description="ap_50, mae_m, mae_percent and p_2m, those that the run has.",
     )
@@ -135,66 +105,11 @@ class EvaluationDocument(EvaluationRow):
         description="What makes it repeatable: version or digest of the state, policy, solver and "
         "software version, digests of the predictions, seed."
     )
-    tables: list[TableDocument]
+    tables: list[Table]
     figures: list[str] = Field(description="Names for `/evaluations/{id}/figures/{name}.json`.")
 
 
-class AxisDocument(Document, shows=Axis):
-    """What an axis shows; `low` and `high` fix its ends where they are not null."""
-
-
-class SeriesDocument(Document):
-    """One curve, or one set of points; `low`, `high` and `count` are empty where there are none."""
-
-    name: str
-    label: str
-    kind: Literal["line", "dashed", "points"]
-    x: list[float]
-    y: list[float]
-    low: list[float]
-    high: list[float]
-    count: list[int]
-    color: float | None = Field(description="What the colour stands for, see the panel's `color`.")
-    group_id: int | None
-    frames: list[FramesLink] = Field(
-        default=[], description="The frames behind each place; empty where they are not kept."
-    )
-
-
-class MarkDocument(Document, shows=Mark):
-    """A dashed line across a panel."""
-
-    axis: Literal["x", "y"]
-
-
-class PanelDocument(Document):
-    """One pair of axes with its curves."""
-
-    title: str
-    x: AxisDocument
-    y: AxisDocument
-    series: list[SeriesDocument]
-    marks: list[MarkDocument]
-    color: AxisDocument | None
-
-
-class FigureDocument(Document):
-    """A figure: panels side by side."""
-
-    name: str
-    title: str
-    note: str
-    panels: list[PanelDocument]
-
-
-class FrameDocument(Document, shows=FrameResult):
-    """One judged frame; null where a number does not exist."""
-
-    frame_id: int = Field(description="Id of the view, below 0 where it is gone.")
-    ball: bool = Field(description="Whether the frame shows a ball.")
-
-
-class FrameList(ListDocument[FrameDocument]):
+class FrameList(ListDocument[FrameResult]):
     """Frames behind a number; `next` is the cursor of the page after this one."""
 
     next: Annotated[str, Field(coerce_numbers_to_str=True)] | None
@@ -204,16 +119,8 @@ class FrameList(ListDocument[FrameDocument]):
 class DifferenceDocument(Document, shows=Difference):
     """One number of both runs; `change` is the second minus the first."""
 
-    first: CellDocument | None
-    second: CellDocument | None
-    change: float | None
-
-
-class FrameDifferenceDocument(Document):
-    """One frame of both runs."""
-
-    first: FrameDocument
-    second: FrameDocument
+    first: Cell | None
+    second: Cell | None
     change: float | None
 
 
@@ -237,7 +144,7 @@ class ComparisonDocument(Document):
     gained: int = Field(description="Frames that only the second run has a value for.")
     lost: int
     mean_change: float | None
-    frames: list[FrameDifferenceDocument] = Field(
+    frames: list[FrameDifference] = Field(
         description="Frames that differ: gained and lost ones, then the largest change first."
     )
     next: str | None

@@ -35,6 +35,7 @@ from app.http.deps import Actor, AppServices, AppStore, DatasetPath, DryRun, Id,
 from app.http.job_responses import ACCEPTED, job_answer
 from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import responses
+from app.http.request_limits import LOOKS, limit
 from app.http.respond import document, no_content, responds
 from app.http.route import Route
 
@@ -162,6 +163,7 @@ def delete_predictions(predictions: Id, store: AppStore, actor: Actor) -> None:
     "/views/{view}/predictions", operation_id="getViewPredictions", responses=responses(404)
 )
 @may(Action.READ, view=OwnedKind.VIEW)
+@limit(LOOKS)
 @paged()
 def get_view_predictions(view: Id, store: AppStore) -> ViewPredictions:
     """What was predicted for a view."""
@@ -176,6 +178,7 @@ def get_view_predictions(view: Id, store: AppStore) -> ViewPredictions:
     "/groups/{group}/predictions", operation_id="getGroupPredictions", responses=responses(404)
 )
 @may(Action.READ, group=OwnedKind.GROUP)
+@limit(LOOKS)
 @paged()
 def get_group_predictions(group: Id, store: AppStore) -> GroupPredictionsDocument:
     """What was predicted for all views of a group, and where its accepted balls come from."""

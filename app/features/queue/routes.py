@@ -25,6 +25,7 @@ from app.http.cursor import paged
 from app.http.deps import AppServices, AppStore, DatasetPath, Id, QueryText
 from app.http.permissions import Action, OwnedKind, Where, may
 from app.http.problem import responses
+from app.http.request_limits import QUESTIONS, limit
 from app.http.route import Route
 
 query_fields_router = APIRouter(tags=["queue"], route_class=Route)
@@ -88,6 +89,7 @@ insight_router = APIRouter(tags=["insight"], route_class=Route)
     "/groups/{group}/remedies", operation_id="getRemedies", responses=responses(404)
 )
 @may(Action.READ, group=OwnedKind.GROUP)
+@limit(QUESTIONS)
 @paged()
 def get_remedies(group: Id, store: AppStore) -> Remedies:
     """Small edits with which a group that fails would pass, each tried out; saves nothing."""
@@ -102,6 +104,7 @@ def get_remedies(group: Id, store: AppStore) -> Remedies:
     "/views/{view}/influence", operation_id="getInfluence", responses=responses(404)
 )
 @may(Action.READ, view=OwnedKind.VIEW)
+@limit(QUESTIONS)
 @paged()
 def get_influence(view: Id, store: AppStore) -> Influences:
     """What the camera of a view would be without each of its markings; saves nothing."""

@@ -146,13 +146,6 @@ class GroupPage(ListDocument[GroupRow]):
     total: int = Field(description="How many match in all.")
 
 
-class GroupIds(Document):
-    """Ids of groups that match, in order."""
-
-    ids: list[int]
-    total: int = Field(description="How many match in all.")
-
-
 class Neighbours(Document, shows=QueueNeighbours):
     """Where a group stands among those that match, and what comes before and after it."""
 

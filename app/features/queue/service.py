@@ -154,7 +154,11 @@ class Neighbours:
 
 @dataclass(frozen=True)
 class Ids:
-    """Ids of groups in order, out of ``total`` that match."""
+    """Ids of groups in order, out of ``total`` that match.
+
+    Attributes:
+        total: How many match in all.
+    """
 
     ids: tuple[int, ...]
     total: int

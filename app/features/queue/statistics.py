@@ -41,7 +41,11 @@ class Measure:
 
 @dataclass(frozen=True)
 class MeasureSeries:
-    """Counts of one split; ``unknown`` groups have no such number."""
+    """Counts of one split; ``unknown`` groups have no such number.
+
+    Attributes:
+        unknown: Groups that have no such number.
+    """
 
     split: str
     counts: tuple[int, ...]
@@ -59,7 +63,14 @@ class MeasureHistogram:
 
 @dataclass(frozen=True)
 class Positions:
-    """Balls on the pitch in cells, metres of the pitch frame; ``counts`` by row of y, then x."""
+    """Balls on the pitch in cells, metres of the pitch frame; ``counts`` by row of y, then x.
+
+    Attributes:
+        x_edges: Metres along the length, from the centre mark.
+        y_edges: Metres across, towards the main cameras.
+        counts: A row for each cell of y, in it one for each x.
+        outside: Balls that lie outside all cells.
+    """
 
     x_edges: tuple[float, ...]
     y_edges: tuple[float, ...]

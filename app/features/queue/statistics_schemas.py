@@ -9,14 +9,15 @@ from pydantic import BaseModel, Field, model_validator
 from app.features.groups.solution_schemas import XY, FixDocument, GuideDocument, Jac, OfferDocument
 from app.features.groups.suggested_edits import Influence
 from app.features.groups.suggestions import Remedy
-from app.features.queue.statistics import Measure, MeasureHistogram, MeasureSeries, Share, Timeline
+from app.features.queue.statistics import (
+    Measure,
+    MeasureHistogram,
+    MeasureSeries,
+    Positions,
+    Share,
+    Timeline,
+)
 from app.http.documents import Document, ListDocument
-
-
-class SplitSeries(Document, shows=MeasureSeries):
-    """The bars of one split."""
-
-    unknown: int = Field(description="Groups that have no such number.")
 
 
 class StatisticsHistogram(Document, shows=Measure):
@@ -31,7 +32,7 @@ class StatisticsHistogram(Document, shows=Measure):
         "and all that is smaller than the second edge.",
     )
     queries: list[str] = Field(description="For each bar, the query that finds its groups.")
-    series: list[SplitSeries]
+    series: list[MeasureSeries]
 
     @model_validator(mode="before")
     @classmethod
@@ -39,19 +40,6 @@ class StatisticsHistogram(Document, shows=Measure):
         return (
             {**vars(value), **vars(value.measure)} if isinstance(value, MeasureHistogram) else value
         )
-
-
-class PositionsDocument(Document):
-    """Balls on the pitch; a cell is found by `x>=a x<b y>=c y<d`."""
-
-    x_edges: list[float] = Field(description="Metres along the length, from the centre mark.")
-    y_edges: list[float] = Field(description="Metres across, towards the main cameras.")
-    counts: list[list[int]] = Field(description="A row for each cell of y, in it one for each x.")
-    outside: int = Field(description="Balls that lie outside all cells.")
-
-
-class MatchShare(Document, shows=Share):
-    """Groups of a match in one split."""
 
 
 class SplitShare(Document):
@@ -68,8 +56,8 @@ class StatisticsDocument(Document):
 
     groups: int
     histograms: list[StatisticsHistogram]
-    positions: PositionsDocument
-    matches: list[MatchShare]
+    positions: Positions
+    matches: list[Share]
     splits: list[SplitShare]
 
 

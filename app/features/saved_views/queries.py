@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 from sqlalchemy import delete, insert, select
 
@@ -18,15 +17,15 @@ _SAVED = select(
 )
 
 
-def dataset_saved_views(session: Session, dataset_id: int) -> Sequence[Any]:
+def dataset_saved_views(session: Session, dataset_id: int) -> Sequence[SavedViewModel]:
     """The saved views of a dataset, by name."""
     statement = _SAVED.where(SavedViewModel.dataset_id == dataset_id)
-    return session.execute(statement.order_by(SavedViewModel.name)).all()
+    return session.rows(SavedViewModel, statement.order_by(SavedViewModel.name))
 
 
-def find_saved_view(session: Session, view_id: int) -> Any | None:
+def find_saved_view(session: Session, view_id: int) -> SavedViewModel | None:
     """A saved view by its id."""
-    return session.execute(_SAVED.where(SavedViewModel.id == view_id)).one_or_none()
+    return session.row(SavedViewModel, _SAVED.where(SavedViewModel.id == view_id))
 
 
 def insert_saved_view(

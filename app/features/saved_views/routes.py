@@ -9,7 +9,6 @@ from app.features.saved_views import service as saved_views
 from app.features.saved_views.schemas import (
     NewSavedView,
     ReviewerList,
-    SavedViewDocument,
     SavedViewList,
 )
 from app.features.saved_views.service import SavedView
@@ -18,7 +17,7 @@ from app.http.cursor import paged
 from app.http.deps import Actor, AppStore, DatasetPath, Id
 from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import responses
-from app.http.respond import as_document, document, responds
+from app.http.respond import document, responds
 from app.http.route import Route
 
 router = APIRouter(tags=["queue"], route_class=Route)
@@ -37,13 +36,13 @@ def list_saved_views(dataset: DatasetPath, store: AppStore) -> SavedViewList:
 
 def _saved(view: SavedView) -> Response:
     headers = {"Location": f"/api/v1/saved-views/{view.id}"}
-    return document(SavedViewDocument.model_validate(view), 201, headers)
+    return document(view, 201, headers)
 
 
 @router.post(
     "/datasets/{dataset}/saved-views",
     operation_id="createSavedView",
-    response_model=SavedViewDocument,
+    response_model=SavedView,
     status_code=201,
     responses={
         **responses(404, 409, 413, 415),
@@ -63,11 +62,10 @@ def save_view(dataset: DatasetPath, view: NewSavedView, store: AppStore, actor: 
 @router.get(
     "/saved-views/{view}",
     operation_id="getSavedView",
-    response_model=SavedViewDocument,
     responses=responses(404),
 )
 @may(Action.READ, view=OwnedKind.SAVED_VIEW)
-def get_saved_view(view: Id, store: AppStore) -> saved_views.SavedView:
+def get_saved_view(view: Id, store: AppStore) -> SavedView:
     """One saved view."""
     return saved_views.get_view(store, view)
 
@@ -75,11 +73,11 @@ def get_saved_view(view: Id, store: AppStore) -> saved_views.SavedView:
 @router.delete(
     "/saved-views/{view}",
     operation_id="deleteSavedView",
-    response_model=SavedViewDocument,
+    response_model=SavedView,
     responses=responses(404),
 )
 @may(Action.ANNOTATE, view=OwnedKind.SAVED_VIEW)
-@responds(as_document(SavedViewDocument.model_validate))
+@responds(document)
 def delete_saved_view(view: Id, store: AppStore) -> SavedView:
     """Forget a saved view; the answer is what it was, so that it can be saved again."""
     return saved_views.delete_view(store, view)

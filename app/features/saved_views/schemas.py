@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from datetime import datetime
 from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field
 
 from app.features.datasets.service import MAX_TITLE
 from app.features.queue.query import MAX_LENGTH
+from app.features.saved_views.service import SavedView
 from app.features.verdicts.service import Reviewer
-from app.http.documents import Document, ListDocument
+from app.http.documents import ListDocument
 
 
 class NewSavedView(BaseModel):
@@ -25,28 +25,9 @@ class NewSavedView(BaseModel):
     q: Annotated[str, Field(max_length=MAX_LENGTH)]
 
 
-class SavedViewDocument(Document):
-    """A query under a name that everybody on the dataset sees."""
-
-    id: int
-    name: str
-    q: str = Field(validation_alias="query")
-    by: str = Field(validation_alias="actor")
-    created: datetime
-    groups: int = Field(description="How many match now.")
-
-
-class SavedViewList(ListDocument[SavedViewDocument]):
+class SavedViewList(ListDocument[SavedView]):
     """Saved views, by name."""
 
 
-class ReviewerDocument(Document, shows=Reviewer):
-    """One person's verdicts."""
-
-    accepted: int = Field(description="Groups whose current verdict is this person's.")
-    today: int = Field(description="Groups judged since midnight UTC.")
-    last: datetime = Field(description="Time of the last verdict.")
-
-
-class ReviewerList(ListDocument[ReviewerDocument]):
+class ReviewerList(ListDocument[Reviewer]):
     """Everybody who has judged a group, the most active first."""

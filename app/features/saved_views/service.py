@@ -19,6 +19,7 @@ from app.features.saved_views.queries import (
     find_saved_view,
     insert_saved_view,
 )
+from app.finite import Moment
 from app.soccer.actors import LOCAL_USER, person_of
 
 MAX_VIEWS = 200
@@ -29,13 +30,19 @@ MAX_OWN = 40
 
 @dataclass(frozen=True)
 class SavedView:
-    """A query with its name; ``groups`` match it now."""
+    """A query under a name that everybody on the dataset sees.
+
+    Attributes:
+        q: A query of the queue.
+        by: Who keeps it.
+        groups: How many match now.
+    """
 
     id: int
     name: str
-    query: str
-    actor: str
-    created: str
+    q: str
+    by: str
+    created: Moment
     groups: int
 
 

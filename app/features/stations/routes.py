@@ -29,6 +29,7 @@ from app.http.conflicts import current_state
 from app.http.deps import Actor, AppServices, AppStore, Id, IfMatch
 from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import Responses, responses
+from app.http.request_limits import LOOKS, limit
 from app.http.respond import responds
 from app.http.route import Route
 from app.http.services import Services
@@ -55,6 +56,7 @@ STATION_CHANGED: Responses = {**responses(*CONFLICTS), **CHANGED}
     },
 )
 @may(Action.READ, station=OwnedKind.STATION)
+@limit(LOOKS)
 def get_station(station: Id, store: AppStore, response: Response) -> StationDetail:
     """A station with its lines and its own ETag."""
     state = load_station(store, station)

@@ -54,7 +54,12 @@ picture, and nobody says why it shall be accepted all the same."""
 
 @dataclass(frozen=True)
 class Refusal:
-    """Groups that a bulk verdict leaves alone, and why."""
+    """Groups that a bulk verdict leaves alone.
+
+    Attributes:
+        reason: ``submitted`` (independent annotations that are closed), ``unsolved``, ``needs_note``
+            (they fail a gate), ``unusable_ball`` or ``no_picture``.
+    """
 
     reason: str
     groups: int

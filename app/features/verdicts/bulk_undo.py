@@ -31,7 +31,12 @@ from app.features.verdicts.service import check_verdict
 
 @dataclass(frozen=True)
 class UndoReport:
-    """What undoing a batch did; ``kept`` are groups that somebody has judged since."""
+    """What undoing a batch did; ``kept`` are groups that somebody has judged since.
+
+    Attributes:
+        restored: Groups that have the verdict of before again.
+        kept: Groups that a person has judged since.
+    """
 
     batch: int
     restored: int
@@ -150,9 +155,9 @@ class RedoReport:
     """What giving a batch again did.
 
     Attributes:
-        batch: The new batch, which can be taken back like any other; None when nothing changed.
+        batch: The new batch, which can be undone like any other; None when nothing changed.
         changed: Groups that have the verdict again.
-        kept: Groups that somebody has judged or edited since; they stay as they are.
+        kept: Groups that a person has judged or edited since; they stay as they are.
         refused: Groups that the verdict cannot be given to any more, and why.
     """
 

@@ -14,13 +14,12 @@ from app.features.groups.schemas import GroupDocument
 from app.features.groups.state import GroupState
 from app.features.verdicts import bulk, bulk_undo
 from app.features.verdicts import bulk_undo as bulk_redo
+from app.features.verdicts.bulk_undo import RedoReport, UndoReport
 from app.features.verdicts.schemas import (
     BatchList,
     BulkResult,
     BulkVerdict,
     DismissalEdit,
-    RedoDocument,
-    UndoDocument,
     VerdictEdit,
 )
 from app.features.verdicts.service import set_verdict
@@ -29,6 +28,7 @@ from app.http.cursor import MAX_ITEMS, Cursor, parse_cursor
 from app.http.deps import Actor, AppServices, AppStore, DatasetPath, DryRun, Id, IfMatch
 from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import responses
+from app.http.request_limits import EDITS, limit
 from app.http.respond import as_document, document, responds
 from app.http.route import Route
 
@@ -43,6 +43,7 @@ router = APIRouter(route_class=Route)
     responses={**responses(*CONFLICTS), **CHANGED},
 )
 @may(Action.REVIEW, group=OwnedKind.GROUP)
+@limit(EDITS)
 @responds(group_answer)
 def put_verdict(
     group: Id,
@@ -146,11 +147,11 @@ def list_batches(
     "/verdict-batches/{batch}/redo",
     tags=["verdicts"],
     operation_id="redoVerdictBatch",
-    response_model=RedoDocument,
+    response_model=RedoReport,
     responses=responses(404, 409),
 )
 @may(Action.REVIEW, batch=OwnedKind.BATCH)
-@responds(as_document(RedoDocument.model_validate))
+@responds(document)
 def redo_batch(batch: Id, store: AppStore, actor: Actor) -> bulk_redo.RedoReport:
     """Give the verdicts of a batch again that was taken back, as a new batch.
 
@@ -164,11 +165,11 @@ def redo_batch(batch: Id, store: AppStore, actor: Actor) -> bulk_redo.RedoReport
     "/verdict-batches/{batch}/undo",
     tags=["verdicts"],
     operation_id="undoVerdictBatch",
-    response_model=UndoDocument,
+    response_model=UndoReport,
     responses=responses(404, 409),
 )
 @may(Action.REVIEW, batch=OwnedKind.BATCH)
-@responds(as_document(UndoDocument.model_validate))
+@responds(document)
 def undo_batch(batch: Id, store: AppStore, actor: Actor) -> bulk_undo.UndoReport:
     """Give each group of a batch the verdict back that it had before; 409 the second time.
 

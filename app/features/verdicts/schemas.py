@@ -92,27 +92,18 @@ class BulkVerdict(BaseModel):
     )
 
 
-class RefusalDocument(Document, shows=Refusal):
-    """Groups that are left alone: `submitted` (independent annotations that are closed), `unsolved`,
-    `needs_note` (they fail a gate), `unusable_ball`, `no_picture`."""
-
-
-class SampleDocument(Document, shows=SampleGroup):
-    """One of the groups that would change, with the number and label that the queue shows."""
-
-
 class BulkResult(Document):
     """What a bulk verdict would do (`dry_run=true`), or did."""
 
     dry_run: bool
     matches: int | None = Field(description="Groups that the query finds; dry run only.")
     would_change: int | None = Field(description="Dry run only, like `sample`.")
-    sample: list[SampleDocument] | None
+    sample: list[SampleGroup] | None
     batch: int | None = Field(
         description="Batch that `POST /verdict-batches/{batch}/undo` undoes; null when nothing changed."
     )
     changed: int
-    refused: list[RefusalDocument]
+    refused: list[Refusal]
 
     @staticmethod
     def planned(plan: BulkPlan) -> BulkResult:
@@ -146,22 +137,3 @@ class BatchDocument(Document):
 
 class BatchList(ListDocument[BatchDocument]):
     """Bulk verdicts, the newest first."""
-
-
-class UndoDocument(Document):
-    """What taking a batch back did."""
-
-    batch: int
-    restored: int = Field(description="Groups that have the verdict of before again.")
-    kept: int = Field(description="Groups that a person has judged since.")
-
-
-class RedoDocument(Document):
-    """What giving a batch again did."""
-
-    batch: int | None = Field(
-        description="The new batch, which can be undone; null when nothing changed."
-    )
-    changed: int = Field(description="Groups that have the verdict again.")
-    kept: int = Field(description="Groups that a person has judged or edited since.")
-    refused: list[RefusalDocument]

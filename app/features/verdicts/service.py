@@ -19,6 +19,7 @@ from app.features.verdicts.queries import (
     insert_verdicts,
     next_verdict_id,
 )
+from app.finite import Moment
 from app.soccer.choices import VerdictState
 from app.soccer.group import Group
 from app.soccer.reasons import REASONS, checked_note, require_words
@@ -170,7 +171,7 @@ class Reviewer:
     rejected: int
     deferred: int
     today: int
-    last: str
+    last: Moment
 
 
 def list_reviewers(store: Store, dataset_id: int) -> list[Reviewer]:

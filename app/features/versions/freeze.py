@@ -96,7 +96,13 @@ class FreezeRequest:
 
 @dataclass(frozen=True)
 class FreezePlan:
-    """What a freeze would do: how many groups enter, in which split, and why the others do not."""
+    """What a freeze would do: how many groups enter, in which split, and why the others do not.
+
+    Attributes:
+        splits: How many of the groups would be in each split; ``none``: in no split, or in two.
+        left_out: Why the other groups do not enter.
+        unsolved: How many of the groups that enter have to be solved first.
+    """
 
     groups: int
     splits: Mapping[str, int]

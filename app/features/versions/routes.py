@@ -11,11 +11,10 @@ from app.features.jobs.schemas import JobDocument
 from app.features.versions import jobs as version_jobs
 from app.features.versions import service as versions
 from app.features.versions.diff import changelog, diff_versions
-from app.features.versions.freeze import plan_freeze
+from app.features.versions.freeze import FreezePlan, plan_freeze
 from app.features.versions.membership import version_manifest
 from app.features.versions.schemas import (
     Changelog,
-    FreezePlanDocument,
     VersionDiffDocument,
     VersionDocument,
     VersionList,
@@ -70,7 +69,7 @@ def list_versions(dataset: DatasetPath, store: AppStore) -> VersionList:
     responses={
         **responses(404, 409, 413, 415),
         **ACCEPTED,
-        200: {"model": FreezePlanDocument, "description": "After a dry run: what would be frozen."},
+        200: {"model": FreezePlan, "description": "After a dry run: what would be frozen."},
     },
 )
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
@@ -89,7 +88,7 @@ def freeze_version(
     """
     if dry_run or request.dry_run:
         plan = plan_freeze(services.store, dataset, request.value())
-        return document(FreezePlanDocument.model_validate(plan))
+        return document(plan)
     return version_jobs.request_freeze(
         services.jobs, services.store, dataset, request.value(), actor=actor
     )

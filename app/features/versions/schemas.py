@@ -88,21 +88,6 @@ class VersionRequest(BaseModel):
         return FreezeRequest(self.name, self.note, self.licence, self.split.value(), self.groups)
 
 
-class FreezePlanDocument(Document):
-    """What a freeze would do."""
-
-    groups: int
-    splits: dict[str, int] = Field(
-        description="How many of the groups would be in each split; `none`: in no split, or in two."
-    )
-    left_out: dict[str, int] = Field(description="Why the other groups do not enter.")
-    unsolved: int = Field(description="How many of the groups that enter have to be solved first.")
-
-
-class FrozenDifferenceDocument(Document, shows=VersionDifference):
-    """Something that did not come out as it was frozen; `group` null: the version itself."""
-
-
 class VerificationDocument(Document):
     """What came of computing a version once more, the last time that somebody asked for it."""
 
@@ -115,7 +100,7 @@ class VerificationDocument(Document):
     groups: int | None = Field(description="Groups of the version; null where it failed.")
     equal: int | None = Field(description="Groups that came out as they were frozen.")
     different: int | None = Field(description="Values that came out differently.")
-    differences: list[FrozenDifferenceDocument] = Field(description="The first of these values.")
+    differences: list[VersionDifference] = Field(description="The first of these values.")
 
     @model_validator(mode="before")
     @classmethod
@@ -200,10 +185,6 @@ class VersionName(BaseModel):
     hash: str
 
 
-class PassageDocument(Document, shows=Passage):
-    """A group that came or went; ``why`` it was not in the other version."""
-
-
 class MoveDocument(Document, shows=Move):
     """A 3D ball that lies elsewhere; pitch frame, metres."""
 
@@ -218,10 +199,6 @@ class ChangeDocument(BaseModel):
     what: list[Literal["annotations", "verdict", "split", "ball"]]
 
 
-class SettingDocument(Document, shows=Setting):
-    """A value of policy, solver or split that differs."""
-
-
 class VersionDiffDocument(BaseModel):
     """What changed from one version to another; lists may be cut, counts are whole."""
 
@@ -230,8 +207,8 @@ class VersionDiffDocument(BaseModel):
     same: bool = Field(description="Whether both versions have the same hash.")
     counts: dict[str, int]
     lines: list[str] = Field(description="In sentences.")
-    added: list[PassageDocument]
-    dropped: list[PassageDocument]
+    added: list[Passage]
+    dropped: list[Passage]
     moved: list[MoveDocument] = Field(description="The farthest first.")
     changed: list[ChangeDocument]
-    settings: list[SettingDocument]
+    settings: list[Setting]

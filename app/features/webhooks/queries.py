@@ -28,21 +28,21 @@ _WEBHOOKS = select(*WebhookModel.__table__.columns)
 _DELIVERIES = select(*DeliveryModel.__table__.columns)
 
 
-def webhooks_of(session: Session, dataset_id: int) -> Sequence[Any]:
+def webhooks_of(session: Session, dataset_id: int) -> Sequence[WebhookModel]:
     """Every webhook of a dataset, in the order in which they were made."""
     mine = WebhookModel.dataset_id == dataset_id
-    return session.execute(_WEBHOOKS.where(mine).order_by(WebhookModel.id)).all()
+    return session.rows(WebhookModel, _WEBHOOKS.where(mine).order_by(WebhookModel.id))
 
 
-def webhook_of(session: Session, dataset_id: int, webhook_id: int) -> Any | None:
+def webhook_of(session: Session, dataset_id: int, webhook_id: int) -> WebhookModel | None:
     """A webhook of a dataset."""
     where = (WebhookModel.id == webhook_id, WebhookModel.dataset_id == dataset_id)
-    return session.execute(_WEBHOOKS.where(*where)).one_or_none()
+    return session.row(WebhookModel, _WEBHOOKS.where(*where))
 
 
-def webhooks_on(session: Session) -> Sequence[Any]:
+def webhooks_on(session: Session) -> Sequence[WebhookModel]:
     """Every webhook that is told."""
-    return session.execute(_WEBHOOKS.where(WebhookModel.off.is_(None))).all()
+    return session.rows(WebhookModel, _WEBHOOKS.where(WebhookModel.off.is_(None)))
 
 
 def insert_webhook(
@@ -155,29 +155,29 @@ def next_due(session: Session) -> str | None:
 
 def deliveries_of(
     session: Session, webhook_id: int, before: int | None, most: int
-) -> Sequence[Any]:
+) -> Sequence[DeliveryModel]:
     """What a webhook was told, newest first, from below an id."""
     where = [DeliveryModel.webhook_id == webhook_id]
     if before is not None:
         where.append(DeliveryModel.id < before)
     statement = _DELIVERIES.where(*where).order_by(DeliveryModel.id.desc()).limit(most)
-    return session.execute(statement).all()
+    return session.rows(DeliveryModel, statement)
 
 
-def delivery_of(session: Session, webhook_id: int, delivery_id: int) -> Any | None:
+def delivery_of(session: Session, webhook_id: int, delivery_id: int) -> DeliveryModel | None:
     """A delivery of a webhook."""
     where = (DeliveryModel.id == delivery_id, DeliveryModel.webhook_id == webhook_id)
-    return session.execute(_DELIVERIES.where(*where)).one_or_none()
+    return session.row(DeliveryModel, _DELIVERIES.where(*where))
 
 
-def waiting_of_kind(session: Session, webhook_id: int, kind: str) -> Any | None:
+def waiting_of_kind(session: Session, webhook_id: int, kind: str) -> DeliveryModel | None:
     """A delivery of that kind that is still to be sent."""
     where = (
         DeliveryModel.webhook_id == webhook_id,
         DeliveryModel.kind == kind,
         DeliveryModel.next_at.is_not(None),
     )
-    return session.execute(_DELIVERIES.where(*where).limit(1)).one_or_none()
+    return session.row(DeliveryModel, _DELIVERIES.where(*where).limit(1))
 
 
 def update_delivery(session: Session, delivery_id: int, values: dict[str, Any]) -> None:

@@ -9,10 +9,8 @@ from fastapi import APIRouter, Query
 from app.features.webhooks import service as webhooks
 from app.features.webhooks.messages import CHOSEN
 from app.features.webhooks.schemas import (
-    DeliveryDocument,
     DeliveryList,
     NewWebhook,
-    WebhookDocument,
     WebhookEdit,
     WebhookList,
     WebhookWithSecret,
@@ -31,7 +29,7 @@ router = APIRouter(
 
 def _with_secret(made: tuple[Webhook, str]) -> WebhookWithSecret:
     webhook, secret = made
-    return WebhookWithSecret(webhook=WebhookDocument.model_validate(webhook), secret=secret)
+    return WebhookWithSecret(webhook=webhook, secret=secret)
 
 
 @router.get("", operation_id="listWebhooks", responses=responses(404))
@@ -60,7 +58,7 @@ def make_webhook(
 @router.patch(
     "/{webhook}",
     operation_id="changeWebhook",
-    response_model=WebhookDocument,
+    response_model=Webhook,
     responses=responses(404, 409, 413, 415),
 )
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
@@ -95,7 +93,7 @@ def renew_secret(
     "/{webhook}/ping",
     operation_id="pingWebhook",
     status_code=201,
-    response_model=DeliveryDocument,
+    response_model=Delivery,
     responses=responses(404, 409),
 )
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
@@ -124,7 +122,7 @@ def list_deliveries(
 @router.post(
     "/{webhook}/deliveries/{delivery}",
     operation_id="sendWebhookDeliveryAgain",
-    response_model=DeliveryDocument,
+    response_model=Delivery,
     responses=responses(404, 409),
 )
 @may(Action.LEAD, dataset=OwnedKind.DATASET)

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from datetime import datetime
-from typing import Annotated, Literal
+from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field
 
 from app.features.webhooks.messages import CHOSEN, Kind
 from app.features.webhooks.sender import LONGEST
+from app.features.webhooks.service import Delivery, Webhook
 from app.http.documents import Document, ListDocument
 
 Url = Annotated[str, Field(min_length=1, max_length=LONGEST)]
@@ -43,21 +43,7 @@ class WebhookEdit(BaseModel):
     )
 
 
-class WebhookDocument(Document):
-    """An address that is told."""
-
-    id: int
-    url: str
-    kinds: list[Kind]
-    off: str | None = Field(description="Why sending was stopped; null: it is on.")
-    created: datetime
-    created_by: str
-    waiting: int = Field(description="Messages that wait to be sent, or sent again.")
-    delivered: int = Field(description="Messages of the last 30 days that arrived.")
-    failed: int = Field(description="Messages of the last 30 days that were given up.")
-
-
-class WebhookList(ListDocument[WebhookDocument]):
+class WebhookList(ListDocument[Webhook]):
     """Webhooks of a dataset, and what they may be."""
 
     allowed: list[str] = Field(description="How the operator lets addresses begin.")
@@ -67,25 +53,9 @@ class WebhookList(ListDocument[WebhookDocument]):
 class WebhookWithSecret(Document):
     """A webhook, and what its messages are signed with: shown this once."""
 
-    webhook: WebhookDocument
+    webhook: Webhook
     secret: str
 
 
-class DeliveryDocument(Document):
-    """A message to a webhook, and how its sending goes."""
-
-    id: int
-    message: str = Field(description="`webhook-id`: the same however often it is sent.")
-    kind: Kind
-    body: str = Field(description="The JSON that is sent, to the letter.")
-    created: datetime
-    state: Literal["waiting", "delivered", "failed"]
-    attempts: int
-    next_at: datetime | None = Field(description="When it is tried next.")
-    tried: datetime | None
-    status: int | None = Field(description="What the receiver answered last.")
-    problem: str | None = Field(description="Why the last try failed.")
-
-
-class DeliveryList(ListDocument[DeliveryDocument]):
+class DeliveryList(ListDocument[Delivery]):
     """What a webhook was told, newest first."""

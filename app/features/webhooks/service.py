@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 from app.canonical import canonical
 from app.db.json_columns import parse
@@ -33,10 +33,11 @@ from app.features.webhooks.queries import (
     webhooks_of,
 )
 from app.features.webhooks.sender import require_allowed
+from app.finite import Moment
 
 MOST = 20
 """Webhooks of one dataset."""
-OFF = "somebody turned it off"
+OFF = "a person turned it off"
 
 
 @dataclass(frozen=True)
@@ -45,14 +46,16 @@ class Webhook:
 
     Attributes:
         off: Why nothing is sent to it any more; None: it is.
-        waiting, delivered, failed: Messages that wait, have arrived, and were given up.
+        waiting: Messages that wait to be sent, or sent again.
+        delivered: Messages of the last 30 days that arrived.
+        failed: Messages of the last 30 days that were given up.
     """
 
     id: int
     url: str
     kinds: list[Kind]
     off: str | None
-    created: str
+    created: Moment
     created_by: str
     waiting: int
     delivered: int
@@ -64,7 +67,8 @@ class Delivery:
     """A message to a webhook, and how its sending goes.
 
     Attributes:
-        message: Its id, the same however often it is sent.
+        message: ``webhook-id``: the same however often it is sent.
+        body: The JSON that is sent, to the letter.
         next_at: When it is tried (again); None: never.
         status: What the receiver answered last.
         problem: Why the last try failed.
@@ -72,13 +76,13 @@ class Delivery:
 
     id: int
     message: str
-    kind: str
+    kind: Kind
     body: str
-    created: str
-    state: str
+    created: Moment
+    state: Literal["waiting", "delivered", "failed"]
     attempts: int
-    next_at: str | None
-    tried: str | None
+    next_at: Moment | None
+    tried: Moment | None
     status: int | None
     problem: str | None
 
@@ -243,4 +247,5 @@ def _webhook(row: Any, counts: Mapping[tuple[int, str], int]) -> Webhook:
 
 
 def _delivery(row: Any) -> Delivery:
-    return Delivery(**{name: getattr(row, name) for name in Delivery.__dataclass_fields__})
+    values = {name: getattr(row, name) for name in Delivery.__dataclass_fields__}
+    return Delivery(**{**values, "kind": Kind(row.kind)})

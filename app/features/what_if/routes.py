@@ -10,6 +10,7 @@ from app.features.what_if.schemas import WhatIf, YieldDocument
 from app.http.deps import AppServices, DatasetPath
 from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import responses
+from app.http.request_limits import QUESTIONS, limit
 from app.http.route import Route
 
 router = APIRouter(prefix="/datasets/{dataset}/yield", tags=["yield"], route_class=Route)
@@ -17,6 +18,7 @@ router = APIRouter(prefix="/datasets/{dataset}/yield", tags=["yield"], route_cla
 
 @router.get("", operation_id="getYield", response_model=YieldDocument, responses=responses(404))
 @may(Action.READ, dataset=OwnedKind.DATASET, whole=True)
+@limit(QUESTIONS)
 def read_yield(dataset: DatasetPath, services: AppServices) -> Yield:
     """What the policy lets through: funnel, curves, splits, distances, leakage.
 
@@ -32,6 +34,7 @@ def read_yield(dataset: DatasetPath, services: AppServices) -> Yield:
     "", operation_id="tryPolicy", response_model=YieldDocument, responses=responses(404, 413, 415)
 )
 @may(Action.READ, dataset=OwnedKind.DATASET, whole=True)
+@limit(QUESTIONS)
 def try_policy(dataset: DatasetPath, values: WhatIf, services: AppServices) -> Yield:
     """What other thresholds would let through; nothing is saved and nothing solved.
 

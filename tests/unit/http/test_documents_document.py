@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass, replace
 
 import pytest
@@ -10,7 +11,8 @@ from pydantic import Field, ValidationError
 from app.features.groups.solution_schemas import FailingGate
 from app.features.policies.schemas import PolicyDocument
 from app.features.predictions.evaluation_schemas import FrameList
-from app.http.documents import Document
+from app.finite import Day, Moment
+from app.http.documents import Document, json_of
 from app.soccer.policy import PAPER
 from app.soccer.solution import Gate
 
@@ -40,6 +42,39 @@ class TestDocument:
 
     def test_a_page_names_the_next_one_by_text(self) -> None:
         assert FrameList(items=[], next=50, total=51).next == "50"
+
+
+@dataclass(frozen=True)
+class Match:
+    """A frozen value as it is served."""
+
+    begins: Moment
+    day: Day
+    ended: Moment | None = None
+    length_m: float = float("nan")
+
+
+class TestJsonOf:
+    def test_a_value_tells_times_in_utc_with_a_z_and_days_as_they_are(self) -> None:
+        match = Match("2026-11-28T21:00:00.000000+00:00", "2026-11-28")
+        assert json.loads(json_of(match)) == {
+            "begins": "2026-11-28T21:00:00Z",
+            "day": "2026-11-28",
+            "ended": None,
+            "length_m": None,
+        }
+
+    def test_a_document_that_holds_a_value_tells_it_alike(self) -> None:
+        class Page(Document):
+            match: Match
+
+        match = Match("2026-11-28T21:00:00.250000+00:00", "2026-11-28")
+        assert json.loads(json_of(Page(match=match)))["match"] == json.loads(json_of(match))
+
+    @pytest.mark.parametrize("bad", [float("inf"), float("-inf")])
+    def test_a_number_that_is_not_finite_is_null(self, bad: float) -> None:
+        match = Match("2026-11-28T21:00:00+00:00", "2026-11-28", length_m=bad)
+        assert json.loads(json_of(match))["length_m"] is None
 
 
 class TestWhatShowsADataclass:

@@ -74,6 +74,17 @@ class TestDocument:
                 told = f"{name}.{key}: describe it in its model or in property_words.py"
                 assert one.get("description"), told
 
+    def test_a_value_that_is_served_has_all_its_fields_and_the_words_of_its_docstring(
+        self, document
+    ) -> None:
+        schema = document["components"]["schemas"]["Banner"]
+        starts = schema["properties"]["starts"]
+        assert schema["required"] == ["text", "starts", "until"]
+        assert "default" not in starts
+        assert {"type": "string", "format": "date-time"} in starts["anyOf"]
+        assert "null" in starts["description"]
+        assert "Attributes" not in schema["description"]
+
     def test_every_shared_description_is_used(self, document) -> None:
         said = {
             (name, key, one["description"])

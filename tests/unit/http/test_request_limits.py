@@ -10,13 +10,14 @@ from typing import Any
 
 import anyio
 import pytest
+from fastapi import FastAPI
 from starlette.responses import Response
-from starlette.testclient import TestClient
 from starlette.types import Scope
 
 from app.admission import release_admission
 from app.http import request_limits as lanes
 from app.http.access import LOGIN
+from app.http.pages import ELSEWHERE
 from app.http.request_limits import (
     AWAY,
     CHANGES,
@@ -35,74 +36,76 @@ from app.http.request_limits import (
     Door,
     Doors,
     Lane,
-    lane_of,
     turn,
 )
+from app.http.route import routes_of
 from app.main import PREFIX
-
-DRAG = f"{PREFIX}/groups/1/preview"
-EDIT = f"{PREFIX}/views/1/ball"
 
 
 class TestLaneOf:
-    @pytest.mark.parametrize(
-        ("method", "path", "lane"),
-        [
-            ("GET", "/groups/1", LOOKS),
-            ("HEAD", "/groups/1", LOOKS),
-            ("GET", "/views/1/predictions", LOOKS),
-            ("GET", "/stations/1", LOOKS),
-            ("GET", "/work", LOOKS),
-            ("GET", "/groups", READS),
-            ("GET", "/groups/ids", READS),
-            ("GET", "/datasets/a/team-work", READS),
-            ("PATCH", "/views/1/ball", EDITS),
-            ("PATCH", "/views/1", EDITS),
-            ("PUT", "/groups/1/verdict", EDITS),
-            ("POST", "/groups/1/undo", EDITS),
-            ("POST", "/batches/1/next", EDITS),
-            ("PUT", "/batches/1/groups/2/lease", EDITS),
-            ("POST", "/groups/1/adoption", CHANGES),
-            ("PATCH", "/stations/1/lines", CHANGES),
-            ("DELETE", "/uploads/a", CHANGES),
-            ("POST", "/datasets/a/verdicts", CHANGES),
-            ("POST", "/datasets/a/edits", LARGE),
-            ("POST", "/groups/1/preview", PREVIEWS),
-            ("GET", "/views/1/influence", QUESTIONS),
-            ("POST", "/datasets/a/yield", QUESTIONS),
-            ("GET", "/datasets/a/noise", QUESTIONS),
-            ("GET", "/views/1/image", IMAGES),
-            ("GET", "/evaluations/1/figures/precision.svg", IMAGES),
-            ("GET", "/views/1/neighbours", IMAGES),
-            ("GET", "/groups/1/neighbours", LOOKS),
-            ("GET", "/exports/1/content", ZIPS),
-            ("POST", "/views/1/paint", IMAGES),
-            ("POST", "/views/1/propose", IMAGES),
-            ("POST", "/uploads", UPLOADS),
-            ("GET", "/uploads", READS),
-            ("GET", "/events", STREAMS),
-        ],
-    )
-    def test_is_told_by_method_and_path(self, method: str, path: str, lane: Any) -> None:
-        assert lane_of(method, PREFIX + path) == lane
+    def test_stands_with_the_route(self, app: FastAPI) -> None:
+        lanes_of = {name: route.lane for name, route in routes_of(app)}
+        for lane, names in {
+            LOOKS: (
+                "GET /groups/{group}",
+                "GET /views/{view}/predictions",
+                "GET /stations/{station}",
+                "GET /work",
+                "GET /groups/{group}/neighbours",
+            ),
+            READS: (
+                "GET /groups",
+                "GET /groups/ids",
+                "GET /datasets/{dataset}/team-work",
+                "GET /uploads",
+            ),
+            EDITS: (
+                "PATCH /views/{view}/ball",
+                "PATCH /views/{view}",
+                "PUT /groups/{group}/verdict",
+                "POST /groups/{group}/undo",
+                "POST /batches/{batch}/next",
+                "PUT /batches/{batch}/groups/{group}/lease",
+            ),
+            CHANGES: (
+                "POST /groups/{group}/adoption",
+                "PATCH /stations/{station}/lines",
+                "DELETE /uploads/{upload}",
+                "POST /datasets/{dataset}/verdicts",
+            ),
+            LARGE: ("POST /datasets/{dataset}/edits",),
+            PREVIEWS: ("POST /groups/{group}/preview",),
+            QUESTIONS: (
+                "GET /views/{view}/influence",
+                "POST /datasets/{dataset}/yield",
+                "GET /datasets/{dataset}/noise",
+            ),
+            IMAGES: (
+                "GET /views/{view}/image",
+                "GET /evaluations/{evaluation}/figures/{figure}.{ending}",
+                "GET /views/{view}/neighbours",
+                "POST /views/{view}/paint",
+                "POST /views/{view}/propose",
+            ),
+            ZIPS: ("GET /exports/{export}/content",),
+            UPLOADS: ("POST /uploads",),
+            STREAMS: ("GET /events",),
+        }.items():
+            for name in names:
+                method, path = name.split(" ")
+                assert lanes_of[f"{method} {PREFIX}{path}"] is lane, name
+
+    def test_health_waits_for_nobody_and_pages_for_each_other_alone(self, app: FastAPI) -> None:
+        lanes_of = {name: route.lane for name, route in routes_of(app)}
+        free = {name for name, lane in lanes_of.items() if lane is None}
+        styles = "GET /assets/{version}/all.css"
+        assert free == {"GET /healthz", "GET /readyz", "GET /metrics", styles}
+        pages = {name for name in lanes_of if PREFIX not in name} - free
+        assert pages == {name for name, lane in lanes_of.items() if lane is PAGES}
+        assert {"GET /", f"GET {ELSEWHERE}"} < pages
 
     @pytest.mark.parametrize(
-        "path", ["/healthz", "/readyz", "/metrics", "/static/main.js", "/assets/1/all.css"]
-    )
-    def test_health_and_files_of_the_page_wait_for_nobody(self, path: str) -> None:
-        assert lane_of("GET", path) is None
-
-    @pytest.mark.parametrize("path", ["/", "/review/3", "/nowhere", "/healthz/x"])
-    def test_pages_wait_for_each_other_alone(self, path: str) -> None:
-        assert lane_of("GET", path) == PAGES
-
-    @pytest.mark.parametrize(
-        ("method", "path", "usual", "large"),
-        [
-            ("PATCH", "/views/1/lines", EDITS, LARGE),
-            ("POST", "/groups/1/preview", PREVIEWS, LARGE),
-            ("PATCH", "/stations/1/lines", CHANGES, CHANGES),
-        ],
+        ("usual", "large"), [(EDITS, LARGE), (PREVIEWS, LARGE), (CHANGES, CHANGES)]
     )
     @pytest.mark.parametrize(
         ("headers", "is_large"),
@@ -114,25 +117,17 @@ class TestLaneOf:
         ],
     )
     def test_what_draws_hundreds_of_points_keeps_nobody_waiting_who_drags_one(
-        self, method: str, path: str, usual: Lane, large: Lane, headers: Any, is_large: bool
+        self, usual: Lane, large: Lane, headers: Any, is_large: bool
     ) -> None:
-        scope = {
-            "type": "http",
-            "method": method,
-            "path": PREFIX + path,
-            "headers": [*headers.items()],
-        }
-        door = Doors().of(scope)
+        door = Doors().of(usual, {"headers": [*headers.items()]})
         assert door is not None
         assert door.lane == (large if is_large else usual)
 
-    def test_every_route_that_changes_something_has_one(self, api: TestClient) -> None:
-        document = api.get(f"{PREFIX}/openapi.json").json()["paths"]
-        routes = [(method.upper(), path) for path, item in document.items() for method in item]
+    def test_every_route_that_changes_something_has_one(self, app: FastAPI) -> None:
         assert [
-            (method, path)
-            for method, path in routes
-            if method != "GET" and lane_of(method, path) in (None, LOOKS, READS, STREAMS, ZIPS)
+            name
+            for name, route in routes_of(app)
+            if not name.startswith("GET ") and route.lane in (None, LOOKS, READS, STREAMS, ZIPS)
         ] == []
 
 
@@ -170,16 +165,14 @@ class Service:
         self.bodies: list[bytes] = []
         self.tasks: list[asyncio.Task[None]] = []
 
-    def ask(
-        self, method: str, path: str, prefix: str = PREFIX, accept: str = "*/*", who: str = ""
-    ) -> None:
+    def ask(self, lane: Lane, path: str = "/1", accept: str = "*/*", who: str = "") -> None:
         headers = [(b"accept", accept.encode())]
-        scope = {"type": "http", "method": method, "path": prefix + path, "headers": headers}
+        scope = {"type": "http", "path": path, "headers": headers}
         if who:
             scope[LOGIN] = Named(who)
 
         async def run() -> None:
-            async with turn(self.doors.of(scope), scope) as refusal:
+            async with turn(self.doors.of(lane, scope), scope) as refusal:
                 response = refusal or await self.app(scope)
             self.statuses.append(response.status_code)
             self.bodies.append(bytes(response.body))
@@ -210,12 +203,12 @@ class TestLanes:
     def test_changes_that_wait_leave_reads_alone(self) -> None:
         async def test(service: Service) -> None:
             for _ in range(CHANGES.width + 5):
-                service.ask("PATCH", "/stations/1")
-            service.ask("GET", "/groups/1")
+                service.ask(CHANGES)
+            service.ask(LOOKS, "/groups/1")
             await service.settle()
             assert len(service.work.begun) == CHANGES.width + 1
             assert service.work.begun[-1].endswith("/groups/1")
-            door = service.doors.of({"type": "http", "method": "PUT", "path": PREFIX + "/x"})
+            door = service.doors.of(CHANGES, {"headers": []})
             assert door is not None and (door.busy, door.waiting) == (CHANGES.width, 5)
             await service.end()
             assert service.statuses == [200] * (CHANGES.width + 6)
@@ -226,7 +219,7 @@ class TestLanes:
     def test_who_sends_many_requests_waits_behind_himself(self) -> None:
         async def test(service: Service) -> None:
             for path, who in (("/views/1", "ann"),) * 3 + (("/views/2", "bob"),):
-                service.ask("PATCH", path, who=who)
+                service.ask(EDITS, path, who=who)
             await service.settle()
             await service.end()
             assert [path[-1] for path in service.work.begun] == ["1", "1", "2", "1"]
@@ -237,14 +230,12 @@ class TestLanes:
         async def test(service: Service) -> None:
             service.work.away = True
             for _ in range(EDITS.width + AWAY + 1):
-                service.ask("PATCH", "/views/1/ball")
+                service.ask(EDITS)
             while len(service.work.begun) < EDITS.width + AWAY:
                 await asyncio.sleep(0.01)
             # Time enough for one more, if it were let in.
             await asyncio.sleep(0.1)
-            door = service.doors.of(
-                {"type": "http", "method": "PATCH", "path": EDIT, "headers": []}
-            )
+            door = service.doors.of(EDITS, {"headers": []})
             assert door is not None
             # One more is at work, has asked to leave, and had to stay.
             assert len(service.work.begun) == EDITS.width + AWAY
@@ -256,18 +247,16 @@ class TestLanes:
         run(test)
 
     @pytest.mark.parametrize(
-        ("method", "path", "elsewhere", "people", "together"),
+        ("lane", "elsewhere", "people", "together"),
         [
-            ("PATCH", EDIT, {"served": True}, ("ann", "ann", "ann", "ann"), EDITS.served),
+            (EDITS, {"served": True}, ("ann", "ann", "ann", "ann"), EDITS.served),
             # One person drags one thing at a time.
-            ("POST", DRAG, {"apart": True}, ("ann", "ann", "bob", "eve"), PREVIEWS.apart),
+            (PREVIEWS, {"apart": True}, ("ann", "ann", "bob", "eve"), PREVIEWS.apart),
         ],
     )
     def test_more_are_let_in_where_what_takes_long_is_not_done_here(
-        self, method: str, path: str, elsewhere: Any, people: tuple[str, ...], together: int
+        self, lane: Lane, elsewhere: Any, people: tuple[str, ...], together: int
     ) -> None:
-        scope = {"type": "http", "method": method, "path": path, "headers": []}
-
         async def let_in(door: Door | None) -> int:
             assert door is not None
             return sum([await is_let_in(door, who) for who in people])
@@ -278,13 +267,16 @@ class TestLanes:
             return False
 
         doors = Doors(), Doors(**elsewhere)
-        assert [asyncio.run(let_in(one.of(scope))) for one in doors] == [1, together]
+        assert [asyncio.run(let_in(one.of(lane, {"headers": []}))) for one in doors] == [
+            1,
+            together,
+        ]
 
     def test_zips_that_are_not_written_yet_leave_reads_alone(self) -> None:
         async def test(service: Service) -> None:
             for _ in range(READS.width + ZIPS.width):
-                service.ask("GET", "/exports/1/content")
-            service.ask("GET", "/groups/1")
+                service.ask(ZIPS)
+            service.ask(LOOKS, "/groups/1")
             await service.settle()
             assert service.work.begun[-1].endswith("/groups/1")
             await service.end()
@@ -294,7 +286,7 @@ class TestLanes:
     def test_one_more_than_may_wait_is_told_to_come_back(self) -> None:
         async def test(service: Service) -> None:
             for _ in range(CHANGES.width + CHANGES.queue + 1):
-                service.ask("POST", "/datasets")
+                service.ask(CHANGES)
             await service.settle()
             assert service.statuses == [503]
             await service.end()
@@ -305,10 +297,10 @@ class TestLanes:
         async def test(service: Service) -> None:
             began = monotonic()
             for _ in range(UPLOADS.width + UPLOADS.queue + 3):
-                service.ask("POST", "/uploads")
+                service.ask(UPLOADS)
             await service.settle()
             assert service.statuses == []
-            service.ask("GET", "/groups/1")
+            service.ask(LOOKS, "/groups/1")
             await service.settle()
             assert len(service.work.begun) == UPLOADS.width + 1
             while len(service.statuses) < 3:
@@ -324,7 +316,7 @@ class TestLanes:
 
         async def test(service: Service) -> None:
             for _ in "12":
-                service.ask("POST", "/groups/1/preview")
+                service.ask(PREVIEWS)
             while not service.statuses:
                 await asyncio.sleep(0.01)
             assert service.statuses == [503]
@@ -342,7 +334,7 @@ class TestLanes:
 
         async def test(service: Service) -> None:
             for _ in range(PAGES.width + 1):
-                service.ask("GET", "/groups", prefix="", accept=accept)
+                service.ask(PAGES, accept=accept)
             while not service.bodies:
                 await asyncio.sleep(0.01)
             assert service.statuses == [503]
@@ -354,11 +346,11 @@ class TestLanes:
     def test_a_turn_ends_when_the_answer_begins(self) -> None:
         async def test(service: Service) -> None:
             for _ in range(IMAGES.width):
-                service.ask("GET", "/views/1/image")
+                service.ask(IMAGES)
             await service.settle()
             service.work.may_answer.set()
             await service.settle()
-            service.ask("GET", "/views/2/image")
+            service.ask(IMAGES, "/views/2/image")
             await service.settle()
             assert service.work.begun[-1].endswith("/views/2/image")
             await service.end()
@@ -368,7 +360,7 @@ class TestLanes:
     def test_streams_begin_a_few_at_a_time_and_hold_up_nobody_while_they_last(self) -> None:
         async def test(service: Service) -> None:
             for _ in range(3 * STREAMS.width):
-                service.ask("GET", "/events")
+                service.ask(STREAMS)
             await service.settle()
             assert len(service.work.begun) == STREAMS.width
             service.work.may_answer.set()
@@ -385,7 +377,7 @@ class TestLanes:
 
         async def test(service: Service) -> None:
             service.app = broken
-            service.ask("GET", "/groups/1")
+            service.ask(LOOKS, "/groups/1")
             with pytest.raises(KeyError):
                 await service.end()
             assert [door.busy for door in service.doors.all] == [0] * len(LANES)

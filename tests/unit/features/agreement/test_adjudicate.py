@@ -16,8 +16,9 @@ from app.features.groups.history import history
 from app.features.groups.state import GroupState
 from app.features.groups.submit import load, submit
 from app.features.imports.ingest import ingest
+from app.features.independent_annotations.queries import Take
 from app.features.independent_annotations.return_work import hand_back_take
-from app.features.independent_annotations.service import Take, get_take, list_takes
+from app.features.independent_annotations.service import get_take, list_takes
 from app.features.integrity.database import examine
 from app.features.people.roles import Role
 from app.features.people.service import invite

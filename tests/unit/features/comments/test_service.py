@@ -12,7 +12,8 @@ from app.features.comments import service as comments
 from app.features.groups.history import history
 from app.features.groups.replay import rebuild
 from app.features.groups.state import read_etags
-from app.features.notifications.service import RingKind, read_all, read_bell, tell
+from app.features.notifications.queries import RingKind
+from app.features.notifications.service import read_all, read_bell, tell
 from app.features.people.logins import Login, read_roles
 from app.features.people.members import give_role
 from app.features.people.queries import person_by_name

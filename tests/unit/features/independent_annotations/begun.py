@@ -7,7 +7,8 @@ from typing import Any
 from app.db.store import Store
 from app.features.groups.submit import solved
 from app.features.independent_annotations import service as take
-from app.features.independent_annotations.service import Take, begin, get_take
+from app.features.independent_annotations.queries import Take
+from app.features.independent_annotations.service import begin, get_take
 
 
 def begin_for_batch(store: Store, group_id: int, person: str, **terms: Any) -> Take:

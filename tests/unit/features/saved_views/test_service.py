@@ -19,7 +19,7 @@ class TestSaveView:
         save_view(store, 1, " Of the test ", "split:test ", actor="ann")
         save_view(store, 1, "All", "", actor="ben")
         found = list_saved_views(store, 1)
-        assert [(item.name, item.query, item.actor, item.groups) for item in found] == [
+        assert [(item.name, item.q, item.by, item.groups) for item in found] == [
             ("All", "", "ben", 2),
             ("Of the test", "split:test", "ann", 1),
         ]
@@ -29,7 +29,7 @@ class TestSaveView:
         save_view(store, 1, "All", "", actor="ann")
         with pytest.raises(ConflictError, match='"All"'):
             save_view(store, 1, "All", "split:test", actor="ben")
-        assert get_view(store, 1).query == ""
+        assert get_view(store, 1).q == ""
 
     @pytest.mark.parametrize("name", ["", "  ", "x" * 81, "a\nb"])
     def test_a_name_can_be_read(self, store, ids, name: str) -> None:
@@ -67,7 +67,7 @@ class TestListSavedViews:
         with store.write() as session:
             changed = update(SavedViewModel).where(SavedViewModel.id == old.id)
             session.execute(changed.values(query="colour:red"))
-        found = [(item.name, item.query, item.groups) for item in list_saved_views(store, 1)]
+        found = [(item.name, item.q, item.groups) for item in list_saved_views(store, 1)]
         assert found == [("Old", "colour:red", 0), ("Present", "", 2)]
 
 

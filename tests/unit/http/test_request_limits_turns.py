@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Awaitable, Callable
 
-from app.http.fair_turns import Turns
+from app.http.request_limits import Turns
 from tests.waiting import SECONDS
 
 
