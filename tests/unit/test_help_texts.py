@@ -40,7 +40,7 @@ PLAIN_WORDS = """
     lazy lease leases least leftovers legend lens lesson lessons letter limits links list listing live local
     locks login logins lone look loupe mail main maintenance many map markdown marks match matches matrix me measures
     membership mentions menu merge messages metrics migrate mini model name names navigation needs neighbours notice
-    nudge numbers object on open openapi opened options order origin other output own ownership
+    nudge numbers object on open openapi opened opentrackio options order origin other output own ownership
     packing page pages paint palette panel parameters parquet parse parts past patch path pen people permissions pins pitch
     pitches pixel place places plain plural png pointer policies pool popover pose position postgresql preopen preview
     problem process processes profile progress projection proof property proposal propose props

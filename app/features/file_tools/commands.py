@@ -1,4 +1,4 @@
-"""Commands on files of lines, cameras, balls and video: calibrate, score, link, shots."""
+"""Commands on files: calibrate, score, link, cameras, shots; they need no dataset."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ from typing import Annotated
 import typer
 
 from app.plural import plural
-from app.terminal.options import Json, Size, Workers, read_settings
+from app.soccer.frames import ImageSize
+from app.terminal.options import Json, Size, Workers, parse_size, read_settings
 from app.terminal.terminal import complain, print_json, print_values, say, show_progress
 
 commands = typer.Typer()
@@ -21,6 +22,13 @@ LineFiles = Annotated[
 
 PROBLEMS = 10
 """Problems that are printed one by one."""
+
+
+class CameraFormat(StrEnum):
+    """What other tools read of cameras over time."""
+
+    NPZ = "npz"
+    OPENTRACKIO = "opentrackio"
 
 
 class Labels(StrEnum):
@@ -205,3 +213,38 @@ def link(
                 f"{piece['offset_s']:.3f} s, speed {piece['speed']:.4f}"
             )
         _tell_problems(result["problems"])
+
+
+@commands.command()
+def cameras(
+    source: Annotated[
+        Path,
+        typer.Argument(
+            metavar="IN", exists=True, help="Folder of camera files, as track leaves it."
+        ),
+    ],
+    out: Annotated[
+        Path, typer.Argument(metavar="OUT", help="The npz, or a folder for OpenTrackIO's samples.")
+    ],
+    format_: Annotated[
+        CameraFormat,
+        typer.Option("--format", help="npz: K, k, R, t of each frame; opentrackio: a JSON each."),
+    ],
+    size: Annotated[
+        ImageSize | None,
+        typer.Option(parser=parse_size, metavar="WxH", help="Size of the images; for opentrackio."),
+    ] = None,
+    json_: Json = False,
+) -> None:
+    """Write the cameras of a clip for other tools: npz as FIFA's skeletal kit has it, or OpenTrackIO.
+
+    In both z points up and y away from the main stand.
+    """
+    from app.features.file_tools.camera_export import export_cameras
+
+    result = export_cameras(source, out, format_.value, size)
+    if json_:
+        print_json(result)
+        return
+    print_values({name: value for name, value in result.items() if name != "problems"}, False)
+    _tell_problems(result["problems"])
