@@ -15,8 +15,8 @@ from app.video.measures import Measured, hash_distance
 
 MOST_APART, MOST_CELLS = 14, 26.0
 """Frames of the same logo: bits of their hashes that differ, and mean distance of their cells."""
-LEAST_CONTRAST, MOST_LIKE = 12.0, 0.8
-"""Of a logo's frame: deviation of its cells, grey levels, and correlation with the shots beside it."""
+LEAST_FOREIGN = 18.0
+"""Mean distance of a logo's frame from any mix of the shots beside it, grey levels."""
 LEAST_SEEN = 3
 """Wipes of one logo from which on it marks replays; two do where a stretch lies between them."""
 LONGEST_SECONDS = 75.0
@@ -60,17 +60,17 @@ def _alike(rows: Measured, one: tuple[int, int], other: tuple[int, int]) -> bool
 
 
 def _foreign(rows: Measured, interval: tuple[int, int]) -> BoolArray:
-    """Which frames of a transition show something else than the shots beside it, darker or lighter."""
+    """Which frames of a transition show something that belongs to neither shot, and to no mix of them."""
     first, last = interval
+    old, new = (
+        rows["cells"][beside].ravel().astype(np.float64)
+        for beside in (max(first - 1, 0), min(last + 1, len(rows) - 1))
+    )
     cells = rows["cells"][first : last + 1].reshape(last - first + 1, -1).astype(np.float64)
-    foreign = cells.std(axis=1) > LEAST_CONTRAST
-    for beside in (max(first - 1, 0), min(last + 1, len(rows) - 1)):
-        shot = rows["cells"][beside].ravel().astype(np.float64)
-        centred = cells - cells.mean(axis=1, keepdims=True)
-        along = centred @ (shot - shot.mean())
-        lengths = np.linalg.norm(centred, axis=1) * np.linalg.norm(shot - shot.mean())
-        foreign &= along < MOST_LIKE * np.maximum(lengths, 1.0)
-    return np.asarray(foreign)
+    # Darker and lighter mixes as well: a fade is none.
+    basis = np.linalg.qr(np.stack([old, new, np.ones_like(old)], axis=1))[0]
+    left = np.abs(cells - cells @ basis @ basis.T).mean(axis=1)
+    return np.asarray(left > LEAST_FOREIGN)
 
 
 def between_logos(

@@ -91,8 +91,9 @@ def find_shots(
     cuts, flashed = hard_cuts(rows, index.step)
     transitions = soft_transitions(rows, index.step, cuts, flashed)
     shots = _divided(index, cuts.tolist(), transitions)
-    clusters = logo_clusters(rows, [(one.first, one.last) for one in transitions])
-    logos = {one.last + 1: cluster for one, cluster in zip(transitions, clusters, strict=True)}
+    wipes = [one for one in transitions if one.kind == "wipe"]
+    clusters = logo_clusters(rows, [(one.first, one.last) for one in wipes])
+    logos = {one.last + 1: cluster for one, cluster in zip(wipes, clusters, strict=True)}
     kinds: list[ShotKind] = []
     for done, shot in enumerate(shots):
         numbers = frames_to_look_at(shot.first, shot.last, shot.end_s - shot.start_s)
@@ -184,7 +185,7 @@ def shots_of_recording(
     def progress(done: int, total: int | None = None, sentence: str = "") -> None:
         tell((done, total, sentence))
 
-    with closing(RecordingReader(path, index)) as reader:
+    with closing(RecordingReader(path, index, kept_bytes=0)) as reader:
 
         def look(numbers: Sequence[int]) -> list[LookedAt]:
             return [look_at(_narrowed(reader.read(number))) for number in numbers]
