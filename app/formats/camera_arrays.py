@@ -1,4 +1,5 @@
-"""Cameras in files of numpy (``.npz``: K, R, t and k, a row a frame) and of OpenCV's FileStorage (YAML)."""
+"""Cameras in files of numpy (``.npz``: K, R, t and k, a row a frame), both ways, and of OpenCV's FileStorage
+(YAML), read."""
 
 from __future__ import annotations
 
@@ -6,6 +7,7 @@ import io
 import math
 import re
 import zipfile
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -14,6 +16,8 @@ import yaml
 
 from app.errors import DatasetFormatError
 from app.formats.file_tree import BROKEN, Limits
+from app.geometry.arrays import FloatArray
+from app.geometry.camera import Camera
 
 _SHAPES = {"K": (3, 3), "R": (3, 3), "t": (3,)}
 """Arrays that must be there, each with the shape of one camera's part."""
@@ -25,6 +29,7 @@ _NUMBERS = {"K": 9, "R": 9, "t": 3, _DISTORTION: 14}
 """Most numbers that one camera has in each array; OpenCV's longest distortion has 14."""
 _MAX_HEADER = 10_000
 _MAX_YAML = 1024 * 1024
+_TO_Z_UP = np.diag([1.0, -1.0, -1.0])
 _TEXT = "tag:yaml.org,2002:str"
 _MERGE = "tag:yaml.org,2002:merge"
 
@@ -66,6 +71,40 @@ def cameras_of_arrays(
         for at in range(count)
     ]
     return [(None if count == 1 else f"{key}/{at}", item) for at, item in enumerate(objects)]
+
+
+def arrays_of_cameras(cameras: Mapping[int, Camera], path: str) -> dict[str, FloatArray]:
+    """Cameras over time as FIFA's skeletal kit has them: a row a frame, from frame 0 on.
+
+    The world is x along the pitch, y across it away from the main stand, z up. Frames without a camera
+    are NaN.
+
+    Args:
+        cameras: By frame.
+        path: File as the user knows it, for the error.
+
+    Returns:
+        ``K`` (F, 3, 3), ``k`` (F, 5) (OpenCV's k1 k2 p1 p2 k3; 8 or 12 where a lens has more), ``R``
+        (F, 3, 3) and ``t`` (F, 3): a point X of the world is R X + t in the camera.
+
+    Raises:
+        DatasetFormatError: A frame is beyond what a file may hold, or a lens is none of OpenCV's.
+    """
+    count = max(cameras, default=-1) + 1
+    if count > MOST_CAMERAS:
+        raise _too_many(path, "K", f"would have {count:,} rows")
+    arrays = {name: np.full((count, *shape), np.nan) for name, shape in _SHAPES.items()}
+    lens = np.full((count, 12), np.nan)
+    for frame, camera in cameras.items():
+        if camera.is_wide:
+            problem = f"has the lens {camera.lens}; an npz holds OpenCV's distortion alone"
+            raise DatasetFormatError(path, f"frame {frame}", "lens", problem)
+        arrays["K"][frame] = camera.K
+        arrays["R"][frame] = camera.rotation @ _TO_Z_UP
+        arrays["t"][frame] = -camera.rotation @ camera.position
+        lens[frame] = camera.distortion
+    used = np.flatnonzero(np.nan_to_num(lens).any(axis=0)).max(initial=0)
+    return {**arrays, _DISTORTION: lens[:, : next(size for size in (5, 8, 12) if used < size)]}
 
 
 def _rows(

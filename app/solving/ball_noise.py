@@ -95,15 +95,18 @@ class Sigma:
 
     ``value`` is the one with which 95 % ellipsoids hold the truth: of few numbers it is above the
     most likely one.
+
+    Attributes:
+        low: End of the 95 % interval.
+        numbers: Independent numbers that rays leave unexplained.
+        left_out: Those among them that noise does not explain.
     """
 
     value: float
     low: float
     high: float
     numbers: int
-    """Independent numbers that rays leave unexplained."""
     left_out: int
-    """Those among them that noise does not explain."""
 
 
 @dataclass(frozen=True)

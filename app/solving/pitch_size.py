@@ -84,8 +84,9 @@ class PitchEstimate:
     """An estimated pitch.
 
     Attributes:
-        length: Metres; None where the frames do not show it, like ``width``.
-        length_sigma_m: Standard deviation of the length; ``width_sigma_m`` of the width.
+        length, width: Metres; None where the frames do not show it.
+        length_sigma_m: Standard deviation of the length.
+        width_sigma_m: Standard deviation of the width.
         frames: Number of frames that it rests on.
     """
 

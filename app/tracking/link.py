@@ -45,7 +45,7 @@ _WRONG = float(np.log(0.1))
 """Logarithm of the share of rays that are of something else."""
 _FREEDOM = 4.0
 """Of the t distribution of misses: gross errors pull little."""
-_BEND = 15.0
+_BEND = 25.0
 """Acceleration of a ball, m/s2: how far it leaves the straight way between two rays."""
 _CANDIDATES = 8
 _APART_S = 0.25
@@ -473,7 +473,8 @@ class _Fit:
         block = np.floor((times - times[0]) / _BLOCK_S).astype(int)
         sums = np.column_stack([np.bincount(block, pulls[:, at]) for at in (0, 1)])
         blocks = len(np.unique(block))
-        run = float(((sums @ known) * sums).sum()) / 2
+        # The two numbers of the map fit two of the blocks.
+        run = float(((sums @ known) * sums).sum()) / 2 * blocks / max(blocks - 2, 1)
         self.run = max(1.0, (run * blocks + _PRIOR_BLOCKS) / (blocks + _PRIOR_BLOCKS))
         turn = np.array([[1.0, -self.middle], [0.0, 1.0]])
         rays = self.replay.times[pairs.replay]

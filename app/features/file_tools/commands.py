@@ -1,4 +1,4 @@
-"""Commands on files of lines, cameras and balls: calibrate, score, link; they need no dataset."""
+"""Commands on files: calibrate, score, link, cameras, shots; they need no dataset."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ from typing import Annotated
 import typer
 
 from app.plural import plural
-from app.terminal.options import Json, Size, Workers, read_settings
+from app.soccer.frames import ImageSize
+from app.terminal.options import Json, Size, Workers, parse_size, read_settings
 from app.terminal.terminal import complain, print_json, print_values, say, show_progress
 
 commands = typer.Typer()
@@ -21,6 +22,13 @@ LineFiles = Annotated[
 
 PROBLEMS = 10
 """Problems that are printed one by one."""
+
+
+class CameraFormat(StrEnum):
+    """What other tools read of cameras over time."""
+
+    NPZ = "npz"
+    OPENTRACKIO = "opentrackio"
 
 
 class Labels(StrEnum):
@@ -133,6 +141,37 @@ def score(
 
 
 @commands.command()
+def shots(
+    recording: Annotated[
+        Path,
+        typer.Argument(
+            metavar="RECORDING", exists=True, dir_okay=False, help="Video file (mp4, mkv, ts, ...)."
+        ),
+    ],
+    out: Annotated[Path, typer.Argument(metavar="OUT", help="Folder for shots.json.")],
+    json_: Json = False,
+) -> None:
+    """Find the shots of a recording: cuts, dissolves, wipes and fades, and what each shot shows.
+
+    OUT gets shots.json: first and last frame of each shot (frames count from 0), when it begins and
+    ends, its kind (main, replay, closeup, other) and how it is entered. Frames of a soft transition
+    belong to no shot.
+    """
+    from app.features.file_tools.shots import shots_file
+
+    with show_progress("Finding shots") as progress:
+        result = shots_file(recording, out, read_settings(), progress)
+    if json_:
+        print_values(result, json_)
+        return
+    for row in result["shots"]:
+        say(
+            f"{row['first']:>7} - {row['last']:<7} {row['start_s']:>9.2f} s  "
+            f"{row['end_s'] - row['start_s']:>7.2f} s  {row['kind']:8} {row['entered_by']}"
+        )
+
+
+@commands.command()
 def link(
     live: Annotated[
         Path, typer.Argument(metavar="LIVE", exists=True, help="Folder of the live shot.")
@@ -174,3 +213,38 @@ def link(
                 f"{piece['offset_s']:.3f} s, speed {piece['speed']:.4f}"
             )
         _tell_problems(result["problems"])
+
+
+@commands.command()
+def cameras(
+    source: Annotated[
+        Path,
+        typer.Argument(
+            metavar="IN", exists=True, help="Folder of camera files, as track leaves it."
+        ),
+    ],
+    out: Annotated[
+        Path, typer.Argument(metavar="OUT", help="The npz, or a folder for OpenTrackIO's samples.")
+    ],
+    format_: Annotated[
+        CameraFormat,
+        typer.Option("--format", help="npz: K, k, R, t of each frame; opentrackio: a JSON each."),
+    ],
+    size: Annotated[
+        ImageSize | None,
+        typer.Option(parser=parse_size, metavar="WxH", help="Size of the images; for opentrackio."),
+    ] = None,
+    json_: Json = False,
+) -> None:
+    """Write the cameras of a clip for other tools: npz as FIFA's skeletal kit has it, or OpenTrackIO.
+
+    In both z points up and y away from the main stand.
+    """
+    from app.features.file_tools.camera_export import export_cameras
+
+    result = export_cameras(source, out, format_.value, size)
+    if json_:
+        print_json(result)
+        return
+    print_values({name: value for name, value in result.items() if name != "problems"}, False)
+    _tell_problems(result["problems"])

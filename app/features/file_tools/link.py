@@ -12,12 +12,12 @@ import numpy as np
 
 from app.durable import replace_file
 from app.errors import DatasetFormatError, InputError
+from app.features.file_tools.camera_export import by_frame
 from app.finite import json_text
 from app.formats.cameras_reader import read_cameras
 from app.formats.csv_text import is_missing, read_rows
 from app.formats.file_tree import DEFAULT_LIMITS
 from app.formats.report import Report
-from app.geometry.camera import Camera
 from app.tracking.ball_rays import BallRays, ball_rays
 from app.tracking.link import TimeMap, find_time_map
 
@@ -97,7 +97,7 @@ def _read_view(folder: Path, report: Report) -> BallRays:
     """The rays of the ball of one folder."""
     if not folder.is_dir():
         raise InputError(f"{folder} is no folder of camera files and {BALL_FILE}")
-    cameras = _by_frame(read_cameras(folder, report))
+    cameras = by_frame(read_cameras(folder, report))
     if not cameras:
         raise report.refusal(f"{folder} holds no camera_<frame>.json")
     rows = _read_ball(folder / BALL_FILE, report)
@@ -122,16 +122,6 @@ def _read_view(folder: Path, report: Report) -> BallRays:
             "at most: cut it out first"
         )
     return ball_rays([one[0] for one in kept], [one[1] for one in kept], [one[2] for one in kept])
-
-
-def _by_frame(cameras: Mapping[str, Camera]) -> dict[int, Camera]:
-    """Cameras by the number of their frame: ``camera_00012.json`` is that of frame 12."""
-    found = {}
-    for key, camera in cameras.items():
-        stem = key.rsplit("/", 1)[-1]
-        if stem.isascii() and stem.isdigit():
-            found[int(stem)] = camera
-    return found
 
 
 def _read_ball(path: Path, report: Report) -> list[tuple[int, float, tuple[float, float]]]:

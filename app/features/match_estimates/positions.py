@@ -52,12 +52,13 @@ class PositionState:
     """The shared position of one match.
 
     Attributes:
+        match: Name of the match.
         groups: How many it has.
         views: Pictures of the main camera that have lines.
-        shared: How many of them have a position.
-        mean: The mean of those, pitch frame, metres; None without any.
+        shared: How many of them have what the others say of its position.
+        mean: Where it stands on average, pitch frame, metres; None where none does.
         sigma_m: How far off it may be for one picture, the median over pictures and axes.
-        current: Whether it would be estimated from the same now; None where it never was.
+        current: Whether it would be estimated from the same now; None: nothing is shared.
         used: Whether the policy uses it.
         sentence: All that in words.
     """

@@ -80,7 +80,8 @@ class MatchPictures:
     """The pictures of a match's main camera as they are in use.
 
     Attributes:
-        frames: How many have lines.
+        match: Name of the match.
+        frames: How many of them have lines.
         picture: What was done to most of them; None: they are as they were taken.
         mixed: They are not all alike.
     """

@@ -7,25 +7,15 @@ from typing import Annotated, Literal
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from app.features.groups.schemas import PictureEdit
+from app.features.match_estimates.positions import PositionState
+from app.features.match_estimates.queries import MatchPictures
 from app.features.policies.noise import Advice
 from app.http.documents import Document, ListDocument
-from app.soccer.picture import PictureGeometry
 from app.solving.ball_noise import Sigma
-from app.solving.line_noise import Interval
+from app.solving.line_noise import LineEstimate
 
 
-class MatchPictureDocument(Document):
-    """The pictures of one match's main camera."""
-
-    match: str
-    frames: int = Field(description="How many of them have lines.")
-    picture: PictureGeometry | None = Field(
-        description="What was done to most of them; null: they are as they were taken."
-    )
-    mixed: bool = Field(description="They are not all alike.")
-
-
-class MatchPicturesDocument(ListDocument[MatchPictureDocument]):
+class MatchPicturesDocument(ListDocument[MatchPictures]):
     """The pictures of a dataset's matches, by name of the match."""
 
 
@@ -50,26 +40,7 @@ class MatchPictureChange(BaseModel):
     picture: PictureEdit | None = Field(description="As proposed; null: as they were taken.")
 
 
-class MatchPositionDocument(Document):
-    """The shared position of one match."""
-
-    match: str
-    groups: int
-    views: int = Field(description="Pictures of the main camera that have lines.")
-    shared: int = Field(description="How many of them have what the others say of its position.")
-    mean: tuple[float, float, float] | None = Field(
-        description="Where it stands on average, pitch frame, metres; null where none does."
-    )
-    sigma_m: float | None = Field(
-        description="How far off it may be for one picture, each axis, the median of pictures."
-    )
-    current: bool | None = Field(
-        description="Whether a new estimate would use the same data; null: no shared position."
-    )
-    sentence: str = Field(description="All that in words.")
-
-
-class SharedPositionsDocument(ListDocument[MatchPositionDocument]):
+class SharedPositionsDocument(ListDocument[PositionState]):
     """The shared positions of a dataset's matches, by name of the match."""
 
     used: bool = Field(description="Whether the policy uses them: `calibration.share_position`.")
@@ -103,22 +74,12 @@ class RigTakenBack(BaseModel):
     taken_back: int = Field(description="How many cameras are what they were.")
 
 
-class SigmaDocument(Document, shows=Sigma):
-    """An estimated standard deviation, pixels at 1920 x 1080."""
-
-    low: float = Field(description="End of the 95 % interval.")
-    numbers: int = Field(description="Independent numbers that rays leave unexplained.")
-    left_out: int = Field(description="Those among them that noise does not explain.")
-
-
 class BallNoiseDocument(Document):
     """Noise of annotated balls; null where no groups say anything."""
 
-    click: SigmaDocument | None = Field(description="Of a coordinate of a ball's centre.")
+    click: Sigma | None = Field(description="Of a coordinate of a ball's centre.")
     share: float | None = Field(description="What the ball's diameter adds, as a share of it.")
-    given: SigmaDocument | None = Field(
-        description="What a given camera of unknown exactness adds."
-    )
+    given: Sigma | None = Field(description="What a given camera of unknown exactness adds.")
 
 
 class SourceNoiseDocument(Document):
@@ -131,20 +92,6 @@ class SourceNoiseDocument(Document):
     ratio: float = Field(description="Of that to the dataset's.")
     numbers: float = Field(description="Independent numbers that speak of it alone.")
     differs: bool = Field(description="The interval leaves out the dataset's sigma.")
-
-
-class IntervalDocument(Document, shows=Interval):
-    """A number with the ends of its 95 % interval."""
-
-
-class LineEstimateDocument(Document):
-    """Noise of clicks on field lines, from all images together."""
-
-    sigma: IntervalDocument = Field(description="Of a point, pixels at 960 x 540.")
-    share: IntervalDocument = Field(
-        description="Of its variance, what the points of a marking have in common."
-    )
-    views: int = Field(description="Images that it rests on.")
 
 
 class AdviceDocument(Document, shows=Advice):
@@ -179,9 +126,7 @@ class NoiseDocument(Document):
     )
     used: list[FactorDocument] = Field(description="Those that sigma uses now.")
     is_new: bool = Field(description="`factors` say something else than `used`.")
-    line_estimate: LineEstimateDocument | None = Field(
-        description="Null where no lines make a camera."
-    )
+    line_estimate: LineEstimate | None = Field(description="Null where no lines make a camera.")
     follows: bool = Field(
         description="The policy uses the estimates: each solve of the dataset sets them."
     )

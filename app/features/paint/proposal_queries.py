@@ -66,9 +66,14 @@ class MatchProposals:
     """How far the views of one match are.
 
     Attributes:
+        match: Name of the match.
         views: Without a camera, given or of their lines, and with a picture; static cameras count
             once.
-        looked: How many of them were looked at as they are now; ``proposed``, ``unsure`` and ``nothing`` add up to it.
+        looked: How many of them were looked at as they are now; ``proposed``, ``unsure`` and
+            ``nothing`` add up to it.
+        proposed: For how many of those lines are proposed.
+        unsure: For how many a camera was found that may be another's.
+        nothing: For how many there was none, or no picture.
         accepted: Views whose lines are as they were proposed, at least in part.
     """
 

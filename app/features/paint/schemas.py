@@ -8,37 +8,15 @@ from pydantic import BaseModel, ConfigDict, Field, StrictBool
 
 from app.features.groups.schemas import LineDocuments, LineEdits, lines_document
 from app.features.match_estimates.schemas import MatchRequest
-from app.features.paint.proposal_queries import Proposal
+from app.features.paint.proposal_queries import MatchProposals, Proposal
+from app.features.paint.service import PaintState
 from app.http.documents import Document, ListDocument
 from app.paint.view_paint import ViewPaint
 from app.paint.view_proposal import ViewProposal
 from app.soccer.choices import ProposalOutcome
 
 
-class MatchPaintDocument(Document):
-    """What was read of the pictures of one match."""
-
-    match: str
-    groups: int
-    views: int = Field(description="Views of moving cameras that have lines.")
-    without_picture: int = Field(description="How many of them have no picture.")
-    read: int = Field(description="How many of their pictures were read.")
-    old: int | None = Field(
-        description="How many were read for other lines than their view has now, beside other "
-        "boxes of people, or by an older version; null where too many were read to compare them."
-    )
-    painted: int = Field(
-        description="How many of those place their camera, unless the lines changed since."
-    )
-    no_paint: int = Field(description="How many show too little paint.")
-    paint_disagrees: int = Field(
-        description="In how many the paint does not lie where the lines were drawn."
-    )
-    no_frame: int = Field(description="How many are missing or cannot be read.")
-    sentence: str = Field(description="All that in words.")
-
-
-class DatasetPaintDocument(ListDocument[MatchPaintDocument]):
+class DatasetPaintDocument(ListDocument[PaintState]):
     """What was read of the paint in a dataset's pictures, by name of the match."""
 
     used: bool = Field(description="Whether the policy uses it: `calibration.source`.")
@@ -128,22 +106,7 @@ class ProposalDocument(Document):
         return cls.model_validate({**vars(found), "lines": lines_document(found.lines)})
 
 
-class MatchProposalsDocument(Document):
-    """How far the views of one match are."""
-
-    match: str
-    views: int = Field(
-        description="Views with a picture and without a camera, given or of their lines; a static "
-        "camera counts once."
-    )
-    looked: int = Field(description="How many of them were looked at.")
-    proposed: int = Field(description="For how many of those lines are proposed.")
-    unsure: int = Field(description="For how many a camera was found that may be another's.")
-    nothing: int = Field(description="For how many there was none, or no picture.")
-    accepted: int = Field(description="Views that have lines as they were proposed by now.")
-
-
-class DatasetProposalsDocument(ListDocument[MatchProposalsDocument]):
+class DatasetProposalsDocument(ListDocument[MatchProposals]):
     """What was proposed for the views of a dataset, by name of the match."""
 
 

@@ -59,6 +59,7 @@ class PaintState:
     """What was read of the pictures of one match.
 
     Attributes:
+        match: Name of the match.
         groups: How many it has.
         views: Views of moving cameras with lines.
         without_picture: How many of them have no picture.

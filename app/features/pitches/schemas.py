@@ -9,6 +9,7 @@ from pydantic import AliasPath, BaseModel, ConfigDict, Field
 from app.features.groups.schemas import PitchSize
 from app.http.documents import Document, ListDocument
 from app.soccer.pitch import LENGTH_RANGE, WIDTH_RANGE, Arc, Pitch, Segment, twin_marking
+from app.solving.pitch_size import PitchEstimate
 
 XYZ = tuple[float, float, float]
 
@@ -52,16 +53,6 @@ class PitchDocument(BaseModel):
         )
 
 
-class PitchEstimateDocument(Document):
-    """What the lines of a match show; null: they do not show it."""
-
-    length: float | None = Field(description="Metres.")
-    width: float | None = Field(description="Metres.")
-    length_sigma_m: float | None = Field(description="Standard deviation of the length.")
-    width_sigma_m: float | None = Field(description="Standard deviation of the width.")
-    frames: int = Field(description="Pictures that it rests on.")
-
-
 class MatchPitchDocument(Document):
     """The pitch of one match."""
 
@@ -72,7 +63,7 @@ class MatchPitchDocument(Document):
     length: float = Field(validation_alias=AliasPath("pitch", "length"), description="In use, m.")
     width: float = Field(validation_alias=AliasPath("pitch", "width"), description="In use, m.")
     mixed: bool = Field(description="Its groups were brought with several sizes.")
-    estimate: PitchEstimateDocument | None = Field(description="Null while it is not computed.")
+    estimate: PitchEstimate | None = Field(description="Null while it is not computed.")
     problem: str | None = Field(description="Why it cannot be estimated.")
     proposed: PitchSize | None = Field(
         description="The size to use instead: it differs beyond its uncertainty."

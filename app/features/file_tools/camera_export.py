@@ -1,0 +1,129 @@
+"""Cameras over time for other tools: a folder of camera files to npz or OpenTrackIO."""
+
+from __future__ import annotations
+
+import io
+import json
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+
+from app.durable import replace_file
+from app.errors import DatasetFormatError, InputError
+from app.finite import json_text
+from app.formats.camera_arrays import arrays_of_cameras
+from app.formats.cameras_reader import read_cameras
+from app.formats.opentrackio_writer import frame_rate, opentrackio_sample, why_not_opentrackio
+from app.formats.report import Report
+from app.geometry.camera import Camera
+from app.soccer.frames import ImageSize
+
+T = TypeVar("T")
+
+
+def export_cameras(
+    source: Path, out: Path, kind: str, size: ImageSize | None = None
+) -> dict[str, Any]:
+    """Write the cameras of a clip, as ``track`` leaves them, for another tool.
+
+    Args:
+        source: Folder of ``camera_<frame>.json``; ``track.json`` in it says the times and outcomes.
+        out: The npz, or the folder that gets ``sample_<frame>.json``.
+        kind: ``npz`` or ``opentrackio``.
+        size: Of the images, where the camera files do not state it; OpenTrackIO needs it.
+
+    Returns:
+        Counts: ``cameras``, ``first`` and ``last`` frame, ``missing`` frames between; ``problems``.
+
+    Raises:
+        InputError: There is no camera of a frame, or no size.
+        DatasetFormatError: A camera is none that the format can say.
+    """
+    report = Report()
+    sizes: dict[str, ImageSize] = {}
+    found = read_cameras(source, report, sizes=sizes)
+    cameras = by_frame(found)
+    if not cameras:
+        raise report.refusal(f"{source} holds no camera_<frame>.json")
+    if kind == "npz":
+        content = io.BytesIO()
+        arrays: dict[str, Any] = dict(arrays_of_cameras(cameras, str(source)))
+        np.savez_compressed(content, **arrays)
+        out.parent.mkdir(parents=True, exist_ok=True)
+        replace_file(out, content.getvalue())
+    else:
+        _write_samples(source, out, cameras, by_frame(sizes), size)
+    return {
+        "cameras": len(cameras),
+        "first": min(cameras),
+        "last": max(cameras),
+        "missing": max(cameras) - min(cameras) + 1 - len(cameras),
+        "problems": [problem.message for problem in report.problems],
+    }
+
+
+def by_frame(values: Mapping[str, T]) -> dict[int, T]:
+    """What belongs to cameras by the number of their frame: ``camera_00012.json`` is that of frame 12."""
+    found = {}
+    for key, value in values.items():
+        stem = key.rsplit("/", 1)[-1]
+        if stem.isascii() and stem.isdigit():
+            found[int(stem)] = value
+    return found
+
+
+def _write_samples(
+    source: Path,
+    out: Path,
+    cameras: Mapping[int, Camera],
+    sizes: Mapping[int, ImageSize],
+    size: ImageSize | None,
+) -> None:
+    rows = _tracked(source)
+    times = {frame: row["time"] for frame, row in rows.items() if _is_number(row.get("time"))}
+    rate = frame_rate(times)
+    width = len(str(max(cameras)))
+    samples = {}
+    for frame, camera in sorted(cameras.items()):
+        shape = sizes.get(frame, size)
+        if shape is None:
+            raise InputError(
+                f"the camera of frame {frame} does not say the size of its image, which OpenTrackIO "
+                "needs: give it as --size 1280x720"
+            )
+        if problem := why_not_opentrackio(camera):
+            raise DatasetFormatError(str(source), f"frame {frame}", None, problem)
+        outcome = rows.get(frame, {}).get("outcome")
+        samples[f"sample_{frame:0{width}d}.json"] = opentrackio_sample(
+            camera,
+            shape,
+            frame,
+            source=source.resolve().name,
+            time=times.get(frame),
+            rate=rate,
+            status=outcome if isinstance(outcome, str) and outcome else None,
+        )
+    out.mkdir(parents=True, exist_ok=True)
+    for name, sample in samples.items():
+        replace_file(out / name, (json_text(sample, indent=1) + "\n").encode())
+
+
+def _tracked(source: Path) -> dict[int, dict[str, Any]]:
+    """The rows of ``track.json`` by frame; none where there is no such file."""
+    path = source / "track.json"
+    if not path.is_file():
+        return {}
+    try:
+        rows = json.loads(path.read_bytes())["frames"]
+        return {int(row["frame"]): row for row in rows}
+    except (ValueError, LookupError, TypeError) as error:
+        raise DatasetFormatError(
+            str(path), None, "frames", "is no list of tracked frames"
+        ) from error
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)

@@ -1,0 +1,139 @@
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from app.errors import ReviewError
+from app.features.file_tools.camera_export import by_frame, export_cameras
+from app.geometry.camera import Camera
+from app.soccer.frames import ImageSize
+from tests.cameras import EVERY_COEFFICIENT, SIZE, looking, wide, write_cameras
+
+POINTS = np.array([(0.0, 0.0, 0.0), (-4.0, 20.0, -2.0), (9.0, 10.0, -0.11), (3.0, -30.0, -8.0)])
+CAMERAS = {
+    frame: looking((0.0, 62.0, -16.0), (frame - 5.0, 0.0, 0.0), 1500.0 + 10 * frame, bend=0.01)
+    for frame in (2, 3, 5)
+}
+
+
+def folder_of(folder: Path, cameras: dict[int, Camera] = CAMERAS) -> Path:
+    folder.mkdir()
+    write_cameras(folder, {f"{frame:05d}": camera for frame, camera in cameras.items()})
+    return folder
+
+
+class TestNpz:
+    def test_opencv_sees_the_same_pixels(self, tmp_path: Path) -> None:
+        """As FIFA's kit projects: ``cv2.projectPoints`` of points whose z is up."""
+        out = tmp_path / "made" / "clip.npz"
+        result = export_cameras(folder_of(tmp_path / "cameras"), out, "npz")
+        assert result == {"cameras": 3, "first": 2, "last": 5, "missing": 1, "problems": []}
+        with np.load(out, allow_pickle=False) as arrays:
+            shapes = {name: arrays[name].shape for name in arrays.files}
+            assert shapes == {"K": (6, 3, 3), "k": (6, 5), "R": (6, 3, 3), "t": (6, 3)}
+            for frame, camera in CAMERAS.items():
+                K, k, R, t = (arrays[name][frame] for name in "KkRt")
+                assert np.linalg.det(R) == pytest.approx(1.0)
+                assert (-R.T @ t)[2] == pytest.approx(16.0)
+                seen, _ = cv2.projectPoints(POINTS * (1.0, -1.0, -1.0), R, t, K, k)
+                # k holds less than the lens has.
+                assert np.allclose(seen[:, 0], camera.project(POINTS), atol=1e-6)
+            for frame in (0, 1, 4):
+                assert all(np.isnan(arrays[name][frame]).all() for name in "KkRt")
+
+    def test_longer_lenses_keep_all_their_numbers(self, tmp_path: Path) -> None:
+        out = tmp_path / "clip.npz"
+        export_cameras(folder_of(tmp_path / "cameras", {0: EVERY_COEFFICIENT}), out, "npz")
+        with np.load(out) as arrays:
+            assert arrays["k"][0].tolist() == EVERY_COEFFICIENT.distortion.tolist()
+
+    def test_a_lens_that_opencv_has_not_is_refused(self, tmp_path: Path) -> None:
+        cameras = {4: wide((0.0, 60.0, -20.0), (0.0, 0.0, 0.0))}
+        with pytest.raises(ReviewError, match=r"frame 4.*fisheye"):
+            export_cameras(folder_of(tmp_path / "cameras", cameras), tmp_path / "a.npz", "npz")
+
+    def test_a_number_that_is_no_frame_s_is_refused(self, tmp_path: Path) -> None:
+        cameras = {3_000_000_000: CAMERAS[2]}
+        with pytest.raises(ReviewError, match="3,000,000,001 rows"):
+            export_cameras(folder_of(tmp_path / "cameras", cameras), tmp_path / "a.npz", "npz")
+
+
+class TestOpenTrackIO:
+    def test_a_sample_a_frame_with_what_track_says(self, tmp_path: Path) -> None:
+        source, out = folder_of(tmp_path / "cameras"), tmp_path / "out"
+        rows = [
+            {"frame": frame, "time": frame / 25, "outcome": "lost" if frame == 4 else "tracked"}
+            for frame in range(6)
+        ]
+        (source / "track.json").write_text(json.dumps({"frames": rows}))
+        export_cameras(source, out, "opentrackio", SIZE)
+        assert sorted(path.name for path in out.iterdir()) == [
+            f"sample_{frame}.json" for frame in CAMERAS
+        ]
+        sample = json.loads((out / "sample_3.json").read_text())
+        assert sample["timing"]["sampleTimestamp"] == {"seconds": 0, "nanoseconds": 120_000_000}
+        assert sample["timing"]["sampleRate"] == {"num": 25, "denom": 1}
+        assert sample["tracker"] == {"status": "tracked"}
+        assert sample["transforms"][0]["translation"] == {"x": 0.0, "y": -62.0, "z": 16.0}
+
+    def test_the_size_has_to_be_known(self, tmp_path: Path) -> None:
+        source = folder_of(tmp_path / "cameras")
+        with pytest.raises(ReviewError, match="--size"):
+            export_cameras(source, tmp_path / "out", "opentrackio")
+        assert not (tmp_path / "out").exists()
+
+    def test_a_camera_may_say_it(self, tmp_path: Path) -> None:
+        source = folder_of(tmp_path / "cameras")
+        for path in source.iterdir():
+            value = {**json.loads(path.read_text()), "width": 1920, "height": 1080}
+            path.write_text(json.dumps(value))
+        export_cameras(source, tmp_path / "out", "opentrackio", ImageSize(640, 360))
+        sample = json.loads((tmp_path / "out" / "sample_2.json").read_text())
+        assert sample["static"]["camera"]["activeSensorResolution"] == {
+            "height": 1080,
+            "width": 1920,
+        }
+
+    def test_a_damaged_track_is_named(self, tmp_path: Path) -> None:
+        source = folder_of(tmp_path / "cameras")
+        (source / "track.json").write_text('{"rows": []}')
+        with pytest.raises(ReviewError, match=r"track\.json"):
+            export_cameras(source, tmp_path / "out", "opentrackio", SIZE)
+
+    def test_what_it_cannot_say_is_refused(self, tmp_path: Path) -> None:
+        source = folder_of(tmp_path / "cameras", {8: EVERY_COEFFICIENT})
+        with pytest.raises(ReviewError, match=r"frame 8.*tangential"):
+            export_cameras(source, tmp_path / "out", "opentrackio", SIZE)
+
+
+class TestByFrame:
+    def test_numbers_count_and_other_names_do_not(self) -> None:
+        assert by_frame({"00012": "a", "clip/7": "b", "north": "c", "²": "d"}) == {12: "a", 7: "b"}
+
+
+class TestCommand:
+    def test_an_empty_folder(
+        self, tmp_path: Path, touchline: Callable[..., tuple[int, str, str]]
+    ) -> None:
+        code, _, err = touchline("cameras", tmp_path, tmp_path / "a.npz", "--format", "npz")
+        assert code == 1
+        assert "camera" in err
+
+    def test_both_formats(
+        self, tmp_path: Path, touchline: Callable[..., tuple[int, str, str]]
+    ) -> None:
+        source = folder_of(tmp_path / "cameras")
+        code, out, _ = touchline("cameras", source, tmp_path / "a.npz", "--format", "npz", "--json")
+        assert code == 0
+        assert json.loads(out)["cameras"] == 3
+        code, out, _ = touchline(
+            "cameras", source, tmp_path / "o", "--format", "opentrackio", "--size", "1280x720"
+        )
+        assert code == 0
+        assert "missing" in out
+        assert len(list((tmp_path / "o").iterdir())) == 3
