@@ -42,23 +42,25 @@ BRIDGED: Outcome = "bridged"
 LOST: Outcome = "lost"
 OUTCOMES = (TRACKED, BRIDGED, LOST)
 
-WINDOWS = (6.0, 4.0, 3.0, 3.0)
-"""Pixels at 960 wide, round by round: the background leaves little to seek."""
-FLOW_PX, SAID_ONCE = 0.8, 4.0
-"""Standard deviation of where the background lays the grass, and of how many such places it tells."""
 GRID = (6, 4)
-MOVE_SIGMA_M, ANGLE_SIGMA, ROLL_SIGMA = 0.10, np.radians(4.0), np.radians(0.15)
+ANGLE_SIGMA = np.radians(4.0)
 """By which a camera changes from frame to frame beside what the background says."""
 FOCAL_SIGMA, KAPPA_SIGMA = 0.05, 0.001
 LEAST_SUPPORTED, LEAST_OF_USUAL, LEAST_WEAKEST = 0.30, 0.6, 0.15
 """A camera has this share of its markings on paint, of what frames before had, and of each marking."""
-MOST_ERROR_PX, MOST_MOVED_PX = 0.6, 3.0
-"""Median distance of paint from its marking, and of the markings from where the background laid them."""
+MOST_ERROR_PX = 0.6
+PATCHY_WEAKEST, PATCHY_OF_USUAL, PATCHY_PX, RATHER = 0.5, 0.9, 0.3, 1.03
+"""Where less has paint another camera is looked for, and how much better that has to agree."""
+SAID_ONCE = 4.0
+"""How many places on the grass the background tells."""
 MOST_BRIDGED = 20
 """Frames in a row that the background alone may carry a camera."""
-USUAL_SHARE = 0.1
-PROPOSED_AFTER, PROPOSED_EVERY = 3, 5
-"""Frames without paint from which on a camera is proposed, and between two tries."""
+USUAL_DECAY = 0.995
+LIKELY, LIKELY_WEAKEST, MOST_UNSURE = 0.65, 0.25, 12
+"""Support of a camera that is likely, also by its weakest marking, and how many of these are kept."""
+PROPOSED_AFTER, PROPOSED_EVERY, PATCHY_EVERY, CLEARLY = 3, 5, 12, 1.1
+"""Frames without paint from which on a camera is proposed, between two tries, and between two where the camera has
+paint, but less than usual: then another has to agree clearly better."""
 
 
 @dataclass(frozen=True)
@@ -75,6 +77,9 @@ class TrackedFrame:
         is_key: Whether it was given, or proposed from nothing.
         age: Frames since one that lies on the paint.
         reason: Why it is not tracked.
+        covariance: Of the camera's parameters (``geometry.resection``), shape (8, 8).
+        error_px: Median distance of the paint from its markings, pixels.
+        weakest: Lowest share of a marking that has paint.
     """
 
     number: int
@@ -86,6 +91,43 @@ class TrackedFrame:
     is_key: bool = False
     age: int = 0
     reason: str | None = None
+    covariance: FloatArray | None = None
+    error_px: float | None = None
+    weakest: float = 1.0
+
+
+@dataclass(frozen=True)
+class Reach:
+    """How far from a predicted camera paint is sought.
+
+    Attributes:
+        windows: To either side, round by round, pixels at 960 wide.
+        flow_px: Standard deviation of where the background lays the grass, likewise.
+        move_sigma_m: Of the position from frame to frame, metres.
+        roll_sigma: Of the roll from frame to frame, radians.
+        most_moved_px: How far the markings may move in the median, pixels at 960 wide.
+    """
+
+    windows: tuple[float, ...]
+    flow_px: float
+    move_sigma_m: float
+    roll_sigma: float
+    most_moved_px: float
+
+
+REACHES = (
+    Reach((6.0, 4.0, 3.0, 3.0), 0.3, 0.03, np.radians(0.02), 3.0),
+    Reach((14.0, 10.0, 7.0, 5.0, 4.0, 3.0, 3.0), 4.0, 1.0, np.radians(0.1), 10.0),
+)
+
+
+@dataclass(frozen=True)
+class Likely:
+    """A camera that a frame may have, and how well it agrees with the paint, 0 to 1."""
+
+    picture: Picture
+    camera: Camera
+    score: float
 
 
 @dataclass
@@ -98,6 +140,8 @@ class Follower:
         known: Cameras of the clip, for what is proposed.
         last: The frame before; None at the start.
         usual: Share of the markings with paint in the frames so far.
+        tried: Frame in which a camera was proposed last, in vain.
+        unsure: Frames with a camera that is likely and not certain.
     """
 
     pitch: Pitch
@@ -106,6 +150,7 @@ class Follower:
     last: TrackedFrame | None = None
     usual: float = 0.0
     tried: int | None = None
+    unsure: list[Likely] = field(default_factory=list)
 
     def start(
         self, picture: Picture, camera: Camera, covariance: FloatArray | None
@@ -131,7 +176,15 @@ class Follower:
             may_propose: Whether a camera is proposed where none can be followed.
         """
         found = self._followed(picture, match)
-        if found.outcome is TRACKED:
+        if match is None:
+            # What is shown now is another picture than the one that was tried.
+            self.tried = None
+        if found.outcome is TRACKED and found.seen is not None:
+            if may_propose and self._is_patchy(found):
+                again = self.propose(picture, PATCHY_EVERY)
+                least = CLEARLY * found.seen.product
+                if again is not None and again.seen is not None and again.seen.product > least:
+                    found = again
             return self._now(found)
         if may_propose and (found.outcome is LOST or found.age >= PROPOSED_AFTER):
             again = self.propose(picture)
@@ -139,16 +192,23 @@ class Follower:
                 return self._now(again)
         return self._now(found)
 
-    def propose(self, picture: Picture) -> TrackedFrame | None:
+    def propose(self, picture: Picture, every: int = PROPOSED_EVERY) -> TrackedFrame | None:
         """A frame whose camera the paint alone says; None where it does not, or was asked lately."""
-        if self.tried is not None and abs(picture.number - self.tried) < PROPOSED_EVERY:
+        if self.tried is not None and abs(picture.number - self.tried) < every:
             return None
         self.tried = picture.number
         try:
             found = propose(picture.image, self.pitch, self.known[-1:], self.policy)
         except (GeometryError, np.linalg.LinAlgError):
             return None
-        if found.outcome != "proposed" or found.camera is None or found.snapped is None:
+        if found.camera is None or found.snapped is None or found.agreement is None:
+            return None
+        if found.outcome != "proposed":
+            is_likely = (
+                found.agreement.supported >= LIKELY and (found.weakest or 0) >= LIKELY_WEAKEST
+            )
+            if is_likely and not self.known and len(self.unsure) < MOST_UNSURE:
+                self.unsure.append(Likely(picture, found.camera, found.agreement.product))
             return None
         return TrackedFrame(
             picture.number, picture.time, TRACKED, found.camera, found.snapped, found.agreement,
@@ -165,36 +225,85 @@ class Follower:
         half = picture.reading.half_diagonal
         camera, _ = rotate_camera(last.camera, match, half)
         unit = max(picture.reading.width / 960, 0.6)
-        known = predicted_covariance(picture, camera, FLOW_PX * unit, 1 + last.age)
         age = last.age + 1
         predicted = replace(nothing, outcome=BRIDGED, camera=camera, age=age)
-        try:
-            snapped = self._snap(picture, camera, known, WINDOWS)
-            seen = agreement(snapped.camera, picture.field, picture.paint, self.pitch)
-        except (GeometryError, np.linalg.LinAlgError):
-            return replace(nothing, reason="the paint cannot be solved")
-        predicted = replace(predicted, seen=seen)
-        why = self._why_not(picture, snapped, seen, unit, age)
+        found, why = self._drawn(picture, camera, predicted, unit)
+        if found is None:
+            return replace(nothing, reason=why)
         if why is None:
-            return TrackedFrame(
-                picture.number, picture.time, TRACKED, snapped.camera, snapped, seen
-            )
+            return found
         if age > MOST_BRIDGED:
-            return replace(nothing, seen=seen, reason=why)
-        return replace(predicted, reason=why)
+            return replace(nothing, seen=found.seen, reason=why)
+        return replace(predicted, seen=found.seen, reason=why)
+
+    def _drawn(
+        self, picture: Picture, camera: Camera, predicted: TrackedFrame, unit: float
+    ) -> tuple[TrackedFrame | None, str | None]:
+        """The predicted camera drawn onto the paint, and why that does not hold.
+
+        Where it does not, or some marking has little paint, paint is sought once more, farther
+        off: a camera may have kept to paint that it met by chance.
+        """
+        best: TrackedFrame | None = None
+        best_score, best_why = -1.0, "the paint cannot be solved"
+        told: str | None = best_why
+        for reach in REACHES:
+            known = predicted_covariance(picture, camera, reach, unit, 1 + self.age)
+            try:
+                snapped = self._snap(picture, camera, known, reach.windows)
+                seen = agreement(snapped.camera, picture.field, picture.paint, self.pitch)
+            except (GeometryError, np.linalg.LinAlgError):
+                continue
+            weakest = 0.0
+            if snapped.reason is None:
+                weakest = weakest_marking(picture.reading, snapped, self.pitch)
+            most = reach.most_moved_px * unit * float(np.sqrt(1 + self.age))
+            why = self._why_not(snapped, seen, weakest, unit, most)
+            score = seen.product * (1.0 if why is None else 0.5)
+            if score > best_score * (1.0 if best is None else RATHER):
+                outcome = TRACKED if why is None else BRIDGED
+                best_score, told = score, why
+                best = replace(
+                    predicted, outcome=outcome, camera=snapped.camera, snapped=snapped, seen=seen,
+                    age=0, weakest=weakest,
+                )  # fmt: skip
+            if told is None and not self._is_patchy(best):
+                break
+        return best, told
+
+    def _is_patchy(self, found: TrackedFrame | None) -> bool:
+        """Whether a camera has less paint, or worse, than one that is right would have."""
+        if found is None or found.seen is None or found.snapped is None:
+            return True
+        unit = max(found.snapped.size[1] / 960, 0.6)
+        return (
+            found.weakest < PATCHY_WEAKEST
+            or found.seen.supported < PATCHY_OF_USUAL * self.usual
+            or (found.snapped.error_px or 0.0) > PATCHY_PX * unit
+        )
+
+    @property
+    def age(self) -> int:
+        """Frames since one that lies on the paint."""
+        return 0 if self.last is None else self.last.age
 
     def _why_not(
-        self, picture: Picture, snapped: Snapped, seen: PaintAgreement, unit: float, age: int
+        self,
+        snapped: Snapped,
+        seen: PaintAgreement,
+        weakest: float,
+        unit: float,
+        most_moved_px: float,
     ) -> str | None:
         if snapped.reason is not None:
             return snapped.reason
         if snapped.error_px is None or snapped.error_px > MOST_ERROR_PX * unit:
             return "the paint lies beside the markings"
-        if snapped.moved_px > MOST_MOVED_PX * unit * np.sqrt(age):
+        if snapped.moved_px > most_moved_px:
             return "the paint lies elsewhere than the background says"
         if seen.supported < max(LEAST_SUPPORTED, LEAST_OF_USUAL * self.usual):
             return "much of the markings has no paint"
-        if weakest_marking(picture.reading, snapped, self.pitch) < LEAST_WEAKEST:
+        if weakest < LEAST_WEAKEST:
             return "a marking that would be seen has no paint"
         return None
 
@@ -210,16 +319,13 @@ class Follower:
         self.last = found
         if found.outcome is TRACKED and found.seen is not None and found.camera is not None:
             share = found.seen.supported
-            self.usual = (
-                share if not self.usual else self.usual + USUAL_SHARE * (share - self.usual)
-            )
+            self.usual = max(share, USUAL_DECAY * self.usual)
             self.known = [*self.known[:1], found.camera]
-            self.tried = None
         return found
 
 
 def predicted_covariance(
-    picture: Picture, camera: Camera, flow_px: float, frames: float
+    picture: Picture, camera: Camera, reach: Reach, unit: float, frames: int
 ) -> FloatArray:
     """How well a camera is known that the background turned, shape (8, 8).
 
@@ -228,7 +334,8 @@ def predicted_covariance(
 
     Args:
         camera: As predicted.
-        flow_px: Standard deviation of a place, pixels.
+        reach: How far off it may be.
+        unit: Pixels for a pixel at 960 wide.
         frames: How many frames the prediction spans.
     """
     half = picture.reading.half_diagonal
@@ -238,8 +345,8 @@ def predicted_covariance(
     ground = camera.on_ground(pixels)
     ground = ground[np.isfinite(ground).all(axis=1) & (np.hypot(*np.nan_to_num(ground).T) < 150)]
     sigma = np.empty(PARAMETERS)
-    sigma[[PAN, TILT]], sigma[ROLL] = ANGLE_SIGMA, ROLL_SIGMA * np.sqrt(frames)
-    sigma[X : Z + 1] = MOVE_SIGMA_M * np.sqrt(frames)
+    sigma[[PAN, TILT]], sigma[ROLL] = ANGLE_SIGMA, reach.roll_sigma * np.sqrt(frames)
+    sigma[X : Z + 1] = reach.move_sigma_m * np.sqrt(frames)
     sigma[LOG_FOCAL], sigma[KAPPA] = FOCAL_SIGMA, KAPPA_SIGMA * np.sqrt(frames)
     information = np.diag(sigma**-2.0)
     if len(ground):
@@ -247,7 +354,7 @@ def predicted_covariance(
         parameters = np.tile(parameters_from_camera(camera, half), (len(points), 1))
         slopes = projection_jacobians(parameters, points, np.full(len(points), half))
         slopes = slopes.reshape(-1, PARAMETERS)
-        share = SAID_ONCE / len(ground) / (flow_px**2 * frames)
+        share = SAID_ONCE / len(ground) / ((reach.flow_px * unit) ** 2 * frames)
         information = information + share * slopes.T @ slopes
     scale = np.sqrt(np.diag(information))
     inverse = np.linalg.inv(information / np.outer(scale, scale)) / np.outer(scale, scale)

@@ -14,6 +14,7 @@ import numpy as np
 
 from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
+from app.paint.propose import propose
 from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy
 from app.tracking.clip import Clip
@@ -21,9 +22,13 @@ from app.tracking.follow import BRIDGED, LOST, MOST_BRIDGED, TRACKED, Follower, 
 from app.tracking.motion import BackgroundMatches, match_background, rotate_camera
 from app.tracking.picture import Picture, read_frames
 
+TRIALS, ASKED = 2, 4
+"""Likely cameras that are followed where none is certain, and frames in which each is asked for again."""
+LEAST_TURN_DEGREES, LEAST_HELD = 5.0, 0.5
+"""By how much it has to turn, and the share of the frames in which it has to lie on the paint."""
 CHUNK = 32
 """Frames in memory while a clip is followed backwards."""
-TIED_PX, TIED_PX_A_FRAME = 4.0, 0.3
+TIED_PX, TIED_PX_A_FRAME, FARTHEST_M = 4.0, 0.3, 150.0
 """At 960 wide: how far the ends of a bridge may lie from each other."""
 
 Tell = Callable[[int], None]
@@ -68,27 +73,87 @@ def follow_shot(
         given: Cameras of annotated frames, by number.
         tell: Called with frames done.
     """
+    shot, follower = _follow_both_ways(clip, given, pitch, policy, tell)
+    if given or any(frame.outcome != LOST for frame in shot.frames):
+        return shot
+    likely = sorted(follower.unsure, key=lambda item: -item.score)
+    for item in likely[:TRIALS]:
+        start = {item.picture.number: Given(item.camera, None)}
+        trial, _ = _follow_both_ways(clip, start, pitch, policy, tell)
+        if _holds(trial, item.picture.number, clip, follower):
+            return trial
+    return shot
+
+
+def _follow_both_ways(
+    clip: Clip,
+    given: Mapping[int, Given],
+    pitch: Pitch,
+    policy: CalibrationPolicy,
+    tell: Tell | None,
+) -> tuple[Shot, Follower]:
+    """Every frame from its neighbours, and who followed them."""
+    shot, follower = _follow_on(clip, given, pitch, policy, tell)
+    for start, end in _runs(shot.frames):
+        if end < len(shot.frames):
+            _follow_back(clip, shot, start, end, pitch, policy)
+    _bridge(shot.frames, shot.matches)
+    return shot, follower
+
+
+def _holds(trial: Shot, number: int, clip: Clip, follower: Follower) -> bool:
+    """Whether a camera that no frame proposes for certain is right all the same.
+
+    The same view has the same fault twice; so the camera has to turn, stay on the paint while it does, and where
+    it has turned a search at its position has to find it for certain.
+    """
+    start = trial.frames[number].camera
+    if start is None:
+        return False
+    tracked = [frame for frame in trial.frames if frame.outcome == TRACKED]
+    turns = {frame.number: _turn_degrees(start, frame.camera) for frame in tracked}
+    far = [frame for frame in tracked if turns[frame.number] >= LEAST_TURN_DEGREES]
+    if len(tracked) < LEAST_HELD * len(trial.frames) or not far:
+        return False
+    for frame in sorted(far, key=lambda frame: turns[frame.number])[:: -max(len(far) // ASKED, 1)]:
+        image = next(clip.frames(frame.number, frame.number + 1)).image
+        found = propose(image, follower.pitch, [start], follower.policy)
+        if found.outcome == "proposed" and _shows_the_same(found.camera, frame.camera, 0):
+            return True
+    return False
+
+
+def _turn_degrees(one: Camera, other: Camera | None) -> float:
+    if other is None:
+        return 0.0
+    return float(np.degrees(np.arccos(np.clip(one.rotation[2] @ other.rotation[2], -1, 1))))
+
+
+def _follow_on(
+    clip: Clip,
+    given: Mapping[int, Given],
+    pitch: Pitch,
+    policy: CalibrationPolicy,
+    tell: Tell | None,
+) -> tuple[Shot, Follower]:
+    """Every frame from the one before, and who followed them."""
     follower = Follower(pitch, policy, known=[item.camera for item in given.values()])
-    frames: list[TrackedFrame] = []
-    matches: list[BackgroundMatches | None] = []
+    shot = Shot([], [])
     before: Picture | None = None
     first = min(given, default=0)
     for picture in read_frames(clip.frames()):
         match = None if before is None else match_background(before.grey, picture.grey)
-        matches.append(match)
+        shot.matches.append(match)
         key = given.get(picture.number)
         if key is not None:
-            frames.append(follower.start(picture, key.camera, key.covariance))
+            shot.frames.append(follower.start(picture, key.camera, key.covariance))
         else:
-            frames.append(follower.step(picture, match, may_propose=picture.number >= first))
+            may_propose = picture.number >= first
+            shot.frames.append(follower.step(picture, match, may_propose))
         before = picture
         if tell is not None:
-            tell(len(frames))
-    for start, end in _runs(frames):
-        if end < len(frames):
-            _follow_back(clip, frames, matches, start, end, pitch, policy)
-    _bridge(frames, matches)
-    return Shot(frames, matches)
+            tell(len(shot.frames))
+    return shot, follower
 
 
 def _runs(frames: Sequence[TrackedFrame]) -> list[tuple[int, int]]:
@@ -99,15 +164,10 @@ def _runs(frames: Sequence[TrackedFrame]) -> list[tuple[int, int]]:
 
 
 def _follow_back(
-    clip: Clip,
-    frames: list[TrackedFrame],
-    matches: Sequence[BackgroundMatches | None],
-    start: int,
-    end: int,
-    pitch: Pitch,
-    policy: CalibrationPolicy,
+    clip: Clip, shot: Shot, start: int, end: int, pitch: Pitch, policy: CalibrationPolicy
 ) -> None:
     """Follow a run from the frame behind it to its start; what is better than before is kept."""
+    frames, matches = shot.frames, shot.matches
     later = frames[end]
     known = [frame.camera for frame in frames if frame.is_key and frame.camera is not None]
     follower = Follower(pitch, policy, known, later, later.seen.supported if later.seen else 0.0)
@@ -137,9 +197,9 @@ def _bridge(frames: list[TrackedFrame], matches: Sequence[BackgroundMatches | No
         tied = (
             inner
             and end - start <= 2 * MOST_BRIDGED
-            and _ties(frames[start - 1], frames[end], matches[start : end + 1])
+            and _ties(frames[start - 1].camera, frames[end].camera, matches[start : end + 1])
         )
-        cameras = _carried(frames[start - 1], matches[start:end]) if tied else []
+        cameras = _carried(frames[start - 1].camera, matches[start:end]) if tied else []
         for number in range(start, end):
             frame = frames[number]
             if tied:
@@ -150,11 +210,10 @@ def _bridge(frames: list[TrackedFrame], matches: Sequence[BackgroundMatches | No
 
 
 def _carried(
-    start: TrackedFrame, matches: Sequence[BackgroundMatches | None]
+    camera: Camera | None, matches: Sequence[BackgroundMatches | None]
 ) -> list[Camera | None]:
-    """The camera of a frame carried along matches."""
+    """A camera carried along matches."""
     cameras: list[Camera | None] = []
-    camera = start.camera
     for match in matches:
         if camera is not None and match is not None:
             half = float(np.hypot(*camera.principal_point))
@@ -166,20 +225,28 @@ def _carried(
 
 
 def _ties(
-    one: TrackedFrame, other: TrackedFrame, matches: Sequence[BackgroundMatches | None]
+    one: Camera | None, other: Camera | None, matches: Sequence[BackgroundMatches | None]
 ) -> bool:
-    """Whether the background carries the camera of one frame to that of another."""
-    last = _carried(one, matches)[-1]
-    if last is None or other.camera is None:
+    """Whether the background carries one camera to the other."""
+    return _shows_the_same(_carried(one, matches)[-1], other, len(matches))
+
+
+def _shows_the_same(one: Camera | None, other: Camera | None, frames: int) -> bool:
+    """Whether two cameras of a frame lay the grass of its picture on the same places.
+
+    Args:
+        frames: Over how many frames the one was carried.
+    """
+    if one is None or other is None:
         return False
-    width = 2 * last.principal_point[0]
+    width = 2 * one.principal_point[0]
     grid = np.stack(np.meshgrid(*(np.linspace(0.1, 0.9, 5),) * 2), -1).reshape(-1, 2)
-    pixels = grid * 2 * np.array(last.principal_point)
-    ground = np.nan_to_num(last.on_ground(pixels), nan=1e6)
-    near = np.hypot(*ground.T) < 150
+    pixels = grid * 2 * np.array(one.principal_point)
+    ground = np.nan_to_num(one.on_ground(pixels), nan=1e6)
+    near = np.hypot(*ground.T) < FARTHEST_M
     if not near.any():
         return False
     places = np.column_stack([ground[near], np.zeros(near.sum())])
-    apart = np.hypot(*(other.camera.project(places) - pixels[near]).T)
+    apart = np.hypot(*(other.project(places) - pixels[near]).T)
     far = float(np.median(np.nan_to_num(apart, nan=np.inf)))
-    return far < (TIED_PX + TIED_PX_A_FRAME * len(matches)) * width / 960
+    return far < (TIED_PX + TIED_PX_A_FRAME * frames) * width / 960

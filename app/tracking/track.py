@@ -17,8 +17,9 @@ from app.soccer.pitch import Pitch
 from app.soccer.policy import CLICKED, CalibrationPolicy
 from app.solving.calibrate import calibrate
 from app.tracking.clip import Clip
-from app.tracking.follow import Outcome
+from app.tracking.follow import Outcome, TrackedFrame
 from app.tracking.shot import Given, Tell, follow_shot
+from app.tracking.shot_solve import solve_shot
 
 
 @dataclass(frozen=True)
@@ -92,24 +93,24 @@ def track_clip(
             f"{path.name} has {len(shot.frames)} frames, and none of the number {beyond[0]}",
             hint="Frames count from 0.",
         )
+    solved = solve_shot(shot.frames, shot.matches, clip.work, pitch, policy)
+    return [_as_shown(frame, clip) for frame in solved]
+
+
+def _as_shown(frame: TrackedFrame, clip: Clip) -> FrameCamera:
+    """A frame in pixels of the video."""
     scale = clip.size.width / clip.work.width
-    return [
-        FrameCamera(
-            number=frame.number,
-            time=frame.time,
-            outcome=frame.outcome,
-            size=clip.size,
-            camera=None if frame.camera is None else clip.as_shown(frame.camera),
-            covariance=None
-            if frame.snapped is None or frame.snapped.covariance is None
-            else tuple(row_by_row(frame.snapped.covariance)),
-            supported=None if frame.seen is None else frame.seen.supported,
-            explained=None if frame.seen is None else frame.seen.explained,
-            error_px=None
-            if frame.snapped is None or frame.snapped.error_px is None
-            else frame.snapped.error_px * scale,
-            is_keyframe=frame.is_key,
-            reason=frame.reason,
-        )
-        for frame in shot.frames
-    ]
+    seen, covariance, error = frame.seen, frame.covariance, frame.error_px
+    return FrameCamera(
+        number=frame.number,
+        time=frame.time,
+        outcome=frame.outcome,
+        size=clip.size,
+        camera=None if frame.camera is None else clip.as_shown(frame.camera),
+        covariance=None if covariance is None else tuple(row_by_row(covariance)),
+        supported=None if seen is None else seen.supported,
+        explained=None if seen is None else seen.explained,
+        error_px=None if error is None else error * scale,
+        is_keyframe=frame.is_key,
+        reason=frame.reason,
+    )

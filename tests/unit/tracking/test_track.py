@@ -67,6 +67,7 @@ def test_frames_without_paint_are_bridged_by_the_background(film: Film, tmp_path
     expected[4] = expected[5] = "bridged"
     assert outcomes(found) == expected
     assert all(found[number].reason for number in (4, 5))
+    assert all(found[number].covariance is not None for number in (4, 5))
     assert farthest(film, found) < 3.0
 
 

@@ -1,0 +1,149 @@
+"""All frames of a shot together say where its camera stands and how it zooms."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from app.geometry.arrays import FloatArray
+from app.geometry.camera import Camera
+from app.geometry.resection import (
+    LOG_FOCAL,
+    PAN,
+    X,
+    Z,
+    camera_from_parameters,
+    parameters_from_camera,
+)
+from app.paint.evidence import Evidence
+from app.paint.snap import Snapped
+from app.paint.tracing import trace_places
+from app.soccer.pitch import Pitch
+from app.soccer.policy import CalibrationPolicy
+from app.tracking.follow import BRIDGED, LOST, TRACKED, TrackedFrame
+from app.tracking.motion import BackgroundMatches
+from app.tracking.shot_solve import invert_diagonal, solve_shot, solve_tridiagonal
+from tests.unit.paint.lawns import SMALL, TRUE
+
+HALF = SMALL.diagonal / 2
+COUNT = 12
+
+
+def posed(number: int) -> Camera:
+    parameters = parameters_from_camera(TRUE, HALF)
+    parameters[PAN] += np.radians(0.4) * number
+    parameters[LOG_FOCAL] += 0.004 * number
+    return camera_from_parameters(parameters, TRUE.principal_point, HALF)
+
+
+def shot(
+    rng: np.random.Generator, off_m: float
+) -> tuple[list[TrackedFrame], list[BackgroundMatches | None]]:
+    """Frames whose cameras were found up to metres off, and the paint and background that they saw."""
+    frames: list[TrackedFrame] = []
+    matches: list[BackgroundMatches | None] = []
+    for number in range(COUNT):
+        truth = posed(number)
+        parameters = parameters_from_camera(truth, HALF)
+        moved = rng.normal(0, off_m, 3)
+        parameters[X : Z + 1] += moved
+        parameters[PAN] += moved[0] / 62
+        found = camera_from_parameters(parameters, truth.principal_point, HALF)
+        traced = trace_places(truth, Pitch(), SMALL.width, SMALL.height, 8.0, 2000)
+        sigmas = np.full(len(traced.pixels), 0.1)
+        noise = rng.normal(0, 0.1, len(sigmas))
+        # Of the found camera: the places are the same, and the paint lies where the truth has it.
+        apart = truth.project(traced.places) - found.project(traced.places)
+        offsets = (apart * traced.normals).sum(axis=1) + noise
+        evidence = Evidence(traced, offsets, sigmas, np.full(len(sigmas), 50.0))
+        snapped = Snapped(found, evidence, 0.1, None, 0.0, None, (SMALL.height, SMALL.width))
+        frames.append(TrackedFrame(number, number / 25, TRACKED, found, snapped))
+        if number:
+            here = rng.uniform((20, 20), (940, 520), (80, 2))
+            places = TRUE.position + 80 * posed(number - 1).rays(here)
+            there = truth.project(places) + rng.normal(0, 0.1, (80, 2))
+            matches.append(BackgroundMatches(here, there))
+        else:
+            matches.append(None)
+    return frames, matches
+
+
+def solve(
+    frames: list[TrackedFrame], matches: list[BackgroundMatches | None]
+) -> list[TrackedFrame]:
+    return solve_shot(frames, matches, SMALL, Pitch(), CalibrationPolicy())
+
+
+def positions(frames: list[TrackedFrame]) -> FloatArray:
+    return np.array([frame.camera.position for frame in frames if frame.camera is not None])
+
+
+def test_positions_come_together_where_the_tripod_stands():
+    frames, matches = shot(np.random.default_rng(1), 0.4)
+    solved = solve(frames, matches)
+    before, after = positions(frames), positions(solved)
+    assert np.linalg.norm(after - TRUE.position, axis=1).max() < 0.2
+    assert np.ptp(after, axis=0).max() < 0.3 * np.ptp(before, axis=0).max()
+    assert all(frame.error_px is not None and frame.error_px < 0.15 for frame in solved)
+
+
+def test_sigma_holds_what_no_pitch_has_as_planned_and_the_truth():
+    frames, matches = shot(np.random.default_rng(2), 0.3)
+    for number, frame in enumerate(solve(frames, matches)):
+        assert frame.camera is not None and frame.covariance is not None
+        assert np.linalg.eigvalsh(frame.covariance)[0] > 0
+        sigma = np.sqrt(np.diag(frame.covariance))
+        assert 0.1 < sigma[X : Z + 1].max() < 3
+        rest = parameters_from_camera(frame.camera, HALF) - parameters_from_camera(
+            posed(number), HALF
+        )
+        assert (np.abs(rest) < 3 * sigma).all()
+
+
+def test_frames_without_paint_lie_between_those_beside_them_and_lost_ones_stay_lost():
+    frames, matches = shot(np.random.default_rng(3), 0.2)
+    for number in (5, 6):
+        frames[number] = replace(frames[number], outcome=BRIDGED, snapped=None)
+    frames[9] = replace(frames[9], outcome=LOST, camera=None, snapped=None)
+    solved = solve(frames, matches)
+    assert solved[9] == frames[9]
+    grass = np.array([[36.0, -4.0, 0.0], [30.0, 10.0, 0.0]])
+    for number in (5, 6):
+        camera = solved[number].camera
+        assert camera is not None
+        assert np.abs(camera.project(grass) - posed(number).project(grass)).max() < 1.5
+        own, beside = (solved[each].covariance for each in (number, 3))
+        assert own is not None and beside is not None
+        assert own[PAN, PAN] > 0 and solved[number].error_px is None
+
+
+def test_two_frames_are_no_shot_and_keep_what_their_paint_says():
+    frames, matches = shot(np.random.default_rng(4), 0.2)
+    solved = solve(frames[:2], matches[:2])
+    assert [frame.camera for frame in solved] == [frame.camera for frame in frames[:2]]
+    assert [frame.error_px for frame in solved] == [0.1, 0.1]
+
+
+@pytest.mark.parametrize("count", [1, 2, 6])
+def test_a_block_tridiagonal_system_is_solved_as_the_whole_matrix(count: int):
+    rng = np.random.default_rng(count)
+    size = 3
+    whole = np.zeros((count * size, count * size))
+    diagonal, beside = np.empty((count, size, size)), rng.normal(size=(count - 1, size, size))
+    for n in range(count):
+        root = rng.normal(size=(size, size))
+        diagonal[n] = root @ root.T + 20 * np.eye(size)
+        at = slice(n * size, (n + 1) * size)
+        whole[at, at] = diagonal[n]
+        if n:
+            above = slice((n - 1) * size, n * size)
+            whole[above, at], whole[at, above] = beside[n - 1], beside[n - 1].T
+    right = rng.normal(size=(count, size, 2))
+    found = solve_tridiagonal(diagonal, beside, right).reshape(-1, 2)
+    assert found == pytest.approx(np.linalg.solve(whole, right.reshape(-1, 2)))
+    inverse = np.linalg.inv(whole)
+    for n, block in enumerate(invert_diagonal(diagonal, beside)):
+        at = slice(n * size, (n + 1) * size)
+        assert block == pytest.approx(inverse[at, at])
