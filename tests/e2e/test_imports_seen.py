@@ -143,13 +143,13 @@ class TestPictures:
         groups = page.request.get("/api/v1/groups?dataset=stills").json()["items"]
         assert [(group["key"], group["views"]) for group in groups] == [("pictures", 2)]
 
-    def test_of_a_video_are_asked_for(self, open_page: OpenPage, tmp_path: Path) -> None:
+    def test_of_a_video_lead_to_recordings(self, open_page: OpenPage, tmp_path: Path) -> None:
         (video := tmp_path / "match.mp4").write_bytes(b"any bytes")
         page = open_page("/import")
         page.get_by_label("Dataset", exact=True).fill("film")
         drop(page, video)
         told = page.get_by_role("alert")
-        expect(told).to_contain_text("match.mp4 is a video. Recordings are not read yet. Export")
+        expect(told).to_contain_text("match.mp4 is a video. Add it on the page Recordings")
         expect(page.get_by_role("button", name="Import", exact=True)).to_have_attribute(
             "title", "Choose a file or folder first"
         )
@@ -160,7 +160,7 @@ class TestPictures:
         bring_in(page, tmp_path / "film.zip", "film")
         card = page.get_by_role("region", name="Progress")
         expect(card).to_contain_text("Nothing could be imported: film.zip holds a video")
-        expect(card).to_contain_text("Export stills from it")
+        expect(card).to_contain_text("touchline import video FILE")
         expect(card).not_to_contain_text("Labels-v3.json")
         expect(card).not_to_contain_text("docs/")
 
