@@ -27,6 +27,7 @@ PARAMETERS: Mapping[str, str] = {
     "passkey": "Id of the passkey.",
     "prediction": "Id of the predicted box.",
     "predictions": "Id of the set of predictions.",
+    "recording": "Id of the recording.",
     "session": "Id of the session.",
     "sort": "Field by which the frames are ordered; with a minus before it, downwards.",
     "state": "Only jobs in this state.",

@@ -124,7 +124,11 @@ def delete_one(recording: Id, store: AppStore, actor: Actor) -> None:
 @may(Action.READ, recording=OwnedKind.RECORDING)
 @limit(IMAGES)
 async def get_frame(
-    recording: Id, frame: Frame, services: AppServices, request: Request, width: Width = None
+    recording: Id,
+    frame: Frame,
+    services: AppServices,
+    request: Request,
+    width: Width = None,
 ) -> Response:
     """A frame as JPEG, scaled down when a width is given; exactly the one of that number."""
     found = await to_thread.run_sync(get_recording, services.store, recording)

@@ -68,8 +68,8 @@ class ShotEdit(BaseModel):
 
     first: Frame = Field(description="Number of its first frame, from 0.")
     last: Frame = Field(description="Number of its last frame.")
-    kind: ShotKind
-    entered_by: ShotStart = "cut"
+    kind: ShotKind = Field(description="What it shows.")
+    entered_by: ShotStart = Field(default="cut", description="How it begins.")
     kept: StrictBool | None = Field(
         default=None, description="Whether somebody wants to work on it; null: nobody said."
     )
@@ -85,7 +85,7 @@ class ShotsEdit(BaseModel):
         },
     )
 
-    shots: Annotated[list[ShotEdit], Field(max_length=MAX_SHOTS)]
+    shots: Annotated[list[ShotEdit], Field(max_length=MAX_SHOTS)] = Field(description="The shots.")
 
     def values(self) -> list[Shot]:
         """The shots."""
@@ -97,6 +97,8 @@ class ShotDocument(Document, shows=Shot):
 
     first: int = Field(description="Number of its first frame, from 0.")
     last: int = Field(description="Number of its last frame.")
+    kind: ShotKind = Field(description="What it shows.")
+    entered_by: ShotStart = Field(description="How it begins.")
     kept: bool | None = Field(description="Whether somebody wants to work on it.")
     start_s: float = Field(description="When its first frame is shown, seconds.")
     end_s: float = Field(description="When its last frame is shown, seconds.")
@@ -105,7 +107,7 @@ class ShotDocument(Document, shows=Shot):
 class ShotList(ListDocument[ShotDocument]):
     """The shots of a recording."""
 
-    recording: int
+    recording: int = Field(description="Id of the recording.")
     etag: str
 
     @staticmethod
