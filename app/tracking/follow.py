@@ -49,7 +49,7 @@ FOCAL_SIGMA, KAPPA_SIGMA = 0.05, 0.001
 LEAST_SUPPORTED, LEAST_OF_USUAL, LEAST_WEAKEST = 0.30, 0.6, 0.15
 """A camera has this share of its markings on paint, of what frames before had, and of each marking."""
 MOST_ERROR_PX = 0.6
-PATCHY_WEAKEST, PATCHY_OF_USUAL, PATCHY_PX, RATHER = 0.5, 0.9, 0.3, 1.03
+PATCHY_WEAKEST, PATCHY_OF_USUAL, PATCHY_PX, RATHER = 0.5, 0.85, 0.3, 1.12
 """Where less has paint another camera is looked for, and how much better that has to agree."""
 SAID_ONCE = 4.0
 """How many places on the grass the background tells."""
@@ -117,7 +117,7 @@ class Reach:
 
 REACHES = (
     Reach((6.0, 4.0, 3.0, 3.0), 0.3, 0.03, np.radians(0.02), 3.0),
-    Reach((14.0, 10.0, 7.0, 5.0, 4.0, 3.0, 3.0), 4.0, 1.0, np.radians(0.1), 10.0),
+    Reach((14.0, 10.0, 7.0, 5.0, 4.0, 3.0, 3.0), 4.0, 1.0, np.radians(0.03), 10.0),
 )
 
 
