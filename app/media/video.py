@@ -25,6 +25,9 @@ from app.errors import ImageError, TooLargeError
 _CONTAINERS = "mov,mp4,m4a,3gp,3g2,mj2,matroska,webm,avi,mpegts,mpeg,asf,flv,ogg"
 """By FFmpeg's names. Those that are left out include playlists (concat, hls): their files could
 be anywhere."""
+# What is wrong with a file is said in our words: the libraries' own would stand between them.
+os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
+cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_ERROR)
 _OPTIONS = f"format_whitelist;{_CONTAINERS}|protocol_whitelist;file"
 
 

@@ -17,7 +17,7 @@ from app.errors import InputError
 from app.geometry.arrays import BoolArray, FloatArray, IntArray
 from app.video.measures import MEASURES, Measured
 
-VERSION = 1
+VERSION = 3
 """Of the index and of what is measured; an index of another one is made again."""
 _FINEST = 200_000
 """Ticks a second; MPEG counts 90,000, and 48,000 and 30,000 are common in MP4."""

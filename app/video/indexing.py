@@ -51,7 +51,6 @@ def index_recording(
     has_table, key_times = _has_seek_table(path), _key_times(path)
     rows, combs = Rows(), list[float]()
     times, intra = list[float](), list[bool]()
-    measurer = FrameMeasurer()
     with open_video(path) as video:
         if not video.isOpened():
             raise ImageError(f"{path.name} is no video that can be read")
@@ -59,6 +58,7 @@ def index_recording(
         check_size(ImageHeader("video", *coded), settings, path.name)
         rotation = int(video.get(cv2.CAP_PROP_ORIENTATION_META)) % 360
         aspect = _pixel_aspect(video, rotation)
+        measurer = FrameMeasurer(video.get(cv2.CAP_PROP_FPS))
         total = int(video.get(cv2.CAP_PROP_FRAME_COUNT))
         while video.grab():
             done, picture = video.retrieve()

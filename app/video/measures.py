@@ -5,6 +5,8 @@ All are made of a picture of ``SMALL`` pixels, whatever the size and shape of th
 
 from __future__ import annotations
 
+from collections import deque
+from collections.abc import Sequence
 from typing import Any
 
 import cv2
@@ -19,6 +21,12 @@ HASH_SIDE, HASHED = 32, 8
 """Side of the picture that is hashed, and of the square of its lowest frequencies."""
 BINS = 8
 """Of a channel in histograms."""
+TORN = 11.0
+"""Mean difference within a cell that no motion explains, grey levels."""
+UNEXPLAINED = 0.2
+"""Residual from which on a fast turn of the camera is looked for."""
+LAGS = (0.24, 0.56, 1.2)
+"""Seconds over which frames are compared, so that soft transitions are seen."""
 MEASURES = np.dtype(
     [
         ("hash", np.uint64),
@@ -26,7 +34,11 @@ MEASURES = np.dtype(
         ("change", np.float32),
         ("histogram", np.float32),
         ("residual", np.float32),
+        ("torn", np.uint8),
         ("motion", np.float32),
+        ("together", np.float32),
+        ("apart", np.float32, (3,)),
+        ("recoloured", np.float32, (3,)),
         ("blend", np.float32),
         ("detail", np.float32),
     ]
@@ -39,7 +51,10 @@ MEASURES = np.dtype(
 - ``histogram``: share of the colours that is another one than in the frame before, 0 to 1.
 - ``residual``: what is left of ``change`` once everything has moved as optical flow says, by the
   contrast of the two frames; about 1 and more: nothing of the one is seen in the other.
-- ``motion``: median length of that flow, pixels of the small picture.
+- ``torn``: how many cells (of 144) that flow leaves more than ``TORN`` grey levels apart.
+- ``motion``: length of the median of that flow, pixels of the small picture.
+- ``together``: share of that flow that agrees with its median: of a camera that turns nearly all.
+- ``apart``, ``recoloured``: as ``residual`` and ``histogram``, from the frames ``LAGS`` seconds before.
 - ``blend``: how far the frame is from the mean of its neighbours, by how far they are from each
   other; 0: it is a blend of them (or all three are equal).
 - ``detail``: mean absolute Laplacian, grey levels; small where a picture is blurred.
@@ -53,12 +68,16 @@ Picture = npt.NDArray[np.uint8]
 
 
 class FrameMeasurer:
-    """Measures frames one after the other; the last row of ``blend`` comes with the next frame."""
+    """Measures frames one after the other; ``blend`` of each comes with the next one.
 
-    def __init__(self) -> None:
+    Args:
+        fps: Frames a second, about.
+    """
+
+    def __init__(self, fps: float) -> None:
         self._flow = cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_FAST)
-        self._before: tuple[Picture, Any] | None = None
-        self._two_before: Picture | None = None
+        self._lags = lags_of(fps)
+        self._past: deque[tuple[Picture, Any]] = deque(maxlen=max(self._lags))
 
     def measure(self, picture: Picture, row: Any, row_before: Any) -> None:
         """Measure a frame.
@@ -74,28 +93,71 @@ class FrameMeasurer:
         row["cells"] = cv2.resize(small, CELLS, interpolation=cv2.INTER_AREA)
         row["detail"] = np.abs(cv2.Laplacian(grey, cv2.CV_16S)).mean()
         colours = cv2.calcHist([small], [0, 1, 2], None, [BINS] * 3, [0, 256] * 3)
-        if self._before is not None:
-            before, colours_before = self._before
+        past = self._past
+        if past:
+            before, colours_before = past[-1]
             row["change"] = cv2.absdiff(grey, before).mean()
-            row["histogram"] = np.abs(colours - colours_before).sum() / (2 * grey.size)
-            self._follow(before, grey, row)
-            if self._two_before is not None and row_before is not None:
-                row_before["blend"] = _blend(self._two_before, before, grey)
-            self._two_before = before
-        self._before = grey, colours
+            row["histogram"] = _recoloured(colours, colours_before)
+            row["residual"], flow, left = self._residual(before, grey)
+            row["torn"] = (cv2.resize(left, CELLS, interpolation=cv2.INTER_AREA) > TORN).sum()
+            row["motion"], row["together"] = _motion(flow)
+            if len(past) > 1 and row_before is not None:
+                row_before["blend"] = _blend(past[-2][0], before, grey)
+        for at, lag in enumerate(self._lags):
+            if len(past) >= lag:
+                before, colours_before = past[-lag]
+                row["recoloured"][at] = _recoloured(colours, colours_before)
+                row["apart"][at] = self._residual(before, grey)[0]
+        past.append((grey, colours))
 
-    def _follow(self, before: Picture, grey: Picture, row: Any) -> None:
-        flow = self._flow.calc(grey, before, np.zeros((*grey.shape, 2), np.float32))
+    def _residual(self, before: Picture, grey: Picture) -> tuple[float, Any, Any]:
+        """What no motion explains, by the contrast; the motion; what it leaves of each pixel."""
+        found = self._followed(before, grey, (0.0, 0.0))
+        if found[0] < UNEXPLAINED:
+            return found
+        # Optical flow loses a camera that turns fast, correlation does not.
+        shift, _ = cv2.phaseCorrelate(grey.astype(np.float32), before.astype(np.float32), _WINDOW)
+        if max(abs(shift[0]), abs(shift[1])) < 2.0:
+            return found
+        return min(found, self._followed(before, grey, shift), key=lambda one: one[0])
+
+    def _followed(
+        self, before: Picture, grey: Picture, shift: Sequence[float]
+    ) -> tuple[float, Any, Any]:
+        start = np.empty((*grey.shape, 2), np.float32)
+        start[:] = shift
+        flow = self._flow.calc(grey, before, start)
         columns, rows = cv2.split(flow + _PLACES)
         moved = cv2.remap(before, columns, rows, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
         contrast = (float(grey.std()) + float(before.std())) / 2
-        row["residual"] = cv2.absdiff(grey, moved).mean() / max(contrast, 1.0)
-        row["motion"] = np.median(np.hypot(flow[..., 0], flow[..., 1]))
+        left = cv2.absdiff(grey, moved)
+        return float(left.mean()) / max(contrast, 1.0), flow, left
+
+
+def lags_of(fps: float) -> list[int]:
+    """``LAGS`` in frames."""
+    return [max(round(lag * min(max(fps, 10.0), 120.0)), 2) for lag in LAGS]
+
+
+def _recoloured(colours: Any, before: Any) -> float:
+    return float(np.abs(colours - before).sum()) / (2 * SMALL[0] * SMALL[1])
+
+
+def _motion(flow: Any) -> tuple[float, float]:
+    """Length of the median of a flow, and share of it that agrees with that."""
+    sparse = flow[::3, ::3].reshape(-1, 2)
+    middle = np.median(sparse, axis=0)
+    length = float(np.hypot(*middle))
+    off = np.hypot(*(sparse - middle).T)
+    return length, float((off < max(0.25 * length, 1.0)).mean())
 
 
 _PLACES = np.stack(np.meshgrid(np.arange(SMALL[0]), np.arange(SMALL[1])), axis=-1).astype(
     np.float32
 )
+
+
+_WINDOW = cv2.createHanningWindow(SMALL, cv2.CV_32F)
 
 
 def perceptual_hash(grey: Picture) -> int:

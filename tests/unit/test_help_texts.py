@@ -30,13 +30,13 @@ PLAIN_WORDS = """
     block blocks bodies body boxes browser bulk bundle button buttons cache calibrate candidate canonical canvas
     caption card cards categories cell changes chart chip choice chooser class cli client cluster codec codecs colours
     command comment comments compare comparison completion config confirm connections contact copy copying corner
-    counts cross css csv cursor curve damped database datasets day delete deps descriptions details detect devices
+    counts cross css csv cursor curve cuts damped database datasets day delete deps descriptions details detect devices
     diagram dialect dialog diff differences dismissals distance documents drags drawing drawn durable editor
     empty engine enrol ephemeral errors estimator evaluate event events executors export exports facets
     facts faults fields figure figures files finder finite first fit fixture folder folders form format formats
     frozen gestures give glossary gold grass grid guess guide guideline guidelines hand header headers heat help
     histograms history hit home hooks hosts idempotency identity if image images import imports index indexing info init insert
-    insight invitation invitations invite items jaccard join json kept kernels key keys known konva last latest
+    insight invitation invitations invite items jaccard join json kept kernels key keys kinds known konva last latest
     lazy lease leases least leftovers legend lens lesson lessons letter limits links list listing live local
     locks login logins lone look loupe mail main maintenance many map markdown marks match matches matrix me measures
     membership mentions menu merge messages metrics migrate mini model name names navigation needs neighbours notice
@@ -44,14 +44,14 @@ PLAIN_WORDS = """
     packing page pages paint palette panel parameters parquet parse parts past patch path pen people permissions pins pitch
     pitches pixel place places plain plural png pointer policies pool popover pose position postgresql preopen preview
     problem process processes profile progress projection proof property proposal propose props
-    provider queries query quota rail rater reader reasons record reimport remote render report requests resect
+    provider queries query quota rail rater reader reasons record reimport remote render repeats report requests resect
     resource respond responses restore result return revert reviewers rights roles rotation router routes row rows
     rules run runs safe save scale scene scene3d scenes schemas score scoreboard scoring scroll search sender sending
     serve server service serving session sets shared sharing sheet sign singular site smallest snapshot solve
     solving source sources sphere spill spread sqlite squares stacks stage staging standpoints starts state
     statements statistics steps storage store stored straight stream strict submit suggested suggestions summary
     surface swap synloc tab table take takes tall team term terminal text threads threshold ticks tokens
-    tools trace tracing transfer tree trees triangulate tries truth types undo undrawn upload v3 v3d video
+    tools trace tracing transitions transfer tree trees triangulate tries truth types undo undrawn upload v3 v3d video
     viewport viewports virtual visibility wal walk warm web what when whiskers window words work worker workspace
     write writer zip
 """

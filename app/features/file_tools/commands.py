@@ -1,4 +1,4 @@
-"""Commands on files of lines, cameras and balls: calibrate, score, link, cameras; they need no dataset."""
+"""Commands on files: calibrate, score, link, cameras, shots; they need no dataset."""
 
 from __future__ import annotations
 
@@ -138,6 +138,37 @@ def score(
         result = score_files(lines, cameras, size=size, without=without, progress=progress)
     print_values(result, json_)
     _tell_problems(result["problems"])
+
+
+@commands.command()
+def shots(
+    recording: Annotated[
+        Path,
+        typer.Argument(
+            metavar="RECORDING", exists=True, dir_okay=False, help="Video file (mp4, mkv, ts, ...)."
+        ),
+    ],
+    out: Annotated[Path, typer.Argument(metavar="OUT", help="Folder for shots.json.")],
+    json_: Json = False,
+) -> None:
+    """Find the shots of a recording: cuts, dissolves, wipes and fades, and what each shot shows.
+
+    OUT gets shots.json: first and last frame of each shot (frames count from 0), when it begins and
+    ends, its kind (main, replay, closeup, other) and how it is entered. Frames of a soft transition
+    belong to no shot.
+    """
+    from app.features.file_tools.shots import shots_file
+
+    with show_progress("Finding shots") as progress:
+        result = shots_file(recording, out, read_settings(), progress)
+    if json_:
+        print_values(result, json_)
+        return
+    for row in result["shots"]:
+        say(
+            f"{row['first']:>7} - {row['last']:<7} {row['start_s']:>9.2f} s  "
+            f"{row['end_s'] - row['start_s']:>7.2f} s  {row['kind']:8} {row['entered_by']}"
+        )
 
 
 @commands.command()

@@ -1,0 +1,83 @@
+"""Hard cuts: frames that show nothing of the frame before, told from flashes and fast motion.
+
+A frame behind a cut is no moved picture of the frame before (``residual``) and has other colours
+(``histogram``). Both at once, and in no frame beside it, is a cut; fast motion and whip pans last
+longer, and after a flash the picture is what it was.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from app.geometry.arrays import BoolArray, FloatArray, IntArray
+from app.video.measures import Measured
+
+LEAST_CHANGE, LEAST_RESIDUAL = 0.12, 0.45
+"""Of a cut: product of residual and histogram, and residual alone."""
+MOST_BESIDE, BESIDE = 0.4, 2
+"""Share of a cut's change that a frame so many frames beside it may have."""
+DARK = 20.0
+"""Mean grey level: what comes out of the dark, or goes into it, is a fade."""
+FLASH_SECONDS = 0.28
+"""Longest flash."""
+MOST_RETURN = 0.6
+"""Share of a change that is left once a flash is over."""
+
+
+def change_of(rows: Measured) -> FloatArray:
+    """How much each frame is another picture than the one before, shape (N,)."""
+    return np.asarray(rows["residual"] * rows["histogram"], np.float64)
+
+
+def hard_cuts(rows: Measured, step: float) -> tuple[IntArray, BoolArray]:
+    """First frames behind hard cuts, and which frames are lit by a flash.
+
+    Args:
+        rows: Measures of the frames.
+        step: Usual time between two frames, seconds.
+
+    Returns:
+        Numbers of frames, ascending; shape (N,).
+    """
+    change, cells = change_of(rows), rows["cells"].astype(np.int16)
+    reach = max(round(FLASH_SECONDS / step), 2)
+    flashed = np.zeros(len(rows), np.bool_)
+    found = []
+    candidates = np.flatnonzero((change > LEAST_CHANGE) & (rows["residual"] > LEAST_RESIDUAL))
+    for number in candidates.tolist():
+        if cells[number - 1 : number + 1].mean(axis=(1, 2, 3)).min() < DARK:
+            continue
+        if (until := _returns(cells, number, reach)) is not None:
+            # A picture that goes dark and comes back is no flash, and no cut either.
+            flashed[number:until] = cells[number].mean() > cells[number - 1].mean()
+            continue
+        if _returned(cells, number, reach) or flashed[number - 1]:
+            continue
+        near = slice(max(number - BESIDE, 0), number + BESIDE + 1)
+        beside = np.where(flashed[near], 0.0, change[near])
+        beside[number - near.start] = 0.0
+        if beside.max() < MOST_BESIDE * change[number]:
+            found.append(number)
+    return np.array(found, np.int64), flashed
+
+
+def _apart(cells: Any, one: Any, others: Any) -> FloatArray:
+    """Mean difference of the cells of a frame from those of others, grey levels."""
+    return np.asarray(np.abs(cells[others] - cells[one]).mean(axis=(1, 2, 3)))
+
+
+def _returns(cells: Any, number: int, reach: int) -> int | None:
+    """First frame after a flash that begins with a frame; None: it begins none."""
+    after = np.arange(number, min(number + reach + 1, len(cells)))
+    away = _apart(cells, number - 1, after)
+    back = np.flatnonzero(away < MOST_RETURN * away[0])
+    return int(after[back[0]]) if len(back) else None
+
+
+def _returned(cells: Any, number: int, reach: int) -> bool:
+    """Whether a frame is like one shortly before the frame before it: a flash has ended."""
+    before = np.arange(number - 1, max(number - 2 - reach, -1), -1)
+    away = _apart(cells, number, before)
+    return bool((away < MOST_RETURN * away[0]).any())
