@@ -32,7 +32,7 @@ from app.tracking.clip import Clip
 from app.tracking.picture import read_frames
 from app.tracking.track import FrameCamera, track_clip
 from tests.bench.table import print_table
-from tests.films import render_film
+from tests.tripod_films import render_film
 
 DATA = Path(os.environ.get("TOUCHLINE_REAL_DATA", Path(__file__).parents[3] / "shared" / "data"))
 MEETS = float(chi2.ppf(0.95, 3))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from tests.films import Film, render_film
+from tests.tripod_films import Film, render_film
 
 
 @pytest.fixture(scope="session")
